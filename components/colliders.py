@@ -1,0 +1,123 @@
+"""Colliders: simple shapes around what is drawn."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..framework.columns import column
+from ..framework.component import Component
+from ..framework.vectors import replace
+
+ALL_LAYERS = -1  # every bit set
+
+
+class Collider(Component, abstract=True):
+    """What every collider has besides its shape.
+
+    offset
+        (d,) m, of the shape's centre from the Transform's position, turned with it
+    restitution
+        relative speed after / before an impact; 1 keeps energy, below 1 loses, above 1 gains
+    friction
+        coefficient; None takes the partner's
+    sensor
+        reports contacts and does not react to them
+    layer, mask
+        two colliders meet if each one's layer has a bit in the other's mask
+    """
+
+    __slots__ = ()
+
+    stack: ClassVar[str] = "collider"
+    stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask")
+
+    offset = column(0.0, item="vector")
+    restitution = column(0.0, minimum=0.0)
+    friction = column(None, optional=True, minimum=0.0)
+    sensor = column(False, dtype=bool)
+    layer = column(1, dtype=int)
+    mask = column(ALL_LAYERS, dtype=int)
+
+
+class SphereCollider(Collider):
+    """A bounding sphere (a circle in 2D); radius 0 is a point."""
+
+    __slots__ = ()
+
+    radius = column(minimum=0.0)
+
+    def __init__(
+        self,
+        radius: float,
+        *,
+        offset: Any = 0.0,
+        restitution: float = 0.0,
+        friction: float | None = None,
+        sensor: bool = False,
+        layer: int = 1,
+        mask: int = ALL_LAYERS,
+    ) -> None:
+        common = {"offset": offset, "restitution": restitution, "friction": friction}
+        self._fill({"radius": radius, **common, "sensor": sensor, "layer": layer, "mask": mask})
+
+    @staticmethod
+    def bounds(shape, like):
+        half = like
+        for k in range(len(like)):
+            half = replace(half, k, shape.radius)
+        return half
+
+
+class AABBCollider(Collider):
+    """A box whose sides stay parallel to the axes; when the Transform turns, it stretches around the turned box.
+
+    half_extents
+        (d,) m, half the size along each axis; zero is allowed
+    """
+
+    __slots__ = ()
+
+    half_extents = column(item="vector", minimum=0.0)
+
+    def __init__(
+        self,
+        half_extents: Any,
+        *,
+        offset: Any = 0.0,
+        restitution: float = 0.0,
+        friction: float | None = None,
+        sensor: bool = False,
+        layer: int = 1,
+        mask: int = ALL_LAYERS,
+    ) -> None:
+        common = {"offset": offset, "restitution": restitution, "friction": friction}
+        self._fill({"half_extents": half_extents, **common, "sensor": sensor, "layer": layer, "mask": mask})
+
+    @classmethod
+    def from_bounds(cls, lower: Any, upper: Any, **common: Any) -> Self:
+        """The box from its minimum and maximum point, relative to the Transform's position.
+
+        ValueError if a minimum exceeds its maximum.
+        """
+        low, high = np.asarray(lower, float), np.asarray(upper, float)
+        if low.shape != high.shape or not (low <= high).all():
+            raise ValueError(f"AABBCollider.from_bounds: lower must not exceed upper, got {lower!r} and {upper!r}")
+        return cls((high - low) / 2, offset=(low + high) / 2, **common)
+
+    @staticmethod
+    def bounds(shape, like):
+        return shape.half_extents
+
+    @staticmethod
+    def turned(shape, axes):
+        """Half extents around the turned box: |R| h (Ericson, Real-Time Collision Detection, 4.2.6)."""
+        half = shape.half_extents
+        result = half
+        for k in range(len(half)):
+            total = 0.0
+            for j in range(len(half)):
+                total += abs(axes[k, j]) * half[j]
+            result = replace(result, k, total)
+        return (result,)

@@ -1,0 +1,73 @@
+"""Transform: where a body is and how it is turned."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ..framework.columns import column
+from ..framework.component import Component
+
+
+def _teleport(table: Any, row: int) -> None:
+    """An assigned position is no movement: nothing is swept, interpolation starts anew."""
+    if "previous_position" in table.arrays:
+        table.arrays["previous_position"][row] = table.arrays["position"][row]
+
+
+class Transform(Component, flat=True):
+    """Position in metres, (d,), and rotation: an angle in radians in 2D, a unit quaternion (w, x, y, z) in 3D.
+
+    Rotation is set by the game, never simulated; it stretches boxes and turns offsets. Assigning ``position`` is a
+    teleport. Of a dynamic or kinematic body ``position`` is a writable view.
+    """
+
+    __slots__ = ()
+
+    position = dataclasses.replace(column(item="vector"), on_write=_teleport)
+    rotation = column(0.0, item="rotation")
+
+    def __init__(self, position: Any, rotation: Any = 0.0) -> None:
+        self._fill({"position": position, "rotation": rotation})
+
+    @property
+    def x(self) -> float:
+        return float(self.position[0])
+
+    @x.setter
+    def x(self, value: float) -> None:
+        self._set(0, value)
+
+    @property
+    def y(self) -> float:
+        return float(self.position[1])
+
+    @y.setter
+    def y(self, value: float) -> None:
+        self._set(1, value)
+
+    @property
+    def z(self) -> float:
+        """3D only; IndexError in 2D."""
+        return float(self.position[2])
+
+    @z.setter
+    def z(self, value: float) -> None:
+        self._set(2, value)
+
+    def _set(self, axis: int, value: float) -> None:
+        position = np.array(self.position)
+        position[axis] = value
+        self.position = position
+
+    @property
+    def interpolated_position(self) -> np.ndarray:
+        """(d,) between the last two steps, as far as ``world.alpha`` says: what to draw."""
+        store = self._store
+        if store is None or "previous_position" not in store.arrays:
+            return np.array(self.position)
+        row = self._row if self._version == store.version else self._locate()
+        before, now = store.arrays["previous_position"][row], store.arrays["position"][row]
+        return before + store.clock.alpha * (now - before)

@@ -1,0 +1,43 @@
+"""World, settings, tables, schedule, registry: what everything else stands on; knows no physics itself."""
+
+from .bodies import Bodies
+from .columns import Column, column
+from .component import Component
+from .contacts import Contact, Contacts
+from .errors import (
+    CaromError,
+    MissingComponentError,
+    NoPhysicsError,
+    ScheduleError,
+    StepError,
+    UnhandledPairError,
+)
+from .plan import Plan
+from .registry import Plugin
+from .schedule import ForceSystem, Phase, System
+from .settings import Settings
+from .statistics import Stats
+from .world import World
+
+__all__ = [
+    "Bodies",
+    "CaromError",
+    "Column",
+    "Component",
+    "Contact",
+    "Contacts",
+    "ForceSystem",
+    "MissingComponentError",
+    "NoPhysicsError",
+    "Phase",
+    "Plan",
+    "Plugin",
+    "ScheduleError",
+    "Settings",
+    "Stats",
+    "StepError",
+    "System",
+    "UnhandledPairError",
+    "World",
+    "column",
+]

@@ -1,0 +1,115 @@
+"""``world.bodies``: the table's columns by name, all rows or one kind's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .component import Component
+from .table import DYNAMIC, KINEMATIC, STATIC, Table
+
+
+class Bodies:
+    """Columns as zero-copy views: ``bodies.position``, and ``bodies.charge.value`` of a component of one's own.
+
+    ``dynamic``, ``kinematic`` and ``static`` are the same for the bodies of one kind. Views hold until the next
+    structural change. Columns of static bodies are read-only.
+    """
+
+    def __init__(self, table: Table, kind: int | None = None) -> None:
+        self._table = table
+        self._kind = kind
+
+    @property
+    def rows(self) -> slice:
+        """The rows these bodies take in the table."""
+        if self._kind is None:
+            return slice(0, self._table.count)
+        stops = (0, *self._table.stops)
+        return slice(stops[self._kind], stops[self._kind + 1])
+
+    @property
+    def dynamic(self) -> Bodies:
+        return Bodies(self._table, DYNAMIC)
+
+    @property
+    def kinematic(self) -> Bodies:
+        return Bodies(self._table, KINEMATIC)
+
+    @property
+    def static(self) -> Bodies:
+        return Bodies(self._table, STATIC)
+
+    def has(self, component: type[Component]) -> np.ndarray:
+        """Mask of the bodies whose entity has that component."""
+        if component not in self._table.component_types:
+            return np.zeros(len(self), bool)
+        return self._table.has_mask(component)[self.rows]
+
+    def row_of(self, entity: int) -> int:
+        """The row of that entity among all bodies; KeyError if it is no body."""
+        return self._table.find(entity)
+
+    def __len__(self) -> int:
+        rows = self.rows
+        return rows.stop - rows.start
+
+    def __getattr__(self, name: str) -> Any:
+        array = self._table.arrays.get(name)
+        if array is not None:
+            view = array[self.rows]
+            if self._kind == STATIC:
+                view.flags.writeable = False
+            return view
+        prefix = name + "."
+        if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):
+            return Fields(self, prefix)
+        raise AttributeError(f"bodies have no column {name!r}; they have {', '.join(self.column_names())}")
+
+    def column_names(self) -> list[str]:
+        return sorted(key for key in self._table.arrays if not key.startswith(("has:", "_")))
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *{key.split(".")[0] for key in self.column_names()}]
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} bodies, columns {', '.join(self.column_names())}>"
+
+
+class Fields:
+    """The columns of one component type, as ``bodies.charge`` gives them."""
+
+    def __init__(self, bodies: Any, prefix: str) -> None:
+        self._bodies = bodies
+        self._prefix = prefix
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bodies, self._prefix + name)
+
+
+class SelectedBodies:
+    """Some dynamic bodies' columns, as copies; ``force`` is written back by :meth:`scatter_force`.
+
+    What a force system sees when only some of the bodies have what it requires.
+    """
+
+    def __init__(self, table: Table, rows: np.ndarray) -> None:
+        self._table = table
+        self._rows = rows
+        self.force = table.arrays["force"][rows]
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __getattr__(self, name: str) -> Any:
+        array = self._table.arrays.get(name)
+        if array is not None:
+            return array[self._rows]
+        prefix = name + "."
+        if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):
+            return Fields(self, prefix)
+        raise AttributeError(f"bodies have no column {name!r}")
+
+    def scatter_force(self) -> None:
+        self._table.arrays["force"][self._rows] = self.force

@@ -1,0 +1,48 @@
+"""Fixed steps behind frames of any length."""
+
+from __future__ import annotations
+
+import math
+
+
+class Clock:
+    """Counts steps; time is computed from the count, so it gathers no rounding."""
+
+    ROUNDING = 1e-9  # of a step: frames of dt must give one step each whatever their sum rounds to
+
+    def __init__(self, dt: float) -> None:
+        self.dt = dt
+        self.step_count = 0
+        self._base_time = 0.0
+        self._base_count = 0
+        self.gathered = 0.0
+        self.dropped_steps = 0
+
+    @property
+    def time(self) -> float:
+        return self._base_time + (self.step_count - self._base_count) * self.dt
+
+    @property
+    def alpha(self) -> float:
+        return min(max(self.gathered / self.dt, 0.0), 1.0)
+
+    def set_dt(self, dt: float) -> None:
+        """From now on; what has passed stays."""
+        self._base_time, self._base_count = self.time, self.step_count
+        self.dt = dt
+
+    def gather(self, seconds: float, limit: int) -> int:
+        """Add a frame's time and take whole steps out of it, at most ``limit``; the surplus is dropped."""
+        self.gathered += seconds
+        steps = math.floor(self.gathered / self.dt + self.ROUNDING)
+        self.gathered = max(0.0, self.gathered - steps * self.dt)
+        self.dropped_steps += max(0, steps - limit)
+        return min(steps, limit)
+
+    def state(self) -> tuple[float, ...]:
+        return (self.dt, self.step_count, self._base_time, self._base_count, self.gathered, self.dropped_steps)
+
+    def restore(self, state: tuple[float, ...]) -> None:
+        dt, count, base_time, base_count, gathered, dropped = state
+        self.dt, self._base_time, self.gathered = dt, base_time, gathered
+        self.step_count, self._base_count, self.dropped_steps = int(count), int(base_count), int(dropped)

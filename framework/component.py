@@ -1,0 +1,192 @@
+"""Components are handles: constructor values until a world adopts them, then a row of its table."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any, ClassVar, Self
+from weakref import WeakSet
+
+import numpy as np
+
+from .columns import REQUIRED, Column
+
+
+class Component:
+    """Base of all components whose fields are columns.
+
+    A subclass lists its fields with :func:`column`; they become constructor arguments in that order. The class is
+    final, because esper looks components up by their exact type.
+    """
+
+    __slots__ = ("__weakref__", "_entity", "_row", "_store", "_values", "_version")
+
+    columns: ClassVar[dict[str, Column]] = {}
+    prefix: ClassVar[str] = ""  # of the columns' names in a table
+    unadopted: ClassVar[WeakSet[Component]]
+    _abstract: ClassVar[bool] = True
+
+    def __init_subclass__(cls, *, abstract: bool = False, flat: bool = False, **kwargs: Any) -> None:
+        """``abstract`` bases may be derived from; ``flat`` columns carry no prefix in the table."""
+        super().__init_subclass__(**kwargs)
+        for base in cls.__mro__[1:]:
+            if issubclass(base, Component) and not base._abstract:
+                raise TypeError(f"{base.__name__} is final: esper finds components by their exact type, not by a base")
+        cls._abstract = abstract
+        cls.prefix = "" if flat else re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower() + "."
+        cls.unadopted = WeakSet()
+        own: dict[str, Column] = {}
+        for name, value in vars(cls).copy().items():
+            if isinstance(value, Column):
+                own[name] = value
+        if abstract:
+            cls.columns = {**cls.columns, **own}
+            return
+        # a concrete class gets its own copy of inherited columns: each has its own place in the table
+        fields: dict[str, Column] = {}
+        for name, inherited in {**own, **{n: c for n, c in cls.columns.items() if n not in own}}.items():
+            field = inherited if name in own else _copy_of(inherited)
+            object.__setattr__(field, "name", name)
+            object.__setattr__(field, "owner", cls.__name__)
+            object.__setattr__(field, "key", cls.prefix + name)
+            setattr(cls, name, field)
+            fields[name] = field
+        cls.columns = fields
+
+    def __init__(self, *args: Any, **values: Any) -> None:
+        names = [name for name, column in self.columns.items() if column.constructor]
+        if len(args) > len(names):
+            raise TypeError(f"{type(self).__name__} takes {len(names)} values ({', '.join(names)}), got {len(args)}")
+        given = dict(zip(names, args, strict=False))
+        for name, value in values.items():
+            if name not in names:
+                raise TypeError(f"{type(self).__name__} has no field {name!r}; it has {', '.join(names) or 'none'}")
+            if name in given:
+                raise TypeError(f"{type(self).__name__} got {name!r} twice")
+            given[name] = value
+        self._fill(given)
+
+    def _fill(self, given: dict[str, Any]) -> None:
+        """Set every column: the given value, else its default."""
+        self._store = None
+        self._entity = None
+        self._row = -1
+        self._version = -1
+        stored: dict[str, Any] = {}
+        for name, column in self.columns.items():
+            value = given.get(name, column.default)
+            if value is REQUIRED:
+                raise TypeError(f"{type(self).__name__} needs a value for {name!r}")
+            stored[name] = column.checked(value)
+        self._values = stored
+        type(self).unadopted.add(self)
+
+    # -- being adopted and let go -----------------------------------------------------------------------------------
+
+    @property
+    def entity(self) -> int | None:
+        """The entity this handle belongs to, None before a world has adopted it."""
+        return self._entity
+
+    def _locate(self) -> int:
+        """The row now, after the table's rows have moved."""
+        self._row = self._store.find(self._entity)
+        self._version = self._store.version
+        return self._row
+
+    def _bind(self, store: Any, entity: int | None, row: int = -1, version: int = -1) -> None:
+        self._store = store
+        self._entity = entity
+        self._row = row
+        self._version = version
+        self._values = None
+
+    def check_dimensions(self, dimensions: int, entity: int | None = None) -> None:
+        """ValueError if a vector of this component does not fit a world of that many dimensions."""
+        if self._store is None:
+            for name, column in self.columns.items():
+                column.check_dimensions(self._values[name], dimensions, entity)
+
+    def copy(self) -> Self:
+        """An unbound component with the same values, for another entity (prefabs)."""
+        other = type(self).__new__(type(self))
+        other._store = None
+        other._entity = None
+        other._row = other._version = -1
+        other._values = {name: column.checked(_unshared(getattr(self, name))) for name, column in self.columns.items()}
+        type(self).unadopted.add(other)
+        return other
+
+    def __repr__(self) -> str:
+        shown = ((n, getattr(self, n)) for n, c in self.columns.items() if c.constructor)
+        fields = ", ".join(f"{n}={v.tolist() if isinstance(v, np.ndarray) else v!r}" for n, v in shown)
+        return f"{type(self).__name__}({fields})"
+
+    @classmethod
+    def many(cls, *args: Any, **values: Any) -> Many:
+        """Values for many entities at once, for ``world.create_entities``: each one value for all, or one per row."""
+        names = [name for name, column in cls.columns.items() if column.constructor]
+        given = dict(zip(names, args, strict=False))
+        unknown = [name for name in values if name not in names]
+        if unknown or len(args) > len(names):
+            raise TypeError(f"{cls.__name__}.many takes {', '.join(names)}; got {', '.join(unknown) or 'too many values'}")
+        given.update(values)
+        for name in names:
+            if name not in given and cls.columns[name].default is REQUIRED:
+                raise TypeError(f"{cls.__name__}.many needs a value for {name!r}")
+        return Many(cls, given)
+
+
+class Many:
+    """One component type's values for many entities; made by ``Component.many``."""
+
+    def __init__(self, component: type[Component], values: dict[str, Any]) -> None:
+        self.component = component
+        self.values = values
+
+    def arrays(self, count: int, dimensions: int) -> dict[str, np.ndarray]:
+        """Checked columns by key, shape (count, ...); ValueError names field and row."""
+        arrays = {}
+        for name, column in self.component.columns.items():
+            default = column.empty_value(dimensions)
+            if name in self.values:
+                arrays[column.key] = column.checked_many(self.values[name], count, dimensions)
+            else:
+                arrays[column.key] = np.broadcast_to(
+                    np.asarray(default, column.dtype), (count, *column.item_shape(dimensions))
+                )
+        return arrays
+
+
+class RowStore:
+    """Values of handles that have no row in a table: created in bulk and not adopted yet, or removed already."""
+
+    version = 0
+
+    def __init__(self, arrays: dict[str, np.ndarray], dimensions: int) -> None:
+        self.arrays = arrays
+        self.dimensions = dimensions
+
+    def find(self, entity: int) -> int:
+        raise KeyError(entity)  # handles into a store never lose their row
+
+    def is_frozen(self, row: int) -> bool:
+        return False
+
+    def written(self, column: Column, row: int) -> None:
+        pass
+
+
+def components_in(components: Any) -> Iterator[Component]:
+    """Those of ``components`` that are carom's (others are esper's business alone)."""
+    return (component for component in components if isinstance(component, Component))
+
+
+def _copy_of(column: Column) -> Column:
+    import dataclasses
+
+    return dataclasses.replace(column)
+
+
+def _unshared(value: Any) -> Any:
+    return value.copy() if isinstance(value, np.ndarray) else value

@@ -1,0 +1,186 @@
+"""``world.contacts``: the contacts of the last step, and what began, stayed, ended or struck since the window opened.
+
+A window is one ``step()`` or one ``advance()``: begin, end and impacts hold everything that happened in it, with the
+number of the step, so that what a game does with them never depends on its frame rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """One contact, seen from ``entity_a``: the normal points from a to b."""
+
+    entity_a: int
+    entity_b: int
+    point: np.ndarray
+    normal: np.ndarray
+    depth: float
+    normal_impulse: float
+    step: int
+    time_of_impact: float  # seconds since the start of the step; nan if this is no impact
+
+    def flipped(self) -> Contact:
+        """The same contact seen from the other body."""
+        return Contact(
+            self.entity_b, self.entity_a, self.point, -self.normal, self.depth, self.normal_impulse, self.step,
+            self.time_of_impact,
+        )  # fmt: skip
+
+
+class ContactRows:
+    """Columns of contacts or contact events, rows ordered by (entity_a, entity_b), entity_a < entity_b.
+
+    entity_a, entity_b (m,) ids; point, normal (m, d); depth (m,) overlap in metres; normal_impulse (m,) in N s;
+    step (m,); time_of_impact (m,) seconds since the start of the step, for impacts.
+    """
+
+    def __init__(self, columns: dict[str, np.ndarray], lookup: EntityLookup) -> None:
+        self._columns = columns
+        self._lookup = lookup
+
+    def __len__(self) -> int:
+        return len(self._columns["entity_a"])
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self._columns[name]
+        except KeyError:
+            raise AttributeError(f"contacts have no column {name!r}; they have {', '.join(self._columns)}") from None
+
+    def row(self, index: int) -> Contact:
+        """That row as one record."""
+        c = self._columns
+        time = c["time_of_impact"][index] if "time_of_impact" in c else np.nan
+        return Contact(
+            int(c["entity_a"][index]), int(c["entity_b"][index]), c["point"][index].copy(), c["normal"][index].copy(),
+            float(c["depth"][index]), float(c["normal_impulse"][index]), int(c["step"][index]), float(time),
+        )  # fmt: skip
+
+    def __iter__(self) -> Iterator[Contact]:
+        return (self.row(index) for index in range(len(self)))
+
+    def pairs(self, first: type[Any], second: type[Any]) -> Iterator[tuple[int, int, Contact]]:
+        """(a, b, contact) for contacts of an entity that has ``first`` with one that has ``second``.
+
+        The contact is oriented from a to b. Entities that have been deleted meanwhile are skipped, also those deleted
+        while iterating.
+        """
+        entities = zip(self._columns["entity_a"].tolist(), self._columns["entity_b"].tolist(), strict=True)
+        for index, (a, b) in enumerate(entities):
+            if self._lookup.has(a, first) and self._lookup.has(b, second):
+                yield a, b, self.row(index)
+            elif self._lookup.has(b, first) and self._lookup.has(a, second):
+                yield b, a, self.row(index).flipped()
+
+    def of(self, entity: int) -> list[Contact]:
+        """The contacts of one entity, each seen from it (the normal points away from it)."""
+        c = self._columns
+        rows = np.flatnonzero((c["entity_a"] == entity) | (c["entity_b"] == entity))
+        found = (self.row(int(index)) for index in rows)
+        return [contact if contact.entity_a == entity else contact.flipped() for contact in found]
+
+
+class EntityLookup:
+    """Asks the world whether a living entity has a component."""
+
+    def __init__(self, has: Callable[[int, type[Any]], bool]) -> None:
+        self.has = has
+
+
+class Contacts(ContactRows):
+    """The last step's contacts, with ``enabled`` that systems between NARROW and RESPONSE may clear.
+
+    A contact is a pair that touched in the step: overlapping at the end of its motion or struck within it.
+    """
+
+    HISTORIES = ("begin", "end", "impacts")
+
+    def __init__(self, dimensions: int, lookup: EntityLookup) -> None:
+        super().__init__(empty_columns(dimensions, enabled=True), lookup)
+        self.dimensions = dimensions
+        self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
+        self._stay = empty_columns(dimensions)
+
+    # -- what users read ----------------------------------------------------------------------------------------------
+
+    @property
+    def begin(self) -> ContactRows:
+        """Pairs that began to touch, since the start of the last ``step()`` or ``advance()``."""
+        return self._history("begin")
+
+    @property
+    def end(self) -> ContactRows:
+        """Pairs that ceased to touch; also when a body was deleted. Point and normal are the last known."""
+        return self._history("end")
+
+    @property
+    def impacts(self) -> ContactRows:
+        """One row per impact, with ``time_of_impact``; a pair may have several in a step."""
+        return self._history("impacts")
+
+    @property
+    def stay(self) -> ContactRows:
+        """Pairs that touched in the last step and in the one before."""
+        return ContactRows(self._stay, self._lookup)
+
+    # -- what the systems write -----------------------------------------------------------------------------------------
+
+    def open_window(self) -> None:
+        """Forget what the last window held."""
+        for chunks in self._chunks.values():
+            chunks.clear()
+        self._stay = empty_columns(self.dimensions)
+
+    def set_current(self, columns: dict[str, np.ndarray]) -> None:
+        self._columns = columns
+
+    def set_stay(self, columns: dict[str, np.ndarray]) -> None:
+        self._stay = columns
+
+    def record(self, history: str, columns: dict[str, np.ndarray]) -> None:
+        if len(columns["entity_a"]):
+            self._chunks[history].append(columns)
+
+    def state(self) -> Any:
+        """What a failed step has to put back."""
+        return self._columns, self._stay, {name: list(chunks) for name, chunks in self._chunks.items()}
+
+    def restore_state(self, state: Any) -> None:
+        self._columns, self._stay, chunks = state
+        self._chunks = {name: list(rows) for name, rows in chunks.items()}
+
+    def _history(self, name: str) -> ContactRows:
+        chunks = self._chunks[name]
+        if not chunks:
+            return ContactRows(empty_columns(self.dimensions, impact=name == "impacts"), self._lookup)
+        if len(chunks) > 1:
+            joined = {key: np.concatenate([chunk[key] for chunk in chunks]) for key in chunks[0]}
+            chunks[:] = [joined]
+        return ContactRows(chunks[0], self._lookup)
+
+
+def empty_columns(dimensions: int, enabled: bool = False, impact: bool = False) -> dict[str, np.ndarray]:
+    """Columns of no contacts."""
+    columns: dict[str, np.ndarray] = {
+        "entity_a": np.empty(0, np.int64),
+        "entity_b": np.empty(0, np.int64),
+        "point": np.empty((0, dimensions)),
+        "normal": np.empty((0, dimensions)),
+        "depth": np.empty(0),
+        "normal_impulse": np.empty(0),
+        "step": np.empty(0, np.int64),
+    }
+    if enabled:
+        columns["enabled"] = np.empty(0, bool)
+    if impact:
+        columns["time_of_impact"] = np.empty(0)
+    return columns

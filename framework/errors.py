@@ -1,0 +1,25 @@
+"""Errors of the framework; plain wrong values are ValueError, wrong names KeyError or AttributeError."""
+
+
+class CaromError(Exception):
+    """Base of carom's own errors."""
+
+
+class NoPhysicsError(CaromError, AttributeError):
+    """Something was asked of a world that no plugin has filled yet."""
+
+
+class MissingComponentError(CaromError):
+    """An entity has a component that is meaningless without another one."""
+
+
+class StepError(CaromError):
+    """A system raised inside a step; carom's columns and clock are back at the start of that step."""
+
+
+class UnhandledPairError(CaromError):
+    """Two shapes can meet in this world and no plugin says how."""
+
+
+class ScheduleError(CaromError):
+    """Systems cannot be put in order: a cycle, or two writers of one column without an order."""

@@ -1,0 +1,43 @@
+"""Event handlers of a world: strongly held, called in the order they were added."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from . import esper_bridge
+
+Handler = Callable[..., None]
+
+
+class Events:
+    """Named events. Handlers set with ``esper.set_handler`` in the same context get them too."""
+
+    def __init__(self) -> None:
+        self._handlers: dict[str, list[Handler]] = {}
+
+    def on(self, name: str, handler: Handler) -> Handler:
+        """Call ``handler`` on every event of that name from now on; returns it, so it serves as a decorator's core."""
+        if not callable(handler):
+            raise TypeError(f"a handler for {name!r} must be callable, got {handler!r}")
+        self._handlers.setdefault(name, []).append(handler)
+        return handler
+
+    def off(self, name: str, handler: Handler) -> None:
+        """Stop calling ``handler``; KeyError if it was not set. Safe inside a handler."""
+        handlers = self._handlers.get(name, [])
+        if handler not in handlers:
+            raise KeyError(f"no such handler for {name!r}: {handler!r}")
+        handlers.remove(handler)
+
+    def wanted(self, name: str) -> bool:
+        """Whether anybody listens (then nothing need be made for nobody)."""
+        return bool(self._handlers.get(name)) or bool(esper_bridge.event_handlers(name))
+
+    def dispatch(self, name: str, *args: Any) -> None:
+        """Call the handlers that were set when the event began and have not been removed since."""
+        for handler in tuple(self._handlers.get(name, ())):
+            if handler in self._handlers.get(name, ()):
+                handler(*args)
+        for handler in esper_bridge.event_handlers(name):
+            handler(*args)

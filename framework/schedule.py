@@ -1,0 +1,154 @@
+"""Systems and their order: phases, before and after, one esper priority for each."""
+
+from __future__ import annotations
+
+import graphlib
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import esper
+
+from .component import Component
+from .errors import ScheduleError
+
+if TYPE_CHECKING:
+    from .world import World
+
+
+class Phase(IntEnum):
+    """The parts of a step, in order. Their esper priorities lie in bands of 1000: see :meth:`priority`."""
+
+    START = 0
+    FORCES = 1
+    INTEGRATION = 2
+    BROAD = 3
+    NARROW = 4
+    RESPONSE = 5
+    END = 6
+
+    @property
+    def priority(self) -> int:
+        """Top of the phase's band of esper priorities: START 7000 ... END 1000; a system's is this minus its place.
+
+        A plain esper processor of priority 0 thus runs after them all.
+        """
+        return 1000 * (len(Phase) - self)
+
+
+FIRST_PRIORITY = 1_000_000  # the step's own opening: synchronize, keep the start state
+LAST_PRIORITY = -1_000_000  # and its closing: the clock
+
+
+class System(esper.Processor):
+    """A piece of a step. Derive from it, set ``phase`` and write ``process``; ``world.add_system`` puts it in order.
+
+    phase
+        runs in that phase, after the built-in system
+    before, after
+        types (or instances) of systems of the same phase to run before or after
+    writes
+        columns it sets (not: adds to). Two systems that write one column without an order between them are an error
+    """
+
+    phase: ClassVar[Phase] = Phase.END
+    before: Sequence[Any] = ()
+    after: Sequence[Any] = ()
+    writes: Sequence[str] = ()
+    world: World
+
+    @property
+    def name(self) -> str:
+        return type(self).__name__
+
+    def process(self, dt: float) -> None:  # type: ignore[override]
+        """Called exactly once per fixed step of ``dt`` seconds."""
+        raise NotImplementedError(f"{self.name} has no process(dt)")
+
+
+class ForceSystem:
+    """Adds forces; pure, because it is called once per stage of the integrator, at that stage's state.
+
+    requires
+        component types a body must have (besides being dynamic) to be among ``bodies``
+    """
+
+    requires: ClassVar[Sequence[type[Component]]] = ()
+    world: World
+
+    @property
+    def name(self) -> str:
+        return type(self).__name__
+
+    def add_forces(self, bodies: Any, time: float) -> None:
+        """Add to ``bodies.force`` (n, d), in newtons, from the other columns and the time in seconds."""
+        raise NotImplementedError(f"{self.name} has no add_forces(bodies, time)")
+
+    # A force system that has a potential may define potential_energy(bodies) -> float, in joules,
+    # so that world.potential_energy() includes it.
+
+
+def in_order(systems: Sequence[System]) -> list[System]:
+    """The systems sorted by phase, then by before/after, ties in the order given; ScheduleError on a cycle."""
+    ordered: list[System] = []
+    for phase in Phase:
+        members = [system for system in systems if system.phase == phase]
+        edges = {index: set() for index in range(len(members))}  # index -> those that run earlier
+        for index, system in enumerate(members):
+            for other in _named(system.after, members, system):
+                edges[index].add(other)
+            for other in _named(system.before, members, system):
+                edges[other].add(index)
+        _check_writers(members, edges)
+        ordered += [members[index] for index in _topological(members, edges)]
+    return ordered
+
+
+def _named(references: Sequence[Any], members: list[System], system: System) -> list[int]:
+    """Indices of the members that the references (types, instances or names) mean."""
+    found = []
+    for reference in references if isinstance(references, (list, tuple)) else (references,):
+        hits = [
+            index
+            for index, member in enumerate(members)
+            if member is not system
+            and (member is reference or (isinstance(reference, type) and isinstance(member, reference)) or member.name == reference)
+        ]
+        found += hits
+    return found
+
+
+def _topological(members: list[System], edges: dict[int, set[int]]) -> list[int]:
+    sorter: graphlib.TopologicalSorter[int] = graphlib.TopologicalSorter(edges)
+    try:
+        sorter.prepare()
+    except graphlib.CycleError as error:
+        names = " -> ".join(members[index].name for index in reversed(error.args[1]))
+        raise ScheduleError(f"systems cannot be ordered, before/after form a cycle: {names}") from None
+    ordered: list[int] = []
+    ready: list[int] = []
+    while sorter.is_active():
+        ready = sorted([*ready, *sorter.get_ready()])
+        index = ready.pop(0)
+        ordered.append(index)
+        sorter.done(index)
+    return ordered
+
+
+def _check_writers(members: list[System], edges: dict[int, set[int]]) -> None:
+    """Two systems that declare the same column must have an order, direct or through others."""
+    earlier: dict[int, set[int]] = {}
+
+    def before(index: int, trail: frozenset[int] = frozenset()) -> set[int]:
+        if index not in earlier and index not in trail:
+            earlier[index] = set(edges[index]).union(*(before(i, trail | {index}) for i in edges[index]))
+        return earlier.get(index, set())
+
+    for j, second in enumerate(members):
+        for i, first in enumerate(members[:j]):
+            shared = sorted(set(first.writes) & set(second.writes))
+            if shared and i not in before(j) and j not in before(i):
+                raise ScheduleError(
+                    f"{first.name} and {second.name} both write {', '.join(shared)} in phase "
+                    f"{first.phase.name} without an order: give one of them before= or after= the other"
+                )

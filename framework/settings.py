@@ -1,0 +1,108 @@
+"""Settings of a world: every dial between speed and accuracy, with its unit and default."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, Self
+
+MixingRule = Literal["average", "geometric_mean", "max", "min", "multiply"]
+MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
+COLLISION_MODES = ("discrete",)
+GEOMETRY_MODES = ("precise", "bounds")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Frozen; change a copy: ``settings.replace(dt=1/120)``.
+
+    dt
+        the fixed step, seconds
+    substeps
+        of the solver for contacts at rest; never changes free flight
+    integrator
+        explicit_euler, semi_implicit_euler, velocity_verlet, rk4, yoshida4, or one that a plugin brings
+    collision
+        discrete: contacts are found from the overlap at the end of the step
+    geometry
+        precise: the last level of a body's colliders decides; bounds: the first
+    restitution_threshold
+        approach speed, m/s, below which a contact is at rest instead of bouncing; None: 2 |a| dt, gravity's share of
+        the step
+    slop
+        overlap, m, that is left alone; None: 0.005 of the smaller body of the pair
+    max_steps_per_advance
+        what one ``advance`` takes at most; the time beyond it is dropped and counted
+    max_impacts_per_step
+        of one body in one step; beyond it the solver for contacts at rest takes over, and it is counted
+    restitution_mixing, friction_mixing
+        how the values of the two bodies become the contact's
+    debug
+        check the bodies' state for non-finite values at every system, not only at the end of the step
+    """
+
+    dt: float = 1 / 60
+    substeps: int = 4
+    integrator: str = "semi_implicit_euler"
+    collision: str = "discrete"
+    geometry: str = "precise"
+    restitution_threshold: float | None = None
+    slop: float | None = None
+    max_steps_per_advance: int = 8
+    max_impacts_per_step: int = 8
+    restitution_mixing: MixingRule = "max"
+    friction_mixing: MixingRule = "geometric_mean"
+    debug: bool = False
+
+    def __post_init__(self) -> None:
+        self._number("dt", above=0.0)
+        for name in ("restitution_threshold", "slop"):
+            if getattr(self, name) is not None:
+                self._number(name, least=0.0)
+        for name in ("substeps", "max_steps_per_advance", "max_impacts_per_step"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise ValueError(f"Settings.{name} must be a whole number from 1, got {value!r}")
+        if not isinstance(self.integrator, str) or not self.integrator:
+            raise ValueError(f"Settings.integrator must be a name, got {self.integrator!r}")
+        if not isinstance(self.debug, bool):
+            raise ValueError(f"Settings.debug must be True or False, got {self.debug!r}")
+        for name, known in (
+            ("collision", COLLISION_MODES),
+            ("geometry", GEOMETRY_MODES),
+            ("restitution_mixing", MIXING_RULES),
+            ("friction_mixing", MIXING_RULES),
+        ):
+            if getattr(self, name) not in known:
+                raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
+
+    def _number(self, name: str, above: float | None = None, least: float | None = None) -> None:
+        value: Any = getattr(self, name)
+        number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        if not number or (above is not None and value <= above) or (least is not None and value < least):
+            rule = f"above {above:g}" if above is not None else f"at least {least:g}"
+            raise ValueError(f"Settings.{name} must be a finite number {rule}, got {value!r}")
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed; TypeError for a field that does not exist."""
+        known = [field.name for field in dataclasses.fields(self)]
+        for name in changes:
+            if name not in known:
+                raise TypeError(f"Settings has no field {name!r}; it has {', '.join(known)}")
+        return dataclasses.replace(self, **changes)
+
+    @classmethod
+    def fast(cls) -> Self:
+        """Large worlds of small things: two substeps, the cheap level of geometry."""
+        return cls(substeps=2, geometry="bounds")
+
+    @classmethod
+    def balanced(cls) -> Self:
+        """The default."""
+        return cls()
+
+    @classmethod
+    def accurate(cls) -> Self:
+        """Velocity Verlet, a smaller step, 32 substeps for what rests."""
+        return cls(dt=1 / 240, integrator="velocity_verlet", substeps=32)

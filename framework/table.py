@@ -1,0 +1,209 @@
+"""The table of bodies: one row each, one array per field, rows ordered [dynamic, kinematic, static] and by entity id.
+
+The order of rows is a function of the ids alone, so any history of creation and deletion that leads to the same ids
+leads to the same rows, the same order of every sum, the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from .columns import Column
+from .component import Component, RowStore
+
+KINDS = ("dynamic", "kinematic", "static")
+DYNAMIC, KINEMATIC, STATIC = range(3)
+
+
+class Table:
+    """Columns of all bodies of one world. Arrays have room for ``capacity`` rows; the first ``count`` are in use."""
+
+    def __init__(self, dimensions: int) -> None:
+        self.dimensions = dimensions
+        self.count = 0
+        self.capacity = 64
+        self.version = 1  # changes whenever rows move
+        self.members_version = 0  # changes whenever a body gains or loses a component
+        self.static_version = 0  # changes whenever a static body does
+        self.stops = (0, 0, 0)  # first row after the dynamic, kinematic and static bodies
+        self.in_step = False
+        self.kind_changed = False
+        self.arrays: dict[str, np.ndarray] = {}
+        self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
+        self.component_types: list[type[Component]] = []
+        self._fills: dict[str, Any] = {}
+        self._stack_rows: dict[str, tuple[str, int]] = {}  # column key -> (stack, slot)
+        self._stacked_types: dict[str, list[type[Component]]] = {}
+        self.add_array("entity", dtype=np.int64)
+
+    # -- columns ----------------------------------------------------------------------------------------------------
+
+    def add_array(self, key: str, item: str = "scalar", dtype: Any = float, fill: Any = 0) -> None:
+        """A column that belongs to no component."""
+        spec = Column(item=item, dtype=dtype)
+        self.arrays[key] = np.full((self.capacity, *spec.item_shape(self.dimensions)), fill, dtype)
+        self._fills[key] = fill
+
+    def add_component_type(self, component: type[Component]) -> None:
+        """Columns for that type, and a mask ``has:<prefix>`` of the rows whose entity has it."""
+        if component in self.component_types:
+            return
+        stack = getattr(component, "stack", None)
+        slot = len(self._stacked_types.setdefault(stack, [])) if stack else 0
+        for name, column in component.columns.items():
+            fill = column.empty_value(self.dimensions)
+            shape = (self.capacity, *column.item_shape(self.dimensions))
+            self._fills[column.key] = fill
+            if stack and name in component.stacked_columns:  # type: ignore[attr-defined]
+                self._grow_stack(f"{stack}.{name}", slot, shape, column, fill)
+            else:
+                array = np.empty(shape, column.dtype)
+                array[...] = fill
+                self.arrays[column.key] = array
+        if stack:
+            self._stacked_types[stack].append(component)
+        self.add_array(f"has:{component.prefix or component.__name__}", dtype=bool, fill=False)
+        self.component_types.append(component)
+
+    def slot_of(self, component: type[Component]) -> int:
+        """The component type's place in its stack."""
+        return self._stacked_types[component.stack].index(component)  # type: ignore[attr-defined]
+
+    def stacked_types(self, stack: str) -> list[type[Component]]:
+        return self._stacked_types.get(stack, [])
+
+    def has_mask(self, component: type[Component]) -> np.ndarray:
+        """Full-capacity mask of the rows whose entity has that component."""
+        return self.arrays[f"has:{component.prefix or component.__name__}"]
+
+    def _grow_stack(self, stack: str, slot: int, shape: tuple[int, ...], column: Column, fill: Any) -> None:
+        fresh = np.empty((slot + 1, *shape), column.dtype)
+        if slot:
+            fresh[:slot] = self.stacks[stack]
+        fresh[slot] = fill
+        self.stacks[stack] = fresh
+        self._stack_rows[column.key] = (stack, slot)
+        self._point_into_stacks()
+
+    def _point_into_stacks(self) -> None:
+        for key, (stack, slot) in self._stack_rows.items():
+            if slot < len(self.stacks[stack]):
+                self.arrays[key] = self.stacks[stack][slot]
+
+    def column(self, key: str) -> np.ndarray:
+        """The rows in use of that column, a view."""
+        return self.arrays[key][: self.count]
+
+    # -- rows -------------------------------------------------------------------------------------------------------
+
+    def find(self, entity: int) -> int:
+        """The row of that entity; KeyError if it has none."""
+        ids = self.arrays["entity"]
+        start = 0
+        for stop in self.stops:
+            row = start + int(np.searchsorted(ids[start:stop], entity))
+            if row < stop and ids[row] == entity:
+                return row
+            start = stop
+        raise KeyError(entity)
+
+    def rows_of(self, entities: np.ndarray) -> np.ndarray:
+        """The rows of entities that all have one, vectorised."""
+        rows = np.full(len(entities), -1, np.int64)
+        start = 0
+        for stop in self.stops:
+            block = self.arrays["entity"][start:stop]
+            if stop > start:
+                place = np.minimum(np.searchsorted(block, entities), stop - start - 1)
+                found = block[place] == entities
+                rows[found] = place[found] + start
+            start = stop
+        return rows
+
+    def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> np.ndarray:
+        """Take rows out, put rows in, restore the order; returns the rows of ``added``.
+
+        removed: rows that go. added: entity ids, any order. Rows before the first change stay where they are.
+        """
+        kinds = np.repeat(np.arange(3), np.diff((0, *self.stops)))
+        if self.kind_changed:
+            kinds = self.column("kind").astype(np.int64)
+        keep = np.ones(self.count, bool)
+        keep[removed] = False
+        old = np.flatnonzero(keep)
+        entity = np.concatenate((self.column("entity")[old], added))
+        kind = np.concatenate((kinds[old], added_kinds))
+        source = np.concatenate((old, np.full(len(added), -1)))
+        order = np.argsort((kind << 48) | entity, kind="stable")
+        source, entity, kind = source[order], entity[order], kind[order]
+
+        count = len(order)
+        self.reserve(count)
+        moved = source != np.arange(count)
+        first = int(np.argmax(moved)) if moved.any() else count
+        tail = source[first:]
+        fresh = tail < 0
+        for key, array in self.arrays.items():
+            block = array[tail]  # a copy
+            block[fresh] = self._fills[key]
+            array[first:count] = block
+        self.arrays["entity"][:count] = entity
+        self.count = count
+        self.stops = tuple(int(s) for s in np.searchsorted(kind, (1, 2, 3)))  # type: ignore[assignment]
+        self.kind_changed = False
+        self.version += 1
+        self.static_version += 1
+        position = np.empty(count, np.int64)
+        position[order] = np.arange(count)
+        return position[len(old) :]
+
+    def reserve(self, count: int) -> None:
+        """Make room for that many rows; capacity doubles, views taken before keep the old arrays."""
+        if count <= self.capacity:
+            return
+        self.capacity = max(count, 2 * self.capacity)
+        for key, array in self.arrays.items():
+            if key not in self._stack_rows:
+                self.arrays[key] = self._grown(array, 0, self._fills[key])
+        for stack, array in self.stacks.items():
+            self.stacks[stack] = self._grown(array, 1, 0)
+        self._point_into_stacks()
+
+    def _grown(self, array: np.ndarray, axis: int, fill: Any) -> np.ndarray:
+        shape = list(array.shape)
+        shape[axis] = self.capacity
+        fresh = np.empty(shape, array.dtype)
+        fresh[...] = fill
+        fresh[(slice(None),) * axis + (slice(self.count),)] = array[(slice(None),) * axis + (slice(self.count),)]
+        return fresh
+
+    def take_out(self, component: type[Component], rows: np.ndarray) -> RowStore:
+        """Copies of those rows of one component, for handles that outlive their rows."""
+        arrays = {column.key: self.arrays[column.key][rows] for column in component.columns.values()}
+        return RowStore(arrays, self.dimensions)
+
+    # -- written through handles ------------------------------------------------------------------------------------
+
+    def is_frozen(self, row: int) -> bool:
+        """Static rows are read in place and written by assignment only, so that no change goes unseen."""
+        return row >= self.stops[1]
+
+    def written(self, column: Column, row: int) -> None:
+        if row >= self.stops[1]:
+            self.static_version += 1
+        if column.on_write is not None:
+            column.on_write(self, row)
+
+    # -- copies -----------------------------------------------------------------------------------------------------
+
+    def copy_columns(self, keys: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+        """Copies of the rows in use, of all columns or of those named."""
+        return {key: self.column(key).copy() for key in (self.arrays if keys is None else keys)}
+
+    def restore_columns(self, columns: dict[str, np.ndarray]) -> None:
+        for key, array in columns.items():
+            self.arrays[key][: len(array)] = array
+        self.static_version += 1

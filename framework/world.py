@@ -1,0 +1,353 @@
+"""World: one esper context, its plugins, its systems and its clock."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any, Self
+
+import esper
+import numpy as np
+
+from . import esper_bridge
+from .bodies import Bodies
+from .clock import Clock
+from .contacts import Contacts
+from .entities import EntityVerbs
+from .errors import CaromError, NoPhysicsError
+from .events import Events
+from .pipeline import Pipeline, StepState
+from .plan import Plan
+from .registry import Plugin, Registry
+from .schedule import ForceSystem, Phase, System
+from .services import PhysicsServices
+from .settings import Settings
+from .statistics import Stats
+
+_numbers = itertools.count(1)
+
+
+class World(EntityVerbs):
+    """A world of entities, stepped by systems in a fixed step.
+
+    plugins
+        what the world can do: ``World(Physics(dimensions=2))``
+    settings
+        see :class:`Settings`
+    name
+        of the esper context, unique by default; ``"default"`` takes over esper's default context
+
+    Inside ``with world:`` plain esper calls work on this world.
+    """
+
+    def __init__(self, *plugins: Plugin, settings: Settings | None = None, name: str | None = None) -> None:
+        if settings is not None and not isinstance(settings, Settings):
+            raise TypeError(f"settings must be Settings, got {settings!r}")
+        for plugin in plugins:
+            if not isinstance(plugin, Plugin):
+                raise TypeError(f"World takes plugins, got {plugin!r}; settings go by name: World(..., settings=...)")
+        if name is None:
+            name = next(n for n in (f"carom-{i}" for i in _numbers) if not esper_bridge.context_exists(n))
+        elif name != "default" and esper_bridge.context_exists(name):
+            raise ValueError(f"an esper world named {name!r} exists already")
+        self.name = name
+        self.closed = False
+        self.registry = Registry()
+        self.physics: PhysicsServices | None = None
+        self.plugins = plugins
+        self._settings = settings or Settings()
+        self._events = Events()
+        self._entered = ExitStack()
+        self._depth: list[str] = []
+        self.force_systems: list[ForceSystem] = []
+        self._pipeline = Pipeline(self)
+        with esper_bridge.context(name):
+            self._pipeline.attach()
+        for plugin in plugins:
+            self.registry.add(plugin)
+        for plugin in plugins:
+            plugin.install(self)
+        if self.physics is not None:
+            self.physics.check_settings(self._settings)
+
+    # -- being an esper context -----------------------------------------------------------------------------------------
+
+    def __enter__(self) -> Self:
+        self._open()
+        self._depth.append(esper.current_world)
+        esper.switch_world(self.name)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        before = self._depth.pop()
+        if esper_bridge.context_exists(before):
+            esper.switch_world(before)
+
+    def close(self) -> None:
+        """Give the esper context back; the world cannot be used afterwards. Closing twice is fine."""
+        if self.closed:
+            return
+        if self._depth:
+            raise CaromError(f"world {self.name!r} cannot be closed inside its own with block")
+        self.closed = True
+        with esper_bridge.context(self.name):
+            self._pipeline.detach()
+            esper.clear_database()
+        if self.name != "default":
+            if esper.current_world == self.name:
+                esper.switch_world("default")
+            esper.delete_world(self.name)
+
+    def _open(self) -> None:
+        if self.closed:
+            raise CaromError(f"world {self.name!r} is closed")
+
+    # -- settings and physics -----------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        """Replace between steps: ``world.settings = world.settings.replace(dt=1/120)``."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: Settings) -> None:
+        if not isinstance(settings, Settings):
+            raise TypeError(f"settings must be Settings, got {settings!r}")
+        self._pipeline.must_be_between_steps("settings")
+        if self.physics is not None:
+            self.physics.check_settings(settings)
+        self._pipeline.clock.set_dt(settings.dt)
+        self._settings = settings
+
+    @property
+    def dimensions(self) -> int | None:
+        return None if self.physics is None else self.physics.dimensions
+
+    @property
+    def _services(self) -> PhysicsServices:
+        self._open()
+        if self.physics is None:
+            raise NoPhysicsError("no physics in this world: World(Physics(...))")
+        return self.physics
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """(d,) m/s^2; assign between steps."""
+        return self._services.gravity
+
+    @gravity.setter
+    def gravity(self, gravity: Any) -> None:
+        self._pipeline.must_be_between_steps("gravity")
+        self._services.set_gravity(gravity)
+
+    @property
+    def bodies(self) -> Bodies:
+        """The columns of all bodies; outside a step, up to date with what was created and deleted."""
+        services = self._services
+        self._pipeline.synchronize()
+        return services.bodies
+
+    @property
+    def contacts(self) -> Contacts:
+        return self._services.contacts
+
+    def kinetic_energy(self) -> float:
+        """Joules, of the dynamic bodies, summed in order of their ids."""
+        self._synchronized()
+        return self._services.kinetic_energy()
+
+    def potential_energy(self) -> float:
+        """Joules, of gravity (zero at the origin), constant forces and force systems that have a potential."""
+        self._synchronized()
+        return self._services.potential_energy()
+
+    def momentum(self) -> np.ndarray:
+        """(d,) kg m/s of the dynamic bodies."""
+        self._synchronized()
+        return self._services.momentum()
+
+    def _synchronized(self) -> PhysicsServices:
+        services = self._services
+        self._pipeline.synchronize()
+        return services
+
+    # -- systems --------------------------------------------------------------------------------------------------------
+
+    def add_system(
+        self, system: System | ForceSystem | esper.Processor, *, before: Any = (), after: Any = (), frame: bool = False
+    ) -> None:
+        """Add a system; during a step it joins at its end.
+
+        A System runs in its phase after the built-in one, or ``before``/``after`` a system (type or instance). A
+        ForceSystem is called by the integrator. ``frame=True``: once per ``advance``, after its steps, with the
+        frame's seconds.
+        """
+        self._open()
+        self._pipeline.add(system, before, after, frame)
+
+    def remove_system(self, system: System | ForceSystem | esper.Processor) -> None:
+        """Remove that instance; during a step it leaves at its end. KeyError if it is not in this world."""
+        self._pipeline.remove(system)
+
+    def add_processor(self, processor: esper.Processor, priority: int = 0) -> None:
+        """esper's verb: any processor at any priority; Phase.X.priority are the bands of carom's own."""
+        self._open()
+        if isinstance(processor, System):
+            self._pipeline.add(processor, (), (), False)
+            return
+        self._pipeline.add_plain(processor, priority)
+
+    def remove_processor(self, processor: type[esper.Processor] | esper.Processor) -> None:
+        """esper's verb: by type, the last one added of it; an instance is taken too."""
+        self._pipeline.remove_processor(processor)
+
+    @property
+    def systems(self) -> list[System]:
+        """carom's systems in the order in which they run."""
+        return self._pipeline.ordered()
+
+    # -- time -----------------------------------------------------------------------------------------------------------
+
+    def step(self) -> None:
+        """One fixed step of ``settings.dt``."""
+        self._open()
+        self._pipeline.step()
+
+    def advance(self, seconds: float) -> int:
+        """As many fixed steps as fit into the time that has gathered; returns how many.
+
+        At most ``settings.max_steps_per_advance``; whole steps beyond that are dropped and counted in
+        ``stats().counters["dropped_steps"]``. What is less than a step is kept: ``alpha``.
+        """
+        self._open()
+        if not (isinstance(seconds, (int, float)) and math.isfinite(seconds) and seconds >= 0):
+            raise ValueError(f"advance takes seconds, finite and not negative, got {seconds!r}")
+        return self._pipeline.advance(seconds)
+
+    @property
+    def alpha(self) -> float:
+        """How far the time gathered has come into the next step, 0 to 1; for drawing between two steps."""
+        return self._pipeline.clock.alpha
+
+    @property
+    def time(self) -> float:
+        """Seconds simulated."""
+        return self._pipeline.clock.time
+
+    @property
+    def step_count(self) -> int:
+        return self._pipeline.clock.step_count
+
+    @property
+    def clock(self) -> Clock:
+        """Counts the steps."""
+        return self._pipeline.clock
+
+    def run(self, phase: Phase) -> None:
+        """Run one phase alone on the state as it is; the clock stands still. For tests."""
+        self._open()
+        self._pipeline.run(Phase(phase))
+
+    def prepare(self, *component_types: type[Any]) -> None:
+        """Compile ahead what bodies of these component types will need, so that nothing stalls in mid-game."""
+        self._services.prepare(component_types, self)  # type: ignore[attr-defined]
+
+    # -- events -----------------------------------------------------------------------------------------------------------
+
+    def on(self, name: str, handler: Callable[..., None]) -> Callable[..., None]:
+        """Call ``handler(contact)`` on contact_begin, contact_stay, contact_end or impact; or on events of your own."""
+        return self._events.on(name, handler)
+
+    def off(self, name: str, handler: Callable[..., None]) -> None:
+        """Take a handler back; safe inside a handler. KeyError if it was not set."""
+        self._events.off(name, handler)
+
+    def dispatch_event(self, name: str, *args: Any) -> None:
+        """Call the handlers of that event, esper's own included."""
+        with esper_bridge.context(self.name):
+            self._events.dispatch(name, *args)
+
+    @property
+    def events(self) -> Events:
+        return self._events
+
+    # -- queries ----------------------------------------------------------------------------------------------------------
+
+    def query_point(self, point: Any, mask: int = -1) -> list[int]:
+        """Entities whose collider contains the point, by id."""
+        return self.query_sphere(point, 0.0, mask)
+
+    def query_aabb(self, lower: Any, upper: Any, mask: int = -1) -> list[int]:
+        """Entities whose collider touches the box, by id."""
+        services = self._synchronized()
+        low, high = self._point(lower, "lower"), self._point(upper, "upper")
+        if (low > high).any():
+            raise ValueError(f"query_aabb: lower {low.tolist()} exceeds upper {high.tolist()}")
+        return services.query_boxes(low[None], high[None], mask)[0].tolist()
+
+    def query_sphere(self, centre: Any, radius: float, mask: int = -1) -> list[int]:
+        """Entities whose collider touches the sphere, by id."""
+        return self.query_spheres(self._point(centre, "centre")[None], radius, mask)[0].tolist()
+
+    def query_spheres(self, centres: Any, radii: Any, mask: int = -1) -> list[np.ndarray]:
+        """For each of m spheres (centres (m, d), radii one or (m,)) the ids of the entities it touches."""
+        services = self._synchronized()
+        centres = np.ascontiguousarray(centres, float)
+        if centres.ndim != 2 or centres.shape[1] != services.dimensions:
+            raise ValueError(f"query_spheres: centres must have shape (m, {services.dimensions}), got {centres.shape}")
+        radii = np.ascontiguousarray(np.broadcast_to(np.asarray(radii, float), len(centres)))
+        if not np.isfinite(centres).all() or not np.isfinite(radii).all() or (radii < 0).any():
+            raise ValueError("query_spheres: centres and radii must be finite, radii not negative")
+        return services.query_spheres(centres, radii, mask)
+
+    def refresh_queries(self) -> None:
+        """Make the next query see positions that were written since the last step."""
+        self._services.refresh_queries()  # type: ignore[attr-defined]
+
+    def _point(self, value: Any, name: str) -> np.ndarray:
+        point = np.asarray(value, float)
+        if point.shape != (self._services.dimensions,) or not np.isfinite(point).all():
+            raise ValueError(f"{name} must be {self._services.dimensions} finite numbers, got {value!r}")
+        return point
+
+    # -- looking inside -----------------------------------------------------------------------------------------------------
+
+    def stats(self) -> Stats:
+        """Time per system and counters since the world began (or ``reset_stats``)."""
+        return self._pipeline.stats()
+
+    def reset_stats(self) -> None:
+        self._pipeline.reset_stats()
+
+    @property
+    def faults(self) -> list[str]:
+        """What went wrong without stopping the world: bodies whose state is no longer finite, limits reached."""
+        return self._pipeline.faults
+
+    def report_fault(self, text: str) -> None:
+        """Add to :attr:`faults`, which hold the last 100."""
+        self._pipeline.faults.append(text)
+        del self._pipeline.faults[:-100]
+
+    def plan(self) -> Plan:
+        """What runs in a step, in order, and why."""
+        self._pipeline.synchronize()
+        return Plan.of(self)
+
+    def snapshot(self) -> StepState:
+        """A copy of the state: columns, clock, contacts."""
+        self._synchronized()
+        return self._pipeline.capture(everything=True)
+
+    def restore(self, snapshot: StepState) -> None:
+        """Go back to a snapshot of this world; ValueError if bodies were created or deleted since."""
+        self._synchronized()
+        self._pipeline.must_be_between_steps("restore")
+        self._pipeline.restore(snapshot)
+
+    def state_hash(self) -> str:
+        """A hash of every body's state, in order of the ids: equal bits, equal hash."""
+        self._synchronized()
+        return self._pipeline.state_hash()

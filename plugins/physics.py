@@ -1,0 +1,61 @@
+"""Physics: the standard group of systems, with spheres and boxes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..framework.registry import Plugin
+from ..systems import (
+    BroadPhase,
+    ContactEvents,
+    ForceAccumulation,
+    Integration,
+    NarrowPhase,
+    Response,
+)
+from ..systems.integrators import STANDARD_INTEGRATORS
+from ..systems.state import PhysicsState
+from .standard_shapes import standard_shapes
+
+if TYPE_CHECKING:
+    from ..framework.world import World
+
+
+class Physics(Plugin):
+    """Linear mechanics of spheres and axis-aligned boxes.
+
+    dimensions
+        2 or 3
+    gravity
+        (d,) m/s^2; 0 for none
+    """
+
+    def __init__(self, dimensions: int = 2, gravity: Any = 0) -> None:
+        super().__init__("physics")
+        if dimensions not in (2, 3):
+            raise ValueError(f"Physics: dimensions must be 2 or 3, got {dimensions!r}")
+        self.dimensions = dimensions
+        self.gravity = gravity
+        self.shapes, self.pairs = list(standard_shapes.shapes), list(standard_shapes.pairs)
+        for name, integrator in STANDARD_INTEGRATORS.items():
+            self.integrator(name)(integrator)
+
+    def install(self, world: World) -> None:
+        """Give the world its table and its systems; ValueError if it has physics already."""
+        if world.physics is not None:
+            raise ValueError("a world takes one Physics")
+        state = PhysicsState(world, self.dimensions, self.gravity)
+        world.physics = state
+        state.forces = ForceAccumulation(state)
+        state.broad_phase = BroadPhase(state)
+        state.narrow_phase = NarrowPhase(state)
+        state.contact_events = ContactEvents(state)
+        for system in (
+            state.forces,
+            Integration(state),
+            state.broad_phase,
+            state.narrow_phase,
+            Response(state),
+            state.contact_events,
+        ):
+            world.add_system(system)

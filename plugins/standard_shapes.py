@@ -1,0 +1,86 @@
+"""The built-in shapes, spheres and boxes, and how they meet; registered like anybody's.
+
+A pair function gets the parameters of a and b and the vector d from a's centre to b's, a tuple of 2 or 3 numbers. It
+returns (hit, depth, normal, point): whether they touch, how far they overlap (negative: how far they are apart), the
+unit normal from a to b and the point of contact relative to a's centre. Touching counts as a hit.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..components import AABBCollider, SphereCollider
+from ..framework.compilation import inlined
+from ..framework.registry import Plugin
+from ..framework.vectors import divided, length, replace, scale
+
+standard_shapes = Plugin("standard shapes")
+
+standard_shapes.shape(cost=1)(SphereCollider)
+standard_shapes.shape(cost=1.5)(AABBCollider)
+
+
+@inlined
+def axis_normal(like, axis, sign):
+    """The unit vector along an axis."""
+    result = like
+    for k in range(len(like)):
+        result = replace(result, k, sign if k == axis else 0.0)
+    return result
+
+
+@standard_shapes.pair(SphereCollider, SphereCollider)
+def sphere_sphere(a, b, d):
+    """Distance of the centres against the sum of the radii. Coincident centres part along the first axis."""
+    distance = length(d)
+    depth = (a.radius + b.radius) - distance
+    normal = divided(d, distance) if distance > 0.0 else axis_normal(d, 0, 1.0)
+    # The point divides the segment between the centres, in the middle of the overlap.
+    return depth >= 0.0, depth, normal, scale(normal, a.radius - 0.5 * depth)
+
+
+@standard_shapes.pair(SphereCollider, AABBCollider)
+def sphere_box(a, b, d):
+    """Sphere against the nearest point of the box; a centre inside leaves through the nearest face."""
+    nearest = d  # of the box, seen from the sphere's centre
+    inside = True
+    for k in range(len(d)):
+        low, high = d[k] - b.half_extents[k], d[k] + b.half_extents[k]
+        if low > 0.0:
+            nearest = replace(nearest, k, low)
+            inside = False
+        elif high < 0.0:
+            nearest = replace(nearest, k, high)
+            inside = False
+        else:
+            nearest = replace(nearest, k, 0.0)
+    distance = length(nearest)
+    if not inside and distance > 0.0:
+        depth = a.radius - distance
+        return depth >= 0.0, depth, divided(nearest, distance), nearest
+    axis, room, sign = 0, math.inf, 1.0
+    for k in range(len(d)):
+        to_face = b.half_extents[k] - abs(d[k])
+        if to_face < room:
+            axis, room, sign = k, to_face, 1.0 if d[k] >= 0.0 else -1.0
+    depth = a.radius + room
+    normal = axis_normal(d, axis, sign)
+    return True, depth, normal, scale(normal, -room)
+
+
+@standard_shapes.pair(AABBCollider, AABBCollider)
+def box_box(a, b, d):
+    """On no axis may the intervals be apart (separating axes); the normal is the axis of least overlap.
+
+    The point is the centre of the region that both share.
+    """
+    axis, depth, sign = 0, math.inf, 1.0
+    point = d
+    for k in range(len(d)):
+        overlap = a.half_extents[k] + b.half_extents[k] - abs(d[k])
+        if overlap < depth:
+            axis, depth, sign = k, overlap, 1.0 if d[k] >= 0.0 else -1.0
+        low = max(-a.half_extents[k], d[k] - b.half_extents[k])
+        high = min(a.half_extents[k], d[k] + b.half_extents[k])
+        point = replace(point, k, 0.5 * (low + high))
+    return depth >= 0.0, depth, axis_normal(d, axis, sign), point

@@ -1,0 +1,139 @@
+"""BROAD: which bodies may meet in this step, from the boxes around their motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..framework.compilation import kernel
+from ..framework.schedule import Phase, System
+from ..framework.vectors import add, replace, row, store
+from .spatial_tree import SpatialTree
+
+if TYPE_CHECKING:
+    from .state import PhysicsState
+
+# Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
+MARGIN = 0.1
+
+
+def make_box_kernel(shape_bounds: Any, write_world: Any) -> Callable[..., None]:
+    """The kernel that boxes bodies, over the shapes of a scene."""
+
+    @kernel
+    def box_motion(
+        start, stop, before, after, shape_of, slots, shapes, world, turns, turned, axes, offsets, offset, size,
+        lower, upper, like,
+    ):  # fmt: skip
+        """Offsets as they are in the world, sizes, and the boxes around the motion of rows start..stop-1.
+
+        turns: whether any shape changes when turned; turned: whether any body is. A row without shape gets NaN.
+        """
+        for i in range(start, stop):
+            shape = shape_of[i]
+            if shape < 0:
+                for k in range(len(like)):
+                    lower[i, k] = upper[i, k] = np.nan
+                continue
+            at = row(offsets[slots[shape]], i, like)
+            if turned:
+                local = at
+                for k in range(len(like)):
+                    total = 0.0
+                    for j in range(len(like)):
+                        total += axes[i, k, j] * local[j]
+                    at = replace(at, k, total)
+            if turns:
+                write_world(shape, i, shapes, world, turned, axes, like)
+            store(offset, i, at)
+            half = shape_bounds(shape, i, world, like)
+            smallest = half[0]
+            for k in range(1, len(like)):
+                smallest = min(smallest, half[k])
+            size[i] = 2.0 * smallest
+            margin = MARGIN * smallest
+            first, last = add(row(before, i, like), at), add(row(after, i, like), at)
+            for k in range(len(like)):
+                lower[i, k] = min(first[k], last[k]) - half[k] - margin
+                upper[i, k] = max(first[k], last[k]) + half[k] + margin
+
+    return box_motion
+
+
+class BroadPhase(System):
+    """Finds candidate pairs with one quadtree (octree) of what moves and one, built once, of what does not.
+
+    Reads previous_position, position, rotation and the colliders; writes the candidate pairs. Pairs of static bodies
+    are never made.
+    """
+
+    phase = Phase.BROAD
+
+    def __init__(self, state: PhysicsState) -> None:
+        self._state = state
+        self._moving = SpatialTree(state.dimensions)
+        self._static = SpatialTree(state.dimensions)
+        self._static_seen: Any = None
+        self._static_positions = np.empty((0, state.dimensions))
+
+    def process(self, dt: float) -> None:
+        state, table, scratch = self._state, self._state.table, self._state.scratch
+        first, second = state.no_pairs, state.no_pairs
+        if state.collides:
+            self.box_all()
+            moving = table.stops[1]
+            self._moving.build(scratch["lower"], scratch["upper"], 0, moving)
+            first, second = self._moving.pairs_within()
+            if self._static.count:
+                fixed, mover = self._static.pairs_between(self._moving)
+                if len(fixed):
+                    first, second = np.concatenate((first, mover)), np.concatenate((second, fixed))
+        state.set_candidates(first, second)
+
+    def box_all(self) -> None:
+        """Boxes around the motion of what moves; of what does not only if it has changed."""
+        state, table, scratch = self._state, self._state.table, self._state.scratch
+        moving, count = table.stops[1], table.count
+        position, before = table.arrays["position"], table.arrays["previous_position"]
+        self._box(0, moving, before if state.moved else position)
+        fixed = position[moving:count]
+        seen = (table.static_version, table.version, state.code)
+        if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
+            before[moving:count] = fixed
+            self._box(moving, count, position)
+            self._static.build(scratch["lower"], scratch["upper"], moving, count)
+            self._static_seen = seen
+            self._static_positions = fixed.copy()
+
+    def _box(self, start: int, stop: int, before: np.ndarray) -> None:
+        state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
+        state.kernels.box_motion(
+            start, stop, before, arrays["position"], scratch["shape"], state.slots, state.shapes,
+            state.world_shapes, state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
+            scratch["offset"], scratch["size"], scratch["lower"], scratch["upper"], state.like,
+        )  # fmt: skip
+
+    @property
+    def trees(self) -> tuple[SpatialTree, SpatialTree]:
+        """Of what moves and of what does not."""
+        return self._moving, self._static
+
+    def trees_now(self) -> None:
+        """Build the trees from where the bodies are at this moment."""
+        moved, self._state.moved = self._state.moved, False
+        try:
+            self.box_all()
+        finally:
+            self._state.moved = moved
+        self._moving.build(self._state.scratch["lower"], self._state.scratch["upper"], 0, self._state.table.stops[1])
+
+    def reason(self) -> str:
+        if not self._state.collides:
+            return "no colliders: nothing to do"
+        moving, count = self._state.table.stops[1], self._state.table.count
+        tree = "quadtree" if self._state.dimensions == 2 else "octree"
+        return f"{tree} of {moving} moving bodies against itself" + (
+            f" and against that of {count - moving} static ones" if count > moving else ""
+        )

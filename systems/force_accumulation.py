@@ -1,0 +1,92 @@
+"""FORCES: everything that acts on a body, summed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..framework.bodies import SelectedBodies
+from ..framework.compilation import kernel
+from ..framework.schedule import ForceSystem, Phase, System
+from ..framework.vectors import replace, store
+
+if TYPE_CHECKING:
+    from .state import PhysicsState
+
+
+@kernel
+def sum_constant_forces(force, mass, gravity, gravity_scale, constant, applied, for_step):
+    """force = m g s + the constant force + what was applied."""
+    for i in range(len(force)):
+        total = gravity
+        weight = mass[i] * gravity_scale[i]
+        for k in range(len(gravity)):
+            total = replace(total, k, weight * gravity[k] + constant[i, k] + applied[i, k] + for_step[i, k])
+        store(force, i, total)
+
+
+class ForceAccumulation(System):
+    """Sums gravity, constant forces, applied forces and every force system into ``bodies.force``.
+
+    Reads position, linear_velocity, mass, gravity_scale, the force columns and what force systems require; writes
+    force. Integrators of several stages sum again at the state of each stage.
+    """
+
+    phase = Phase.FORCES
+    writes = ("force",)
+
+    def __init__(self, state: PhysicsState) -> None:
+        self._state = state
+        self.evaluations = 0
+        self.summed: np.ndarray | None = None  # a copy, while integrators with more stages need to compare
+
+    def process(self, dt: float) -> None:
+        self.evaluate(self.world.time)
+        stages = self._state.integrator().evaluations
+        self.summed = self._state.bodies.dynamic.force.copy() if self.world.force_systems and stages > 1 else None
+        self._state.table.forces_summed = True
+
+    def evaluate(self, time: float) -> None:
+        """Sum all forces at the state in the columns; ``time`` in seconds."""
+        state = self._state
+        dynamic = state.bodies.dynamic
+        if not len(dynamic):
+            return
+        self.evaluations += 1
+        sum_constant_forces(
+            dynamic.force, dynamic.mass, tuple(state.gravity.tolist()), dynamic.gravity_scale, dynamic.constant_force,
+            dynamic.applied_force, dynamic.step_force,
+        )  # fmt: skip
+        for system in self.world.force_systems:
+            self._add(system, dynamic, time)
+
+    def _add(self, system: ForceSystem, dynamic: Any, time: float) -> None:
+        """A force system sees the bodies it requires: columns in place where that is all of them, else copies."""
+        bodies = required_bodies(self._state, system)
+        if bodies is None:
+            return
+        try:
+            system.add_forces(bodies, time)
+        except Exception as error:
+            error.add_note(f"in force system {system.name}")
+            raise
+        if isinstance(bodies, SelectedBodies):
+            bodies.scatter_force()
+
+    def reason(self) -> str:
+        names = ", ".join(system.name for system in self.world.force_systems)
+        gravity = "gravity and " if self._state.gravity.any() else ""
+        return f"{gravity}constant and applied forces" + (f"; force systems {names}" if names else "")
+
+
+def required_bodies(state: PhysicsState, system: ForceSystem) -> Any:
+    """The dynamic bodies that have what the force system requires; None if there are none."""
+    dynamic = state.bodies.dynamic
+    mask = np.ones(len(dynamic), bool)
+    for component in system.requires:
+        mask &= dynamic.has(component)
+    if mask.all():
+        return dynamic if len(dynamic) else None
+    rows = np.flatnonzero(mask)
+    return SelectedBodies(state.table, rows) if len(rows) else None

@@ -1,0 +1,234 @@
+"""Integrators: how a body moves in free flight through one step.
+
+Each takes the motion (columns at the start of the step, with the forces of that state summed) and leaves the
+prediction in the columns. It also says what path the bodies take within the step, because an impact is found and
+dated on that path: explicit Euler moves on a line with the old velocity, semi-implicit Euler on a line with the new
+one, velocity Verlet on a parabola, the others on a cubic through both ends.
+
+Damping is exact for a constant force in every method: it enters as the integrating factor e^(-c h), and what
+multiplies accelerations are the phi functions of exponential integrators (Hochbruck & Ostermann, Acta Numerica 2010);
+for c = 0 they are the ordinary coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from ..framework.compilation import inlined, kernel
+
+if TYPE_CHECKING:
+    from .motion import Motion
+
+LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
+
+
+class Integrator:
+    """Derive from it and register it with ``plugin.integrator(name)``.
+
+    order
+        of the error of a whole run, in dt
+    evaluations
+        of the forces, per step
+    path
+        LINE, PARABOLA or CUBIC
+    """
+
+    order: ClassVar[int]
+    evaluations: ClassVar[int]
+    path: ClassVar[int] = CUBIC
+    moves_with_old_velocity: ClassVar[bool] = False  # of a LINE: which end's velocity it follows
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        """Move ``motion.position`` and ``motion.velocity`` of the dynamic bodies by ``dt`` seconds."""
+        raise NotImplementedError
+
+
+class ExplicitEuler(Integrator):
+    """Position with the old velocity. Drifts upwards by g dt t / 2; unstable for springs."""
+
+    order, evaluations, path = 1, 1, LINE
+    moves_with_old_velocity = True
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        euler(*motion.arrays, dt, False)
+
+
+class SemiImplicitEuler(Integrator):
+    """Velocity first, position with the new one. Symplectic: energy stays within bounds below z = 2."""
+
+    order, evaluations, path = 1, 1, LINE
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        euler(*motion.arrays, dt, True)
+
+
+class VelocityVerlet(Integrator):
+    """Second order, symplectic; for velocity-dependent forces the velocity at the end is predicted by v + a dt."""
+
+    order, evaluations, path = 2, 2, PARABOLA
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        verlet(motion, dt, 0.0)
+
+
+class RungeKutta4(Integrator):
+    """The classical fourth-order method; for damped bodies its exponential form (Cox & Matthews 2002)."""
+
+    order, evaluations = 4, 4
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        first, middle = np.empty_like(motion.velocity), np.empty_like(motion.velocity)
+        speeds, kicks = np.empty_like(motion.velocity), np.empty_like(motion.velocity)
+        for stage in range(4):
+            if stage:
+                motion.evaluate(dt if stage == 3 else dt / 2)
+            runge_kutta_stage(
+                stage, *motion.arrays, motion.start_position, motion.start_velocity, first, middle, speeds, kicks, dt
+            )
+
+
+class Yoshida4(Integrator):
+    """Fourth order, symplectic: three Verlet steps of lengths w1, w0, w1 (Yoshida 1990)."""
+
+    order, evaluations = 4, 4
+
+    def advance(self, motion: Motion, dt: float) -> None:
+        outer = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
+        inner = 1.0 - 2.0 * outer
+        verlet(motion, outer * dt, 0.0)
+        verlet(motion, inner * dt, outer * dt)
+        verlet(motion, outer * dt, (outer + inner) * dt)
+
+
+def verlet(motion: Motion, h: float, start: float) -> None:
+    """One Verlet step of length h, ``start`` seconds into the step; the forces at its start are summed already."""
+    if not motion.force_changes:  # the acceleration at the end would be the same
+        verlet_drift(*motion.arrays, np.empty((0, motion.velocity.shape[1])), h)
+        return
+    acceleration = np.empty_like(motion.velocity)
+    verlet_drift(*motion.arrays, acceleration, h)
+    motion.evaluate(start + h)
+    verlet_kick(*motion.arrays, acceleration, h)
+
+
+@inlined
+def phi1(z):
+    """(e^z - 1) / z."""
+    return 1.0 if z == 0.0 else math.expm1(z) / z
+
+
+@inlined
+def phi2(z):
+    """(phi1(z) - 1) / z; a series near zero, where the difference cancels."""
+    if abs(z) > 0.5:
+        return (phi1(z) - 1.0) / z
+    total, term = 0.0, 1.0
+    for n in range(2, 18):
+        term /= n
+        total += term
+        term *= z
+    return total
+
+
+@inlined
+def phi3(z):
+    """(phi2(z) - 1/2) / z."""
+    if abs(z) > 0.5:
+        return (phi2(z) - 0.5) / z
+    total, term = 0.0, 0.5
+    for n in range(3, 19):
+        term /= n
+        total += term
+        term *= z
+    return total
+
+
+@kernel
+def euler(position, velocity, force, inverse_mass, damping, h, new_velocity):
+    """v' = v e^(-c h) + a (1 - e^(-c h)) / c; x' = x + h (v' or v)."""
+    for i in range(len(position)):
+        c = damping[i]
+        decay, gain = 1.0, h
+        if c != 0.0:
+            decay, gain = math.exp(-c * h), h * phi1(-c * h)
+        for k in range(position.shape[1]):
+            old = velocity[i, k]
+            new = old * decay + force[i, k] * inverse_mass[i] * gain
+            velocity[i, k] = new
+            position[i, k] += h * (new if new_velocity else old)
+
+
+@kernel
+def verlet_drift(position, velocity, force, inverse_mass, damping, acceleration, h):
+    """x' = x + v h phi1 + a h^2 phi2; v' = v e^(-c h) + a h phi1; keeps a unless there is no room for it."""
+    keep = len(acceleration) > 0
+    for i in range(len(position)):
+        c = damping[i]
+        decay, first, second = 1.0, 1.0, 0.5
+        if c != 0.0:
+            decay, first, second = math.exp(-c * h), phi1(-c * h), phi2(-c * h)
+        for k in range(position.shape[1]):
+            a = force[i, k] * inverse_mass[i]
+            position[i, k] += h * (first * velocity[i, k] + h * second * a)
+            velocity[i, k] = velocity[i, k] * decay + h * first * a
+            if keep:
+                acceleration[i, k] = a
+
+
+@kernel
+def verlet_kick(position, velocity, force, inverse_mass, damping, acceleration, h):
+    """The second half: the mean of both accelerations instead of the first."""
+    for i in range(len(position)):
+        gain = 0.5 * h * (phi1(-damping[i] * h) if damping[i] != 0.0 else 1.0)
+        for k in range(position.shape[1]):
+            velocity[i, k] += gain * (force[i, k] * inverse_mass[i] - acceleration[i, k])
+
+
+@kernel
+def runge_kutta_stage(
+    stage, position, velocity, force, inverse_mass, damping, x0, v0, first, middle, speeds, kicks, h
+):  # fmt: skip
+    """Take the acceleration of one stage in and go to the state of the next; after stage 3 that is the result.
+
+    first: a1; middle: the velocity of stage 2; speeds, kicks: weighted sums of velocities and accelerations.
+    """
+    for i in range(len(position)):
+        z = -damping[i] * h
+        f1 = f2 = f3 = 1.0 / 6.0
+        decay = half_decay = half_gain = 1.0
+        if z != 0.0:
+            p1, p2, p3 = phi1(z), phi2(z), phi3(z)
+            f1, f2, f3 = p1 - 3.0 * p2 + 4.0 * p3, p2 - 2.0 * p3, 4.0 * p3 - p2
+            decay, half_decay, half_gain = math.exp(z), math.exp(0.5 * z), phi1(0.5 * z)
+        for k in range(position.shape[1]):
+            a, v = force[i, k] * inverse_mass[i], velocity[i, k]
+            if stage == 0:
+                first[i, k] = a
+                speeds[i, k], kicks[i, k] = v, f1 * a
+                position[i, k] = x0[i, k] + 0.5 * h * v
+                velocity[i, k] = middle[i, k] = v0[i, k] * half_decay + 0.5 * h * half_gain * a
+            elif stage == 1:
+                speeds[i, k] += 2.0 * v
+                kicks[i, k] += 2.0 * f2 * a
+                position[i, k] = x0[i, k] + 0.5 * h * v
+                velocity[i, k] = v0[i, k] * half_decay + 0.5 * h * half_gain * a
+            elif stage == 2:
+                speeds[i, k] += 2.0 * v
+                kicks[i, k] += 2.0 * f2 * a
+                position[i, k] = x0[i, k] + h * v
+                velocity[i, k] = middle[i, k] * half_decay + 0.5 * h * half_gain * (2.0 * a - first[i, k])
+            else:
+                position[i, k] = x0[i, k] + h / 6.0 * (speeds[i, k] + v)
+                velocity[i, k] = v0[i, k] * decay + h * (kicks[i, k] + f3 * a)
+
+
+STANDARD_INTEGRATORS: dict[str, type[Integrator]] = {
+    "explicit_euler": ExplicitEuler,
+    "semi_implicit_euler": SemiImplicitEuler,
+    "velocity_verlet": VelocityVerlet,
+    "rk4": RungeKutta4,
+    "yoshida4": Yoshida4,
+}

@@ -1,0 +1,32 @@
+"""The kernels that depend on a scene's shapes, made once per set of shapes and compiled when first called."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from .broad_phase import make_box_kernel
+from .impacts import make_impact_kernel
+from .narrow_phase import make_narrow_kernel
+from .queries import make_query_kernel
+from .resting import make_resting_kernels
+from .shape_code import ShapeCode
+
+
+class SceneKernels:
+    """What the collision phases call."""
+
+    def __init__(self, code: ShapeCode) -> None:
+        self.box_motion: Any = make_box_kernel(code.shape_bounds, code.write_world)
+        self.find_contacts: Any = make_narrow_kernel(code.evaluate)
+        self.resolve_impacts: Any = make_impact_kernel(code.evaluate)
+        self.find_resting: Any
+        self.solve_resting: Any
+        self.find_resting, self.solve_resting = make_resting_kernels(code.evaluate)
+        self.touching_sphere: Any = make_query_kernel(code.meets_sphere) if code.meets_sphere else None
+        self.touching_box: Any = make_query_kernel(code.meets_box) if code.meets_box else None
+
+
+@lru_cache(maxsize=64)
+def kernels_for(code: ShapeCode) -> SceneKernels:
+    return SceneKernels(code)

@@ -1,0 +1,163 @@
+"""The buffers between the collision phases: candidates, pairs, contacts. They only grow."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..framework.contacts import Contacts, empty_columns
+from .narrow_phase import order_of_pairs
+
+if TYPE_CHECKING:
+    from ..framework.table import Table
+
+
+class PairBuffers:
+    """Mixed into the physics state.
+
+    candidates: rows (first, second) from the broad phase. pair_a, pair_b, responds (m,): the pairs whose layers meet,
+    a's entity id the smaller. hits (found,): indices of the pairs that touch at the end of their motion, with depths,
+    normals, points. pair_impulse, pair_normal, pair_point, pair_depth, pair_times: per pair, what the response made
+    of it.
+    """
+
+    table: Table
+    contacts: Contacts
+    rank: np.ndarray
+    dimensions: int
+    world: Any
+
+    def __init__(self, dimensions: int) -> None:
+        self.no_pairs = np.empty(0, np.int32)
+        self.candidates = (self.no_pairs, self.no_pairs)
+        self.candidates_ready = self.contacts_ready = False
+        self.pairs = self.found = 0
+        self.resting = np.empty(0, np.int64)
+        self.impact_pairs = np.empty(0, np.int64)
+        self.step_impacts: dict[str, np.ndarray] | None = None
+        self.impact_counts = np.zeros(2, np.int64)
+        self.contact_columns = empty_columns(dimensions, enabled=True)
+        self._contact_pairs = np.empty(0, np.int64)  # the pair behind each row of the contacts
+        names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "resting_contacts")
+        self.pair_counters = dict.fromkeys(names, 0)
+        self._allocate(64)
+
+    def _allocate(self, size: int) -> None:
+        d = self.dimensions
+        self.pair_a, self.pair_b = np.empty(size, np.int64), np.empty(size, np.int64)
+        self.responds = np.empty(size, bool)
+        self.hits, self.depths = np.empty(size, np.int64), np.empty(size)
+        self.normals, self.points = np.empty((size, d)), np.empty((size, d))
+        self.pair_impulse, self.pair_depth, self.pair_times = np.empty(size), np.empty(size), np.empty(size)
+        self.pair_normal, self.pair_point = np.empty((size, d)), np.empty((size, d))
+
+    def reserve_pairs(self, count: int) -> None:
+        if count > len(self.pair_a):
+            self._allocate(max(count, 2 * len(self.pair_a)))
+
+    def begin_pairs(self) -> None:
+        """A new step: nothing is known yet."""
+        self.candidates_ready = self.contacts_ready = False
+        self.pairs = self.found = 0
+        self.step_impacts = None
+        self.resting = self.impact_pairs = np.empty(0, np.int64)
+
+    def set_candidates(self, first: np.ndarray, second: np.ndarray) -> None:
+        self.candidates = (first, second)
+        self.candidates_ready = True
+        self.contacts_ready = False
+        self.pair_counters["candidates"] += len(first)
+
+    def set_pairs(self, pairs: int, found: int) -> None:
+        """The narrow phase is done; puts the contacts into canonical order."""
+        self.pairs, self.found = pairs, found
+        self.contacts_ready = True
+        self.pair_counters["pairs"] += pairs
+        hits = self.hits[:found]
+        order = order_of_pairs(self.pair_a[hits], self.pair_b[hits], self.rank)
+        for array in (self.hits, self.depths, self.normals, self.points):
+            array[:found] = array[:found][order]
+
+    def clear_pairs(self) -> None:
+        """Nothing has been done to the pairs yet; those in contact start with the geometry found."""
+        hits = self.hits[: self.found]
+        self.pair_impulse[: self.pairs] = 0.0
+        self.pair_times[: self.pairs] = np.nan
+        self.pair_depth[hits] = self.depths[: self.found]
+        self.pair_normal[hits] = self.normals[: self.found]
+        self.pair_point[hits] = self.points[: self.found]
+
+    def take_enabled(self) -> None:
+        """Pairs whose contact a system has disabled push no more in this step."""
+        enabled = self.contact_columns["enabled"]
+        if not enabled.all():
+            self.responds[self._contact_pairs[~enabled]] = False
+
+    def publish_contacts(self, final: bool = False) -> None:
+        """Make the contacts' columns: after NARROW those found; ``final``: also those that impacts led to."""
+        pairs = self.hits[: self.found]
+        if not final:
+            depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))
+            impulse, enabled = np.zeros(self.found), np.ones(self.found, bool)
+        else:
+            was_enabled = self.contact_columns["enabled"]
+            pairs = self._with_new_pairs(pairs)
+            depth, normal, point = self.pair_depth[pairs], self.pair_normal[pairs], self.pair_point[pairs]
+            impulse = self.pair_impulse[pairs]
+            enabled = was_enabled
+            if len(pairs) != self.found:
+                enabled = np.ones(len(pairs), bool)
+                enabled[np.isin(pairs, self._contact_pairs[~was_enabled])] = False
+            self.pair_counters["contacts"] += len(pairs)
+            self.pair_counters["resting_contacts"] += len(self.resting)
+        entity = self.table.arrays["entity"]
+        self._contact_pairs = pairs.copy()
+        self.contact_columns = {
+            "entity_a": entity[self.pair_a[pairs]],
+            "entity_b": entity[self.pair_b[pairs]],
+            "point": point,
+            "normal": normal,
+            "depth": depth,
+            "normal_impulse": impulse,
+            "step": np.full(len(pairs), self.world.step_count),
+            "enabled": enabled,
+        }
+        self.contacts.set_current(self.contact_columns)
+
+    def _with_new_pairs(self, pairs: np.ndarray) -> np.ndarray:
+        """The contacts found and those that only the response brought about, in canonical order."""
+        known = np.zeros(self.pairs, bool)
+        known[pairs] = True
+        more = np.union1d(self.resting, self.impact_pairs)
+        more = more[~known[more]] if len(more) else more
+        if not len(more):
+            return pairs
+        joined = np.concatenate((pairs, more))
+        return joined[order_of_pairs(self.pair_a[joined], self.pair_b[joined], self.rank)]
+
+    def log_impacts(self, pair: np.ndarray, value: np.ndarray) -> None:
+        """Record the impacts of the step, in the order of their times; value: time, impulse, normal, point."""
+        self.impact_pairs = pair
+        self.pair_counters["impacts"] += int(self.impact_counts[0])
+        self.pair_counters["capped_impacts"] += int(self.impact_counts[1])
+        if self.impact_counts[1]:
+            limit = self.world.settings.max_impacts_per_step
+            self.world.report_fault(
+                f"step {self.world.step_count}: {self.impact_counts[1]} impacts beyond {limit} of a body in one step"
+            )
+        self.impact_counts[:] = 0
+        if not len(pair):
+            return
+        entity, d = self.table.arrays["entity"], self.dimensions
+        self.step_impacts = {
+            "entity_a": entity[self.pair_a[pair]],
+            "entity_b": entity[self.pair_b[pair]],
+            "point": value[:, 2 + d :].copy(),
+            "normal": value[:, 2 : 2 + d].copy(),
+            "depth": np.zeros(len(pair)),
+            "normal_impulse": value[:, 1].copy(),
+            "step": np.full(len(pair), self.world.step_count),
+            "time_of_impact": value[:, 0].copy(),
+        }
+        self.contacts.record("impacts", self.step_impacts)

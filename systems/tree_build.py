@@ -1,0 +1,309 @@
+"""The tree's layout: which cell a box belongs to, and all boxes in the order of their cells.
+
+A body sits in one cell of one level: the deepest level whose cells are at least as large as its box, in the cell that
+holds the box's centre. Its box then reaches at most half a cell over the cell's border (a *loose* quadtree or octree).
+There are no nodes and no pointers: each level is a row-major grid of cell numbers, ``x + w y + w h z``, and one counting
+sort over all levels brings the bodies into the order of their cells. A directory says where each cell begins.
+
+Cell numbers are taken modulo the number of cells of the level, so a level covers all space with a finite directory:
+objects outside the trimmed bounds share cells with objects inside, and the box test tells them apart. Running off
+the end of a row leads into the next one, which costs a false candidate and saves a branch.
+
+Rounding: coordinates are taken relative to the origin first, and a box counts as larger than it is by REACH times its
+distance from the origin. That covers every rounding error on the way to the cell number and bounds cell
+numbers to 2**38 per axis; whatever is farther out sits on a coarser level, at last in the one cell of the top level.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba.cpython.unsafe.tuple import tuple_setitem
+
+from ..framework.compilation import kernel
+
+MAX_LEVELS = 60
+BRUTE_FORCE_BELOW = 24  # so few objects are quicker tested all with all than sorted
+SAMPLE = 256  # objects that the bounds and the cell size are estimated from
+TRIMMED = 3  # the sample's extreme values kept per side; the last of them is its 1 % or 99 % quantile
+CELLS_PER_OBJECT = 3.0  # size of the finest level's directory
+CROWDED = 24.0  # mean number of objects in an object's cell from which finer cells are tried
+REACH = 2.0**-38  # relative rounding error granted to every box
+LOOSE = 1.0 + 2.0**-16  # the finest cell exceeds the typical box by this, so that REACH does not push it a level up
+SMALLEST_CELL = 1e-290
+LARGEST_SAMPLE = 1e150
+CODE_BITS = 60
+
+# Columns of ``table``, one row per level: level 0 is the finest, row ``levels`` the top level, row ``levels + 1`` the
+# boxes that are in no level because they are empty or NaN. A cell's number is SHIFT plus index times STRIDE per axis.
+BASE, CELLS, SHIFT, BEGIN, END, STRIDE = range(6)
+TABLE_COLUMNS = 8
+
+# Places in ``frame``; those apart by 3 hold one value per axis.
+ORIGIN, LOWEST, HIGHEST, EXTENT = 0, 3, 6, 9
+INVERSE, SMALL, LEVELS, FINE = 12, 13, 14, 15
+EXTREMES = 16  # 2 * TRIMMED values for each axis and for the size
+SCALES = EXTREMES + 4 * 2 * TRIMMED
+FRAME_SIZE = SCALES + MAX_LEVELS + 2
+
+
+def directory_size(count: int) -> int:
+    """Entries that :func:`build_tree` may use for ``count`` objects."""
+    return int(6 * CELLS_PER_OBJECT * count) + 150 * (MAX_LEVELS + 2)
+
+
+@kernel
+def build_tree(lower, upper, start, stop, directory, keys, order, cells, boxes, codes, table, frame, like):
+    """Sort rows start..stop-1 by cell. Fills all other arguments and returns how many objects are in the tree."""
+    levels = _choose_frame(lower, upper, start, stop, frame, like)
+    levels = _lay_out_levels(levels, table, frame, len(directory), like)
+    crowding = _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like)
+    # Most scenes are done here. The rest serves distant clusters, whose bounds say nothing about their density,
+    # and scenes with many objects too large or too far out for the levels there are.
+    before = crowding
+    while crowding >= 0.0 and 0 < levels < MAX_LEVELS - 1:
+        top = table[levels, END] - table[levels, BEGIN]
+        cell, inverse, coarsest = frame[FINE], frame[INVERSE], levels
+        if top > 64 + (stop - start) // 256:
+            levels = MAX_LEVELS - 1
+        elif crowding > CROWDED * (table[0, END] - table[0, BEGIN]) and cell > 2.0 * frame[SMALL]:
+            finer = _spacing(lower, upper, start, stop, directory, keys, table, frame, like)
+            finer = max(finer, max(frame[SMALL] * LOOSE, SMALLEST_CELL))
+            if finer > 0.5 * cell:
+                break
+            frame[FINE] = finer
+            frame[INVERSE] = 1.0 / finer
+            while finer < cell and levels < MAX_LEVELS - 1:
+                finer *= 2.0
+                levels += 1
+        else:
+            break
+        levels = _lay_out_levels(levels, table, frame, len(directory), like)
+        crowding = _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like)
+        if frame[FINE] < cell:
+            if crowding > 0.7 * before:  # no better: the former cells again, and no further attempt
+                frame[FINE], frame[INVERSE] = cell, inverse
+                levels = _lay_out_levels(coarsest, table, frame, len(directory), like)
+                _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like)
+                break
+            before = crowding
+    frame[LEVELS] = levels
+    _place(lower, upper, start, stop, directory, keys, order, cells, boxes, like)
+    encode_boxes(boxes, table[levels, END], frame, codes, like)
+    return table[levels, END]
+
+
+@kernel
+def _choose_frame(lower, upper, start, stop, frame, like):
+    """Origin, trimmed extent per axis and finest cell, from a sample of objects; returns the number of levels."""
+    d = len(like)
+    count = stop - start
+    for k in range(EXTREMES, EXTREMES + 8 * TRIMMED):
+        frame[k] = np.inf
+    # The TRIMMED smallest values of each quantity, and of its negative, ascending. The last quantity is the size.
+    taken = 0
+    for k in range(min(count, SAMPLE)):
+        # Multiplicative hashing: a plain stride would pick a single column out of a lattice.
+        row = start + (k if count <= SAMPLE else (((k * 2654435761) & 0xFFFFFFFF) * count) >> 32)
+        size = 0.0
+        usable = True
+        for q in range(d):
+            low, high = lower[row, q], upper[row, q]
+            usable &= (high >= low) & (low > -LARGEST_SAMPLE) & (high < LARGEST_SAMPLE)
+            size = max(size, high - low)
+        if usable:
+            taken += 1
+            for q in range(2 * d + 2):
+                value = 0.5 * (lower[row, q >> 1] + upper[row, q >> 1]) if q < 2 * d else size
+                value = -value if q & 1 else value
+                for i in range(EXTREMES + q * TRIMMED, EXTREMES + (q + 1) * TRIMMED):
+                    kept = frame[i]
+                    frame[i] = min(kept, value)
+                    value = max(kept, value)
+    if taken == 0:
+        for k in range(EXTREMES, EXTREMES + 8 * TRIMMED):
+            frame[k] = 0.0
+    trim = EXTREMES + min(taken // 85, TRIMMED - 1)
+    longest = SMALLEST_CELL
+    for q in range(d):
+        frame[ORIGIN + q] = frame[trim + 2 * q * TRIMMED]
+        frame[EXTENT + q] = -frame[trim + (2 * q + 1) * TRIMMED] - frame[ORIGIN + q]
+        longest = max(longest, frame[EXTENT + q])
+    small = frame[trim + 2 * d * TRIMMED]
+    large = -frame[trim + (2 * d + 1) * TRIMMED]
+
+    budget = CELLS_PER_OBJECT * count + 64.0
+    cell = max(longest / budget, SMALLEST_CELL)
+    total = np.inf
+    while total > budget:
+        cell *= 1.1
+        total = 1.0
+        for q in range(d):
+            total *= max(3.0, frame[EXTENT + q] / cell + 1.0)
+    # A whole number of halvings below the large boxes: boxes of equal size fit their cell tightly.
+    halved = max(large, cell)
+    while 0.5 * halved >= max(cell, small):
+        halved *= 0.5
+    frame[FINE] = halved * LOOSE
+    frame[INVERSE] = 1.0 / frame[FINE]
+    frame[SMALL] = small
+    if count <= BRUTE_FORCE_BELOW:
+        return 0
+    levels = 1
+    longest *= frame[INVERSE]
+    while longest >= 1.0:
+        longest *= 0.5
+        levels += 1
+    return levels
+
+
+@kernel
+def _lay_out_levels(levels, table, frame, room, like):
+    """Fill the table for ``levels`` levels, the top level and the boxes in no level; returns ``levels``.
+
+    Level l has at most max(0.2 room / 2**l, 3**d) cells and two thirds of them as guards: all levels fit in ``room``.
+    """
+    d = len(like)
+    base = 0
+    scale = 1.0
+    for level in range(levels + 2):
+        cells = 1
+        outer = 1
+        table[level, BASE] = base
+        frame[SCALES + level] = scale if level < levels else 0.0
+        wanted = 1.0
+        for q in range(d):
+            wanted *= max(3.0, frame[EXTENT + q] * frame[INVERSE] * scale + 1.0)
+        # Where finer cells were tried the bounds cannot be covered: an equal width per axis, the rest wraps round.
+        cut = np.inf if wanted <= 0.2 * room * scale else (0.2 * room * scale) ** (1.0 / d)
+        for q in range(d):
+            width = max(3.0, min(frame[EXTENT + q] * frame[INVERSE] * scale + 1.0, cut))
+            table[level, STRIDE + q] = cells if level < levels else 0
+            outer = cells
+            cells *= int(width)
+        # Two rows of guard cells: whatever is inside the bounds then has its neighbours without wrapping round.
+        table[level, CELLS] = cells + 2 * outer if level < levels else 1
+        table[level, SHIFT] = outer + 1 if level < levels else 0
+        base += table[level, CELLS]
+        scale *= 0.5
+    return levels
+
+
+@kernel
+def _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like):
+    """Key of each object's cell, directory of all cells, extent of what was found; returns the finest level's crowding.
+
+    Crowding is the sum of squared cell counts: the number of candidates within cells, twice.
+    """
+    d = len(like)
+    used = table[levels + 1, BASE] + 1
+    for k in range(used + 2):
+        directory[k] = 0
+    origin, lowest, highest = like, like, like
+    for q in range(d):
+        origin = tuple_setitem(origin, q, frame[ORIGIN + q])
+    inverse = frame[INVERSE]
+    for row in range(start, stop):
+        size = 0.0
+        valid, tame = True, True
+        middle = like
+        for q in range(d):
+            valid &= upper[row, q] >= lower[row, q]
+            low = lower[row, q] - origin[q]
+            high = upper[row, q] - origin[q]
+            reach = (high - low) + REACH * (abs(low) + abs(high))
+            tame &= reach < np.inf  # also false for NaN, from two equal infinities
+            size = max(size, reach)
+            middle = tuple_setitem(middle, q, 0.5 * (low + high) * inverse)
+        size *= inverse
+        # Sizes up to 1 in finest cells belong to level 0, up to 2 to level 1, up to 4 to level 2: the binary exponent.
+        level = min(max(((np.float64(size).view(np.int64) - 1) >> 52) - 1022, 0), levels)
+        level = level if valid & tame & (size < 1e300) else levels
+        number = table[level, SHIFT]
+        for q in range(d):
+            at = middle[q] if level < levels else 0.0
+            lowest = tuple_setitem(lowest, q, min(lowest[q], at))
+            highest = tuple_setitem(highest, q, max(highest[q], at))
+            number += np.int64(math.floor(at * frame[SCALES + level])) * table[level, STRIDE + q]
+        if number < 0 or number >= table[level, CELLS]:
+            number %= table[level, CELLS]
+        key = number + table[level, BASE] if valid else used - 1
+        keys[row - start] = key
+        directory[key + 2] += 1
+    for q in range(d):
+        frame[LOWEST + q] = lowest[q]
+        frame[HIGHEST + q] = highest[q]
+
+    crowding = 0.0
+    total = 0
+    finest = table[0, CELLS] if levels > 0 else 0
+    for k in range(used):
+        found = directory[k + 2]
+        crowding += float(found) * float(found) if k < finest else 0.0
+        total += found
+        directory[k + 2] = total
+    for level in range(levels + 2):
+        table[level, BEGIN] = directory[table[level, BASE] + 1]
+        table[level, END] = directory[table[level, BASE] + table[level, CELLS] + 1]
+    return crowding
+
+
+@kernel
+def _spacing(lower, upper, start, stop, directory, keys, table, frame, like):
+    """Mean distance of the objects in the fullest cell of level 0: the cell size that would part them; 0 if it is 0."""
+    d = len(like)
+    fullest, most = 0, 0
+    for k in range(table[0, CELLS]):
+        here = directory[k + 2] - directory[k + 1]
+        fullest, most = (k, here) if here > most else (fullest, most)
+    widest = 0.0
+    for q in range(d):
+        low, high = np.inf, -np.inf
+        for row in range(start, stop):
+            if keys[row - start] == fullest:
+                middle = 0.5 * (lower[row, q] + upper[row, q])
+                low, high = min(low, middle), max(high, middle)
+        widest = max(widest, high - low)
+    return widest / float(most) ** (1.0 / d)
+
+
+@kernel
+def _place(lower, upper, start, stop, directory, keys, order, cells, boxes, like):
+    """The counting sort's last pass. Afterwards directory[key] is where cell ``key`` begins."""
+    d = len(like)
+    for row in range(start, stop):
+        key = keys[row - start]
+        at = directory[key + 1]
+        directory[key + 1] = at + 1
+        order[at] = row
+        cells[at] = key
+        for q in range(d):
+            boxes[at, q] = lower[row, q]
+            boxes[at, d + q] = upper[row, q]
+
+
+@kernel
+def encode_boxes(boxes, count, frame, codes, like):
+    """Each box's corners in small integers, all in one number: 14 bits each in 2D, 9 in 3D, with a free bit above.
+
+    Lower corners come first, then the largest integer minus the upper corners. Rounding down and clamping keep order,
+    so boxes that overlap have codes that overlap. Codes compare boxes of one frame only.
+    """
+    d = len(like)
+    field = CODE_BITS // (2 * d)
+    largest = float((1 << (field - 1)) - 1)
+    scale, offset = like, like
+    for q in range(d):
+        scale = tuple_setitem(scale, q, largest / (frame[EXTENT + q] + frame[FINE]))
+        offset = tuple_setitem(offset, q, frame[ORIGIN + q] - 0.5 * frame[FINE])
+    for i in range(count):
+        code = np.int64(0)
+        for q in range(d):
+            low = (boxes[i, q] - offset[q]) * scale[q]
+            high = (boxes[i, d + q] - offset[q]) * scale[q]
+            low = min(low if low > 0.0 else 0.0, largest)
+            high = min(high if high > 0.0 else 0.0, largest)
+            code |= np.int64(low) << (q * field)
+            code |= (np.int64(largest) - np.int64(high)) << ((d + q) * field)
+        codes[i] = code
