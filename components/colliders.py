@@ -8,7 +8,7 @@ import numpy as np
 
 from ..framework.columns import column
 from ..framework.component import Component
-from ..framework.vectors import replace
+from ..framework.vectors import item, replace
 
 ALL_LAYERS = -1  # every bit set
 
@@ -118,6 +118,6 @@ class AABBCollider(Collider):
         for k in range(len(half)):
             total = 0.0
             for j in range(len(half)):
-                total += abs(axes[k, j]) * half[j]
+                total += abs(axes[k, j]) * item(half, j)
             result = replace(result, k, total)
         return (result,)

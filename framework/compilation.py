@@ -53,17 +53,27 @@ log = CompilationLog()
 def kernel(function: Function) -> Function:
     """Compile ``function`` on first call, per argument types, and keep the machine code on disk.
 
-    IEEE semantics throughout (no fastmath: same input, same bits); division by zero gives inf or nan.
+    IEEE semantics throughout (no fastmath: same input, same bits); division by zero gives inf or nan. The function
+    cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
+    passed in tuples. Use :func:`allocating_kernel` for those that must.
     """
-    dispatcher: Any = numba.njit(error_model="numpy")(function)
-    if isinstance(dispatcher, Dispatcher):  # a plain function when NUMBA_DISABLE_JIT is set
-        dispatcher._cache = KernelCache(dispatcher)  # type: ignore[attr-defined]
-    return dispatcher
+    return _cached(numba.njit(error_model="numpy", _nrt=False)(function))
+
+
+def allocating_kernel(function: Function) -> Function:
+    """Like :func:`kernel`, for functions that make arrays; keep hot loops out of them."""
+    return _cached(numba.njit(error_model="numpy")(function))
 
 
 def inlined(function: Function) -> Function:
     """For helpers that must disappear into the kernels which call them; those alone are kept on disk."""
-    return numba.njit(error_model="numpy", forceinline=True)(function)  # type: ignore[return-value]
+    return numba.njit(error_model="numpy", forceinline=True, _nrt=False)(function)  # type: ignore[return-value]
+
+
+def _cached(dispatcher: Any) -> Any:
+    if isinstance(dispatcher, Dispatcher):  # a plain function when NUMBA_DISABLE_JIT is set
+        dispatcher._cache = KernelCache(dispatcher)  # type: ignore[attr-defined]
+    return dispatcher
 
 
 def cache_folder() -> Path | None:
@@ -169,6 +179,8 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
     if isinstance(value, Dispatcher):
         digest.update(repr(sorted(value.targetoptions.items())).encode())
         value = value.py_func
+    if hasattr(value, "carom_depends_on"):  # code written by hand, see vectors
+        value = value.carom_depends_on
     if isinstance(value, types.FunctionType):
         if id(value) in seen:
             digest.update(b"again")

@@ -1,94 +1,228 @@
 """Points and vectors inside kernels: tuples of 2 or 3 floats, so that the dimension is known when a kernel compiles.
 
 One source serves 2D and 3D: a kernel takes ``like``, a tuple of zeros of the world's dimension, and loops over
-``range(len(like))``; the loops unroll completely.
+``range(len(like))``. Each operation is defined by the plain Python function that stands here, which is also what runs
+with the JIT off; in compiled code it becomes a few instructions, written out per component, because loops over tuples
+take numba and LLVM many times as long to compile.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
-from numba.cpython.unsafe.tuple import tuple_setitem
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from .compilation import inlined
 
-
-@inlined
-def row(column, index, like):
-    """Row ``index`` of an (n, d) column as a tuple."""
-    result = like
-    for k in range(len(like)):
-        result = tuple_setitem(result, k, column[index, k])
-    return result
+_INDEX = ir.IntType(32)
 
 
-@inlined
-def store(column, index, vector):
-    for k in range(len(vector)):
-        column[index, k] = vector[k]
+def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callable[[Any], Any]:
+    """Replace a plain function by code that ``emit(context, builder, argument types, values)`` writes."""
+
+    def decorate(function: Any) -> Any:
+        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+            return function
+        count = function.__code__.co_argcount
+
+        def typing(typing_context: Any, *arguments: Any) -> Any:
+            made = signature(*arguments)
+            if made is None:
+                return None
+
+            def codegen(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+                return emit(context, builder, sig.args, values)
+
+            return made, codegen
+
+        names = ", ".join(f"a{i}" for i in range(count))
+        scope = {"typing": typing}
+        exec(f"def {function.__name__}(context, {names}): return typing(context, {names})", scope)
+        made = intrinsic(scope[function.__name__])
+        made.__doc__ = function.__doc__
+        made.carom_depends_on = (function, emit, signature)
+        return made
+
+    return decorate
 
 
-@inlined
-def replace(vector, k, value):
-    """``vector`` with component ``k`` set to ``value``."""
-    return tuple_setitem(vector, k, value)
+def _vector(value: Any) -> types.UniTuple | None:
+    """The vector type for an argument, None if it is no tuple of numbers."""
+    if isinstance(value, types.BaseTuple) and value.count in (2, 3):
+        return types.UniTuple(types.float64, value.count)
+    return None
 
 
-@inlined
+def _elementwise(operation: Callable[..., Any], vectors: int, scalars: int) -> tuple[Any, Any]:
+    """(emit, signature) of an operation on each component of some vectors, with some scalars."""
+
+    def emit(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+        result = values[0]
+        for k in range(arguments[0].count):
+            parts = [builder.extract_value(value, k) for value in values[:vectors]]
+            result = builder.insert_value(result, operation(builder, *parts, *values[vectors:]), k)
+        return result
+
+    def signature(*arguments: Any) -> Any:
+        kind = _vector(arguments[0])
+        if kind is None:
+            return None
+        return kind(*(kind,) * vectors, *(types.float64,) * scalars)
+
+    return emit, signature
+
+
+@_emitted(*_elementwise(lambda b, x, y: b.fadd(x, y), 2, 0))
 def add(a, b):
-    result = a
-    for k in range(len(a)):
-        result = tuple_setitem(result, k, a[k] + b[k])
-    return result
+    """a + b."""
+    return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
-@inlined
+@_emitted(*_elementwise(lambda b, x, y: b.fsub(x, y), 2, 0))
 def sub(a, b):
-    result = a
-    for k in range(len(a)):
-        result = tuple_setitem(result, k, a[k] - b[k])
-    return result
+    """a - b."""
+    return tuple(x - y for x, y in zip(a, b, strict=True))
 
 
-@inlined
+@_emitted(*_elementwise(lambda b, x, s: b.fmul(x, s), 1, 1))
 def scale(a, factor):
-    result = a
-    for k in range(len(a)):
-        result = tuple_setitem(result, k, a[k] * factor)
-    return result
+    """a times a number."""
+    return tuple(x * factor for x in a)
 
 
-@inlined
+@_emitted(*_elementwise(lambda b, x, s: b.fdiv(x, s), 1, 1))
+def divided(a, divisor):
+    """a divided by a number."""
+    return tuple(x / divisor for x in a)
+
+
+@_emitted(*_elementwise(lambda b, x, y, s: b.fadd(x, b.fmul(s, y)), 2, 1))
 def add_scaled(a, b, factor):
     """a + factor * b."""
-    result = a
-    for k in range(len(a)):
-        result = tuple_setitem(result, k, a[k] + factor * b[k])
-    return result
+    return tuple(x + factor * y for x, y in zip(a, b, strict=True))
 
 
-@inlined
+@_emitted(*_elementwise(lambda b, x: b.fneg(x), 1, 0))
 def negative(a):
-    result = a
-    for k in range(len(a)):
-        result = tuple_setitem(result, k, -a[k])
-    return result
+    """-a."""
+    return tuple(-x for x in a)
 
 
-@inlined
-def dot(a, b):
-    total = a[0] * b[0]
-    for k in range(1, len(a)):
-        total += a[k] * b[k]
+def _emit_dot(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    products = [
+        builder.fmul(builder.extract_value(values[0], k), builder.extract_value(values[1], k))
+        for k in range(arguments[0].count)
+    ]
+    total = products[0]
+    for product in products[1:]:
+        total = builder.fadd(total, product)
     return total
 
 
-@inlined
-def divided(a, divisor):
-    result = a
-    for k in range(len(a)):
-        result = tuple_setitem(result, k, a[k] / divisor)
+def _sign_dot(a: Any, b: Any) -> Any:
+    kind = _vector(a)
+    return None if kind is None else types.float64(kind, kind)
+
+
+@_emitted(_emit_dot, _sign_dot)
+def dot(a, b):
+    """Scalar product."""
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total += x * y
+    return total
+
+
+def _in_memory(builder: Any, vector: Any, index: Any) -> tuple[Any, Any]:
+    """The vector on the stack, and the place of one component; LLVM dissolves both once the index is known."""
+    memory = cgutils.alloca_once(builder, vector.type)
+    builder.store(vector, memory)
+    return memory, builder.gep(memory, [index.type(0), index], inbounds=True)
+
+
+def _emit_item(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    return builder.load(_in_memory(builder, *values)[1])
+
+
+def _sign_item(a: Any, k: Any) -> Any:
+    kind = _vector(a)
+    return None if kind is None else types.float64(kind, types.intp)
+
+
+@_emitted(_emit_item, _sign_item)
+def item(a, k):
+    """Component k, which must be in range: unlike ``a[k]`` it is not checked, and compiles much faster."""
+    return a[k]
+
+
+def _emit_replace(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    memory, place = _in_memory(builder, *values[:2])
+    builder.store(values[2], place)
+    return builder.load(memory)
+
+
+def _sign_replace(a: Any, k: Any, value: Any) -> Any:
+    kind = _vector(a)
+    return None if kind is None else kind(kind, types.intp, types.float64)
+
+
+@_emitted(_emit_replace, _sign_replace)
+def replace(a, k, value):
+    """a with component k, which must be in range, set to ``value``."""
+    return (*a[:k], value, *a[k + 1 :])
+
+
+def _places(context: Any, builder: Any, kind: Any, array: Any, index: Any, count: int) -> list[Any]:
+    """Addresses of the components of a row of an (n, d) array."""
+    made = context.make_array(kind)(context, builder, array)
+    columns = [context.get_constant(types.intp, k) for k in range(count)]
+    return [cgutils.get_item_pointer(context, builder, kind, made, [index, k]) for k in columns]
+
+
+def _emit_row(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    result = values[2]
+    for k, place in enumerate(_places(context, builder, arguments[0], values[0], values[1], arguments[2].count)):
+        result = builder.insert_value(result, builder.load(place), k)
     return result
+
+
+def _sign_row(column: Any, index: Any, like: Any) -> Any:
+    kind = _vector(like)
+    if kind is None or not isinstance(column, types.Array) or column.ndim != 2 or column.dtype != types.float64:
+        return None
+    return kind(column, types.intp, kind)
+
+
+@_emitted(_emit_row, _sign_row)
+def row(column, index, like):
+    """Row ``index`` (not negative) of an (n, d) column as a tuple."""
+    return tuple(column[index, k] for k in range(len(like)))
+
+
+def _emit_store(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    for k, place in enumerate(_places(context, builder, arguments[0], values[0], values[1], arguments[2].count)):
+        builder.store(builder.extract_value(values[2], k), place)
+    return context.get_dummy_value()
+
+
+def _sign_store(column: Any, index: Any, vector: Any) -> Any:
+    kind = _vector(vector)
+    if kind is None or not isinstance(column, types.Array) or column.ndim != 2 or column.dtype != types.float64:
+        return None
+    return types.none(column, types.intp, kind)
+
+
+@_emitted(_emit_store, _sign_store)
+def store(column, index, vector):
+    """Set row ``index`` (not negative) of an (n, d) column."""
+    for k, value in enumerate(vector):
+        column[index, k] = value
 
 
 @inlined
@@ -99,11 +233,8 @@ def length(a):
         return math.sqrt(square)
     largest = 0.0
     for k in range(len(a)):
-        largest = max(largest, abs(a[k]))
+        largest = max(largest, abs(item(a, k)))
     if largest == 0.0 or not math.isfinite(largest):
         return largest
-    square = 0.0
-    for k in range(len(a)):
-        part = a[k] / largest
-        square += part * part
-    return largest * math.sqrt(square)
+    part = divided(a, largest)
+    return largest * math.sqrt(dot(part, part))

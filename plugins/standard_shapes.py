@@ -12,7 +12,7 @@ import math
 from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import inlined
 from ..framework.registry import Plugin
-from ..framework.vectors import divided, length, replace, scale
+from ..framework.vectors import divided, item, length, replace, scale
 
 standard_shapes = Plugin("standard shapes")
 
@@ -45,7 +45,7 @@ def sphere_box(a, b, d):
     nearest = d  # of the box, seen from the sphere's centre
     inside = True
     for k in range(len(d)):
-        low, high = d[k] - b.half_extents[k], d[k] + b.half_extents[k]
+        low, high = item(d, k) - item(b.half_extents, k), item(d, k) + item(b.half_extents, k)
         if low > 0.0:
             nearest = replace(nearest, k, low)
             inside = False
@@ -60,9 +60,9 @@ def sphere_box(a, b, d):
         return depth >= 0.0, depth, divided(nearest, distance), nearest
     axis, room, sign = 0, math.inf, 1.0
     for k in range(len(d)):
-        to_face = b.half_extents[k] - abs(d[k])
+        to_face = item(b.half_extents, k) - abs(item(d, k))
         if to_face < room:
-            axis, room, sign = k, to_face, 1.0 if d[k] >= 0.0 else -1.0
+            axis, room, sign = k, to_face, 1.0 if item(d, k) >= 0.0 else -1.0
     depth = a.radius + room
     normal = axis_normal(d, axis, sign)
     return True, depth, normal, scale(normal, -room)
@@ -77,10 +77,10 @@ def box_box(a, b, d):
     axis, depth, sign = 0, math.inf, 1.0
     point = d
     for k in range(len(d)):
-        overlap = a.half_extents[k] + b.half_extents[k] - abs(d[k])
+        overlap = item(a.half_extents, k) + item(b.half_extents, k) - abs(item(d, k))
         if overlap < depth:
-            axis, depth, sign = k, overlap, 1.0 if d[k] >= 0.0 else -1.0
-        low = max(-a.half_extents[k], d[k] - b.half_extents[k])
-        high = min(a.half_extents[k], d[k] + b.half_extents[k])
+            axis, depth, sign = k, overlap, 1.0 if item(d, k) >= 0.0 else -1.0
+        low = max(-item(a.half_extents, k), item(d, k) - item(b.half_extents, k))
+        high = min(item(a.half_extents, k), item(d, k) + item(b.half_extents, k))
         point = replace(point, k, 0.5 * (low + high))
     return depth >= 0.0, depth, axis_normal(d, axis, sign), point

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..framework.compilation import kernel
 from ..framework.schedule import Phase, System
-from ..framework.vectors import add, replace, row, store
+from ..framework.vectors import add, item, replace, row, store
 from .spatial_tree import SpatialTree
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def make_box_kernel(shape_bounds: Any, write_world: Any) -> Callable[..., None]:
                 for k in range(len(like)):
                     total = 0.0
                     for j in range(len(like)):
-                        total += axes[i, k, j] * local[j]
+                        total += axes[i, k, j] * item(local, j)
                     at = replace(at, k, total)
             if turns:
                 write_world(shape, i, shapes, world, turned, axes, like)
@@ -51,13 +51,13 @@ def make_box_kernel(shape_bounds: Any, write_world: Any) -> Callable[..., None]:
             half = shape_bounds(shape, i, world, like)
             smallest = half[0]
             for k in range(1, len(like)):
-                smallest = min(smallest, half[k])
+                smallest = min(smallest, item(half, k))
             size[i] = 2.0 * smallest
             margin = MARGIN * smallest
             first, last = add(row(before, i, like), at), add(row(after, i, like), at)
             for k in range(len(like)):
-                lower[i, k] = min(first[k], last[k]) - half[k] - margin
-                upper[i, k] = max(first[k], last[k]) + half[k] + margin
+                lower[i, k] = min(item(first, k), item(last, k)) - item(half, k) - margin
+                upper[i, k] = max(item(first, k), item(last, k)) + item(half, k) + margin
 
     return box_motion
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..framework.bodies import SelectedBodies
 from ..framework.compilation import kernel
 from ..framework.schedule import ForceSystem, Phase, System
-from ..framework.vectors import replace, store
+from ..framework.vectors import item, replace, store
 
 if TYPE_CHECKING:
     from .state import PhysicsState
@@ -22,7 +22,7 @@ def sum_constant_forces(force, mass, gravity, gravity_scale, constant, applied, 
         total = gravity
         weight = mass[i] * gravity_scale[i]
         for k in range(len(gravity)):
-            total = replace(total, k, weight * gravity[k] + constant[i, k] + applied[i, k] + for_step[i, k])
+            total = replace(total, k, weight * item(gravity, k) + constant[i, k] + applied[i, k] + for_step[i, k])
         store(force, i, total)
 
 

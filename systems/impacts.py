@@ -13,12 +13,15 @@ from typing import Any
 import numpy as np
 
 from ..framework.compilation import inlined, kernel
-from ..framework.vectors import add, add_scaled, divided, dot, length, negative, row, scale, store, sub
+from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, row, scale, store, sub
 
 AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(5)  # in the order of framework.settings.MIXING_RULES
 
 TIME_ITERATIONS = 80
-NEVER = 2.0  # of the step: no impact in it
+ROUNDING = 4e-16  # of the distance between the centres: a separation smaller than that is none
+
+# places in ``counts``: events made, events waiting, impacts logged, impacts cut off by the cap, the event now, its pair
+EVENTS, WAITING, LOGGED, CAPPED, CURRENT, LAST = range(6)
 
 
 @inlined
@@ -36,21 +39,15 @@ def mix(rule, a, b):
 
 
 @inlined
-def path_position(i, t, origin, path, second, third, degree, like):
-    """Where body i is at time t of the step."""
-    x = add_scaled(row(origin, i, like), row(path, i, like), t)
-    if degree > 1:
-        x = add_scaled(x, add_scaled(row(second, i, like), row(third, i, like), t), t * t)
-    return x
+def along(t, x0, x1, x2, x3):
+    """x0 + x1 t + x2 t^2 + x3 t^3."""
+    return add_scaled(x0, add_scaled(x1, add_scaled(x2, x3, t), t), t)
 
 
 @inlined
-def path_velocity(i, t, path, second, third, degree, like):
-    """How fast body i moves at time t of the step."""
-    v = row(path, i, like)
-    if degree > 1:
-        v = add_scaled(v, add_scaled(scale(row(second, i, like), 2.0), row(third, i, like), 3.0 * t), t)
-    return v
+def along_rate(t, x1, x2, x3):
+    """The derivative of :func:`along`."""
+    return add_scaled(x1, add_scaled(scale(x2, 2.0), x3, 3.0 * t), t)
 
 
 @inlined
@@ -91,180 +88,179 @@ def heap_pop(heap, size, times, keys):
         parent = child
 
 
+@kernel
+def bounce(
+    event, dt, pair_a, pair_b, position, velocity, inverse_mass, origin, path, struck, pair_impulse, pair_normal,
+    pair_point, pair_depth, pair_times, events, event_values, log_pair, log_value, counts, like,
+):  # fmt: skip
+    """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
+    c = events[event, 0]
+    a, b = pair_a[c], pair_b[c]
+    now = event_values[event, 0]
+    impulse = event_values[event, 1] / (inverse_mass[a] + inverse_mass[b])
+    normal = like
+    for k in range(len(like)):
+        normal = replace(normal, k, event_values[event, 2 + k])
+        pair_normal[c, k] = event_values[event, 2 + k]
+        pair_point[c, k] = event_values[event, 2 + len(like) + k]
+    for side in range(2):
+        i = a if side == 0 else b
+        dv = scale(normal, (-impulse if side == 0 else impulse) * inverse_mass[i])
+        struck[i] += 1
+        if inverse_mass[i] > 0.0:
+            store(origin, i, add_scaled(row(origin, i, like), dv, -now))
+            store(path, i, add(row(path, i, like), dv))
+            store(position, i, add_scaled(row(position, i, like), dv, dt - now))
+            store(velocity, i, add(row(velocity, i, like), dv))
+    pair_impulse[c] += impulse
+    pair_depth[c] = 0.0
+    pair_times[c] = now
+    logged = counts[LOGGED]
+    log_pair[logged] = c
+    for k in range(2 + 2 * len(like)):
+        log_value[logged, k] = event_values[event, k]
+    log_value[logged, 1] = impulse
+    counts[LOGGED] += 1
+
+
 def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
     """The event loop over the shapes of a scene."""
 
     @kernel
-    def pair_at(a, b, t, shape_of, offset, shapes, motion, like):
-        """The pair's geometry at time t of the step."""
-        origin, path, second, third, degree = motion
-        centre = add(path_position(a, t, origin, path, second, third, degree, like), row(offset, a, like))
-        other = add(path_position(b, t, origin, path, second, third, degree, like), row(offset, b, like))
-        hit, depth, normal, point = evaluate(shape_of[a], a, shape_of[b], b, sub(other, centre), shapes, like)
-        return hit, depth, normal, add(centre, point)
+    def consider(
+        c, since, dt, looked_at, pair_a, pair_b, rank, shape_of, offset, shapes, velocity, start_velocity, motion,
+        restitution, slots, rule, fixed_threshold, cap, share, struck, pair_impulse, events, event_times, event_keys,
+        event_values, heap, counts, like,
+    ):  # fmt: skip
+        """Put the pair's next impact into the queue, if it has one: e > 0, overlap at the end, a fast approach.
 
-    @kernel
-    def entry_time(a, b, since, dt, shape_of, offset, shapes, motion, like):
-        """When the pair begins to touch, between ``since`` and dt, at whose end it does; ``since`` if it does already.
-
-        A bracketing secant (Illinois) on the separation, which halves the bracket whenever that does not.
+        The time is when the pair begins to touch, ``since`` if it does then already. It is found between a time
+        apart and one in touch by secants on the separation (Illinois), every eighth time by halving the bracket.
         """
-        hit, depth, _, _ = pair_at(a, b, since, shape_of, offset, shapes, motion, like)
-        if hit:
-            return since
-        low, high, at_low = since, dt, depth
-        _, at_high, _, _ = pair_at(a, b, dt, shape_of, offset, shapes, motion, like)
-        side = 0
-        for iteration in range(TIME_ITERATIONS):
-            middle = 0.5 * (low + high)
-            if at_low < 0.0 < at_high and iteration % 8 != 7:
-                secant = high - (high - low) * (at_high / (at_high - at_low))
-                if low < secant < high:
-                    middle = secant
-            if not low < middle < high:
-                break
-            hit, depth, _, _ = pair_at(a, b, middle, shape_of, offset, shapes, motion, like)
-            if hit:
-                high, at_high = middle, depth
-                if depth == 0.0:
+        origin, path, second, third, degree = motion
+        a, b = pair_a[c], pair_b[c]
+        shape_a, shape_b = shape_of[a], shape_of[b]
+        e = mix(rule, restitution[slots[shape_a], a], restitution[slots[shape_b], b])
+        if e <= 0.0:
+            return
+        low, high, at_low, at_high, side = since, dt, 0.0, 0.0, 0
+        # b's path as a sees it
+        x0, x1 = sub(row(origin, b, like), row(origin, a, like)), sub(row(path, b, like), row(path, a, like))
+        x0 = add(x0, sub(row(offset, b, like), row(offset, a, like)))
+        x2, x3 = like, like
+        if degree > 1:
+            x2, x3 = sub(row(second, b, like), row(second, a, like)), sub(row(third, b, like), row(third, a, like))
+        t, normal, point, apart = dt, like, like, like
+        for look in range(TIME_ITERATIONS):  # one place that calls evaluate: it is what takes time to compile
+            middle = dt if look == 0 else since
+            if look > 1:
+                middle = 0.5 * (low + high)
+                if at_low < 0.0 < at_high and look % 8 != 7:
+                    secant = high - (high - low) * (at_high / (at_high - at_low))
+                    if low < secant < high:
+                        middle = secant
+                if not low < middle < high:
                     break
-                at_low = 0.5 * at_low if side == 1 else at_low
-                side = 1
+            d = along(middle, x0, x1, x2, x3)
+            hit, depth, n, p = evaluate(shape_a, a, shape_b, b, d, shapes, like)
+            near = look > 1 and abs(depth) <= ROUNDING * length(d)
+            if hit or near:
+                t, normal, point, apart = middle, n, p, d
+                if near:
+                    break
+                if look > 1:
+                    at_low = 0.5 * at_low if side == 1 else at_low
+                    side = 1
+                high, at_high = middle, depth
+                if look == 1:
+                    break
+            elif look == 0 and not looked_at:
+                return
             else:
+                if look > 1:
+                    at_high = 0.5 * at_high if side == -1 else at_high
+                    side = -1
                 low, at_low = middle, depth
-                at_high = 0.5 * at_high if side == -1 else at_high
-                side = -1
-        return high
-
-    @kernel
-    def approach(a, b, t, shape_of, offset, shapes, motion, like):
-        """Speed of separation along the normal at time t (negative: approach), depth, normal, point, and whether the
-        centres coincide.
-        """
-        origin, path, second, third, degree = motion
-        _, depth, normal, point = pair_at(a, b, t, shape_of, offset, shapes, motion, like)
-        w = sub(
-            path_velocity(b, t, path, second, third, degree, like),
-            path_velocity(a, t, path, second, third, degree, like),
-        )
-        centre = add(path_position(a, t, origin, path, second, third, degree, like), row(offset, a, like))
-        other = add(path_position(b, t, origin, path, second, third, degree, like), row(offset, b, like))
-        apart = sub(other, centre)
-        coincident = True
+        w = along_rate(t, x1, x2, x3)
+        if dot(apart, apart) == 0.0 and length(apart) == 0.0 and length(w) > 0.0:
+            if pair_impulse[c] > 0.0:  # it has parted already
+                return
+            normal = divided(negative(w), length(w))  # no direction between the centres: they part the way they came
+        speed = dot(w, normal)
+        threshold = fixed_threshold
+        if threshold < 0.0:
+            threshold = 2.0 * max(
+                gravity_share(a, share, velocity, start_velocity, like),
+                gravity_share(b, share, velocity, start_velocity, like),
+            )
+        if not speed < -threshold:
+            return
+        if struck[a] >= cap or struck[b] >= cap:
+            counts[CAPPED] += 1
+            return
+        centre = add(add_scaled(row(origin, a, like), row(path, a, like), t), row(offset, a, like))
+        if degree > 1:
+            centre = add_scaled(centre, add_scaled(row(second, a, like), row(third, a, like), t), t * t)
+        point = add(centre, point)
+        event = counts[EVENTS]
+        events[event, 0], events[event, 1], events[event, 2] = c, struck[a], struck[b]
+        event_times[event], event_keys[event] = t, rank[a] * len(rank) + rank[b]
+        event_values[event, 0], event_values[event, 1] = t, -(1.0 + e) * speed
         for k in range(len(like)):
-            coincident = coincident and apart[k] == 0.0
-        if coincident and length(w) > 0.0:  # no direction between the centres: they part the way they came
-            normal = divided(negative(w), length(w))
-        return dot(w, normal), depth, normal, point, coincident
+            event_values[event, 2 + k] = item(normal, k)
+            event_values[event, 2 + len(like) + k] = item(point, k)
+        counts[WAITING] = heap_push(heap, counts[WAITING], event, event_times, event_keys)
+        counts[EVENTS] += 1
 
     @kernel
     def resolve_impacts(
-        dt, pair_a, pair_b, pairs, responds, hits, found, rank, shape_of, offset, shapes, position, velocity,
-        start_velocity, inverse_mass, motion, restitution, slots, rule, fixed_threshold, cap, share, struck, pair_impulse,
-        pair_normal, pair_point, pair_depth, pair_times, counters, like,
+        dt, pair_a, pair_b, responds, offsets, neighbours, rank, shape_of, offset, shapes, position, velocity,
+        start_velocity, inverse_mass, motion, restitution, slots, rule, fixed_threshold, cap, share, struck,
+        pair_impulse, pair_normal, pair_point, pair_depth, pair_times, events, event_times, event_keys, event_values,
+        heap, log_pair, log_value, counts, like,
     ):  # fmt: skip
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
 
-        share (n,): see gravity_share. struck (n,): impacts per body. pair_*: per pair, the impulse summed and the last impact's geometry and time.
-        Returns the log of impacts: pair, time, impulse, normal, point; counters[0] impacts, [1] cut off by the cap.
+        The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[-1] are the contacts found.
+        share (n,): see gravity_share. struck (n,): impacts per body. pair_*: per pair, the impulse summed and the last
+        impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see EVENTS.
+        Returns False if the queue or the log may not suffice: call again with larger ones to go on.
         """
-        origin, path, second, third, degree = motion
-        capacity = 2 * found + 16
-        times, keys = np.empty(capacity), np.empty(capacity, np.int64)
-        event_pair = np.empty(capacity, np.int64)
-        stamps = np.empty((capacity, 2), np.int64)
-        heap = np.empty(capacity, np.int64)
-        events, size = 0, 0
-        log_pair, log_value = np.empty(found + 16, np.int64), np.empty((found + 16, 2 + 2 * len(like)))
-        logged = 0
-        offsets, neighbours = np.empty(0, np.int64), np.empty(0, np.int64)
-        # What is looked at next: first every contact, later the pairs of the two bodies just struck.
-        queue = hits[:found].astype(np.int64)
-        now = 0.0
+        bodies = len(rank)
         while True:
-            for q in range(len(queue)):
-                c = queue[q]
-                if not responds[c]:
-                    continue
+            # What is looked at: at first every contact, later the pairs of the two bodies just struck.
+            c = counts[LAST]
+            first, first_stop, second, second_stop = offsets[bodies], len(neighbours), 0, 0
+            if c >= 0:
                 a, b = pair_a[c], pair_b[c]
-                e = mix(rule, restitution[slots[shape_of[a]], a], restitution[slots[shape_of[b]], b])
-                if e <= 0.0:
-                    continue
-                if now > 0.0 or logged > 0:
-                    hit, _, _, _ = pair_at(a, b, dt, shape_of, offset, shapes, motion, like)
-                    if not hit:
-                        continue
-                t = entry_time(a, b, now, dt, shape_of, offset, shapes, motion, like)
-                speed, _, _, _, coincident = approach(a, b, t, shape_of, offset, shapes, motion, like)
-                if coincident and pair_impulse[c] > 0.0:  # it has parted already
-                    continue
-                threshold = fixed_threshold
-                if threshold < 0.0:
-                    threshold = 2.0 * max(
-                        gravity_share(a, share, velocity, start_velocity, like),
-                        gravity_share(b, share, velocity, start_velocity, like),
-                    )
-                if not speed < -threshold:
-                    continue
-                if struck[a] >= cap or struck[b] >= cap:
-                    counters[1] += 1
-                    continue
-                if events == capacity:
-                    capacity *= 2
-                    times, keys = grown(times, capacity), grown(keys, capacity)
-                    event_pair, heap = grown(event_pair, capacity), grown(heap, capacity)
-                    larger = np.empty((capacity, 2), np.int64)
-                    larger[:events] = stamps[:events]
-                    stamps = larger
-                times[events], event_pair[events] = t, c
-                keys[events] = rank[a] * len(rank) + rank[b]
-                stamps[events, 0], stamps[events, 1] = struck[a], struck[b]
-                size = heap_push(heap, size, events, times, keys)
-                events += 1
+                first, first_stop, second, second_stop = offsets[a], offsets[a + 1], offsets[b], offsets[b + 1]
+            wanted = first_stop - first + second_stop - second
+            if counts[EVENTS] + wanted > len(heap) or counts[LOGGED] == len(log_pair):
+                return False
+            for q in range(wanted):
+                p = neighbours[first + q if first + q < first_stop else second + q - (first_stop - first)]
+                if responds[p]:
+                    since = event_times[counts[CURRENT]] if c >= 0 else 0.0
+                    consider(
+                        p, since, dt, c < 0, pair_a, pair_b, rank, shape_of, offset, shapes, velocity, start_velocity,
+                        motion, restitution, slots, rule, fixed_threshold, cap, share, struck, pair_impulse, events,
+                        event_times, event_keys, event_values, heap, counts, like,
+                    )  # fmt: skip
             chosen = -1
-            while size > 0:
-                size = heap_pop(heap, size, times, keys)
-                event = heap[size]
-                c = event_pair[event]
-                if stamps[event, 0] == struck[pair_a[c]] and stamps[event, 1] == struck[pair_b[c]]:
+            while counts[WAITING] > 0 and chosen < 0:
+                counts[WAITING] = heap_pop(heap, counts[WAITING], event_times, event_keys)
+                event = heap[counts[WAITING]]
+                p = events[event, 0]
+                if events[event, 1] == struck[pair_a[p]] and events[event, 2] == struck[pair_b[p]]:
                     chosen = event
-                    break
             if chosen < 0:
-                break
-            now, c = times[chosen], event_pair[chosen]
-            a, b = pair_a[c], pair_b[c]
-            speed, depth, normal, point, _ = approach(a, b, now, shape_of, offset, shapes, motion, like)
-            e = mix(rule, restitution[slots[shape_of[a]], a], restitution[slots[shape_of[b]], b])
-            impulse = -(1.0 + e) * speed / (inverse_mass[a] + inverse_mass[b])
-            for side in range(2):
-                i = a if side == 0 else b
-                dv = scale(normal, (-impulse if side == 0 else impulse) * inverse_mass[i])
-                struck[i] += 1
-                if inverse_mass[i] > 0.0:
-                    store(origin, i, add_scaled(row(origin, i, like), dv, -now))
-                    store(path, i, add(row(path, i, like), dv))
-                    store(position, i, add_scaled(row(position, i, like), dv, dt - now))
-                    store(velocity, i, add(row(velocity, i, like), dv))
-            pair_impulse[c] += impulse
-            pair_depth[c] = depth
-            pair_times[c] = now
-            store(pair_normal, c, normal)
-            store(pair_point, c, point)
-            if logged == len(log_pair):
-                log_pair = grown(log_pair, 2 * logged)
-                larger_value = np.empty((2 * logged, log_value.shape[1]))
-                larger_value[:logged] = log_value
-                log_value = larger_value
-            log_pair[logged] = c
-            log_value[logged, 0], log_value[logged, 1] = now, impulse
-            for k in range(len(like)):
-                log_value[logged, 2 + k], log_value[logged, 2 + len(like) + k] = normal[k], point[k]
-            logged += 1
-            if len(offsets) == 0:
-                offsets, neighbours = pairs_of_bodies(pair_a, pair_b, pairs, len(struck))
-            queue = join(neighbours, offsets[a], offsets[a + 1], offsets[b], offsets[b + 1])
-        counters[0] += logged
-        return log_pair[:logged], log_value[:logged]
+                return True
+            counts[CURRENT], counts[LAST] = chosen, events[chosen, 0]
+            bounce(
+                chosen, dt, pair_a, pair_b, position, velocity, inverse_mass, motion[0], motion[1], struck,
+                pair_impulse, pair_normal, pair_point, pair_depth, pair_times, events, event_values, log_pair,
+                log_value, counts, like,
+            )  # fmt: skip
 
     return resolve_impacts
 
@@ -277,35 +273,23 @@ def gravity_share(i, share, velocity, start_velocity, like):
     return share[i]
 
 
-@inlined
-def grown(array, capacity):
-    larger = np.empty(capacity, array.dtype)
-    larger[: len(array)] = array
-    return larger
-
-
 @kernel
-def join(neighbours, first, first_stop, second, second_stop):
-    """Two stretches of a list, one after the other."""
-    result = np.empty(first_stop - first + second_stop - second, np.int64)
-    result[: first_stop - first] = neighbours[first:first_stop]
-    result[first_stop - first :] = neighbours[second:second_stop]
-    return result
+def pairs_of_bodies(pair_a, pair_b, pairs, hits, found, bodies, offsets, neighbours):
+    """The pairs of each body: those of row i are neighbours[offsets[i]:offsets[i + 1]], ascending; then the contacts.
 
-
-@kernel
-def pairs_of_bodies(pair_a, pair_b, pairs, bodies):
-    """The pairs of each body: those of row i are neighbours[offsets[i]:offsets[i + 1]], ascending."""
-    offsets = np.zeros(bodies + 2, np.int64)
+    offsets (bodies + 2,), neighbours (2 * pairs + found,).
+    """
+    for i in range(bodies + 2):
+        offsets[i] = 0
     for c in range(pairs):
         offsets[pair_a[c] + 2] += 1
         offsets[pair_b[c] + 2] += 1
     for i in range(2, bodies + 2):
         offsets[i] += offsets[i - 1]
-    neighbours = np.empty(2 * pairs, np.int64)
     for c in range(pairs):
         neighbours[offsets[pair_a[c] + 1]] = c
         offsets[pair_a[c] + 1] += 1
         neighbours[offsets[pair_b[c] + 1]] = c
         offsets[pair_b[c] + 1] += 1
-    return offsets, neighbours
+    for h in range(found):
+        neighbours[2 * pairs + h] = hits[h]

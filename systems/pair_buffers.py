@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..framework.contacts import Contacts, empty_columns
+from .impacts import CAPPED, LOGGED
 from .narrow_phase import order_of_pairs
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ class PairBuffers:
         self.resting = np.empty(0, np.int64)
         self.impact_pairs = np.empty(0, np.int64)
         self.step_impacts: dict[str, np.ndarray] | None = None
-        self.impact_counts = np.zeros(2, np.int64)
         self.contact_columns = empty_columns(dimensions, enabled=True)
         self._contact_pairs = np.empty(0, np.int64)  # the pair behind each row of the contacts
         names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "resting_contacts")
@@ -136,18 +136,19 @@ class PairBuffers:
         joined = np.concatenate((pairs, more))
         return joined[order_of_pairs(self.pair_a[joined], self.pair_b[joined], self.rank)]
 
-    def log_impacts(self, pair: np.ndarray, value: np.ndarray) -> None:
-        """Record the impacts of the step, in the order of their times; value: time, impulse, normal, point."""
+    def log_impacts(self, pairs: np.ndarray, values: np.ndarray, counts: np.ndarray) -> None:
+        """Record the impacts of the step, in the order of their times; values: time, impulse, normal, point."""
+        logged, capped = int(counts[LOGGED]), int(counts[CAPPED])
+        pair, value = pairs[:logged].copy(), values[:logged]
         self.impact_pairs = pair
-        self.pair_counters["impacts"] += int(self.impact_counts[0])
-        self.pair_counters["capped_impacts"] += int(self.impact_counts[1])
-        if self.impact_counts[1]:
+        self.pair_counters["impacts"] += logged
+        self.pair_counters["capped_impacts"] += capped
+        if capped:
             limit = self.world.settings.max_impacts_per_step
             self.world.report_fault(
-                f"step {self.world.step_count}: {self.impact_counts[1]} impacts beyond {limit} of a body in one step"
+                f"step {self.world.step_count}: {capped} impacts beyond {limit} of a body in one step"
             )
-        self.impact_counts[:] = 0
-        if not len(pair):
+        if not logged:
             return
         entity, d = self.table.arrays["entity"], self.dimensions
         self.step_impacts = {

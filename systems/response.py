@@ -8,6 +8,8 @@ import numpy as np
 
 from ..framework.schedule import Phase, System
 from ..framework.settings import MIXING_RULES
+from .event_queue import EventQueue
+from .impacts import pairs_of_bodies
 from .narrow_phase import order_of_pairs
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ class Response(System):
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
+        self._queue = EventQueue(state.dimensions)
 
     def process(self, dt: float) -> None:
         state = self._state
@@ -56,18 +59,26 @@ class Response(System):
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         settings, count = self.world.settings, state.table.count
         struck = np.zeros(count, np.int64)
+        offsets = np.empty(count + 2, np.int64)
+        neighbours = np.empty(2 * state.pairs + state.found, np.int64)
+        pairs_of_bodies(
+            state.pair_a, state.pair_b, state.pairs, state.hits, state.found, count, offsets, neighbours
+        )
+        queue = self._queue
+        queue.begin()
         curves = (scratch["path_second"], scratch["path_third"])
         motion = (scratch["origin"], scratch["path_velocity"], *curves, state.path_degree)
         threshold = settings.restitution_threshold
-        pair, value = state.kernels.resolve_impacts(
-            dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.hits, state.found, state.rank,
-            scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
+        while not state.kernels.resolve_impacts(
+            dt, state.pair_a, state.pair_b, state.responds, offsets, neighbours, state.rank, scratch["shape"],
+            scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
             scratch["start_velocity"], arrays["inverse_mass"], motion, state.table.stacks["collider.restitution"],
             state.slots, MIXING_RULES.index(settings.restitution_mixing), -1.0 if threshold is None else threshold,
             settings.max_impacts_per_step, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
-            state.pair_point, state.pair_depth, state.pair_times, state.impact_counts, state.like,
-        )  # fmt: skip
-        state.log_impacts(pair, value)
+            state.pair_point, state.pair_depth, state.pair_times, *queue.arrays, state.like,
+        ):  # fmt: skip
+            queue.grow(state.found)
+        state.log_impacts(queue.log_pair, queue.log_value, queue.counts)
         return struck
 
     def _resting(self, dt: float, struck: np.ndarray) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.compilation import kernel
+from ..framework.compilation import allocating_kernel, kernel
 from ..framework.vectors import add, add_scaled, dot, row, scale, store, sub
 from .impacts import gravity_share, mix
 
@@ -32,7 +32,7 @@ def make_resting_kernels(evaluate: Any) -> tuple[Callable[..., Any], Callable[..
         hit, depth, normal, point = evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
         return hit, depth, normal, add(centre, point)
 
-    @kernel
+    @allocating_kernel
     def find_resting(
         pair_a, pair_b, pairs, responds, hits, found, shape_of, offset, shapes, position, velocity, start_velocity,
         restitution, slots, rule, fixed_threshold, share, struck, pair_impulse, like,
@@ -67,7 +67,7 @@ def make_resting_kernels(evaluate: Any) -> tuple[Callable[..., Any], Callable[..
             count += 1
         return result[:count]
 
-    @kernel
+    @allocating_kernel
     def solve_resting(
         dt, resting, pair_a, pair_b, shape_of, offset, shapes, position, velocity, origin, start, inverse_mass, size,
         fixed_slop, pair_impulse, pair_normal, pair_point, pair_depth, like,

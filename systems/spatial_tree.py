@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import tree_build, tree_pairs, tree_queries
+from .tree_refine import refine
 
 Rows: TypeAlias = NDArray[np.int32]
 Corners: TypeAlias = NDArray[np.float64]
@@ -26,7 +27,7 @@ CANDIDATE_LIMIT = 1 << 26
 class CandidateLimitError(RuntimeError):
     """More candidate pairs than allowed, counted before anything was stored: too many objects in one place.
 
-    ``count`` is the number of candidates, an upper bound of the number of overlapping pairs; ``limit`` what was allowed.
+    ``count`` is the number of candidates, an upper bound of the number of overlapping pairs; ``limit`` what is allowed.
     """
 
     def __init__(self, count: int, limit: int) -> None:
@@ -73,10 +74,19 @@ class SpatialTree:
             raise ValueError(f"rows {start}..{stop} are not within the {len(lower)} given")
         if stop - start > len(self._keys):
             self._reserve(max(stop - start, len(self._keys) * 3 // 2))
-        self.count = tree_build.build_tree(
-            lower, upper, start, stop, self._directory, self._keys, self._order, self._cells, self._boxes,
-            self._codes, self._table, self._frame, self._like,
-        )  # fmt: skip
+        table, frame, directory, keys, like = self._table, self._frame, self._directory, self._keys, self._like
+        tree_build.choose_frame(lower, upper, start, stop, frame, like)
+        if not tree_build.assign_cells(lower, upper, start, stop, directory, keys, table, frame, like):
+
+            def assign() -> bool:
+                return tree_build.assign_cells(lower, upper, start, stop, directory, keys, table, frame, like)
+
+            rows = slice(start, stop)
+            refine(assign, lower[rows], upper[rows], directory, keys[: stop - start], table, frame)
+        tree_build.place(
+            lower, upper, start, stop, directory, keys, self._order, self._cells, self._boxes, self._codes, frame, like
+        )
+        self.count = int(table[int(frame[tree_build.LEVELS]), tree_build.END])
 
     def pairs_within(self, limit: int = CANDIDATE_LIMIT) -> tuple[Rows, Rows]:
         """Rows (first, second) of all pairs of objects whose boxes overlap; each pair once, no order within a pair.
@@ -86,13 +96,22 @@ class SpatialTree:
         """
         if self.count < 2:
             return self._first[:0], self._second[:0]
-        while True:
-            stop, candidates = tree_pairs.ranges_within(
-                self._table, self._frame, self._directory, self._cells, self._boxes, self._ranges, self._like
-            )
-            if stop >= 0:
-                break
-            self._grow_ranges(tree_pairs.RANGES_PER_OBJECT * self.count)
+        wanted = tree_pairs.RANGES_PER_OBJECT * self.count
+        if wanted + tree_pairs.SPARE > len(self._ranges):
+            self._grow_ranges(wanted)
+        stop, candidates, levels = tree_pairs.ranges_within_levels(
+            self._table, self._frame, self._directory, self._cells, self._ranges, self._like
+        )
+        if levels > 1:
+            before = stop
+            while True:
+                stop, more = tree_pairs.ranges_across_levels(
+                    self._table, self._frame, self._directory, self._boxes, self._ranges, before, self._like
+                )
+                if stop >= 0:
+                    break
+                self._grow_ranges(wanted, keep=before)
+            candidates += more
         if candidates > limit:
             raise CandidateLimitError(candidates, limit)
         self._state[0] = 0
@@ -120,11 +139,11 @@ class SpatialTree:
             raise CandidateLimitError(candidates, limit)
         self._state[0] = 0
         if middle > 0:
-            self._test(0, middle, self, other, self._codes_in(other))
+            self._test(0, middle, self, other, self._no_codes)
         # The second kind of range is owned by objects of the other tree: columns change places.
         if stop > middle:
             self._first, self._second = self._second, self._first
-            self._test(middle, stop, other, self, other._codes_in(self))
+            self._test(middle, stop, other, self, other._no_codes)
             self._first, self._second = self._second, self._first
         return self._first[: self._state[0]], self._second[: self._state[0]]
 
@@ -188,13 +207,6 @@ class SpatialTree:
             self._first = np.concatenate((self._first, np.empty_like(self._first)))
             self._second = np.concatenate((self._second, np.empty_like(self._second)))
 
-    def _codes_in(self, other: SpatialTree) -> NDArray[np.int64]:
-        """This tree's boxes coded in the frame of the other one."""
-        if len(self._foreign_codes) < len(self._codes):
-            self._foreign_codes = np.zeros_like(self._codes)
-        tree_build.encode_boxes(self._boxes, self.count, other._frame, self._foreign_codes, self._like)
-        return self._foreign_codes
-
     def _reserve(self, capacity: int) -> None:
         d = self.dimensions
         self._directory = np.zeros(tree_build.directory_size(capacity), np.int32)
@@ -203,10 +215,12 @@ class SpatialTree:
         self._cells = np.empty(capacity, np.int32)
         self._boxes = np.empty((capacity, 2 * d))
         self._codes = np.zeros(capacity + tree_pairs.BLOCK, np.int64)  # read past the end, never used
-        self._foreign_codes = np.zeros(0, np.int64)
+        self._no_codes = np.zeros(capacity, np.int64)  # of use between trees, whose frames differ
 
-    def _grow_ranges(self, wanted: int) -> None:
-        self._ranges = np.empty((max(wanted, 2 * len(self._ranges)) + 2 * tree_pairs.SPARE, 3), np.int32)
+    def _grow_ranges(self, wanted: int, keep: int = 0) -> None:
+        larger = np.empty((max(wanted, 2 * len(self._ranges)) + 2 * tree_pairs.SPARE, 3), np.int32)
+        larger[:keep] = self._ranges[:keep]
+        self._ranges = larger
 
     def _grow_found(self, used: int) -> None:
         larger = np.empty(2 * len(self._found), np.int32)

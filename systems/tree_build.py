@@ -1,9 +1,9 @@
 """The tree's layout: which cell a box belongs to, and all boxes in the order of their cells.
 
-A body sits in one cell of one level: the deepest level whose cells are at least as large as its box, in the cell that
-holds the box's centre. Its box then reaches at most half a cell over the cell's border (a *loose* quadtree or octree).
-There are no nodes and no pointers: each level is a row-major grid of cell numbers, ``x + w y + w h z``, and one counting
-sort over all levels brings the bodies into the order of their cells. A directory says where each cell begins.
+A body sits in one cell of one level: the deepest level whose cells are at least as large as its box, in the cell
+that holds the box's centre. Its box then reaches at most half a cell over the cell's border (a *loose* quadtree or
+octree). There are no nodes and no pointers: each level is a row-major grid of cell numbers, ``x + w y + w h z``, and
+one counting sort over all levels brings the bodies into the order of their cells. A directory says where each begins.
 
 Cell numbers are taken modulo the number of cells of the level, so a level covers all space with a finite directory:
 objects outside the trimmed bounds share cells with objects inside, and the box test tells them apart. Running off
@@ -29,6 +29,7 @@ SAMPLE = 256  # objects that the bounds and the cell size are estimated from
 TRIMMED = 3  # the sample's extreme values kept per side; the last of them is its 1 % or 99 % quantile
 CELLS_PER_OBJECT = 3.0  # size of the finest level's directory
 CROWDED = 24.0  # mean number of objects in an object's cell from which finer cells are tried
+TOO_MANY = 64  # objects too large or too far out for all levels, from which coarser levels are added
 REACH = 2.0**-38  # relative rounding error granted to every box
 LOOSE = 1.0 + 2.0**-16  # the finest cell exceeds the typical box by this, so that REACH does not push it a level up
 SMALLEST_CELL = 1e-290
@@ -41,62 +42,25 @@ BASE, CELLS, SHIFT, BEGIN, END, STRIDE = range(6)
 TABLE_COLUMNS = 8
 
 # Places in ``frame``; those apart by 3 hold one value per axis.
-ORIGIN, LOWEST, HIGHEST, EXTENT = 0, 3, 6, 9
-INVERSE, SMALL, LEVELS, FINE = 12, 13, 14, 15
-EXTREMES = 16  # 2 * TRIMMED values for each axis and for the size
+ORIGIN, LOWEST, HIGHEST, EXTENT, WIDTH = 0, 3, 6, 9, 12  # WIDTH: cells of level 0 that the directory has
+INVERSE, SMALL, LEVELS, FINE, CROWDING = 15, 16, 17, 18, 19
+EXTREMES = 20  # 2 * TRIMMED values for each axis and for the size
 SCALES = EXTREMES + 4 * 2 * TRIMMED
 FRAME_SIZE = SCALES + MAX_LEVELS + 2
 
 
 def directory_size(count: int) -> int:
-    """Entries that :func:`build_tree` may use for ``count`` objects."""
+    """Entries that the directory of ``count`` objects may need.
+
+    Level 0 has at most CELLS_PER_OBJECT * count + 64 cells; all coarser levels together at most 1.5 times that, if
+    none of them has its least number, 27 in 3D; guard rows add two thirds at most.
+    """
     return int(6 * CELLS_PER_OBJECT * count) + 150 * (MAX_LEVELS + 2)
 
 
 @kernel
-def build_tree(lower, upper, start, stop, directory, keys, order, cells, boxes, codes, table, frame, like):
-    """Sort rows start..stop-1 by cell. Fills all other arguments and returns how many objects are in the tree."""
-    levels = _choose_frame(lower, upper, start, stop, frame, like)
-    levels = _lay_out_levels(levels, table, frame, len(directory), like)
-    crowding = _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like)
-    # Most scenes are done here. The rest serves distant clusters, whose bounds say nothing about their density,
-    # and scenes with many objects too large or too far out for the levels there are.
-    before = crowding
-    while crowding >= 0.0 and 0 < levels < MAX_LEVELS - 1:
-        top = table[levels, END] - table[levels, BEGIN]
-        cell, inverse, coarsest = frame[FINE], frame[INVERSE], levels
-        if top > 64 + (stop - start) // 256:
-            levels = MAX_LEVELS - 1
-        elif crowding > CROWDED * (table[0, END] - table[0, BEGIN]) and cell > 2.0 * frame[SMALL]:
-            finer = _spacing(lower, upper, start, stop, directory, keys, table, frame, like)
-            finer = max(finer, max(frame[SMALL] * LOOSE, SMALLEST_CELL))
-            if finer > 0.5 * cell:
-                break
-            frame[FINE] = finer
-            frame[INVERSE] = 1.0 / finer
-            while finer < cell and levels < MAX_LEVELS - 1:
-                finer *= 2.0
-                levels += 1
-        else:
-            break
-        levels = _lay_out_levels(levels, table, frame, len(directory), like)
-        crowding = _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like)
-        if frame[FINE] < cell:
-            if crowding > 0.7 * before:  # no better: the former cells again, and no further attempt
-                frame[FINE], frame[INVERSE] = cell, inverse
-                levels = _lay_out_levels(coarsest, table, frame, len(directory), like)
-                _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like)
-                break
-            before = crowding
-    frame[LEVELS] = levels
-    _place(lower, upper, start, stop, directory, keys, order, cells, boxes, like)
-    encode_boxes(boxes, table[levels, END], frame, codes, like)
-    return table[levels, END]
-
-
-@kernel
-def _choose_frame(lower, upper, start, stop, frame, like):
-    """Origin, trimmed extent per axis and finest cell, from a sample of objects; returns the number of levels."""
+def choose_frame(lower, upper, start, stop, frame, like):
+    """Origin, trimmed extent per axis, finest cell and number of levels, from a sample of the objects."""
     d = len(like)
     count = stop - start
     for k in range(EXTREMES, EXTREMES + 8 * TRIMMED):
@@ -148,23 +112,26 @@ def _choose_frame(lower, upper, start, stop, frame, like):
     frame[FINE] = halved * LOOSE
     frame[INVERSE] = 1.0 / frame[FINE]
     frame[SMALL] = small
-    if count <= BRUTE_FORCE_BELOW:
-        return 0
-    levels = 1
-    longest *= frame[INVERSE]
-    while longest >= 1.0:
-        longest *= 0.5
-        levels += 1
-    return levels
+    for q in range(d):
+        frame[WIDTH + q] = frame[EXTENT + q] * frame[INVERSE]
+    levels = 0.0
+    if count > BRUTE_FORCE_BELOW:
+        levels = 1.0
+        longest *= frame[INVERSE]
+        while longest >= 1.0:
+            longest *= 0.5
+            levels += 1.0
+    frame[LEVELS] = levels
 
 
 @kernel
-def _lay_out_levels(levels, table, frame, room, like):
-    """Fill the table for ``levels`` levels, the top level and the boxes in no level; returns ``levels``.
+def assign_cells(lower, upper, start, stop, directory, keys, table, frame, like):
+    """Lay out the levels, find each object's cell and count; returns whether the cells suit the scene.
 
-    Level l has at most max(0.2 room / 2**l, 3**d) cells and two thirds of them as guards: all levels fit in ``room``.
+    Crowding is the sum of squared cell counts: twice the candidates within cells.
     """
     d = len(like)
+    levels = int(frame[LEVELS])
     base = 0
     scale = 1.0
     for level in range(levels + 2):
@@ -172,31 +139,16 @@ def _lay_out_levels(levels, table, frame, room, like):
         outer = 1
         table[level, BASE] = base
         frame[SCALES + level] = scale if level < levels else 0.0
-        wanted = 1.0
         for q in range(d):
-            wanted *= max(3.0, frame[EXTENT + q] * frame[INVERSE] * scale + 1.0)
-        # Where finer cells were tried the bounds cannot be covered: an equal width per axis, the rest wraps round.
-        cut = np.inf if wanted <= 0.2 * room * scale else (0.2 * room * scale) ** (1.0 / d)
-        for q in range(d):
-            width = max(3.0, min(frame[EXTENT + q] * frame[INVERSE] * scale + 1.0, cut))
             table[level, STRIDE + q] = cells if level < levels else 0
             outer = cells
-            cells *= int(width)
+            cells *= max(3, int(frame[WIDTH + q] * scale) + 1)
         # Two rows of guard cells: whatever is inside the bounds then has its neighbours without wrapping round.
         table[level, CELLS] = cells + 2 * outer if level < levels else 1
         table[level, SHIFT] = outer + 1 if level < levels else 0
         base += table[level, CELLS]
         scale *= 0.5
-    return levels
 
-
-@kernel
-def _assign_cells(lower, upper, start, stop, directory, keys, table, frame, levels, like):
-    """Key of each object's cell, directory of all cells, extent of what was found; returns the finest level's crowding.
-
-    Crowding is the sum of squared cell counts: the number of candidates within cells, twice.
-    """
-    d = len(like)
     used = table[levels + 1, BASE] + 1
     for k in range(used + 2):
         directory[k] = 0
@@ -246,64 +198,40 @@ def _assign_cells(lower, upper, start, stop, directory, keys, table, frame, leve
     for level in range(levels + 2):
         table[level, BEGIN] = directory[table[level, BASE] + 1]
         table[level, END] = directory[table[level, BASE] + table[level, CELLS] + 1]
-    return crowding
+    frame[CROWDING] = crowding
+    found = table[0, END] - table[0, BEGIN]
+    top = table[levels, END] - table[levels, BEGIN]
+    return levels == 0 or (crowding <= CROWDED * found and top <= TOO_MANY + (stop - start) // 256)
 
 
 @kernel
-def _spacing(lower, upper, start, stop, directory, keys, table, frame, like):
-    """Mean distance of the objects in the fullest cell of level 0: the cell size that would part them; 0 if it is 0."""
+def place(lower, upper, start, stop, directory, keys, order, cells, boxes, codes, frame, like):
+    """The counting sort's last pass: objects in the order of their cells, with copies of their boxes, and codes.
+
+    Afterwards directory[key] is where cell ``key`` begins. A code is a box in small integers, all in one number: 14
+    bits for each corner's coordinate in 2D, 9 in 3D, and a free bit above each. Lower corners come first, then the
+    largest integer minus the upper corners. Rounding down and clamping keep order: the codes of boxes that overlap do.
+    """
     d = len(like)
-    fullest, most = 0, 0
-    for k in range(table[0, CELLS]):
-        here = directory[k + 2] - directory[k + 1]
-        fullest, most = (k, here) if here > most else (fullest, most)
-    widest = 0.0
+    field = CODE_BITS // (2 * d)
+    largest = (1 << (field - 1)) - 1
+    scale, offset = like, like
     for q in range(d):
-        low, high = np.inf, -np.inf
-        for row in range(start, stop):
-            if keys[row - start] == fullest:
-                middle = 0.5 * (lower[row, q] + upper[row, q])
-                low, high = min(low, middle), max(high, middle)
-        widest = max(widest, high - low)
-    return widest / float(most) ** (1.0 / d)
-
-
-@kernel
-def _place(lower, upper, start, stop, directory, keys, order, cells, boxes, like):
-    """The counting sort's last pass. Afterwards directory[key] is where cell ``key`` begins."""
-    d = len(like)
+        scale = tuple_setitem(scale, q, largest / (frame[EXTENT + q] + frame[FINE]))
+        offset = tuple_setitem(offset, q, frame[ORIGIN + q] - 0.5 * frame[FINE])
     for row in range(start, stop):
         key = keys[row - start]
         at = directory[key + 1]
         directory[key + 1] = at + 1
         order[at] = row
         cells[at] = key
+        code = 0
         for q in range(d):
-            boxes[at, q] = lower[row, q]
-            boxes[at, d + q] = upper[row, q]
-
-
-@kernel
-def encode_boxes(boxes, count, frame, codes, like):
-    """Each box's corners in small integers, all in one number: 14 bits each in 2D, 9 in 3D, with a free bit above.
-
-    Lower corners come first, then the largest integer minus the upper corners. Rounding down and clamping keep order,
-    so boxes that overlap have codes that overlap. Codes compare boxes of one frame only.
-    """
-    d = len(like)
-    field = CODE_BITS // (2 * d)
-    largest = float((1 << (field - 1)) - 1)
-    scale, offset = like, like
-    for q in range(d):
-        scale = tuple_setitem(scale, q, largest / (frame[EXTENT + q] + frame[FINE]))
-        offset = tuple_setitem(offset, q, frame[ORIGIN + q] - 0.5 * frame[FINE])
-    for i in range(count):
-        code = np.int64(0)
-        for q in range(d):
-            low = (boxes[i, q] - offset[q]) * scale[q]
-            high = (boxes[i, d + q] - offset[q]) * scale[q]
-            low = min(low if low > 0.0 else 0.0, largest)
-            high = min(high if high > 0.0 else 0.0, largest)
-            code |= np.int64(low) << (q * field)
-            code |= (np.int64(largest) - np.int64(high)) << ((d + q) * field)
-        codes[i] = code
+            low, high = lower[row, q], upper[row, q]
+            boxes[at, q] = low
+            boxes[at, d + q] = high
+            low = min(max((low - offset[q]) * scale[q], 0.0), float(largest))
+            high = min(max((high - offset[q]) * scale[q], 0.0), float(largest))
+            code |= int(low) << (q * field)
+            code |= (largest - int(high)) << ((d + q) * field)
+        codes[at] = code

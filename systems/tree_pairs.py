@@ -4,8 +4,8 @@ Objects that may overlap a given one lie in a few rows of cells, and a row of ce
 Pass 1 writes these ranges, pass 2 tests their members. Neither pass branches on what it finds: range and pair
 are written always, and the counter moves on or not. A mispredicted branch costs more than the test it would avoid.
 
-Pass 2 looks at the boxes' codes first (see :func:`encode_boxes`): one subtraction rules out most candidates, and exact
-corners are compared only for the others.
+Pass 2 looks at the boxes' codes first (see :func:`tree_build.place`): one subtraction rules out most candidates, and
+exact corners are compared only for the others.
 
 Integers handed from kernel to kernel are variables, never literals: numba compiles a callee once more for a literal.
 """
@@ -100,19 +100,22 @@ def _write_run(ranges, found, owner, number, length, directory, base, cells):
 
 
 @kernel
-def ranges_within(table, frame, directory, cells, boxes, ranges, like):
-    """Pass 1 inside one tree. Returns (ranges, candidates), or (-1, 0) if ``ranges`` is too short."""
+def ranges_within_levels(table, frame, directory, cells, ranges, like):
+    """Pass 1 between objects of one level. Returns (ranges, candidates, number of levels that hold objects).
+
+    ``ranges`` must have room for RANGES_PER_OBJECT per object, and SPARE.
+    """
     d = len(like)
     levels = int(frame[LEVELS])
     found = np.int64(0)
-    if table[levels, END] * RANGES_PER_OBJECT + SPARE > len(ranges):
-        return np.int64(-1), np.int64(0)
+    in_use = 0
     one, three = np.int64(1), np.int64(3)
     for level in range(levels + 1):
         # Each object with the later ones of its cell and with half of the neighbour cells.
         base, size = table[level, BASE], table[level, CELLS]
         row, layer = table[level, STRIDE + 1], table[level, STRIDE + 2]
         begin, end = table[level, BEGIN], table[level, END]
+        in_use += end > begin
         farthest = row + 2 if d == 2 else layer + row + 2  # from there on numbers would run over the level's end
         safe = directory[base + max(size - farthest, 0)]
         for i in range(begin, end):
@@ -141,6 +144,20 @@ def ranges_within(table, frame, directory, cells, boxes, ranges, like):
                         found += stop > first
                     else:
                         found = _write_run(ranges, found, i, at - base, three, directory, base, size)
+    candidates = np.int64(0)
+    for r in range(found):
+        candidates += ranges[r, 2] - ranges[r, 1]
+    return found, candidates, in_use
+
+
+@kernel
+def ranges_across_levels(table, frame, directory, boxes, ranges, found, like):
+    """Pass 1 between objects of different levels, appended after the first ``found`` ranges.
+
+    Returns (ranges, candidates among the new ones), or (-1, 0) if ``ranges`` is too short.
+    """
+    before = found
+    levels = int(frame[LEVELS])
     for fine in range(levels):
         for coarse in range(fine + 1, levels + 1):
             if table[coarse, END] > table[coarse, BEGIN] and table[fine, END] > table[fine, BEGIN]:
@@ -151,7 +168,7 @@ def ranges_within(table, frame, directory, cells, boxes, ranges, like):
                 if found < 0:
                     return found, np.int64(0)
     candidates = np.int64(0)
-    for r in range(found):
+    for r in range(before, found):
         candidates += ranges[r, 2] - ranges[r, 1]
     return found, candidates
 
@@ -236,8 +253,8 @@ def overlapping(
 ):  # fmt: skip
     """Pass 2: write the pairs whose boxes overlap, from range ``position`` on, until the output may not suffice.
 
-    Owners index boxes_a, members boxes_b; both codes are in the frame of b. state[0] is the number of pairs so far.
-    Returns the range to continue at. Ranges are used up on the way.
+    Owners index boxes_a, members boxes_b; codes_a must be in the frame of codes_b, or zeros, which overlap all.
+    state[0] is the number of pairs so far. Returns the range to continue at. Ranges are used up on the way.
     """
     d = len(like)
     field = CODE_BITS // (2 * d)
