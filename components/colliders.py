@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..framework.columns import column
+from ..framework.columns import REQUIRED, column
 from ..framework.component import Component
 from ..framework.vectors import item, replace
 
@@ -39,6 +39,12 @@ class Collider(Component, abstract=True):
     sensor = column(False, dtype=bool)
     layer = column(1, dtype=int)
     mask = column(ALL_LAYERS, dtype=int)
+
+    @classmethod
+    def sample(cls, **common: Any) -> Self:
+        """Some collider of this type, half a unit in every measure it demands; for compiling ahead and checks."""
+        demanded = {name: 0.5 for name, field in cls.columns.items() if field.default is REQUIRED}
+        return cls(**demanded, **common)
 
 
 class SphereCollider(Collider):

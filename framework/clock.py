@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 
 class Clock:
@@ -28,14 +29,18 @@ class Clock:
 
     def set_dt(self, dt: float) -> None:
         """From now on; what has passed stays."""
-        self._base_time, self._base_count = self.time, self.step_count
-        self.dt = dt
+        if dt != self.dt:  # else replacing other settings again and again would gather rounding after all
+            self._base_time, self._base_count = self.time, self.step_count
+            self.dt = dt
 
     def gather(self, seconds: float, limit: int) -> int:
         """Add a frame's time and take whole steps out of it, at most ``limit``; the surplus is dropped."""
         self.gathered += seconds
-        steps = math.floor(self.gathered / self.dt + self.ROUNDING)
-        self.gathered = max(0.0, self.gathered - steps * self.dt)
+        rest = math.fmod(self.gathered, self.dt)  # exact, however long the frame was
+        steps = round(min((self.gathered - rest) / self.dt, sys.float_info.max))
+        if rest > (1.0 - self.ROUNDING) * self.dt:
+            steps, rest = steps + 1, 0.0
+        self.gathered = rest
         self.dropped_steps += max(0, steps - limit)
         return min(steps, limit)
 

@@ -50,6 +50,10 @@ class CompilationLog:
 log = CompilationLog()
 
 
+# A wrapper for C callers costs compile time and serves none of our kernels.
+_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
+
+
 def kernel(function: Function) -> Function:
     """Compile ``function`` on first call, per argument types, and keep the machine code on disk.
 
@@ -57,17 +61,23 @@ def kernel(function: Function) -> Function:
     cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
     passed in tuples. Use :func:`allocating_kernel` for those that must.
     """
-    return _cached(numba.njit(error_model="numpy", _nrt=False)(function))
+    return _cached(numba.njit(**_OPTIONS, _nrt=False)(function))
 
 
 def allocating_kernel(function: Function) -> Function:
     """Like :func:`kernel`, for functions that make arrays; keep hot loops out of them."""
-    return _cached(numba.njit(error_model="numpy")(function))
+    return _cached(numba.njit(**_OPTIONS)(function))
+
+
+def part(function: Function) -> Function:
+    """For functions that only kernels call: no entry from Python, nothing on disk of their own."""
+    return numba.njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=False)(function)  # type: ignore[return-value]
 
 
 def inlined(function: Function) -> Function:
-    """For helpers that must disappear into the kernels which call them; those alone are kept on disk."""
-    return numba.njit(error_model="numpy", forceinline=True, _nrt=False)(function)  # type: ignore[return-value]
+    """Like :func:`part`, for small helpers that must disappear into the kernels which call them."""
+    options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True, "_nrt": False}
+    return numba.njit(**options)(function)  # type: ignore[return-value]
 
 
 def _cached(dispatcher: Any) -> Any:

@@ -62,3 +62,21 @@ class PhysicsServices(ABC):
 
     @abstractmethod
     def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> list[np.ndarray]: ...
+
+    @abstractmethod
+    def refresh_queries(self) -> None:
+        """The next query looks at the bodies anew."""
+
+    @abstractmethod
+    def prepare(self, components: tuple[type[Any], ...]) -> None:
+        """Compile what bodies of these component types need; of those there are, if none are given."""
+
+    @abstractmethod
+    def reset_counters(self) -> None: ...
+
+    @abstractmethod
+    def tracking_state(self) -> Any:
+        """Which pairs touched at the end of the last step: a copy."""
+
+    @abstractmethod
+    def restore_tracking(self, state: Any) -> None: ...

@@ -252,7 +252,7 @@ class World(EntityVerbs):
 
     def prepare(self, *component_types: type[Any]) -> None:
         """Compile ahead what bodies of these component types will need, so that nothing stalls in mid-game."""
-        self._services.prepare(component_types, self)  # type: ignore[attr-defined]
+        self._services.prepare(component_types)
 
     # -- events -----------------------------------------------------------------------------------------------------------
 
@@ -304,7 +304,7 @@ class World(EntityVerbs):
 
     def refresh_queries(self) -> None:
         """Make the next query see positions that were written since the last step."""
-        self._services.refresh_queries()  # type: ignore[attr-defined]
+        self._services.refresh_queries()
 
     def _point(self, value: Any, name: str) -> np.ndarray:
         point = np.asarray(value, float)

@@ -99,7 +99,7 @@ class BroadPhase(System):
         position, before = table.arrays["position"], table.arrays["previous_position"]
         self._box(0, moving, before if state.moved else position)
         fixed = position[moving:count]
-        seen = (table.static_version, table.version, state.code)
+        seen = (table.static_version, table.version, state.code, state.turned)
         if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
             before[moving:count] = fixed
             self._box(moving, count, position)
@@ -111,7 +111,7 @@ class BroadPhase(System):
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         state.kernels.box_motion(
             start, stop, before, arrays["position"], scratch["shape"], state.slots, state.shapes,
-            state.world_shapes, state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
+            state.world_shapes, state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
             scratch["offset"], scratch["size"], scratch["lower"], scratch["upper"], state.like,
         )  # fmt: skip
 

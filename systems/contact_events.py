@@ -83,4 +83,5 @@ class ContactEvents(System):
 
 
 def _select(columns: Columns, mask: np.ndarray) -> Columns:
-    return {key: column[mask] for key, column in columns.items() if key != "enabled"}
+    rows = np.flatnonzero(mask)
+    return {key: column.take(rows, axis=0) for key, column in columns.items() if key != "enabled"}

@@ -10,6 +10,7 @@ from ..framework.bodies import SelectedBodies
 from ..framework.compilation import kernel
 from ..framework.schedule import ForceSystem, Phase, System
 from ..framework.vectors import item, replace, store
+from .motion import limit_speeds
 
 if TYPE_CHECKING:
     from .state import PhysicsState
@@ -42,6 +43,8 @@ class ForceAccumulation(System):
         self.summed: np.ndarray | None = None  # a copy, while integrators with more stages need to compare
 
     def process(self, dt: float) -> None:
+        if self._state.limits_speed:
+            limit_speeds(self._state)  # before a drag force sees them
         self.evaluate(self.world.time)
         stages = self._state.integrator().evaluations
         self.summed = self._state.bodies.dynamic.force.copy() if self.world.force_systems and stages > 1 else None

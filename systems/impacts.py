@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.compilation import inlined, kernel
+from ..framework.compilation import inlined, kernel, part
 from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, row, scale, store, sub
 
 AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(5)  # in the order of framework.settings.MIXING_RULES
@@ -56,7 +56,7 @@ def earlier(i, j, times, keys):
     return times[i] < times[j] or (times[i] == times[j] and keys[i] < keys[j])
 
 
-@kernel
+@part
 def heap_push(heap, size, event, times, keys):
     """Add an event to the binary heap; returns the new size."""
     heap[size] = event
@@ -70,7 +70,7 @@ def heap_push(heap, size, event, times, keys):
     return size + 1
 
 
-@kernel
+@part
 def heap_pop(heap, size, times, keys):
     """Take the earliest event off the top (it is heap[size - 1] afterwards); returns the new size."""
     size -= 1
@@ -88,7 +88,7 @@ def heap_pop(heap, size, times, keys):
         parent = child
 
 
-@kernel
+@part
 def bounce(
     event, dt, pair_a, pair_b, position, velocity, inverse_mass, origin, path, struck, pair_impulse, pair_normal,
     pair_point, pair_depth, pair_times, events, event_values, log_pair, log_value, counts, like,
@@ -126,7 +126,7 @@ def bounce(
 def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
     """The event loop over the shapes of a scene."""
 
-    @kernel
+    @part
     def consider(
         c, since, dt, looked_at, pair_a, pair_b, rank, shape_of, offset, shapes, velocity, start_velocity, motion,
         restitution, slots, rule, fixed_threshold, cap, share, struck, pair_impulse, events, event_times, event_keys,

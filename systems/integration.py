@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..framework.compilation import kernel
 from ..framework.schedule import Phase, System
 from .integrators import CUBIC, LINE, PARABOLA
-from .motion import Motion
+from .motion import Motion, limit_distance, limit_speeds
 
 if TYPE_CHECKING:
     from .state import PhysicsState
-
-
-@kernel
-def limit_speed(velocity, limit):
-    """Shorten velocities that exceed their limit (nan: none)."""
-    for i in range(len(velocity)):
-        if limit[i] == limit[i]:
-            square = 0.0
-            for k in range(velocity.shape[1]):
-                square += velocity[i, k] * velocity[i, k]
-            if square > limit[i] * limit[i]:
-                factor = limit[i] / math.sqrt(square)
-                for k in range(velocity.shape[1]):
-                    velocity[i, k] *= factor
 
 
 class Integration(System):
@@ -48,13 +32,16 @@ class Integration(System):
         dynamic, moving = table.stops[0], table.stops[1]
         arrays, scratch = table.arrays, state.scratch
         np.copyto(arrays["previous_position"][: table.count], arrays["position"][: table.count])
+        if state.limits_speed:
+            limit_speeds(state)  # systems may have pushed since the forces were summed
         np.copyto(scratch["start_velocity"][:moving], arrays["linear_velocity"][:moving])
         integrator = state.integrator()
         if dynamic:
             motion = self._motion(dynamic)
             integrator.advance(motion, dt)
             if state.limits_speed:
-                limit_speed(motion.velocity, arrays["max_linear_speed"][:dynamic])
+                limit_speeds(state)
+                limit_distance(motion.position, motion.start_position, arrays["max_linear_speed"][:dynamic], dt)
         if moving > dynamic:
             arrays["position"][dynamic:moving] += dt * arrays["linear_velocity"][dynamic:moving]
         state.path_degree = integrator.path

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from ..framework.compilation import kernel
+
+if TYPE_CHECKING:
+    from .state import PhysicsState
 
 
 @dataclass
@@ -37,3 +44,32 @@ class Motion:
         """Sum the forces anew at the state in the columns, ``seconds`` into the step."""
         if self.evaluator is not None:
             self.evaluator(seconds)
+
+
+@kernel
+def limit_distance(points, origins, speed, seconds):
+    """Bring points nearer that are farther than speed * seconds from their origin (speed nan: no limit).
+
+    Scaled by the largest component, so that no square overflows.
+    """
+    for i in range(len(points)):
+        limit = speed[i] * seconds
+        largest = 0.0
+        for k in range(points.shape[1]):
+            largest = max(largest, abs(points[i, k] - origins[i, k]))
+        if limit != limit or largest == 0.0 or not math.isfinite(largest):
+            continue
+        square = 0.0
+        for k in range(points.shape[1]):
+            square += ((points[i, k] - origins[i, k]) / largest) ** 2
+        length = math.sqrt(square)
+        if length > limit / largest:
+            for k in range(points.shape[1]):
+                points[i, k] = origins[i, k] + (points[i, k] - origins[i, k]) / largest * (limit / length)
+
+
+def limit_speeds(state: PhysicsState) -> None:
+    """Shorten the velocities of the dynamic bodies that exceed their max_linear_speed."""
+    dynamic = state.bodies.dynamic
+    velocity = dynamic.linear_velocity
+    limit_distance(velocity, np.zeros_like(velocity), dynamic.max_linear_speed, 1.0)

@@ -128,9 +128,10 @@ class PairBuffers:
     def _with_new_pairs(self, pairs: np.ndarray) -> np.ndarray:
         """The contacts found and those that only the response brought about, in canonical order."""
         known = np.zeros(self.pairs, bool)
-        known[pairs] = True
-        more = np.union1d(self.resting, self.impact_pairs)
-        more = more[~known[more]] if len(more) else more
+        known[self.resting] = True
+        known[self.impact_pairs] = True
+        known[pairs] = False
+        more = np.flatnonzero(known)
         if not len(more):
             return pairs
         joined = np.concatenate((pairs, more))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.compilation import allocating_kernel, kernel
+from ..framework.compilation import allocating_kernel, part
 from ..framework.vectors import add, add_scaled, dot, row, scale, store, sub
 from .impacts import gravity_share, mix
 
@@ -25,7 +25,7 @@ PUSH_LIMIT = 0.05  # of the size, per step
 def make_resting_kernels(evaluate: Any) -> tuple[Callable[..., Any], Callable[..., None]]:
     """The kernels over the shapes of a scene: (find the contacts at rest, solve them)."""
 
-    @kernel
+    @part
     def geometry(a, b, position, offset, shape_of, shapes, like):
         centre = add(row(position, a, like), row(offset, a, like))
         d = sub(add(row(position, b, like), row(offset, b, like)), centre)

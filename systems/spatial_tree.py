@@ -105,9 +105,7 @@ class SpatialTree:
         if levels > 1:
             before = stop
             while True:
-                stop, more = tree_pairs.ranges_across_levels(
-                    self._table, self._frame, self._directory, self._boxes, self._ranges, before, self._like
-                )
+                _, stop, more = self._ranges_between(self, before, True)
                 if stop >= 0:
                     break
                 self._grow_ranges(wanted, keep=before)
@@ -128,10 +126,7 @@ class SpatialTree:
         if self.count == 0 or other.count == 0:
             return self._first[:0], self._second[:0]
         while True:
-            middle, stop, candidates = tree_pairs.ranges_between(
-                self._table, self._frame, self._directory, self._boxes,
-                other._table, other._frame, other._directory, other._boxes, self._ranges, self._like,
-            )  # fmt: skip
+            middle, stop, candidates = self._ranges_between(other, 0, False)
             if stop >= 0:
                 break
             self._grow_ranges(4 * min(self.count, other.count))
@@ -191,6 +186,13 @@ class SpatialTree:
         if found > tree_queries.SORTED_HERE:
             rows.sort()
         return rows
+
+    def _ranges_between(self, other: SpatialTree, found: int, within: bool) -> tuple[int, int, int]:
+        """See :func:`tree_pairs.ranges_between`."""
+        return tree_pairs.ranges_between(
+            self._table, self._frame, self._directory, self._boxes,
+            other._table, other._frame, other._directory, other._boxes, self._ranges, found, within, self._like,
+        )  # fmt: skip
 
     def _test(
         self, position: int, stop: int, owners: SpatialTree, members: SpatialTree, codes: NDArray[np.int64]

@@ -106,7 +106,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
             keys = [shape.component.columns[name].key for name in shape.parameters]
             columns = tuple(self.table.arrays[key] for key in keys)
             shapes.append(columns)
-            if shape.turned is None:
+            if shape.turned is None or not self.turned:
                 world_shapes.append(columns)
                 continue
             for key, column in zip(keys, columns, strict=True):
@@ -224,6 +224,23 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> list[np.ndarray]:
         return self.queries.boxes(lower, upper, mask)
+
+    def prepare(self, components: tuple[type[Any], ...]) -> None:
+        """Step a small world of such bodies, so that all they need is compiled."""
+        colliders = [c for c in components if issubclass(c, Collider)]
+        if not colliders:
+            colliders = [c for c in self.table.stacked_types(Collider.stack) if self.table.has_mask(c).any()]
+        with type(self.world)(*self.world.plugins, settings=self.world.settings) as small:
+            for restitution in (0.0, 1.0):
+                for collider in colliders:
+                    for x in (0.0, 0.1, 50.0, 50.5):
+                        place = Transform([x, *(0.0,) * (self.dimensions - 1)])
+                        body = RigidBody(linear_velocity=[-x, *(0.0,) * (self.dimensions - 1)])
+                        small.create_entity(place, body, collider.sample(restitution=restitution))
+                    small.create_entity(Transform([0.0] * self.dimensions), collider.sample(restitution=restitution))
+            for _ in range(3):
+                small.step()
+        small.close()
 
     def refresh_queries(self) -> None:
         self.queries.forget()

@@ -27,6 +27,7 @@ MAX_LEVELS = 60
 BRUTE_FORCE_BELOW = 24  # so few objects are quicker tested all with all than sorted
 SAMPLE = 256  # objects that the bounds and the cell size are estimated from
 TRIMMED = 3  # the sample's extreme values kept per side; the last of them is its 1 % or 99 % quantile
+MARGIN = 1.0 / 40.0  # of the trimmed extent, added per side: evenly spread objects are then all inside
 CELLS_PER_OBJECT = 3.0  # size of the finest level's directory
 CROWDED = 24.0  # mean number of objects in an object's cell from which finer cells are tried
 TOO_MANY = 64  # objects too large or too far out for all levels, from which coarser levels are added
@@ -91,8 +92,9 @@ def choose_frame(lower, upper, start, stop, frame, like):
     trim = EXTREMES + min(taken // 85, TRIMMED - 1)
     longest = SMALLEST_CELL
     for q in range(d):
-        frame[ORIGIN + q] = frame[trim + 2 * q * TRIMMED]
-        frame[EXTENT + q] = -frame[trim + (2 * q + 1) * TRIMMED] - frame[ORIGIN + q]
+        extent = -frame[trim + (2 * q + 1) * TRIMMED] - frame[trim + 2 * q * TRIMMED]
+        frame[ORIGIN + q] = frame[trim + 2 * q * TRIMMED] - MARGIN * extent
+        frame[EXTENT + q] = extent + 2.0 * MARGIN * extent
         longest = max(longest, frame[EXTENT + q])
     small = frame[trim + 2 * d * TRIMMED]
     large = -frame[trim + (2 * d + 1) * TRIMMED]

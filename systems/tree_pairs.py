@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numba.cpython.unsafe.tuple import tuple_setitem
 
-from ..framework.compilation import inlined, kernel
+from ..framework.compilation import inlined, kernel, part
 from .tree_build import (
     BASE,
     BEGIN,
@@ -84,7 +84,7 @@ def cover(low, high, table, frame, level):
     return first, n0, n1, n2
 
 
-@kernel
+@part
 def _write_run(ranges, found, owner, number, length, directory, base, cells):
     """Append the objects of cells number..number + length - 1 (modulo ``cells``) as one range, or two if it wraps."""
     number %= cells
@@ -151,38 +151,19 @@ def ranges_within_levels(table, frame, directory, cells, ranges, like):
 
 
 @kernel
-def ranges_across_levels(table, frame, directory, boxes, ranges, found, like):
-    """Pass 1 between objects of different levels, appended after the first ``found`` ranges.
+def ranges_between(
+    table_a, frame_a, directory_a, boxes_a, table_b, frame_b, directory_b, boxes_b, ranges, found, within, like
+):  # fmt: skip
+    """Pass 1 between two trees, or, ``within`` one given twice, between its levels; appended to ``found`` ranges.
 
-    Returns (ranges, candidates among the new ones), or (-1, 0) if ``ranges`` is too short.
+    Ranges of b owned by objects of a come first, then ranges of a owned by objects of b: the cheaper side of each pair
+    of levels looks into the other. Returns (end of the first kind, end of all, candidates among the new ones), or
+    (-1, -1, 0) if ``ranges`` is too short.
     """
-    before = found
-    levels = int(frame[LEVELS])
-    for fine in range(levels):
-        for coarse in range(fine + 1, levels + 1):
-            if table[coarse, END] > table[coarse, BEGIN] and table[fine, END] > table[fine, BEGIN]:
-                down = _cost(table, frame, coarse, table, frame, fine, like)
-                up = _cost(table, frame, fine, table, frame, coarse, like)
-                a, b = (coarse, fine) if down <= up else (fine, coarse)
-                found = _ranges_across(table, boxes, a, table, frame, directory, b, ranges, found, like)
-                if found < 0:
-                    return found, np.int64(0)
-    candidates = np.int64(0)
-    for r in range(before, found):
-        candidates += ranges[r, 2] - ranges[r, 1]
-    return found, candidates
-
-
-@kernel
-def ranges_between(table_a, frame_a, directory_a, boxes_a, table_b, frame_b, directory_b, boxes_b, ranges, like):
-    """Pass 1 between two trees: ranges of b owned by objects of a come first, then ranges of a owned by objects of b.
-
-    Returns (ranges of the first kind, all ranges, candidates), or (-1, -1, 0) if ``ranges`` is too short.
-    """
-    found, middle = np.int64(0), np.int64(0)
+    before, middle = found, found
     for turn in range(2):
         for a in range(int(frame_a[LEVELS]) + 1):
-            for b in range(int(frame_b[LEVELS]) + 1):
+            for b in range(a + 1 if within else 0, int(frame_b[LEVELS]) + 1):
                 if table_a[a, END] > table_a[a, BEGIN] and table_b[b, END] > table_b[b, BEGIN]:
                     forth = _cost(table_a, frame_a, a, table_b, frame_b, b, like)
                     back = _cost(table_b, frame_b, b, table_a, frame_a, a, like)
@@ -199,12 +180,12 @@ def ranges_between(table_a, frame_a, directory_a, boxes_a, table_b, frame_b, dir
         if turn == 0:
             middle = found
     candidates = np.int64(0)
-    for r in range(found):
+    for r in range(before, found):
         candidates += ranges[r, 2] - ranges[r, 1]
     return middle, found, candidates
 
 
-@kernel
+@part
 def _cost(table_a, frame_a, a, table_b, frame_b, b, like):
     """Estimated cost of looking with the objects of level a into level b: runs of cells and candidates in them."""
     size = frame_a[SCALES + a] * frame_a[INVERSE]  # 1 / cell; 0 for the top level, whose boxes may have any size
@@ -219,7 +200,7 @@ def _cost(table_a, frame_a, a, table_b, frame_b, b, like):
     return objects * (4.0 + 3.0 * runs + share * float(table_b[b, END] - table_b[b, BEGIN]))
 
 
-@kernel
+@part
 def _ranges_across(table_a, boxes_a, a, table_b, frame_b, directory_b, b, ranges, found, like):
     """Each object of level a with the objects of level b in reach; -1 if ``ranges`` is too short."""
     d = len(like)
