@@ -34,7 +34,7 @@ class Transform(Component, flat=True):
 
     @property
     def x(self) -> float:
-        return float(self.position[0])
+        return self._get(0)
 
     @x.setter
     def x(self, value: float) -> None:
@@ -42,7 +42,7 @@ class Transform(Component, flat=True):
 
     @property
     def y(self) -> float:
-        return float(self.position[1])
+        return self._get(1)
 
     @y.setter
     def y(self, value: float) -> None:
@@ -51,14 +51,20 @@ class Transform(Component, flat=True):
     @property
     def z(self) -> float:
         """3D only; IndexError in 2D."""
-        return float(self.position[2])
+        return self._get(2)
 
     @z.setter
     def z(self, value: float) -> None:
         self._set(2, value)
 
+    def _get(self, axis: int) -> float:
+        position = self.position
+        return float(position[axis] if np.ndim(position) else position)  # one number stands for all
+
     def _set(self, axis: int, value: float) -> None:
         position = np.array(self.position)
+        if not position.ndim:
+            raise ValueError(f"Transform.position is {self.position!r} for every axis: assign the whole position")
         position[axis] = value
         self.position = position
 

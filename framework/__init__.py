@@ -12,6 +12,7 @@ from .errors import (
     StepError,
     UnhandledPairError,
 )
+from .hits import Hits
 from .plan import Plan
 from .registry import Plugin
 from .schedule import ForceSystem, Phase, System
@@ -27,6 +28,7 @@ __all__ = [
     "Contact",
     "Contacts",
     "ForceSystem",
+    "Hits",
     "MissingComponentError",
     "NoPhysicsError",
     "Phase",

@@ -1,123 +1,158 @@
 """Keeping the table in step with esper: who has come, gone or changed since the last look.
 
-One cheap question first (did anything structural happen at all?); only then sets of ids are compared. Replaced
-components do not show in the sets: a component made and not adopted yet is the only thing that can replace one, so
-only while such components exist are identities compared.
+esper's changes are logged as they happen (see esper_bridge), so the work here is in proportion to what has changed: the
+handles of the entities concerned are compared with those the table knows, everything is checked, and only then written.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from . import esper_bridge
-from .component import Component, RowStore
+from .component import Component
 from .errors import MissingComponentError
-from .table import Table
+from .handles import Sources
+from .table import STATIC, Table
+
+Ids = set[int]
+Handles = dict[int, Component]
 
 
 class Adoption:
     """Adopts the components of entities that form a body: those with ``anchor`` and any of ``partners``."""
 
-    def __init__(self, table: Table, anchor: type[Component], is_partner: Any, kind_of: Any) -> None:
+    def __init__(self, table: Table, anchor: type[Component], is_partner: Callable[[type[Any]], bool]) -> None:
         self.table = table
         self.anchor = anchor
         self._is_partner = is_partner  # component type -> whether it makes a body together with the anchor
-        self._kind_of = kind_of  # components of an entity -> kind of body
-        self._token: object = None
-        self._members: dict[type[Component], dict[int, Component]] = {}
-
-    def in_step_with_esper(self) -> bool:
-        """Whether nothing structural has happened since the last synchronize."""
-        return self._token is esper_bridge.change_token() and not self.table.kind_changed
+        self._members: dict[type[Component], Handles] = {}
+        self._pending: dict[type[Any], Ids] = {}  # changes that could not be taken in yet
 
     def synchronize(self) -> bool:
-        """Bring the table up to date; True if rows were added, removed or moved.
+        """Bring the table up to date; True if anything has changed.
 
-        Raises MissingComponentError or ValueError, naming the entity, before anything has been changed.
+        Raises MissingComponentError or ValueError, naming the entity, before anything has been written; what is amiss
+        is looked at again the next time.
         """
-        token = esper_bridge.change_token()
-        if token is self._token and not self.table.kind_changed:
+        log = esper_bridge.changes()
+        if not log and not self._pending and not self.table.kind_changed:
             return False
-        types = [t for t in esper_bridge.component_types() if isinstance(t, type) and issubclass(t, Component)]
-        bodies = self._bodies(types)
-        gone, come, fresh = self._differences(types, bodies)
+        self._gather(*log.take())
+        touched = self._pending
+        types = list(dict.fromkeys((*self._members, *(t for t in touched if t in esper_bridge.component_types()))))
+        come, left = self._bodies(touched)
+        gone, fresh = self._differences(types, touched, come, left)
         self._check(fresh)
-        changed = self._apply(gone, come, fresh)
-        self._token = token
-        return changed
+        self._pending = {}
+        return self._apply(gone, come, left, fresh)
+
+    def release(self) -> None:
+        """Let all handles go: the world closes, they keep their last values."""
+        for component, members in self._members.items():
+            self._let_go(component, set(members))
 
     # -- what has changed -------------------------------------------------------------------------------------------
 
-    def _bodies(self, types: list[type[Component]]) -> set[int]:
-        """Ids of the entities that form a body."""
-        anchored = esper_bridge.entities_with(self.anchor)
-        partnered: set[int] = set()
-        for component in types:
+    def _gather(self, touched: dict[type[Any], Ids], cleared: bool) -> None:
+        if cleared:
+            for component, members in self._members.items():
+                touched.setdefault(component, set()).update(members)
+        if self._pending:
+            for component, entities in self._pending.items():
+                touched.setdefault(component, set()).update(entities)
+        self._pending = touched
+
+    def _bodies(self, touched: dict[type[Any], Ids]) -> tuple[Ids, Ids]:
+        """Ids that become bodies, ids that cease to be."""
+        affected = set().union(*touched.values())
+        anchored = affected & esper_bridge.entities_with(self.anchor)
+        bodies: Ids = set()
+        for component in esper_bridge.component_types():
             if self._is_partner(component):
-                entities = esper_bridge.entities_with(component)
+                entities = affected & esper_bridge.entities_with(component)
                 if not entities <= anchored:
-                    entity = min(entities - anchored)
                     raise MissingComponentError(
-                        f"entity {entity} has {component.__name__} but no {self.anchor.__name__}: "
+                        f"entity {min(entities - anchored)} has {component.__name__} but no {self.anchor.__name__}: "
                         f"add {self.anchor.__name__}(...) or remove {component.__name__}"
                     )
-                partnered |= entities
-        return partnered
+                bodies |= entities
+        known = self._members.get(self.anchor, {}).keys() & affected
+        return bodies - known, known - bodies
 
     def _differences(
-        self, types: list[type[Component]], bodies: set[int]
-    ) -> tuple[dict[type[Component], set[int]], set[int], dict[type[Component], dict[int, Component]]]:
-        """Ids whose handle goes, per type; ids that become bodies; handles to adopt, per type."""
-        known = self._members.get(self.anchor, {})
-        come = bodies - known.keys()
-        gone: dict[type[Component], set[int]] = {}
-        fresh: dict[type[Component], dict[int, Component]] = {}
-        for component in {*types, *self._members}:
+        self, types: list[type[Any]], touched: dict[type[Any], Ids], come: Ids, left: Ids
+    ) -> tuple[dict[type[Component], Ids], dict[type[Component], Handles]]:
+        """Per component type, ids whose handle goes and handles to adopt, by ascending id."""
+        anchors = self._members.get(self.anchor, {})
+        everything = esper_bridge.all_components()
+        gone: dict[type[Component], Ids] = {}
+        fresh: dict[type[Component], Handles] = {}
+        # A body that comes brings all its components, also those that it has had for long.
+        types = [*types, *(t for t in esper_bridge.component_types() if come and t not in types and _is_ours(t))]
+        for component in types:
             members = self._members.get(component, {})
-            present = esper_bridge.entities_with(component) & bodies
-            left = members.keys() - present
-            new = present - members.keys()
-            if component.unadopted:
-                new |= {
-                    entity
-                    for entity in present & members.keys()
-                    if esper_bridge.components_of(entity)[component] is not members[entity]
-                }
-            left |= new & members.keys()
-            if left:
-                gone[component] = left
+            changed = touched.get(component, set())
+            present = esper_bridge.entities_with(component)
+            staying = {entity for entity in changed - come - left if entity in anchors}
+            leaving = (members.keys() & left) | {e for e in staying - present if e in members}
+            new: Handles = {}
+            for entity in sorted((come & present) | (staying & present)):
+                handle = everything[entity][component]
+                if members.get(entity) is not handle:
+                    new[entity] = handle
+            if members:
+                leaving |= members.keys() & new.keys()
+            if leaving:
+                gone[component] = leaving
             if new:
-                fresh[component] = {e: esper_bridge.components_of(e)[component] for e in sorted(new)}
-        return gone, come, fresh
+                fresh[component] = new
+        return gone, fresh
 
-    def _check(self, fresh: dict[type[Component], dict[int, Component]]) -> None:
-        """Every error is found before anything is written."""
-        seen: dict[int, int] = {}
+    # -- checks: every error is found before anything is written -------------------------------------------------------
+
+    def _check(self, fresh: dict[type[Component], Handles]) -> None:
+        dimensions = self.table.dimensions
         for component, handles in fresh.items():
-            members = self._members.get(component, {})
-            for entity, handle in handles.items():
-                handle.check_dimensions(self.table.dimensions, entity)
-                owner = handle.entity
-                if id(handle) in seen or (
-                    owner is not None and owner != entity and members.get(owner) is handle
-                    and esper_bridge.known_entity(owner)
-                    and esper_bridge.components_of(owner).get(component) is handle
-                ):  # fmt: skip
-                    other = seen.get(id(handle), owner)
-                    raise ValueError(
-                        f"one {component.__name__} was given to entities {other} and {entity}: use copy() for the second"
-                    )
-                seen[id(handle)] = entity
+            self.table.check_component_type(component)
+            values = handles.values()
+            if len(set(map(id, values))) < len(handles):
+                self._refuse_second_use(component, handles)
+            if set(map(type, values)) != {component}:
+                self._refuse_other_types(component, handles)
+            for entity in [entity for entity, handle in handles.items() if handle._entity is not None]:
+                self._check_owner(component, handles[entity], entity)
+            for entity in [e for e, h in handles.items() if h._store is None or h._store.dimensions != dimensions]:
+                handles[entity].check_dimensions(dimensions, entity)
+
+    def _refuse_second_use(self, component: type[Component], handles: Handles) -> None:
+        seen: dict[int, int] = {}
+        for entity, handle in handles.items():
+            other = seen.setdefault(id(handle), entity)
+            if other != entity:
+                raise ValueError(_second_use(component, f"entities {other} and {entity}"))
+
+    def _refuse_other_types(self, component: type[Component], handles: Handles) -> None:
+        entity, handle = next((e, h) for e, h in handles.items() if type(h) is not component)
+        raise ValueError(
+            f"entity {entity} has a {type(handle).__name__} under the type {component.__name__}: carom's components are "
+            f"final and cannot be added under another type"
+        )
+
+    def _check_owner(self, component: type[Component], handle: Component, entity: int) -> None:
+        """A handle that is bound to a row may come here only if its entity does not have it any more."""
+        owner = handle._entity
+        if handle._store is not self.table:
+            raise ValueError(_second_use(component, f"entity {owner} of another world and to entity {entity}"))
+        if owner != entity and esper_bridge.all_components().get(owner, {}).get(component) is handle:
+            raise ValueError(_second_use(component, f"entities {owner} and {entity}"))
 
     # -- bringing the table up to date --------------------------------------------------------------------------------
 
     def _apply(
-        self,
-        gone: dict[type[Component], set[int]],
-        come: set[int],
-        fresh: dict[type[Component], dict[int, Component]],
+        self, gone: dict[type[Component], Ids], come: Ids, left: Ids, fresh: dict[type[Component], Handles]
     ) -> bool:
         table = self.table
         for component in fresh:
@@ -125,84 +160,75 @@ class Adoption:
             self._members.setdefault(component, {})
         for component, entities in gone.items():
             self._let_go(component, entities)
-        left = np.array(sorted(gone.get(self.anchor, set()) - come - fresh.get(self.anchor, {}).keys()), np.int64)
+        sources = {component: Sources(component, list(handles.values())) for component, handles in fresh.items()}
         added = np.array(sorted(come), np.int64)
-        self._refresh_kinds(gone, come, fresh)
-        kinds = np.array([self._kind_of(esper_bridge.components_of(entity)) for entity in added.tolist()], np.int64)
-        changed = bool(len(left) or len(added) or table.kind_changed)
-        if changed:
-            rows = table.rebuild(table.rows_of(left), added, kinds)
-            table.arrays["kind"][rows] = kinds
+        kinds = self._kinds(added, fresh, sources)
+        moved = bool(len(left) or len(added) or table.kind_changed)
+        if moved:
+            table.rebuild(table.rows_of(_array(left)), added, kinds)
         for component, handles in fresh.items():
-            self._adopt(component, handles)
+            self._adopt(component, handles, sources[component])
         if fresh or gone:
             table.members_version += 1
             table.static_version += 1
-        return changed or bool(fresh or gone)
+        return moved or bool(fresh or gone)
 
-    def _refresh_kinds(self, gone: Any, come: set[int], fresh: Any) -> None:
-        """A body that gained or lost a component may be of another kind now."""
-        entities = {e for ids in gone.values() for e in ids} | {e for handles in fresh.values() for e in handles}
-        members = self._members.get(self.anchor, {})
-        for entity in sorted((entities - come) & members.keys()):
-            if not esper_bridge.known_entity(entity):
-                continue
-            kind = self._kind_of(esper_bridge.components_of(entity))
-            row = self.table.find(entity)
-            if self.table.arrays["kind"][row] != kind:
-                self.table.arrays["kind"][row] = kind
-                self.table.kind_changed = True
+    def _kinds(
+        self, added: np.ndarray, fresh: dict[type[Component], Handles], sources: dict[type[Component], Sources]
+    ) -> np.ndarray:
+        """Kinds of the bodies that come, and new kinds written for those that got another carrier of it."""
+        kinds = np.full(len(added), STATIC, np.int64)
+        carrier = self.table.kind_carrier
+        if carrier in fresh:
+            entities = _array(fresh[carrier])
+            values = sources[carrier].values(carrier.columns["kind"], self.table.dimensions)
+            here = np.isin(entities, added, assume_unique=True)
+            kinds[np.searchsorted(added, entities[here])] = values[here]
+            self.table.set_kinds(self.table.rows_of(entities[~here]), values[~here])
+        return kinds
 
-    def _let_go(self, component: type[Component], entities: set[int]) -> None:
+    def _let_go(self, component: type[Component], entities: Ids) -> None:
         """Handles of removed components keep their last values; the rows fall back to the defaults."""
-        members = self._members[component]
-        ids = np.array(sorted(entities), np.int64)
-        rows = self.table.rows_of(ids)
-        store = self.table.take_out(component, rows)
+        members, table = self._members[component], self.table
+        ids = _array(entities)
+        rows = table.rows_of(ids)
+        store = table.take_out(component, rows)
         for index, entity in enumerate(ids.tolist()):
             handle = members.pop(entity)
-            if handle._store is self.table and handle._entity == entity:
+            if handle._store is table and handle._entity == entity:
                 handle._bind(store, None, index, store.version)
         for column in component.columns.values():
-            self.table.arrays[column.key][rows] = column.empty_value(self.table.dimensions)
-        self.table.has_mask(component)[rows] = False
+            table.arrays[column.key][rows] = column.empty_value(table.dimensions)
+        table.has_mask(component)[rows] = False
+        if component is table.kind_carrier:
+            table.set_kinds(rows, np.full(len(rows), STATIC))
 
-    def _adopt(self, component: type[Component], handles: dict[int, Component]) -> None:
+    def _adopt(self, component: type[Component], handles: Handles, sources: Sources) -> None:
         """Write the handles' values into their rows, column by column, and bind the handles."""
         table = self.table
         rows = table.rows_of(np.fromiter(handles, np.int64, len(handles)))
-        stores: dict[int, RowStore] = {}
-        groups: dict[int, list[int]] = {}
-        loose: list[int] = []
-        sources = list(handles.values())
-        for index, handle in enumerate(sources):
-            store = handle._store
-            if store is None:
-                loose.append(index)
-            else:
-                stores[id(store)] = store
-                groups.setdefault(id(store), []).append(index)
-        for name, column in component.columns.items():
-            array = table.arrays[column.key]
-            if loose:
-                values = [sources[index]._values[name] for index in loose]
-                _write_values(array, rows[loose], values, column.empty_value(table.dimensions))
-            for key, members in groups.items():
-                taken = [sources[index]._row for index in members]
-                array[rows[members]] = stores[key].arrays[column.key][taken]
-        if "previous_position" in table.arrays and component is self.anchor:
+        for column in component.columns.values():
+            table.arrays[column.key][rows] = sources.values(column, table.dimensions)
+        if component is self.anchor and "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
         table.has_mask(component)[rows] = True
-        for entity, handle in handles.items():
-            handle._bind(table, entity)
-        component.unadopted.difference_update(sources)
+        version = table.version
+        for (entity, handle), row in zip(handles.items(), rows.tolist(), strict=True):
+            handle._store = table
+            handle._entity = entity
+            handle._row = row
+            handle._version = version
+            handle._values = None
         self._members[component].update(handles)
 
 
-def _write_values(array: np.ndarray, rows: np.ndarray, values: list[Any], empty: Any) -> None:
-    """``array[rows] = values``, where a single number stands for a whole vector (0: no rotation)."""
-    if array.ndim == 1:
-        array[rows] = values
-        return
-    for row, value in zip(rows.tolist(), values, strict=True):
-        array[row] = empty if np.ndim(value) == 0 and array.shape[1] == 4 else value
+def _is_ours(component: type[Any]) -> bool:
+    return isinstance(component, type) and issubclass(component, Component)
+
+
+def _array(entities: Any) -> np.ndarray:
+    return np.array(sorted(entities), np.int64)
+
+
+def _second_use(component: type[Component], owners: str) -> str:
+    return f"one {component.__name__} was given to {owners}: use copy() for the second"

@@ -14,8 +14,11 @@ class Bodies:
     """Columns as zero-copy views: ``bodies.position``, and ``bodies.charge.value`` of a component of one's own.
 
     ``dynamic``, ``kinematic`` and ``static`` are the same for the bodies of one kind. Views hold until the next
-    structural change. Columns of static bodies are read-only.
+    structural change. Columns of static bodies are read-only, and so are ``entity`` and ``kind`` of all. Assigning writes
+    into the column: ``bodies.linear_velocity = 0``.
     """
+
+    __slots__ = ("_kind", "_table")
 
     def __init__(self, table: Table, kind: int | None = None) -> None:
         self._table = table
@@ -59,13 +62,19 @@ class Bodies:
         array = self._table.arrays.get(name)
         if array is not None:
             view = array[self.rows]
-            if self._kind == STATIC:
+            if self._kind == STATIC or name in ("entity", "kind"):
                 view.flags.writeable = False
             return view
         prefix = name + "."
         if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):
             return Fields(self, prefix)
         raise AttributeError(f"bodies have no column {name!r}; they have {', '.join(self.column_names())}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in Bodies.__slots__:
+            object.__setattr__(self, name, value)
+        else:  # also what ``bodies.force += f`` ends with
+            _write(getattr(self, name), value, name)
 
     def column_names(self) -> list[str]:
         return sorted(key for key in self._table.arrays if not key.startswith(("has:", "_")))
@@ -80,18 +89,24 @@ class Bodies:
 class Fields:
     """The columns of one component type, as ``bodies.charge`` gives them."""
 
+    __slots__ = ("_bodies", "_prefix")
+
     def __init__(self, bodies: Any, prefix: str) -> None:
-        self._bodies = bodies
-        self._prefix = prefix
+        object.__setattr__(self, "_bodies", bodies)
+        object.__setattr__(self, "_prefix", prefix)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._bodies, self._prefix + name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        _write(getattr(self, name), value, self._prefix + name)
 
 
 class SelectedBodies:
     """Some dynamic bodies' columns, as copies; ``force`` is written back by :meth:`scatter_force`.
 
-    What a force system sees when only some of the bodies have what it requires.
+    What a force system sees when only some of the bodies have what it requires. The other columns are read-only: what
+    is written into a copy would be lost.
     """
 
     def __init__(self, table: Table, rows: np.ndarray) -> None:
@@ -105,7 +120,9 @@ class SelectedBodies:
     def __getattr__(self, name: str) -> Any:
         array = self._table.arrays.get(name)
         if array is not None:
-            return array[self._rows]
+            copy = array[self._rows]
+            copy.flags.writeable = False
+            return copy
         prefix = name + "."
         if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):
             return Fields(self, prefix)
@@ -113,3 +130,10 @@ class SelectedBodies:
 
     def scatter_force(self) -> None:
         self._table.arrays["force"][self._rows] = self.force
+
+
+def _write(view: Any, value: Any, name: str) -> None:
+    if not isinstance(view, np.ndarray):
+        raise AttributeError(f"bodies.{name} is no column that could be assigned")
+    if view is not value:
+        view[...] = value

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterator
 from typing import Any, ClassVar, Self
-from weakref import WeakSet
 
 import numpy as np
 
@@ -23,8 +23,8 @@ class Component:
 
     columns: ClassVar[dict[str, Column]] = {}
     prefix: ClassVar[str] = ""  # of the columns' names in a table
-    unadopted: ClassVar[WeakSet[Component]]
     _abstract: ClassVar[bool] = True
+    _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
 
     def __init_subclass__(cls, *, abstract: bool = False, flat: bool = False, **kwargs: Any) -> None:
         """``abstract`` bases may be derived from; ``flat`` columns carry no prefix in the table."""
@@ -34,11 +34,10 @@ class Component:
                 raise TypeError(f"{base.__name__} is final: esper finds components by their exact type, not by a base")
         cls._abstract = abstract
         cls.prefix = "" if flat else re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower() + "."
-        cls.unadopted = WeakSet()
-        own: dict[str, Column] = {}
-        for name, value in vars(cls).copy().items():
-            if isinstance(value, Column):
-                own[name] = value
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Column)}
+        for name in own:
+            if hasattr(Component, name):
+                raise TypeError(f"{cls.__name__}: a column cannot be named {name!r}, every component has that already")
         if abstract:
             cls.columns = {**cls.columns, **own}
             return
@@ -52,6 +51,7 @@ class Component:
             setattr(cls, name, field)
             fields[name] = field
         cls.columns = fields
+        cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
 
     def __init__(self, *args: Any, **values: Any) -> None:
         names = [name for name, column in self.columns.items() if column.constructor]
@@ -79,7 +79,6 @@ class Component:
                 raise TypeError(f"{type(self).__name__} needs a value for {name!r}")
             stored[name] = column.checked(value)
         self._values = stored
-        type(self).unadopted.add(self)
 
     # -- being adopted and let go -----------------------------------------------------------------------------------
 
@@ -103,19 +102,26 @@ class Component:
 
     def check_dimensions(self, dimensions: int, entity: int | None = None) -> None:
         """ValueError if a vector of this component does not fit a world of that many dimensions."""
-        if self._store is None:
-            for name, column in self.columns.items():
-                column.check_dimensions(self._values[name], dimensions, entity)
+        if self._store is not None and self._store.dimensions == dimensions:
+            return
+        for column in self._shaped:
+            value = self._values[column.name] if self._store is None else getattr(self, column.name)
+            column.check_dimensions(value, dimensions, entity)
 
     def copy(self) -> Self:
         """An unbound component with the same values, for another entity (prefabs)."""
         other = type(self).__new__(type(self))
-        other._store = None
-        other._entity = None
-        other._row = other._version = -1
-        other._values = {name: column.checked(_unshared(getattr(self, name))) for name, column in self.columns.items()}
-        type(self).unadopted.add(other)
+        if hasattr(self, "__dict__"):
+            vars(other).update(vars(self))  # what a class without __slots__ keeps besides its columns
+        other._bind(None, None)
+        other._values = {name: column.unshared(getattr(self, name)) for name, column in self.columns.items()}
         return other
+
+    def __copy__(self) -> Self:
+        return self.copy()
+
+    def __deepcopy__(self, memo: Any) -> Self:
+        return self.copy()
 
     def __repr__(self) -> str:
         shown = ((n, getattr(self, n)) for n, c in self.columns.items() if c.constructor)
@@ -127,6 +133,9 @@ class Component:
         """Values for many entities at once, for ``world.create_entities``: each one value for all, or one per row."""
         names = [name for name, column in cls.columns.items() if column.constructor]
         given = dict(zip(names, args, strict=False))
+        twice = [name for name in values if name in given]
+        if twice:
+            raise TypeError(f"{cls.__name__}.many got {', '.join(twice)} twice")
         unknown = [name for name in values if name not in names]
         if unknown or len(args) > len(names):
             raise TypeError(f"{cls.__name__}.many takes {', '.join(names)}; got {', '.join(unknown) or 'too many values'}")
@@ -145,16 +154,13 @@ class Many:
         self.values = values
 
     def arrays(self, count: int, dimensions: int) -> dict[str, np.ndarray]:
-        """Checked columns by key, shape (count, ...); ValueError names field and row."""
+        """Checked columns by key, shape (count, ...), arrays of their own; ValueError names field and row."""
         arrays = {}
         for name, column in self.component.columns.items():
-            default = column.empty_value(dimensions)
-            if name in self.values:
-                arrays[column.key] = column.checked_many(self.values[name], count, dimensions)
-            else:
-                arrays[column.key] = np.broadcast_to(
-                    np.asarray(default, column.dtype), (count, *column.item_shape(dimensions))
-                )
+            array = np.empty((count, *column.item_shape(dimensions)), column.dtype)
+            given = name in self.values
+            array[...] = column.checked_many(self.values[name], count, dimensions) if given else column.empty_value(dimensions)
+            arrays[column.key] = array
         return arrays
 
 
@@ -183,10 +189,4 @@ def components_in(components: Any) -> Iterator[Component]:
 
 
 def _copy_of(column: Column) -> Column:
-    import dataclasses
-
     return dataclasses.replace(column)
-
-
-def _unshared(value: Any) -> Any:
-    return value.copy() if isinstance(value, np.ndarray) else value

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import gc
-import itertools
+import operator
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 import esper
 
 from . import esper_bridge
 from .component import Component, Many, RowStore, components_in
+from .errors import NoPhysicsError
+from .handles import make_handles
 
 C = TypeVar("C")
 
@@ -18,7 +21,9 @@ C = TypeVar("C")
 class EntityVerbs:
     """What esper's module functions do, for one world; mixed into :class:`World`."""
 
-    name: str
+    def _context(self) -> AbstractContextManager[None]:
+        """The world's esper context, made the current one for a while."""
+        raise NotImplementedError
 
     @property
     def dimensions(self) -> int | None:
@@ -31,7 +36,7 @@ class EntityVerbs:
         ValueError if a component's vectors do not fit the world's dimensions; nothing is created then.
         """
         self._check(components, None)
-        with esper_bridge.context(self.name):
+        with self._context():
             return esper.create_entity(*components)
 
     def create_entities(self, count: int, *many: Many) -> range:
@@ -39,33 +44,32 @@ class EntityVerbs:
 
         ValueError names field and row of a bad value; nothing is created then.
         """
-        if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+        if isinstance(count, bool) or not hasattr(count, "__index__") or operator.index(count) < 0:
             raise ValueError(f"count must be a whole number from 0, got {count!r}")
+        count = operator.index(count)
         for one in many:
             if not isinstance(one, Many):
                 raise TypeError(f"create_entities takes what Component.many(...) makes, got {one!r}")
+        types = [one.component for one in many]
+        if len(set(types)) < len(types):
+            raise ValueError(f"create_entities: one component of each type, got {', '.join(t.__name__ for t in types)}")
         dimensions = self.dimensions
         if dimensions is None:
-            raise ValueError("create_entities needs a world with physics: World(Physics(...))")
-        columns = []
+            raise NoPhysicsError("no physics in this world: World(Physics(...))")
         collecting = gc.isenabled()
         gc.disable()  # a hundred thousand new objects would start it again and again for nothing
         try:
-            for one in many:
-                store = RowStore({k: a.copy() for k, a in one.arrays(count, dimensions).items()}, dimensions)
-                columns.append(_handles(one.component, store, count))
-            with esper_bridge.context(self.name):
-                ids = [esper.create_entity(*row) for row in zip(*columns, strict=True)] if columns else [
-                    esper.create_entity() for _ in range(count)
-                ]  # fmt: skip
+            stores = [RowStore(one.arrays(count, dimensions), dimensions) for one in many]
+            columns = [make_handles(t, store, count) for t, store in zip(types, stores, strict=True)]
+            with self._context():
+                return esper_bridge.create_many(types, columns, count)
         finally:
             if collecting:
                 gc.enable()
-        return range(ids[0], ids[-1] + 1) if ids else range(0)
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
         """Delete at the start of the next step, or at once; KeyError if there is no such entity."""
-        with esper_bridge.context(self.name):
+        with self._context():
             if not esper_bridge.known_entity(entity):
                 raise KeyError(f"no entity {entity!r} in this world")
             esper.delete_entity(entity, immediate=immediate)
@@ -74,37 +78,42 @@ class EntityVerbs:
 
     def entity_exists(self, entity: int) -> bool:
         """False for unknown entities and those marked for deletion."""
-        with esper_bridge.context(self.name):
+        with self._context():
             return esper.entity_exists(entity)
 
     def add_component(self, entity: int, component: Any, type_alias: type[Any] | None = None) -> None:
-        """Add a component, or replace the one of its type; seen by the next step."""
+        """Add a component, or replace the one of its type; seen by the next step.
+
+        carom's components are final, so ``type_alias`` is for others: TypeError.
+        """
+        if isinstance(component, Component) and type_alias not in (None, type(component)):
+            raise TypeError(f"{type(component).__name__} is final and cannot be added as {type_alias!r}")
         self._check((component,), entity)
-        with esper_bridge.context(self.name):
+        with self._context():
             self._known(entity)
             esper.add_component(entity, component, type_alias)
 
     def remove_component(self, entity: int, component_type: type[C]) -> C:
         """Remove and return a component; KeyError if the entity or the component does not exist."""
-        with esper_bridge.context(self.name):
+        with self._context():
             self._known(entity)
             if not esper.has_component(entity, component_type):
                 raise KeyError(f"entity {entity} has no {component_type.__name__}")
             return esper.remove_component(entity, component_type)
 
     def has_component(self, entity: int, component_type: type[Any]) -> bool:
-        with esper_bridge.context(self.name):
+        with self._context():
             self._known(entity)
             return esper.has_component(entity, component_type)
 
     def has_components(self, entity: int, *component_types: type[Any]) -> bool:
-        with esper_bridge.context(self.name):
+        with self._context():
             self._known(entity)
             return esper.has_components(entity, *component_types)
 
     def component_for_entity(self, entity: int, component_type: type[C]) -> C:
         """The entity's component of that type; KeyError if either does not exist."""
-        with esper_bridge.context(self.name):
+        with self._context():
             self._known(entity)
             found = esper.try_component(entity, component_type)
             if found is None:
@@ -112,26 +121,26 @@ class EntityVerbs:
             return found
 
     def components_for_entity(self, entity: int) -> tuple[Any, ...]:
-        with esper_bridge.context(self.name):
+        with self._context():
             self._known(entity)
             return esper.components_for_entity(entity)
 
     def try_component(self, entity: int, component_type: type[C]) -> C | None:
-        with esper_bridge.context(self.name):
+        with self._context():
             return esper.try_component(entity, component_type)
 
     def try_components(self, entity: int, *component_types: type[Any]) -> tuple[Any, ...] | None:
-        with esper_bridge.context(self.name):
+        with self._context():
             return esper.try_components(entity, *component_types)
 
     def get_component(self, component_type: type[C]) -> list[tuple[int, C]]:
-        """(entity, component) of all entities that have it; a list of its own, so deleting meanwhile is safe."""
-        with esper_bridge.context(self.name):
+        """(entity, component) of all entities that have it, in no particular order; deleting meanwhile is safe."""
+        with self._context():
             return esper.get_component(component_type)
 
     def get_components(self, *component_types: type[Any]) -> list[tuple[int, tuple[Any, ...]]]:
         """(entity, components) of all entities that have them all."""
-        with esper_bridge.context(self.name):
+        with self._context():
             return esper.get_components(*component_types)
 
     def _known(self, entity: int) -> None:
@@ -143,16 +152,3 @@ class EntityVerbs:
         if dimensions is not None:
             for component in components_in(components):
                 component.check_dimensions(dimensions, entity)
-
-
-def _handles(component: type[Component], store: RowStore, count: int) -> list[Component]:
-    """Handles into the rows of a store, in order."""
-    make = component.__new__
-    handles = [make(component) for _ in itertools.repeat(None, count)]
-    for row, handle in enumerate(handles):
-        handle._store = store
-        handle._values = None
-        handle._entity = None
-        handle._row = row
-        handle._version = 0
-    return handles

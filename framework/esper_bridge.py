@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import esper
 
-
-class _NoEntityHasThis:
-    """The marker: esper caches an empty list for it and makes a new one after any structural change."""
-
-
-for _name in ("_components", "_entities", "_dead_entities", "_processors", "_processors_dict", "_context_map"):
+_NAMES = (
+    "_components", "_context_map", "_dead_entities", "_entities", "_entity_count", "_processors", "_processors_dict",
+)  # fmt: skip
+for _name in _NAMES:
     if not hasattr(esper, _name):
         raise ImportError(f"carom cannot work with esper {esper.version}: it has no {_name}")
 
 
+# -- contexts -----------------------------------------------------------------------------------------------------------
+
+
 def context_exists(name: str) -> bool:
-    return name in esper.list_worlds()
+    return name in esper._context_map
 
 
 @contextlib.contextmanager
@@ -33,13 +35,166 @@ def context(name: str) -> Iterator[None]:
     try:
         yield
     finally:
-        if before in esper._context_map:
-            esper.switch_world(before)
+        leave(before)
 
 
-def change_token() -> object:
-    """An object that stays the same until components or entities are added or removed (under a microsecond)."""
-    return esper.get_component(_NoEntityHasThis)
+def leave(before: str) -> None:
+    """Back to the context that was current before, or to the default one if it has been deleted meanwhile."""
+    esper.switch_world(before if context_exists(before) else "default")
+
+
+# -- what has changed ---------------------------------------------------------------------------------------------------
+
+
+class ChangeLog:
+    """The entities that gained, lost or replaced a component, by component type; carom's own types only.
+
+    esper notes every such change in one place, the set of entities it keeps per component type. Those sets are watched,
+    so finding what has changed costs as much as there is of it, however many entities there are.
+    """
+
+    def __init__(self, base: type[Any]) -> None:
+        self.base = base  # only types derived from it are watched
+        self.cleared = False  # by esper.clear_database(): everything before it has gone
+        self._touched: dict[type[Any], _Touched] = {}
+
+    def __bool__(self) -> bool:
+        return self.cleared or any([touched.entities for touched in self._touched.values()])
+
+    def of(self, component: type[Any]) -> _Touched:
+        return self._touched.setdefault(component, _Touched())
+
+    def take(self) -> tuple[dict[type[Any], set[int]], bool]:
+        """What has been logged since the last time."""
+        touched = {component: entry.entities for component, entry in self._touched.items() if entry.entities}
+        for component in touched:
+            self._touched[component].entities = set()
+        cleared, self.cleared = self.cleared, False
+        return touched, cleared
+
+
+class _Touched:
+    """Where the sets of one component type log into; the set inside is exchanged when the log is read."""
+
+    __slots__ = ("entities",)
+
+    def __init__(self) -> None:
+        self.entities: set[int] = set()
+
+
+class _Members(set[int]):
+    """esper's set of the entities with one component; logs who enters and leaves, and who enters again (replaced)."""
+
+    __slots__ = ("_touched",)
+
+    def __init__(self, entities: Iterable[int], touched: _Touched) -> None:
+        super().__init__(entities)
+        self._touched = touched
+        touched.entities.update(self)
+
+    def add(self, entity: int) -> None:
+        self._touched.entities.add(entity)
+        super().add(entity)
+
+    def discard(self, entity: int) -> None:
+        self._touched.entities.add(entity)
+        super().discard(entity)
+
+    def update(self, *entities: Iterable[int]) -> None:
+        self._touched.entities.update(*entities)
+        super().update(*entities)
+
+
+class _WatchedComponents(dict[type[Any], set[int]]):
+    """esper's dict of those sets."""
+
+    def __init__(self, content: dict[type[Any], set[int]], log: ChangeLog) -> None:
+        super().__init__()
+        self.log = log
+        for component, entities in content.items():
+            self[component] = entities
+
+    def __setitem__(self, component: type[Any], entities: set[int]) -> None:
+        if isinstance(component, type) and issubclass(component, self.log.base):
+            entities = _Members(entities, self.log.of(component))
+        super().__setitem__(component, entities)
+
+    def clear(self) -> None:
+        self.log.cleared = True
+        super().clear()
+
+
+def watch(base: type[Any]) -> None:
+    """Log changes of components derived from ``base`` in the current context from now on; what is there counts as new."""
+    esper._components = _WatchedComponents(esper._components, ChangeLog(base))
+
+
+def watched() -> bool:
+    """Whether the current context is."""
+    return isinstance(esper._components, _WatchedComponents)
+
+
+def unwatch() -> None:
+    """Give esper plain containers back."""
+    esper._components = {
+        component: set(entities) if isinstance(entities, _Members) else entities
+        for component, entities in esper._components.items()
+    }
+
+
+def changes() -> ChangeLog:
+    """The log of the current context."""
+    return esper._components.log  # type: ignore[attr-defined]
+
+
+def _check_that_nothing_escapes() -> None:
+    """ImportError if this esper changes components in a way that the log does not see."""
+
+    class Probe:
+        pass
+
+    def expect(action: Any, *entities: int) -> None:
+        action()
+        touched, cleared = log.take()
+        if touched.get(Probe, set()) != set(entities) or cleared != (not entities):
+            raise ImportError(f"carom cannot work with esper {esper.version}: it hides changes of components")
+
+    with context("carom is looking at esper"):
+        watch(Probe)
+        log = changes()
+        expect(lambda: esper.create_entity(Probe()), 1)
+        expect(lambda: esper.create_entity(Probe()), 2)
+        expect(lambda: esper.add_component(1, Probe()), 1)
+        expect(lambda: esper.remove_component(1, Probe), 1)
+        expect(lambda: esper.add_component(1, Probe()), 1)
+        expect(lambda: esper.delete_entity(1, immediate=True), 1)
+        esper.delete_entity(2)
+        expect(esper.process, 2)
+        expect(lambda: esper.create_entity(Probe()), 3)
+        expect(esper.clear_database)
+    esper.delete_world("carom is looking at esper")
+
+
+_check_that_nothing_escapes()
+
+
+# -- entities -----------------------------------------------------------------------------------------------------------
+
+
+def create_many(types: list[type[Any]], columns: list[list[Any]], count: int) -> range:
+    """``count`` entities with one component of each type, as ``esper.create_entity`` makes them one by one."""
+    ids = list(itertools.islice(esper._entity_count, count))
+    rows: list[dict[type[Any], Any]] = [{} for _ in ids]
+    for component, handles in zip(types, columns, strict=True):
+        for row, handle in zip(rows, handles, strict=True):
+            row[component] = handle
+    esper._entities.update(zip(ids, rows, strict=True))
+    for component in types if ids else ():
+        if component not in esper._components:
+            esper._components[component] = set()
+        esper._components[component].update(ids)
+    esper.clear_cache()
+    return range(ids[0], ids[-1] + 1) if ids else range(0)
 
 
 def component_types() -> list[type[Any]]:
@@ -49,6 +204,11 @@ def component_types() -> list[type[Any]]:
 def entities_with(component: type[Any]) -> set[int]:
     """esper's own set of the entities that have the component: do not change it."""
     return esper._components.get(component, set())
+
+
+def all_components() -> dict[int, dict[type[Any], Any]]:
+    """esper's own dict of all entities' components: do not change it."""
+    return esper._entities
 
 
 def components_of(entity: int) -> dict[type[Any], Any]:
@@ -66,8 +226,28 @@ def forget_death(entity: int) -> None:
     esper._dead_entities.discard(entity)
 
 
+def forget_unknown_dead() -> None:
+    """The same for deletions that plain esper calls have left behind: of entities that do not exist (any more)."""
+    if esper._dead_entities:
+        esper._dead_entities.intersection_update(esper._entities)
+
+
+# -- processors and events ----------------------------------------------------------------------------------------------
+
+
 def processors() -> list[esper.Processor]:
     return list(esper._processors)
+
+
+def same_processors(known: list[esper.Processor]) -> bool:
+    """Whether the current context still has these very processors, in this order."""
+    now = esper._processors
+    return len(now) == len(known) and all(a is b for a, b in zip(now, known, strict=True))
+
+
+def renew_processors() -> None:
+    """A process() that is running goes on with the processors as they are now, whatever is added or removed next."""
+    esper._processors = list(esper._processors)
 
 
 def remove_processor_instance(processor: esper.Processor) -> None:
@@ -81,7 +261,14 @@ def remove_processor_instance(processor: esper.Processor) -> None:
         esper._processors_dict.pop(kind, None)
 
 
-def event_handlers(name: str) -> list[Any]:
-    """The live handlers set with esper.set_handler, as a copy, so that a handler may remove itself or others."""
-    found = (reference() for reference in tuple(esper.event_registry.get(name, ())))
-    return [handler for handler in found if handler is not None]
+def event_handlers(name: str) -> Iterator[Any]:
+    """The live handlers set with esper.set_handler; safe against handlers that remove themselves or others."""
+    for reference in tuple(esper.event_registry.get(name, ())):
+        handler = reference()
+        if handler is not None and reference in esper.event_registry.get(name, ()):
+            yield handler
+
+
+def has_event_handlers(name: str | None = None) -> bool:
+    """Whether plain esper has handlers for that event, or for any."""
+    return bool(esper.event_registry if name is None else esper.event_registry.get(name))

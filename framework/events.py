@@ -32,12 +32,24 @@ class Events:
 
     def wanted(self, name: str) -> bool:
         """Whether anybody listens (then nothing need be made for nobody)."""
-        return bool(self._handlers.get(name)) or bool(esper_bridge.event_handlers(name))
+        return bool(self._handlers.get(name)) or esper_bridge.has_event_handlers(name)
+
+    def any_handlers(self) -> bool:
+        """Whether anybody listens to anything."""
+        return any(self._handlers.values()) or esper_bridge.has_event_handlers()
 
     def dispatch(self, name: str, *args: Any) -> None:
         """Call the handlers that were set when the event began and have not been removed since."""
         for handler in tuple(self._handlers.get(name, ())):
             if handler in self._handlers.get(name, ()):
-                handler(*args)
+                _call(name, handler, args)
         for handler in esper_bridge.event_handlers(name):
-            handler(*args)
+            _call(name, handler, args)
+
+
+def _call(name: str, handler: Handler, args: tuple[Any, ...]) -> None:
+    try:
+        handler(*args)
+    except Exception as error:
+        error.add_note(f"in {getattr(handler, '__qualname__', handler)}, a handler of {name}")
+        raise

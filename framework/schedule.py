@@ -29,9 +29,9 @@ class Phase(IntEnum):
 
     @property
     def priority(self) -> int:
-        """Top of the phase's band of esper priorities: START 7000 ... END 1000; a system's is this minus its place.
+        """Top of the phase's band of esper priorities, START 7000 ... END 1000; its systems follow from one below it.
 
-        A plain esper processor of priority 0 thus runs after them all.
+        A plain esper processor of this priority thus runs before the phase, one of priority 0 after them all.
         """
         return 1000 * (len(Phase) - self)
 
@@ -104,18 +104,18 @@ def in_order(systems: Sequence[System]) -> list[System]:
     return ordered
 
 
+def means(reference: Any, system: System) -> bool:
+    """Whether a type, an instance or a name stands for that system."""
+    if isinstance(reference, type):
+        return isinstance(system, reference)
+    return system is reference or system.name == reference
+
+
 def _named(references: Sequence[Any], members: list[System], system: System) -> list[int]:
-    """Indices of the members that the references (types, instances or names) mean."""
-    found = []
-    for reference in references if isinstance(references, (list, tuple)) else (references,):
-        hits = [
-            index
-            for index, member in enumerate(members)
-            if member is not system
-            and (member is reference or (isinstance(reference, type) and isinstance(member, reference)) or member.name == reference)
-        ]
-        found += hits
-    return found
+    """Indices of the other members that the references mean."""
+    references = references if isinstance(references, (list, tuple)) else (references,)
+    others = [(index, member) for index, member in enumerate(members) if member is not system]
+    return [index for reference in references for index, member in others if means(reference, member)]
 
 
 def _topological(members: list[System], edges: dict[int, set[int]]) -> list[int]:

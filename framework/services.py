@@ -10,6 +10,7 @@ import numpy as np
 from .adoption import Adoption
 from .bodies import Bodies
 from .contacts import Contacts
+from .hits import Hits
 from .table import Table
 
 
@@ -58,10 +59,10 @@ class PhysicsServices(ABC):
     def counters(self) -> dict[str, int]: ...
 
     @abstractmethod
-    def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> list[np.ndarray]: ...
+    def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits: ...
 
     @abstractmethod
-    def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> list[np.ndarray]: ...
+    def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits: ...
 
     @abstractmethod
     def refresh_queries(self) -> None:

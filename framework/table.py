@@ -16,6 +16,7 @@ from .component import Component, RowStore
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
+RESERVED = ("column_names", "dynamic", "has", "kinematic", "row_of", "rows", "static")  # attributes of Bodies
 
 
 class Table:
@@ -34,6 +35,7 @@ class Table:
         self.arrays: dict[str, np.ndarray] = {}
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
+        self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
         self._fills: dict[str, Any] = {}
         self._stack_rows: dict[str, tuple[str, int]] = {}  # column key -> (stack, slot)
         self._stacked_types: dict[str, list[type[Component]]] = {}
@@ -65,8 +67,29 @@ class Table:
                 self.arrays[column.key] = array
         if stack:
             self._stacked_types[stack].append(component)
-        self.add_array(f"has:{component.prefix or component.__name__}", dtype=bool, fill=False)
+        if "kind" in component.columns and not component.prefix:
+            self.kind_carrier = component
+        self.add_array(self.mask_name(component), dtype=bool, fill=False)
         self.component_types.append(component)
+
+    def check_component_type(self, component: type[Component]) -> None:
+        """ValueError if its columns would go by the name of others."""
+        if component in self.component_types:
+            return
+        for other in self.component_types:
+            if self.mask_name(other) == self.mask_name(component):
+                raise ValueError(f"two component types are named {component.__name__}: {other!r} and {component!r}")
+        taken = self.arrays.keys() & {column.key for column in component.columns.values()}
+        name = component.prefix.rstrip(".")
+        if taken or name in self.arrays or name in RESERVED:
+            raise ValueError(
+                f"component {component.__name__}: bodies have {', '.join(sorted(taken)) or name} already; give it another name"
+            )
+
+    @staticmethod
+    def mask_name(component: type[Component]) -> str:
+        """The key of the mask of the rows whose entity has that component."""
+        return f"has:{component.prefix or component.__name__}"
 
     def slot_of(self, component: type[Component]) -> int:
         """The component type's place in its stack."""
@@ -77,7 +100,7 @@ class Table:
 
     def has_mask(self, component: type[Component]) -> np.ndarray:
         """Full-capacity mask of the rows whose entity has that component."""
-        return self.arrays[f"has:{component.prefix or component.__name__}"]
+        return self.arrays[self.mask_name(component)]
 
     def _grow_stack(self, stack: str, slot: int, shape: tuple[int, ...], column: Column, fill: Any) -> None:
         fresh = np.empty((slot + 1, *shape), column.dtype)
@@ -146,11 +169,17 @@ class Table:
         first = int(np.argmax(moved)) if moved.any() else count
         tail = source[first:]
         fresh = tail < 0
+        only_fresh = bool(fresh.all())
         for key, array in self.arrays.items():
-            block = array[tail]  # a copy
+            if only_fresh:
+                array[first:count] = self._fills[key]
+                continue
+            block = array.take(tail, axis=0)  # a copy
             block[fresh] = self._fills[key]
             array[first:count] = block
         self.arrays["entity"][:count] = entity
+        if self.kind_carrier is not None:
+            self.arrays["kind"][:count] = kind
         self.count = count
         self.stops = tuple(int(s) for s in np.searchsorted(kind, (1, 2, 3)))  # type: ignore[assignment]
         self.kind_changed = False
@@ -159,6 +188,12 @@ class Table:
         position = np.empty(count, np.int64)
         position[order] = np.arange(count)
         return position[len(old) :]
+
+    def set_kinds(self, rows: np.ndarray, kinds: np.ndarray) -> None:
+        """Bodies that are of another kind from now on; they move to their place at the next ``rebuild``."""
+        self.arrays["kind"][rows] = kinds
+        if not np.array_equal(np.searchsorted(self.stops, rows, side="right"), kinds):
+            self.kind_changed = True
 
     def reserve(self, count: int) -> None:
         """Make room for that many rows; capacity doubles, views taken before keep the old arrays."""

@@ -5,20 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import AbstractContextManager
 from typing import Any, Self
 
 import esper
 import numpy as np
 
-from . import esper_bridge
+from . import esper_bridge, snapshots
 from .bodies import Bodies
 from .clock import Clock
+from .component import Component
 from .contacts import Contacts
 from .entities import EntityVerbs
 from .errors import CaromError, NoPhysicsError
 from .events import Events
-from .pipeline import Pipeline, StepState
+from .pipeline import Pipeline
+from .hits import Hits
 from .plan import Plan
 from .registry import Plugin, Registry
 from .schedule import ForceSystem, Phase, System
@@ -59,18 +61,23 @@ class World(EntityVerbs):
         self.plugins = plugins
         self._settings = settings or Settings()
         self._events = Events()
-        self._entered = ExitStack()
         self._depth: list[str] = []
-        self.force_systems: list[ForceSystem] = []
         self._pipeline = Pipeline(self)
-        with esper_bridge.context(name):
-            self._pipeline.attach()
         for plugin in plugins:
             self.registry.add(plugin)
-        for plugin in plugins:
-            plugin.install(self)
-        if self.physics is not None:
-            self.physics.check_settings(self._settings)
+        with esper_bridge.context(name):
+            if esper_bridge.watched():
+                raise ValueError(f"esper's context {name!r} is a World already")
+            esper_bridge.watch(Component)
+            self._pipeline.attach()
+        try:
+            for plugin in plugins:
+                plugin.install(self)
+            if self.physics is not None:
+                self.physics.check_settings(self._settings)
+        except BaseException:
+            self._give_back()
+            raise
 
     # -- being an esper context -----------------------------------------------------------------------------------------
 
@@ -81,24 +88,36 @@ class World(EntityVerbs):
         return self
 
     def __exit__(self, *_: object) -> None:
-        before = self._depth.pop()
-        if esper_bridge.context_exists(before):
-            esper.switch_world(before)
+        esper_bridge.leave(self._depth.pop())
 
     def close(self) -> None:
-        """Give the esper context back; the world cannot be used afterwards. Closing twice is fine."""
+        """Give the esper context back; the world cannot be used afterwards. Closing twice is fine.
+
+        Handles of its components keep their last values.
+        """
         if self.closed:
             return
         if self._depth:
             raise CaromError(f"world {self.name!r} cannot be closed inside its own with block")
+        self._pipeline.must_be_between_steps("a world can be closed")
+        if self.physics is not None:
+            self.physics.adoption.release()
+        self._give_back()
+
+    def _give_back(self) -> None:
         self.closed = True
         with esper_bridge.context(self.name):
-            self._pipeline.detach()
+            self._pipeline.lineup.detach()
             esper.clear_database()
+            esper_bridge.unwatch()
         if self.name != "default":
             if esper.current_world == self.name:
                 esper.switch_world("default")
             esper.delete_world(self.name)
+
+    def _context(self) -> AbstractContextManager[None]:
+        self._open()
+        return esper_bridge.context(self.name)
 
     def _open(self) -> None:
         if self.closed:
@@ -115,7 +134,8 @@ class World(EntityVerbs):
     def settings(self, settings: Settings) -> None:
         if not isinstance(settings, Settings):
             raise TypeError(f"settings must be Settings, got {settings!r}")
-        self._pipeline.must_be_between_steps("settings")
+        self._open()
+        self._pipeline.must_be_between_steps("settings can be replaced")
         if self.physics is not None:
             self.physics.check_settings(settings)
         self._pipeline.clock.set_dt(settings.dt)
@@ -139,7 +159,7 @@ class World(EntityVerbs):
 
     @gravity.setter
     def gravity(self, gravity: Any) -> None:
-        self._pipeline.must_be_between_steps("gravity")
+        self._pipeline.must_be_between_steps("gravity can be replaced")
         self._services.set_gravity(gravity)
 
     @property
@@ -185,28 +205,42 @@ class World(EntityVerbs):
         frame's seconds.
         """
         self._open()
-        self._pipeline.add(system, before, after, frame)
+        self._pipeline.lineup.add(system, before, after, frame)
 
     def remove_system(self, system: System | ForceSystem | esper.Processor) -> None:
         """Remove that instance; during a step it leaves at its end. KeyError if it is not in this world."""
-        self._pipeline.remove(system)
+        self._open()
+        self._pipeline.lineup.remove(system)
 
-    def add_processor(self, processor: esper.Processor, priority: int = 0) -> None:
-        """esper's verb: any processor at any priority; Phase.X.priority are the bands of carom's own."""
+    def has_system(self, system: System | ForceSystem | esper.Processor) -> bool:
+        """Whether that very system is in this world, or joins at the end of the step."""
+        return self._pipeline.lineup.has(system)
+
+    def add_processor(self, processor: esper.Processor, priority: float = 0) -> None:
+        """esper's verb: any processor at any priority; Phase.X.priority are the bands of carom's own.
+
+        A System runs in its phase, whatever the priority.
+        """
         self._open()
         if isinstance(processor, System):
-            self._pipeline.add(processor, (), (), False)
+            self._pipeline.lineup.add(processor, (), (), False)
             return
-        self._pipeline.add_plain(processor, priority)
+        self._pipeline.lineup.add_plain(processor, priority)
 
     def remove_processor(self, processor: type[esper.Processor] | esper.Processor) -> None:
         """esper's verb: by type, the last one added of it; an instance is taken too."""
-        self._pipeline.remove_processor(processor)
+        self._open()
+        self._pipeline.lineup.remove_processor(processor)
+
+    @property
+    def force_systems(self) -> list[ForceSystem]:
+        """Those that this step calls, in order of addition."""
+        return self._pipeline.lineup.force_systems
 
     @property
     def systems(self) -> list[System]:
         """carom's systems in the order in which they run."""
-        return self._pipeline.ordered()
+        return list(self._pipeline.lineup.systems)
 
     # -- time -----------------------------------------------------------------------------------------------------------
 
@@ -266,7 +300,7 @@ class World(EntityVerbs):
 
     def dispatch_event(self, name: str, *args: Any) -> None:
         """Call the handlers of that event, esper's own included."""
-        with esper_bridge.context(self.name):
+        with self._context():
             self._events.dispatch(name, *args)
 
     @property
@@ -291,8 +325,8 @@ class World(EntityVerbs):
         """Entities whose collider touches the sphere, by id."""
         return self.query_spheres(self._point(centre, "centre")[None], radius, mask)[0].tolist()
 
-    def query_spheres(self, centres: Any, radii: Any, mask: int = -1) -> list[np.ndarray]:
-        """For each of m spheres (centres (m, d), radii one or (m,)) the ids of the entities it touches."""
+    def query_spheres(self, centres: Any, radii: Any, mask: int = -1) -> Hits:
+        """For each of m spheres (centres (m, d), radii one or (m,)) the ids of the entities it touches, ascending."""
         services = self._synchronized()
         centres = np.ascontiguousarray(centres, float)
         if centres.ndim != 2 or centres.shape[1] != services.dimensions:
@@ -301,6 +335,18 @@ class World(EntityVerbs):
         if not np.isfinite(centres).all() or not np.isfinite(radii).all() or (radii < 0).any():
             raise ValueError("query_spheres: centres and radii must be finite, radii not negative")
         return services.query_spheres(centres, radii, mask)
+
+    def query_aabbs(self, lower: Any, upper: Any, mask: int = -1) -> Hits:
+        """For each of m boxes (corners (m, d)) the ids of the entities it touches, ascending."""
+        services = self._synchronized()
+        low, high = np.ascontiguousarray(lower, float), np.ascontiguousarray(upper, float)
+        if low.ndim != 2 or low.shape[1] != services.dimensions or low.shape != high.shape:
+            raise ValueError(
+                f"query_aabbs: corners must have shape (m, {services.dimensions}), got {low.shape} and {high.shape}"
+            )
+        if not np.isfinite(low).all() or not np.isfinite(high).all() or (low > high).any():
+            raise ValueError("query_aabbs: corners must be finite, lower not above upper")
+        return services.query_boxes(low, high, mask)
 
     def refresh_queries(self) -> None:
         """Make the next query see positions that were written since the last step."""
@@ -333,21 +379,24 @@ class World(EntityVerbs):
 
     def plan(self) -> Plan:
         """What runs in a step, in order, and why."""
-        self._pipeline.synchronize()
-        return Plan.of(self)
+        with self._context():
+            self._pipeline.lineup.reconcile()
+            self._pipeline.synchronize()
+            return Plan.of(self)
 
-    def snapshot(self) -> StepState:
+    def snapshot(self) -> snapshots.StepState:
         """A copy of the state: columns, clock, contacts."""
-        self._synchronized()
-        return self._pipeline.capture(everything=True)
+        self._pipeline.must_be_between_steps("a snapshot can be taken")
+        return snapshots.snapshot(self._synchronized(), self._pipeline.clock)
 
-    def restore(self, snapshot: StepState) -> None:
-        """Go back to a snapshot of this world; ValueError if bodies were created or deleted since."""
-        self._synchronized()
-        self._pipeline.must_be_between_steps("restore")
-        self._pipeline.restore(snapshot)
+    def restore(self, snapshot: snapshots.StepState) -> None:
+        """Go back to a snapshot of this world; settings and gravity stay as they are.
+
+        ValueError if bodies, or components of bodies, were added or removed since.
+        """
+        self._pipeline.must_be_between_steps("a snapshot can be restored")
+        snapshots.restore(snapshot, self._synchronized(), self._pipeline.clock)
 
     def state_hash(self) -> str:
         """A hash of every body's state, in order of the ids: equal bits, equal hash."""
-        self._synchronized()
-        return self._pipeline.state_hash()
+        return snapshots.state_hash(self._synchronized())

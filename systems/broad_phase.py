@@ -10,6 +10,7 @@ import numpy as np
 from ..framework.compilation import kernel
 from ..framework.schedule import Phase, System
 from ..framework.vectors import add, item, replace, row, store
+from .few_boxes import FEW, FewBoxes, pairs_between
 from .spatial_tree import SpatialTree
 
 if TYPE_CHECKING:
@@ -73,28 +74,29 @@ class BroadPhase(System):
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
-        self._moving = SpatialTree(state.dimensions)
-        self._static = SpatialTree(state.dimensions)
+        self._moving_tree, self._static_tree = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
+        self._moving: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
+        self._static: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
         self._static_seen: Any = None
         self._static_positions = np.empty((0, state.dimensions))
 
     def process(self, dt: float) -> None:
-        state, table, scratch = self._state, self._state.table, self._state.scratch
+        state, table = self._state, self._state.table
         first, second = state.no_pairs, state.no_pairs
         if state.collides:
             self.box_all()
             moving = table.stops[1]
-            self._moving.build(scratch["lower"], scratch["upper"], 0, moving)
+            self._moving = self._partition(self._moving_tree, 0, moving)
             first, second = self._moving.pairs_within()
             if self._static.count:
-                fixed, mover = self._static.pairs_between(self._moving)
+                fixed, mover = pairs_between(self._static, self._moving)
                 if len(fixed):
                     first, second = np.concatenate((first, mover)), np.concatenate((second, fixed))
         state.set_candidates(first, second)
 
     def box_all(self) -> None:
         """Boxes around the motion of what moves; of what does not only if it has changed."""
-        state, table, scratch = self._state, self._state.table, self._state.scratch
+        state, table = self._state, self._state.table
         moving, count = table.stops[1], table.count
         position, before = table.arrays["position"], table.arrays["previous_position"]
         self._box(0, moving, before if state.moved else position)
@@ -103,7 +105,7 @@ class BroadPhase(System):
         if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
             before[moving:count] = fixed
             self._box(moving, count, position)
-            self._static.build(scratch["lower"], scratch["upper"], moving, count)
+            self._static = self._partition(self._static_tree, moving, count)
             self._static_seen = seen
             self._static_positions = fixed.copy()
 
@@ -116,7 +118,7 @@ class BroadPhase(System):
         )  # fmt: skip
 
     @property
-    def trees(self) -> tuple[SpatialTree, SpatialTree]:
+    def partitions(self) -> tuple[SpatialTree | FewBoxes, SpatialTree | FewBoxes]:
         """Of what moves and of what does not."""
         return self._moving, self._static
 
@@ -127,13 +129,21 @@ class BroadPhase(System):
             self.box_all()
         finally:
             self._state.moved = moved
-        self._moving.build(self._state.scratch["lower"], self._state.scratch["upper"], 0, self._state.table.stops[1])
+        self._moving = self._partition(self._moving_tree, 0, self._state.table.stops[1])
+
+    def _partition(self, tree: SpatialTree, start: int, stop: int) -> SpatialTree | FewBoxes:
+        """The boxes of rows start..stop-1, as a tree unless they are few."""
+        boxes = FewBoxes(self._state.dimensions) if stop - start <= FEW else tree
+        boxes.build(self._state.scratch["lower"], self._state.scratch["upper"], start, stop)
+        return boxes
 
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
         moving, count = self._state.table.stops[1], self._state.table.count
         tree = "quadtree" if self._state.dimensions == 2 else "octree"
+        if max(moving, count - moving) <= FEW:
+            return f"every pair of {moving} moving and {count - moving} static bodies; a {tree} from {FEW} on"
         return f"{tree} of {moving} moving bodies against itself" + (
             f" and against that of {count - moving} static ones" if count > moving else ""
         )

@@ -90,8 +90,8 @@ def heap_pop(heap, size, times, keys):
 
 @part
 def bounce(
-    event, dt, pair_a, pair_b, position, velocity, inverse_mass, origin, path, struck, pair_impulse, pair_normal,
-    pair_point, pair_depth, pair_times, events, event_values, log_pair, log_value, counts, like,
+    event, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, origin, path, struck, pair_impulse,
+    pair_normal, pair_point, pair_depth, pair_times, events, event_values, log_pair, log_value, counts, like,
 ):  # fmt: skip
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
     c = events[event, 0]
@@ -106,8 +106,9 @@ def bounce(
     for side in range(2):
         i = a if side == 0 else b
         dv = scale(normal, (-impulse if side == 0 else impulse) * inverse_mass[i])
-        struck[i] += 1
-        if inverse_mass[i] > 0.0:
+        if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
+            struck[i] += 1
+            store(start_velocity, i, add(row(start_velocity, i, like), dv))
             store(origin, i, add_scaled(row(origin, i, like), dv, -now))
             store(path, i, add(row(path, i, like), dv))
             store(position, i, add_scaled(row(position, i, like), dv, dt - now))
@@ -195,6 +196,13 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
             )
         if not speed < -threshold:
             return
+        if degree == 1 and e != 1.0:
+            # A straight path has the flight's velocity in its middle only. With that of another time a bounce gains
+            # or loses, and a ball that always meets the floor at the same phase of a step hops for ever. Elastic
+            # pairs do reflect the path: their flight then runs backwards exactly, and nothing drifts.
+            bend_a = sub(row(velocity, a, like), row(start_velocity, a, like))
+            bend_b = sub(row(velocity, b, like), row(start_velocity, b, like))
+            speed = min(0.0, speed + dot(sub(bend_b, bend_a), normal) * (t / dt - 0.5))
         if struck[a] >= cap or struck[b] >= cap:
             counts[CAPPED] += 1
             return
@@ -222,8 +230,8 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
 
         The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[-1] are the contacts found.
-        share (n,): see gravity_share. struck (n,): impacts per body. pair_*: per pair, the impulse summed and the last
-        impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see EVENTS.
+        share (n,): see gravity_share. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
+        the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see EVENTS.
         Returns False if the queue or the log may not suffice: call again with larger ones to go on.
         """
         bodies = len(rank)
@@ -234,6 +242,10 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
             if c >= 0:
                 a, b = pair_a[c], pair_b[c]
                 first, first_stop, second, second_stop = offsets[a], offsets[a + 1], offsets[b], offsets[b + 1]
+                if inverse_mass[a] == 0.0:
+                    first_stop = first
+                if inverse_mass[b] == 0.0:
+                    second_stop = second
             wanted = first_stop - first + second_stop - second
             if counts[EVENTS] + wanted > len(heap) or counts[LOGGED] == len(log_pair):
                 return False
@@ -257,8 +269,8 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
                 return True
             counts[CURRENT], counts[LAST] = chosen, events[chosen, 0]
             bounce(
-                chosen, dt, pair_a, pair_b, position, velocity, inverse_mass, motion[0], motion[1], struck,
-                pair_impulse, pair_normal, pair_point, pair_depth, pair_times, events, event_values, log_pair,
+                chosen, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion[0], motion[1],
+                struck, pair_impulse, pair_normal, pair_point, pair_depth, pair_times, events, event_values, log_pair,
                 log_value, counts, like,
             )  # fmt: skip
 

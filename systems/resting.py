@@ -22,6 +22,23 @@ PUSH_RATE = 0.2  # of the overlap beyond the slop, per step
 PUSH_LIMIT = 0.05  # of the size, per step
 
 
+@part
+def solve(resting, pair_a, pair_b, normals, room, impulse, velocity, inverse_mass, like):
+    """Impulses (added to ``impulse``) after which no contact closes faster than ``room`` allows."""
+    for _ in range(ITERATIONS):
+        for r in range(len(resting)):
+            c = resting[r]
+            a, b = pair_a[c], pair_b[c]
+            normal = row(normals, r, like)
+            speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
+            total = max(0.0, impulse[r] - (speed + room[r]) / (inverse_mass[a] + inverse_mass[b]))
+            change = total - impulse[r]
+            impulse[r] = total
+            if change != 0.0:
+                store(velocity, a, add_scaled(row(velocity, a, like), normal, -change * inverse_mass[a]))
+                store(velocity, b, add_scaled(row(velocity, b, like), normal, change * inverse_mass[b]))
+
+
 def make_resting_kernels(evaluate: Any) -> tuple[Callable[..., Any], Callable[..., None]]:
     """The kernels over the shapes of a scene: (find the contacts at rest, solve them)."""
 
@@ -90,26 +107,22 @@ def make_resting_kernels(evaluate: Any) -> tuple[Callable[..., Any], Callable[..
             store(pair_normal, c, normal)
             store(pair_point, c, point)
             pair_depth[c] = depth
-        for _ in range(ITERATIONS):
-            for r in range(count):
-                c = resting[r]
-                a, b = pair_a[c], pair_b[c]
-                normal = row(normals, r, like)
-                speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
-                total = max(0.0, impulse[r] - (speed + room[r]) / (inverse_mass[a] + inverse_mass[b]))
-                change = total - impulse[r]
-                impulse[r] = total
-                if change != 0.0:
-                    store(velocity, a, add_scaled(row(velocity, a, like), normal, -change * inverse_mass[a]))
-                    store(velocity, b, add_scaled(row(velocity, b, like), normal, change * inverse_mass[b]))
+        solve(resting, pair_a, pair_b, normals, room, impulse, velocity, inverse_mass, like)
         for r in range(count):
-            c = resting[r]
-            pair_impulse[c] += impulse[r]
             if impulse[r] > 0.0:
-                loaded[pair_a[c]] = loaded[pair_b[c]] = True
+                loaded[pair_a[resting[r]]] = loaded[pair_b[resting[r]]] = True
         for i in range(len(position)):
             if loaded[i] and inverse_mass[i] > 0.0:
                 store(position, i, add_scaled(row(origin, i, like), row(velocity, i, like), dt))
+        closed = False
+        for r in range(count):
+            if impulse[r] > 0.0 and room[r] > 0.0:
+                room[r] = 0.0
+                closed = True
+        if closed:  # they have come as near as they may: none keeps the speed it came with, else it bounces off later
+            solve(resting, pair_a, pair_b, normals, room, impulse, velocity, inverse_mass, like)
+        for r in range(count):
+            pair_impulse[resting[r]] += impulse[r]
         for r in range(count):
             c = resting[r]
             a, b = pair_a[c], pair_b[c]

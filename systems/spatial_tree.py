@@ -88,6 +88,16 @@ class SpatialTree:
         )
         self.count = int(table[int(frame[tree_build.LEVELS]), tree_build.END])
 
+    @property
+    def boxes(self) -> Corners:
+        """(count, 2 d): lower and upper corners of the objects, in the tree's order."""
+        return self._boxes[: self.count]
+
+    @property
+    def rows(self) -> Rows:
+        """The objects' rows, in the tree's order."""
+        return self._order[: self.count]
+
     def pairs_within(self, limit: int = CANDIDATE_LIMIT) -> tuple[Rows, Rows]:
         """Rows (first, second) of all pairs of objects whose boxes overlap; each pair once, no order within a pair.
 

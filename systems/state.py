@@ -11,8 +11,9 @@ from ..framework.adoption import Adoption
 from ..framework.bodies import Bodies
 from ..framework.component import Component
 from ..framework.contacts import Contacts, EntityLookup
+from ..framework.hits import Hits
 from ..framework.services import PhysicsServices
-from ..framework.table import KINDS, STATIC, Table
+from ..framework.table import Table
 from .energy import kinetic_energy, momentum, potential_energy
 from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
@@ -50,7 +51,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.table.add_array("inverse_mass")
         self.scratch: dict[str, np.ndarray] = {}  # per row, made anew within a step or when rows have moved
         self._allocate_scratch()
-        self.adoption = Adoption(self.table, Transform, _makes_body, _kind_of)
+        self.adoption = Adoption(self.table, Transform, _makes_body)
         self.bodies = Bodies(self.table)
         self.lookup = EntityLookup(self._living_with)
         self.contacts = Contacts(dimensions, self.lookup)
@@ -219,10 +220,10 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.forces.evaluations = 0
         self.pair_counters = dict.fromkeys(self.pair_counters, 0)
 
-    def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> list[np.ndarray]:
+    def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
         return self.queries.spheres(centres, radii, mask)
 
-    def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> list[np.ndarray]:
+    def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
         return self.queries.boxes(lower, upper, mask)
 
     def prepare(self, components: tuple[type[Any], ...]) -> None:
@@ -258,9 +259,3 @@ class PhysicsState(PairBuffers, PhysicsServices):
 def _makes_body(component: type[Component]) -> bool:
     """A Transform together with one of these is a body."""
     return component is RigidBody or issubclass(component, Collider)
-
-
-def _kind_of(components: dict[type[Any], Any]) -> int:
-    """A collider without RigidBody is static."""
-    body = components.get(RigidBody)
-    return STATIC if body is None else KINDS.index(body.kind)

@@ -19,9 +19,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.cpython.unsafe.tuple import tuple_setitem
 
 from ..framework.compilation import kernel
+from ..framework.vectors import item, replace
 
 MAX_LEVELS = 60
 BRUTE_FORCE_BELOW = 24  # so few objects are quicker tested all with all than sorted
@@ -32,6 +32,8 @@ CELLS_PER_OBJECT = 3.0  # size of the finest level's directory
 CROWDED = 24.0  # mean number of objects in an object's cell from which finer cells are tried
 TOO_MANY = 64  # objects too large or too far out for all levels, from which coarser levels are added
 REACH = 2.0**-38  # relative rounding error granted to every box
+NEARLY_EQUAL = 1.2  # the largest of the sample against its 99 % quantile: below it that is no other size
+ABOVE_SAMPLE = 1.02  # what the largest of all may exceed the largest of the sample by
 LOOSE = 1.0 + 2.0**-16  # the finest cell exceeds the typical box by this, so that REACH does not push it a level up
 SMALLEST_CELL = 1e-290
 LARGEST_SAMPLE = 1e150
@@ -107,6 +109,9 @@ def choose_frame(lower, upper, start, stop, frame, like):
         total = 1.0
         for q in range(d):
             total *= max(3.0, frame[EXTENT + q] / cell + 1.0)
+    largest = -frame[EXTREMES + (2 * d + 1) * TRIMMED]
+    if largest < NEARLY_EQUAL * large:
+        large = ABOVE_SAMPLE * largest  # all of a size: one level holds them
     # A whole number of halvings below the large boxes: boxes of equal size fit their cell tightly.
     halved = max(large, cell)
     while 0.5 * halved >= max(cell, small):
@@ -156,7 +161,7 @@ def assign_cells(lower, upper, start, stop, directory, keys, table, frame, like)
         directory[k] = 0
     origin, lowest, highest = like, like, like
     for q in range(d):
-        origin = tuple_setitem(origin, q, frame[ORIGIN + q])
+        origin = replace(origin, q, frame[ORIGIN + q])
     inverse = frame[INVERSE]
     for row in range(start, stop):
         size = 0.0
@@ -164,21 +169,21 @@ def assign_cells(lower, upper, start, stop, directory, keys, table, frame, like)
         middle = like
         for q in range(d):
             valid &= upper[row, q] >= lower[row, q]
-            low = lower[row, q] - origin[q]
-            high = upper[row, q] - origin[q]
+            low = lower[row, q] - item(origin, q)
+            high = upper[row, q] - item(origin, q)
             reach = (high - low) + REACH * (abs(low) + abs(high))
             tame &= reach < np.inf  # also false for NaN, from two equal infinities
             size = max(size, reach)
-            middle = tuple_setitem(middle, q, 0.5 * (low + high) * inverse)
+            middle = replace(middle, q, 0.5 * (low + high) * inverse)
         size *= inverse
         # Sizes up to 1 in finest cells belong to level 0, up to 2 to level 1, up to 4 to level 2: the binary exponent.
         level = min(max(((np.float64(size).view(np.int64) - 1) >> 52) - 1022, 0), levels)
         level = level if valid & tame & (size < 1e300) else levels
         number = table[level, SHIFT]
         for q in range(d):
-            at = middle[q] if level < levels else 0.0
-            lowest = tuple_setitem(lowest, q, min(lowest[q], at))
-            highest = tuple_setitem(highest, q, max(highest[q], at))
+            at = item(middle, q) if level < levels else 0.0
+            lowest = replace(lowest, q, min(item(lowest, q), at))
+            highest = replace(highest, q, max(item(highest, q), at))
             number += np.int64(math.floor(at * frame[SCALES + level])) * table[level, STRIDE + q]
         if number < 0 or number >= table[level, CELLS]:
             number %= table[level, CELLS]
@@ -186,8 +191,8 @@ def assign_cells(lower, upper, start, stop, directory, keys, table, frame, like)
         keys[row - start] = key
         directory[key + 2] += 1
     for q in range(d):
-        frame[LOWEST + q] = lowest[q]
-        frame[HIGHEST + q] = highest[q]
+        frame[LOWEST + q] = item(lowest, q)
+        frame[HIGHEST + q] = item(highest, q)
 
     crowding = 0.0
     total = 0
@@ -219,8 +224,8 @@ def place(lower, upper, start, stop, directory, keys, order, cells, boxes, codes
     largest = (1 << (field - 1)) - 1
     scale, offset = like, like
     for q in range(d):
-        scale = tuple_setitem(scale, q, largest / (frame[EXTENT + q] + frame[FINE]))
-        offset = tuple_setitem(offset, q, frame[ORIGIN + q] - 0.5 * frame[FINE])
+        scale = replace(scale, q, largest / (frame[EXTENT + q] + frame[FINE]))
+        offset = replace(offset, q, frame[ORIGIN + q] - 0.5 * frame[FINE])
     for row in range(start, stop):
         key = keys[row - start]
         at = directory[key + 1]
@@ -232,8 +237,8 @@ def place(lower, upper, start, stop, directory, keys, order, cells, boxes, codes
             low, high = lower[row, q], upper[row, q]
             boxes[at, q] = low
             boxes[at, d + q] = high
-            low = min(max((low - offset[q]) * scale[q], 0.0), float(largest))
-            high = min(max((high - offset[q]) * scale[q], 0.0), float(largest))
+            low = min(max((low - item(offset, q)) * item(scale, q), 0.0), float(largest))
+            high = min(max((high - item(offset, q)) * item(scale, q), 0.0), float(largest))
             code |= int(low) << (q * field)
             code |= (largest - int(high)) << ((d + q) * field)
         codes[at] = code

@@ -18,6 +18,7 @@ import numpy as np
 from numba.cpython.unsafe.tuple import tuple_setitem
 
 from ..framework.compilation import inlined, kernel, part
+from ..framework.vectors import item, replace
 from .tree_build import (
     BASE,
     BEGIN,
@@ -58,8 +59,8 @@ def cover(low, high, table, frame, level):
         # Clamping to what is there keeps numbers small and makes a floor of any length cost no more than the scene.
         least = max(frame[LOWEST + q] * shrink, -FARTHEST)
         most = min(frame[HIGHEST + q] * shrink, FARTHEST)
-        bottom = (low[q] - frame[ORIGIN + q]) * scale - HALF_CELL
-        top = (high[q] - frame[ORIGIN + q]) * scale + HALF_CELL
+        bottom = (item(low, q) - frame[ORIGIN + q]) * scale - HALF_CELL
+        top = (item(high, q) - frame[ORIGIN + q]) * scale + HALF_CELL
         bottom = bottom if bottom >= least else least  # in this order NaN (infinity times 0) becomes the bound
         top = top if top <= most else most
         if bottom > most or top < least:
@@ -208,8 +209,8 @@ def _ranges_across(table_a, boxes_a, a, table_b, frame_b, directory_b, b, ranges
     for i in range(table_a[a, BEGIN], table_a[a, END]):
         low, high = like, like
         for q in range(d):
-            low = tuple_setitem(low, q, boxes_a[i, q])
-            high = tuple_setitem(high, q, boxes_a[i, d + q])
+            low = replace(low, q, boxes_a[i, q])
+            high = replace(high, q, boxes_a[i, d + q])
         first, n0, n1, n2 = cover(low, high, table_b, frame_b, b)
         if found + 2 * n1 * n2 + SPARE > len(ranges):
             return np.int64(-1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..framework.compilation import inlined, kernel
-from ..framework.vectors import row
+from ..framework.vectors import item, row
 from .tree_build import BASE, BEGIN, CELLS, END, LEVELS, STRIDE
 from .tree_pairs import cover
 
@@ -19,7 +19,7 @@ def _scan(low, high, begin, end, boxes, order, rows, found):
     for k in range(begin, end):
         hit = True
         for q in range(d):
-            hit &= (low[q] <= boxes[k, d + q]) & (boxes[k, q] <= high[q])
+            hit &= (item(low, q) <= boxes[k, d + q]) & (boxes[k, q] <= item(high, q))
         rows[found] = order[k]
         found += hit
     return found
@@ -33,7 +33,7 @@ def query_box(low, high, table, frame, directory, order, boxes, rows, found):
     """
     start = found
     for q in range(len(low)):
-        if not (low[q] <= high[q]):  # NaN or empty: overlaps nothing
+        if not (item(low, q) <= item(high, q)):  # NaN or empty: overlaps nothing
             return found
     for level in range(int(frame[LEVELS]) + 1):
         if table[level, END] > table[level, BEGIN]:

@@ -1,0 +1,68 @@
+"""Values of handles on their way into a table and out of it."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from .columns import Column
+from .component import Component, RowStore
+
+
+class Sources:
+    """Where the values of some handles of one type are: with the handle itself, or in rows of stores."""
+
+    def __init__(self, component: type[Component], handles: list[Component]) -> None:
+        self._count = len(handles)
+        self._loose: list[int] = []  # indices of handles that hold their values themselves
+        self._values: list[dict[str, Any]] = []
+        store = handles[0]._store
+        if store is not None and all([handle._store is store for handle in handles]):  # made in bulk, all of them
+            self._groups = [(store, np.arange(self._count), np.array([handle._row for handle in handles]))]
+            return
+        groups: dict[int, tuple[RowStore, list[int], list[int]]] = {}
+        for index, handle in enumerate(handles):
+            store = handle._store
+            if store is None:
+                self._loose.append(index)
+                self._values.append(handle._values)
+                continue
+            group = groups.get(id(store))
+            if group is None:
+                group = groups[id(store)] = (store, [], [])
+            group[1].append(index)
+            group[2].append(handle._row)
+        self._groups = [(store, np.array(indices), np.array(rows)) for store, indices, rows in groups.values()]
+
+    def values(self, column: Column, dimensions: int) -> np.ndarray:
+        """(n, ...) of that column, one per handle."""
+        result = np.empty((self._count, *column.item_shape(dimensions)), column.dtype)
+        if self._loose:
+            values = [values[column.name] for values in self._values]
+            result[self._loose] = values if result.ndim == 1 else _vectors(values, column, dimensions)
+        for store, indices, rows in self._groups:
+            result[indices] = store.arrays[column.key][rows]
+        return result
+
+
+def _vectors(values: list[Any], column: Column, dimensions: int) -> np.ndarray:
+    """Rows from values of which some may be a single number that stands for all (0: no rotation)."""
+    width = column.item_shape(dimensions)[0]
+    whole = column.empty_value(dimensions) if column.item == "rotation" else None
+    rows = [value if isinstance(value, np.ndarray) else (whole if whole is not None else (value,) * width) for value in values]
+    return np.array(rows, column.dtype).reshape(len(rows), width)
+
+
+def make_handles(component: type[Component], store: RowStore, count: int) -> list[Component]:
+    """Handles into the rows of a store, in order."""
+    make = component.__new__
+    handles = [make(component) for _ in itertools.repeat(None, count)]
+    for row, handle in enumerate(handles):
+        handle._store = store
+        handle._values = None
+        handle._entity = None
+        handle._row = row
+        handle._version = 0
+    return handles

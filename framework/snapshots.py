@@ -1,0 +1,89 @@
+"""Copies of a world's state: for going back to the start of a failed step, for snapshots, and a hash to compare by."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .clock import Clock
+from .services import PhysicsServices
+
+MOVING = ("position", "previous_position", "linear_velocity", "applied_force", "step_force")  # what carom's systems write
+
+
+@dataclass
+class StepState:
+    """A copy of what a step may change: columns, clock, contacts, which pairs touch."""
+
+    entities: np.ndarray
+    columns: dict[str, np.ndarray]
+    clock: tuple[float, ...]
+    contacts: Any
+    tracking: Any
+
+
+def capture(physics: PhysicsServices, clock: Clock, everything: bool) -> StepState:
+    """The state now; ``everything``: all columns, else only those that carom's own systems write."""
+    table = physics.table
+    columns = table.copy_columns(None if everything else MOVING)
+    entities = columns.pop("entity", table.column("entity"))
+    return StepState(entities, columns, clock.state(), physics.contacts.state(), physics.tracking_state())
+
+
+def put_back(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
+    """Undo what a step has done; rows do not move within a step."""
+    physics.table.restore_columns(state.columns)
+    clock.restore(state.clock)
+    physics.contacts.restore_state(state.contacts)
+    physics.restore_tracking(state.tracking)
+
+
+def snapshot(physics: PhysicsServices, clock: Clock) -> StepState:
+    """A capture that shares nothing with the world."""
+    state = capture(physics, clock, everything=True)
+    state.contacts, state.tracking = copy.deepcopy((state.contacts, state.tracking))
+    return state
+
+
+def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
+    """Make the world what it was; ValueError if bodies or their components have come or gone since.
+
+    The settings stay as they are now, dt too.
+    """
+    table = physics.table
+    rows = table.rows_of(state.entities)
+    if len(state.entities) != table.count or (rows < 0).any():
+        raise ValueError("this snapshot holds other bodies than the world has now: some were created or deleted since")
+    for component in table.component_types:
+        mask = table.has_mask(component)[rows]
+        was = state.columns.get(table.mask_name(component), np.zeros(len(rows), bool))
+        if not np.array_equal(mask, was):
+            entity = int(state.entities[np.flatnonzero(mask != was)[0]])
+            raise ValueError(f"entity {entity}: {component.__name__} was added or removed since this snapshot was taken")
+    for key, column in state.columns.items():
+        table.arrays[key][rows] = column
+    table.set_kinds(rows, state.columns["kind"])
+    table.static_version += 1
+    dt = clock.dt
+    clock.restore(state.clock)
+    clock.set_dt(dt)
+    physics.contacts.restore_state(copy.deepcopy(state.contacts))
+    physics.restore_tracking(copy.deepcopy(state.tracking))
+    physics.refresh_queries()
+
+
+def state_hash(physics: PhysicsServices) -> str:
+    """Of all values of all bodies' components, in order of the entity ids; 0.0 and -0.0 are the same."""
+    table = physics.table
+    order = np.argsort(table.column("entity"), kind="stable")
+    digest = hashlib.sha256(table.column("entity")[order].tobytes())
+    present = [c for c in table.component_types if table.has_mask(c)[: table.count].any()]
+    for component in sorted(present, key=table.mask_name):
+        for key in (table.mask_name(component), *(column.key for column in component.columns.values())):
+            digest.update(key.encode())
+            digest.update(np.ascontiguousarray(table.column(key)[order] + 0).tobytes())
+    return digest.hexdigest()
