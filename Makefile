@@ -1,0 +1,68 @@
+# carom: every target works on a fresh clone with python3 (3.11 or newer), pip and make.
+#   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
+#   make test    the tests, without the slow ones
+
+PYTHON ?= python3
+SCENE ?= asteroids
+ARGS ?=
+
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+
+# An editable install holds the folder's path, so a clone that moved installs again.
+HERE := $(shell pwd | cksum | cut -d " " -f 1)
+VENV := .venv/made-$(HERE)
+RUN := .venv/run-$(HERE)
+TEST := .venv/test-$(HERE)
+DEV := .venv/dev-$(HERE)
+
+.PHONY: run test test-slow bench ide typecheck lint clean
+
+run: $(RUN)
+	$(BIN)/carom run $(SCENE) --out out $(ARGS)
+
+test: $(TEST)
+	$(BIN)/pytest -m "not slow" $(ARGS)
+
+test-slow: $(TEST)
+	$(BIN)/pytest -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
+
+bench: $(RUN)
+	$(BIN)/carom bench $(ARGS)
+
+# Checkers and editors do not follow the import hooks of an editable install; they follow links.
+ide:
+	rm -rf build/ide
+	mkdir -p build/ide/carom
+	for file in framework/carom/*; do case $$file in *__pycache__) ;; *) ln -s "../../../$$file" build/ide/carom/ ;; esac; done
+	for folder in framework components systems plugins scenes lab; do ln -s "../../../$$folder" build/ide/carom/$$folder; done
+
+typecheck: $(DEV) ide
+	$(BIN)/pyright
+
+lint: $(DEV)
+	$(BIN)/ruff check
+
+clean:
+	rm -rf .venv build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
+
+$(VENV):
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "carom needs Python 3.11 or newer; name one: make PYTHON=python3.12 ..." >&2; exit 1; }
+	rm -rf .venv
+	$(PYTHON) -m venv .venv || { \
+	  $(PYTHON) -m venv --clear --without-pip .venv && \
+	  $(PYTHON) -m pip --python .venv/bin/python install --quiet pip; }
+	touch $@
+
+$(RUN): $(VENV) pyproject.toml
+	$(PIP) -e ".[plot]"
+	touch $@
+
+$(TEST): $(VENV) pyproject.toml
+	$(PIP) -e ".[test]"
+	touch $@
+
+$(DEV): $(TEST) pyproject.toml
+	$(PIP) -e ".[test,dev]"
+	touch $@

@@ -1,0 +1,1 @@
+"""carom.lab: the ``carom`` command: running scenes, measuring them, drawing them."""

@@ -1,0 +1,207 @@
+"""The ``carom`` command: run a scene, list the scenes, benchmark."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from .. import __version__, scenes
+from .bench import bench_gas
+from .choices import parse_assignments, preset
+from .loading import Loaded, load
+from .problems import Problem, did_you_mean
+from .progress import StepProgress
+from .report import print_report
+from .run import Run, run
+
+DEFAULT_SECONDS = 10.0  # of a file that does not say
+STOPPED = 130  # the exit code of what Ctrl-C stopped
+
+
+class Commands(click.Group):
+    """A click group whose errors are one line on stderr, with suggestions, and exit code 2."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0] if args else ""
+        if name and not name.startswith("-") and self.get_command(ctx, name) is None:
+            raise Problem(f"no command {name!r}{did_you_mean(name, self.list_commands(ctx))}")
+        return super().resolve_command(ctx, args)
+
+    def main(self, *args: Any, **options: Any) -> Any:
+        options["standalone_mode"] = False
+        traceback_wanted = "--traceback" in (options.get("args") or sys.argv[1:])
+        try:
+            result = super().main(*args, **options)
+        except click.exceptions.Abort:
+            click.echo("carom: stopped", err=True)
+            sys.exit(STOPPED)
+        except click.ClickException as error:
+            if traceback_wanted:
+                raise
+            click.echo(f"carom: {' '.join(error.format_message().split())}", err=True)
+            sys.exit(2)
+        sys.exit(result if isinstance(result, int) else 0)
+
+
+@click.group(
+    cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, invoke_without_command=True
+)
+@click.version_option(__version__, prog_name="carom")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """carom: a physics framework for games, from the command line."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@cli.command("run", short_help="Run a scene or a file and show what happened.")
+@click.argument("target", metavar="SCENE|FILE.py")
+@click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
+@click.option("--seconds", type=float, help="How long to simulate (default: what the scene recommends).")
+@click.option(
+    "--settings", "preset_name", metavar="fast|balanced|accurate", help="Default: what the scene recommends."
+)
+@click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="FIELD=VALUE",
+    help="Set one field of Settings; repeatable.",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Which variant of the scene."
+)
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("out"),
+    show_default=True,
+    help="Where pictures go.",
+)
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."
+)
+@click.option("--no-pictures", is_flag=True, help="Draw nothing.")
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+def run_command(
+    target: str,
+    steps: int | None,
+    seconds: float | None,
+    preset_name: str | None,
+    assignments: tuple[str, ...],
+    seed: int,
+    out: Path,
+    as_json: bool,
+    no_pictures: bool,
+    traceback: bool,
+) -> None:
+    """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
+    del traceback  # seen by Commands.main
+    settings = preset(preset_name) if preset_name is not None else None
+    changes = parse_assignments(assignments)
+    if steps is not None and seconds is not None:
+        raise Problem("--steps and --seconds exclude each other")
+    if seconds is not None and not (math.isfinite(seconds) and seconds >= 0):
+        raise Problem(f"--seconds takes a number of at least 0, not {seconds:g}")
+    loaded = load(target)
+    draw = _drawing(no_pictures, out)
+    screen = Console(stderr=True)
+
+    world = loaded.build(settings, changes, seed)
+    if steps is None:
+        steps = _steps_for(loaded, seconds, world.settings.dt)
+    finished = _run_with_progress(loaded, world, steps, seed, screen)
+    if draw is not None:
+        with screen.status("drawing ..."):
+            finished.report.pictures = [str(path) for path in draw(finished, out, loaded.view)]
+
+    if as_json:
+        click.echo(json.dumps(finished.report.as_dict(), indent=2))
+        return
+    console = Console()
+    print_report(finished.report, console)
+    for picture in finished.report.pictures:
+        console.print(f"picture: {picture}", highlight=False, soft_wrap=True)
+
+
+@cli.command("scenes")
+def scenes_command() -> None:
+    """List the scenes of the library."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("scene", style="bold")
+    table.add_column("", justify="right")
+    table.add_column("seconds", justify="right")
+    table.add_column("what it is")
+    for name in scenes.names():
+        scene = scenes.get(name)
+        table.add_row(name, f"{scene.dimensions}D", f"{scene.seconds:g}", scene.description)
+    Console().print(table)
+
+
+@cli.command("bench", short_help="Time an elastic gas on this machine.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.option(
+    "--repeats", type=click.IntRange(min=1), default=5, show_default=True, help="Runs; the median counts."
+)
+def bench_command(as_json: bool, repeats: int) -> None:
+    """Time an elastic gas of 1,000 and of 10,000 bodies: nanoseconds per body per step."""
+    rows = bench_gas((1000, 10_000), repeats)
+    if as_json:
+        click.echo(json.dumps([row.as_dict() for row in rows], indent=2))
+        return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scene", "bodies", "ns per body per step", "ms per step", "spread", "compiling"):
+        table.add_column(heading, justify="left" if heading == "scene" else "right")
+    for row in rows:
+        table.add_row(
+            row.scene,
+            f"{row.bodies:,}",
+            f"{row.nanoseconds:.1f}",
+            f"{row.milliseconds:.4f}",
+            f"{row.fastest:.1f} to {row.slowest:.1f}",
+            f"{row.compile_seconds:.2f} s",
+        )
+    Console().print(table)
+
+
+def _drawing(no_pictures: bool, out: Path) -> Any:
+    """The function that draws, or None; what is in the way is said at once, not after a long run."""
+    if no_pictures:
+        return None
+    try:
+        from .pictures import draw_run
+    except ImportError:
+        click.echo(
+            "carom: no pictures, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'",
+            err=True,
+        )
+        return None
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Problem(f"--out {out}: {error.strerror or error}") from error
+    return draw_run
+
+
+def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
+    wanted = seconds if seconds is not None else (loaded.seconds or DEFAULT_SECONDS)
+    return max(0, round(wanted / dt))
+
+
+def _run_with_progress(loaded: Loaded, world: Any, steps: int, seed: int, screen: Console) -> Run:
+    with StepProgress(screen, loaded.name, steps) as progress, loaded.blame():
+        return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done)
+
+
+def main() -> None:
+    """The entry point of the ``carom`` script and of ``python -m carom``."""
+    cli()

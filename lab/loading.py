@@ -1,0 +1,159 @@
+"""What is to be run: a scene of the library by name, or a file that defines build(settings, seed=0)."""
+
+from __future__ import annotations
+
+import importlib.machinery
+import importlib.util
+import inspect
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import scenes
+from ..framework import Settings, World
+from .choices import apply
+from .problems import Problem, did_you_mean, one_line
+
+Bounds = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Something that builds worlds; ``seconds`` and ``view`` are None where nobody says."""
+
+    name: str
+    function: Any
+    file: Path | None = None
+    seconds: float | None = None
+    view: Bounds | None = None
+
+    def build(self, settings: Settings | None, changes: dict[str, Any], seed: int) -> World:
+        """A world with ``settings`` (None: the scene's own) and fields changed; Problem if it fails."""
+        world = self._call(settings, seed)
+        if changes:  # the scene's own settings are known only once it is built
+            changed = apply(world.settings, changes)
+            world.close()
+            world = self._call(changed, seed)
+        return world
+
+    def _call(self, settings: Settings | None, seed: int) -> World:
+        with self.blame():
+            world = self.function(settings, seed=seed)
+        if not isinstance(world, World):
+            raise Problem(f"{self.name}: build returned {_a(world)}, not a World")
+        if world.dimensions is None:
+            raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
+        return world
+
+    @contextmanager
+    def blame(self) -> Iterator[None]:
+        """Turns what is raised inside into a Problem that names the line of the user's file it came from."""
+        try:
+            yield
+        except (Exception, SystemExit) as error:
+            if isinstance(error, Problem):
+                raise
+            raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
+
+
+def load(target: str) -> Loaded:
+    """The scene named ``target``, or the file at that path; Problem if there is neither."""
+    if target in scenes.names():
+        scene = scenes.get(target)
+        return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view)
+    path = Path(target)
+    if path.suffix == ".py" or path.is_file():
+        return _load_file(path)
+    if path.parent != Path():
+        raise Problem(f"no file {target!r}: a file of one's own ends in .py")
+    raise Problem(
+        f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)"
+    )
+
+
+def _load_file(path: Path) -> Loaded:
+    if not path.exists():
+        siblings = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
+        hint = did_you_mean(path.name, siblings) if siblings else ""
+        raise Problem(f"no file {str(path)!r}{hint if 'mean' in hint else ''}")
+    if not path.is_file():
+        raise Problem(f"{str(path)!r} is not a file")
+    module = _execute(path)
+    function = getattr(module, "build", None)
+    if not callable(function):
+        own = [
+            name
+            for name, value in vars(module).items()
+            if inspect.isfunction(value) and value.__module__ == module.__name__
+        ]
+        hint = did_you_mean("build", own) if own else ""
+        raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
+    _check_signature(path, function)
+    seconds = getattr(module, "SECONDS", None)
+    return Loaded(path.name, function, file=path.resolve(), seconds=float(seconds) if seconds else None)
+
+
+def _execute(path: Path) -> Any:
+    """Import the file under a name of its own; its folder goes on the path, for its neighbours."""
+    name = f"carom_file_{path.stem}"
+    loader = _SourceLoader(name, str(path))
+    module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
+    module.__file__ = str(path)
+    sys.modules[name] = module  # dataclasses and pickle look here
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    try:
+        loader.exec_module(module)
+    except SyntaxError as error:
+        file = Path(error.filename).name if error.filename else path.name
+        raise Problem(f"{file}, line {error.lineno}: {error.msg}") from error
+    except (Exception, SystemExit) as error:
+        raise Problem(f"{path.name}{_line_in(path.resolve(), error)}: {one_line(error)}") from error
+    return module
+
+
+class _SourceLoader(importlib.machinery.SourceFileLoader):
+    """Reads the file as it is now and leaves no byte code beside it."""
+
+    def get_code(self, fullname: str) -> Any:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
+def _check_signature(path: Path, function: Any) -> None:
+    try:
+        inspect.signature(function).bind(None, seed=0)
+    except TypeError:
+        line = getattr(getattr(function, "__code__", None), "co_firstlineno", None)
+        where = f", line {line}" if line else ""
+        raise Problem(f"{path.name}{where}: build must take (settings, seed=0)") from None
+
+
+def _line_in(file: Path | None, error: BaseException) -> str:
+    """`, line 12`: the last line of the user's file on the way to the error or to its cause; else nothing."""
+    if file is None:
+        return ""
+    seen: set[int] = set()
+    chain: list[BaseException] = []
+    step: BaseException | None = error
+    while step is not None and id(step) not in seen:
+        seen.add(id(step))
+        chain.append(step)
+        step = step.__cause__ or step.__context__
+    for link in reversed(chain):  # the first cause knows best
+        lines = [
+            frame.lineno
+            for frame in traceback.extract_tb(link.__traceback__)
+            if frame.filename and Path(frame.filename).resolve() == file
+        ]
+        if lines:
+            return f", line {lines[-1]}"
+    return ""
+
+
+def _a(value: Any) -> str:
+    return "nothing (None)" if value is None else f"a {type(value).__name__}"

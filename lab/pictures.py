@@ -1,0 +1,214 @@
+"""The two pictures of a run: how things stand at the end, and the paths they took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgba_array
+
+from . import canvas
+from .canvas import Panel, Sheet
+from .marks import draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
+from .projection import Projection, corners
+from .run import QUIET, Run, Traces
+from .shapes import Floats, Shapes, shapes_of
+
+SMALLEST_LEGIBLE = 5.0  # points: below this typical diameter a second panel magnifies a part
+MAGNIFIED_DIAMETER = 20.0  # points
+CROWD_3D = 500  # untraced bodies that would hide the paths behind them
+SOME = 60  # bodies whose beginnings are shown
+FEW = 3  # bodies whose shapes are repeated along their path
+GHOSTS = 14  # times that they are
+DRAWABLE = 1e30  # farther out there is no picture
+UNTRACED = "#1b2431"
+
+
+@dataclass(frozen=True)
+class Still:
+    """What is drawn, as arrays: all colliders, their velocities (n, d), contact points and normals (m, d)."""
+
+    shapes: Shapes
+    velocity: Floats
+    points: Floats
+    normals: Floats
+
+    @classmethod
+    def of(cls, run: Run) -> Still:
+        """The world as it stands at the end of ``run``."""
+        world, d = run.world, run.report.dimensions
+        shapes = shapes_of(world)
+        ids = np.asarray(world.bodies.entity)
+        order = np.argsort(ids, kind="stable")
+        row = order[np.minimum(np.searchsorted(ids, shapes.entity, sorter=order), max(len(ids) - 1, 0))]
+        velocity = np.asarray(world.bodies.linear_velocity)[row] if len(ids) else np.zeros((0, d))
+        contacts = world.contacts
+        points, normals = (np.array(c, float).reshape(-1, d) for c in (contacts.point, contacts.normal))
+        return cls(shapes, velocity, points, normals)
+
+    @property
+    def moving(self) -> np.ndarray:
+        """Which shapes can be drawn as bodies."""
+        return ~self.shapes.static & (np.abs(self.shapes.centre) < DRAWABLE).all(axis=1)
+
+
+@QUIET
+def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
+    """Draw ``run`` into the folder ``out``; returns the files. ``view``: two corners, None to find them."""
+    still = Still.of(run)
+    ends = find_view(still, run.traces) if view is None else view
+    projection = Projection.of(*(np.asarray(end, float) for end in ends))
+    frame = (
+        projection.frame()
+        if view is not None or projection.flat
+        else _tight_frame(still, run.traces, projection)
+    )
+    stem = Path(run.report.scene).stem
+    out.mkdir(parents=True, exist_ok=True)
+    return [
+        draw_final(run, still, projection, frame).save(out / f"{stem}-final.png"),
+        draw_traces(run, still, projection, frame).save(out / f"{stem}-traces.png"),
+    ]
+
+
+def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
+    """Where the bodies have been, with what stands close by."""
+    shapes, moving = still.shapes, still.shapes.where(still.moving)
+    d = shapes.centre.shape[1]
+    lows, highs = [moving.lower], [moving.upper]
+    if len(traces.samples):
+        paths = traces.places
+        size = moving.half.max(axis=0) if len(moving.entity) else np.zeros(d)
+        lows.append(paths - size)
+        highs.append(paths + size)
+    low, high = np.concatenate(lows), np.concatenate(highs)
+    if not len(low):
+        low, high = (
+            (shapes.lower, shapes.upper) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
+        )
+    lower, upper = low.min(axis=0), high.max(axis=0)
+    room = 0.12 * max(float((upper - lower).max()), 1e-9)
+    near_low, near_high = lower - 2 * room, upper + 2 * room
+    fixed = shapes.where(shapes.static)
+    close = fixed.where(np.all((fixed.upper >= near_low) & (fixed.lower <= near_high), axis=1))
+    for box_low, box_high in zip(close.lower, close.upper, strict=True):
+        lower = np.minimum(lower, np.maximum(box_low, near_low))
+        upper = np.maximum(upper, np.minimum(box_high, near_high))
+    return lower - room / 2, upper + room / 2
+
+
+def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas.View:
+    """3D: what the bodies, their paths and the walls near them take up in the plane, with a margin."""
+    bodies, walls = still.shapes.where(still.moving), still.shapes.where(still.shapes.static)
+    near = walls.where(np.all((walls.upper >= projection.lower) & (walls.lower <= projection.upper), axis=1))
+    boxes = [
+        *zip(bodies.lower, bodies.upper, strict=True),
+        *zip(np.maximum(near.lower, projection.lower), np.minimum(near.upper, projection.upper), strict=True),
+    ]
+    points = [corners(low, high) for low, high in boxes]
+    if len(traces.samples):
+        points.append(traces.places)
+    lower, upper = projection.frame(np.concatenate(points) if points else None)
+    margin = 0.06 * (upper - lower).max()
+    return lower - margin, upper + margin
+
+
+def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
+    """All shapes to scale, coloured by speed, with velocities and contacts; crowds get a magnified part."""
+    report, shapes = run.report, still.shapes
+    bodies, velocity = shapes.where(still.moving), still.velocity[still.moving]
+    norm = canvas.speed_norm(bodies.speed)
+    part = _magnified(bodies, projection)
+    subtitle = (
+        f"{report.bodies['dynamic']:,} bodies after {report.simulated_seconds:.4g} s ({report.steps:,} steps)"
+        f"   ·   {len(still.points):,} contacts   ·   {report.settings['integrator']}"
+    )
+    views = [frame, *([part] if part else [])]
+    sheet = Sheet.new(report.scene, subtitle, views, numbered=projection.flat)
+    colours = canvas.SPEED(norm(bodies.speed))
+    for panel in sheet.panels:
+        draw_walls(panel, shapes.where(shapes.static), projection)
+        draw_bodies(panel, bodies, colours, projection)
+    detail = sheet.panels[-1]
+    draw_contacts(detail, still.points, still.normals, bodies.typical_diameter, projection)
+    seconds = draw_arrows(detail, bodies, velocity, projection, float(norm.vmax or 1.0))
+    if part:
+        sheet.panels[0].outline(*part)
+
+    legend = [("->", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
+    if len(still.points):
+        legend.append(("o", canvas.CONTACT, "contact"))
+    sheet.legend(legend)
+    sheet.speed_scale(norm)
+    return sheet
+
+
+def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
+    """The paths, each body in its colour, the past fading; the traced bodies where they are now."""
+    traces, shapes, report = run.traces, still.shapes, run.report
+    count, all_bodies = len(traces.entities), report.bodies["dynamic"]
+    some = (
+        f"the {count:,} of {all_bodies:,} bodies that went farthest" if count < all_bodies else "all bodies"
+    )
+    subtitle = f"paths of {some} over {report.simulated_seconds:.4g} s, fading into the past"
+    sheet = Sheet.new(report.scene, subtitle, [frame], numbered=projection.flat)
+    panel = sheet.panels[0]
+    draw_walls(panel, shapes.where(shapes.static), projection)
+
+    traced = np.isin(shapes.entity, traces.entities)
+    others, followed = shapes.where(still.moving & ~traced), shapes.where(still.moving & traced)
+    if projection.flat or len(others.entity) <= CROWD_3D:
+        faint = np.tile(to_rgba_array(UNTRACED), (len(others.entity), 1))
+        draw_bodies(panel, others, faint, projection, zorder=2)
+    palette = to_rgba_array(canvas.BODY_COLOURS)
+    colours = palette[np.arange(count) * 5 % len(palette)]  # neighbours by id get different ones
+    if count and len(traces.samples) > 1:
+        draw_paths(panel, traces.positions, colours, projection)
+    own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
+    if 0 < count <= SOME:
+        _draw_starts(panel, traces, followed, own, projection)
+    if count <= FEW:
+        _draw_ghosts(panel, traces, followed, own, projection)
+    draw_bodies(panel, followed, own, projection)
+    return sheet
+
+
+def _draw_starts(
+    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
+) -> None:
+    """Where the bodies began, faintly."""
+    places = traces.positions[0, np.searchsorted(traces.entities, followed.entity)]
+    faint = colours.copy()
+    faint[:, 3] = 0.16
+    draw_bodies(panel, replace(followed, centre=places), faint, projection, zorder=2.2)
+
+
+def _draw_ghosts(
+    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
+) -> None:
+    """The shapes at even times along the path, as under a stroboscope."""
+    positions = traces.positions
+    when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]
+    for row, entity in enumerate(followed.entity):
+        places = positions[when, np.searchsorted(traces.entities, entity)]
+        places = places[np.isfinite(places).all(axis=1)]
+        repeated = np.tile(colours[row], (len(places), 1))
+        repeated[:, 3] = np.linspace(0.12, 0.4, len(places))
+        draw_bodies(panel, followed.row(row).at(places), repeated, projection, zorder=2.7)
+
+
+def _magnified(bodies: Shapes, projection: Projection) -> tuple[Floats, Floats] | None:
+    """2D, bodies too small to be seen: the part around the fastest one, for a second panel to show."""
+    if not projection.flat or not len(bodies.entity):
+        return None
+    lower, upper = projection.lower, projection.upper
+    per_unit = 72 * canvas.LONG_SIDE_OF_TWO / float((upper - lower).max())
+    diameter = bodies.typical_diameter * per_unit
+    if not 0 < diameter < SMALLEST_LEGIBLE:
+        return None
+    half = (upper - lower) * diameter / MAGNIFIED_DIAMETER / 2
+    middle = bodies.centre[int(np.argmax(bodies.speed))]
+    middle = np.clip(middle, lower + half, upper - half)
+    return middle - half, middle + half

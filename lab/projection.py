@@ -1,0 +1,94 @@
+"""How a scene falls onto the plane of a picture: 2D as it is, 3D through a perspective camera."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+AZIMUTH, ELEVATION = np.radians(-58.0), np.radians(20.0)
+DISTANCE = 2.6  # of the camera from the middle of the view, in diagonals of the view
+
+
+@dataclass(frozen=True)
+class Projection:
+    """The space between ``lower`` and ``upper``, seen from outside.
+
+    ``axes`` (d, d): rows right, up and, in 3D, towards the camera; y points up in the picture.
+    """
+
+    lower: Floats
+    upper: Floats
+    axes: Floats
+    distance: float
+
+    @classmethod
+    def of(cls, lower: Floats, upper: Floats) -> Projection:
+        """Looks at the space between two corners."""
+        if len(lower) == 2:
+            return cls(lower, upper, np.eye(2), np.inf)
+        level = np.cos(ELEVATION)
+        toward = np.array([-level * np.sin(AZIMUTH), np.sin(ELEVATION), level * np.cos(AZIMUTH)])
+        right = np.cross([0.0, 1.0, 0.0], toward)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(toward, right), toward])
+        return cls(lower, upper, axes, DISTANCE * float(np.linalg.norm(upper - lower)))
+
+    @property
+    def dimensions(self) -> int:
+        return len(self.lower)
+
+    @property
+    def flat(self) -> bool:
+        """Whether the scene is 2D."""
+        return self.dimensions == 2
+
+    def plane(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Points (..., d): places in the plane (..., 2), magnification (...), depth (...): 0 far, 1 near."""
+        points = np.asarray(points, float)
+        if self.flat:
+            ones = np.ones(points.shape[:-1])
+            return points, ones, ones
+        relative = self._relative(points)
+        ahead = self._relative(corners(self.lower, self.upper))[:, 2]
+        depth = np.clip((relative[..., 2] - ahead.min()) / max(float(np.ptp(ahead)), 1e-300), 0.0, 1.0)
+        magnification = self.distance / np.maximum(self.distance - relative[..., 2], 0.05 * self.distance)
+        return relative[..., :2] * magnification[..., None], magnification, depth
+
+    @property
+    def camera(self) -> Floats:
+        """Where it stands, (3,)."""
+        return (self.lower + self.upper) / 2 + self.distance * self.axes[2]
+
+    def frame(self, points: Floats | None = None) -> tuple[Floats, Floats]:
+        """The corners of the rectangle in the plane that holds the view, or only ``points`` (n, d)."""
+        places, _, _ = self.plane(corners(self.lower, self.upper) if points is None else points)
+        return places.min(axis=0), places.max(axis=0)
+
+    def _relative(self, points: Floats) -> Floats:
+        return (points - (self.lower + self.upper) / 2) @ self.axes.T
+
+
+def corners(lower: Floats, upper: Floats) -> Floats:
+    """The 2^d corners; bit k of the row's number says which end of axis k."""
+    d = len(lower)
+    bits = (np.arange(2**d)[:, None] >> np.arange(d)) & 1
+    return np.where(bits, upper, lower)
+
+
+def edges() -> list[tuple[int, int]]:
+    """The twelve edges of a box, as pairs of rows of :func:`corners`."""
+    return [(a, a | 1 << axis) for a in range(8) for axis in range(3) if not a >> axis & 1]
+
+
+def faces() -> list[tuple[int, float, list[int]]]:
+    """The six faces of a box: axis, direction (-1 or 1) of the normal, rows of :func:`corners` around it."""
+    found = []
+    for axis in range(3):
+        u, v = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
+        for direction, base in ((-1.0, 0), (1.0, 1 << axis)):
+            found.append((axis, direction, [base, base | u, base | u | v, base | v]))
+    return found

@@ -1,0 +1,39 @@
+"""carom.scenes: one library of scenes for tests, benchmarks, the lab and demonstrations.
+
+Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` takes the scene's
+own default. The same protocol holds for a file given to ``carom run FILE.py``.
+
+>>> from carom import scenes
+>>> world = scenes.get("billiards").build(seed=3)
+"""
+
+from . import asteroids, billiards, gas, jump, player
+from .protocol import Build, Scene
+
+_SCENES: dict[str, Scene] = {
+    scene.name: scene
+    for scene in (
+        jump.SCENE,
+        asteroids.SCENE,
+        billiards.SCENE,
+        gas.SCENE_2D,
+        gas.SCENE_3D,
+        player.SCENE,
+    )
+}
+
+
+def names() -> tuple[str, ...]:
+    """The names of all scenes, in the order of the library."""
+    return tuple(_SCENES)
+
+
+def get(name: str) -> Scene:
+    """The scene called ``name``; KeyError, with the names there are, for an unknown one."""
+    try:
+        return _SCENES[name]
+    except KeyError:
+        raise KeyError(f"no scene named {name!r}; there are: {', '.join(_SCENES)}") from None
+
+
+__all__ = ["Build", "Scene", "get", "names"]

@@ -1,0 +1,33 @@
+"""What a scene is: a function that builds a world, and what a reader or a picture needs to know about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..framework import Settings, World
+
+
+class Build(Protocol):
+    """``build(settings, seed=0) -> World``: the same settings and seed give the same world, bit for bit."""
+
+    def __call__(self, settings: Settings | None = None, seed: int = 0) -> World: ...
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One scene of the library.
+
+    ``seconds`` is the simulated time after which the scene has shown what it is about; ``view`` is the part
+    of space worth drawing, as its lower and upper corner (one number per dimension each).
+    """
+
+    name: str
+    description: str
+    build: Build
+    seconds: float
+    view: tuple[tuple[float, ...], tuple[float, ...]]
+
+    @property
+    def dimensions(self) -> int:
+        return len(self.view[0])
