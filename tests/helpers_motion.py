@@ -1,0 +1,64 @@
+"""Bodies in free flight under forces with known answers, and their recorded motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from worlds import make_world
+
+from carom.components import RigidBody, Transform
+from carom.framework import Component, ForceSystem, column
+
+METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
+ORDERS = dict(zip(METHODS, (1, 1, 2, 4, 4), strict=True))
+STAGES = dict(zip(METHODS, (1, 1, 2, 4, 4), strict=True))
+DRIFT = {"explicit_euler": 1, "semi_implicit_euler": -1}  # times g dt t / 2: the methods' error under constant force
+FRAME_RATES = (15, 30, 60, 144)
+
+all_methods = pytest.mark.parametrize("method", METHODS)
+
+
+class Oscillator(Component):
+    """A spring to the origin and a drag."""
+
+    stiffness = column(0.0)  # N/m
+    drag = column(0.0)  # N s/m
+
+
+class SpringAndDrag(ForceSystem):
+    requires = (RigidBody, Oscillator)
+
+    def add_forces(self, bodies, time):
+        bodies.force[:] -= bodies.oscillator.stiffness[:, None] * bodies.position
+        bodies.force[:] -= bodies.oscillator.drag[:, None] * bodies.linear_velocity
+
+    def potential_energy(self, bodies):
+        return 0.5 * (bodies.oscillator.stiffness * (bodies.position**2).sum(axis=1)).sum()
+
+
+def oscillators(method, dt, stiffness, drag=0.0, *, x0=1.0, v0=0.0, mass=1.0, **world):
+    """A world of independent oscillators along the first axis, one for each value given."""
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(a, float)) for a in (stiffness, drag, x0, v0, mass)))
+    stiffness, drag, x0, v0, mass = arrays
+    result = make_world(dt=dt, integrator=method, **world)
+    result.create_entities(
+        len(mass),
+        Transform.many(np.column_stack((x0, np.zeros_like(x0)))),
+        RigidBody.many(mass, np.column_stack((v0, np.zeros_like(v0)))),
+        Oscillator.many(stiffness, drag),
+    )
+    result.add_system(SpringAndDrag())
+    return result
+
+
+def record(world, steps):
+    """Positions and velocities of all bodies at steps 0 ... steps, each (steps + 1, n, d)."""
+    bodies = world.bodies
+    position, velocity = bodies.position, bodies.linear_velocity
+    positions = np.empty((steps + 1, *position.shape))
+    velocities = np.empty_like(positions)
+    for n in range(steps + 1):
+        if n:
+            world.step()
+        positions[n], velocities[n] = position, velocity
+    return positions, velocities

@@ -1,0 +1,385 @@
+"""The ``carom`` command as its users meet it: what it prints, what it draws, and how it says no."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from carom import __version__, scenes
+from carom.framework import Settings
+from carom.lab.choices import parse_assignments
+from carom.lab.cli import cli
+from carom.lab.run import Traces
+
+FALLING_BALL = """
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics
+
+def build(settings=None, seed=0):
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=settings or Settings.balanced())
+    world.create_entity(Transform((0, 0)), AABBCollider(half_extents=(50, 0.5)))
+    world.create_entity(Transform((seed, 10)), RigidBody(mass=2.0), SphereCollider(radius=0.5))
+    return world
+"""
+
+
+@pytest.fixture
+def carom(tmp_path, monkeypatch):
+    """Runs the command in an empty folder; the result has exit_code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str):
+        return CliRunner().invoke(cli, list(arguments))
+
+    return run
+
+
+def test_traces_keep_those_that_went_farthest():
+    """Three bodies on a line: 3 goes 2 to and fro, 7 goes 1, 8 goes 5 and is deleted."""
+    along = np.array([[0, 0, 0], [1, 0, 5], [0, 1, np.nan]], np.float32)
+    samples = [np.stack([row, np.zeros(3, np.float32)], axis=1) for row in along]
+    kept = Traces(np.array([3, 7, 8]), samples).farthest(2)
+    assert kept.entities.tolist() == [3, 8]
+    np.testing.assert_array_equal(kept.positions[:, :, 0], along[:, [0, 2]])
+
+
+@pytest.fixture
+def ball(tmp_path) -> Path:
+    path = tmp_path / "ball.py"
+    path.write_text(FALLING_BALL)
+    return path
+
+
+def report_of(result) -> dict:
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def refusal(result) -> str:
+    """The one line of a refusal: exit code 2, nothing on stdout, no traceback."""
+    assert result.exit_code == 2, (result.exit_code, result.stdout, result.stderr, result.exception)
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("carom: ")
+    return lines[0]
+
+
+def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):
+    result = carom("run", "billiards", "--seconds", "0.3", "--out", "pictures")
+    assert result.exit_code == 0, result.stderr
+    expected = (
+        "billiards",
+        "16 dynamic",
+        "contacts",
+        "energy drift",
+        "momentum drift",
+        "deepest overlap",
+        "escaped",
+    )
+    for word in (*expected, "BroadPhase", "whole step"):
+        assert word in result.stdout
+    for name in ("billiards-final.png", "billiards-traces.png"):
+        picture = tmp_path / "pictures" / name
+        assert str(Path("pictures") / name) in result.stdout
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert picture.stat().st_size > 10_000
+
+
+def test_3d_is_drawn_too(carom, tmp_path, ball):
+    text = ball.read_text().replace("dimensions=2", "dimensions=3").replace("-9.81)", "-9.81, 0.0)")
+    text = (
+        text.replace("(0, 0)", "(0, 0, 0)")
+        .replace("(seed, 10)", "(seed, 10, 0)")
+        .replace("(50, 0.5)", "(50, 0.5, 50)")
+    )
+    box = "    world.create_entity(Transform((3, 5, 1)), RigidBody(), AABBCollider(half_extents=(1, 0.5, 2)))"
+    ball.write_text(text.replace("    return world", f"{box}\n    return world"))
+    report = report_of(carom("run", "ball.py", "--steps", "30", "--json"))
+    assert report["dimensions"] == 3
+    assert [Path(p).name for p in report["pictures"]] == ["ball-final.png", "ball-traces.png"]
+    assert all((tmp_path / p).is_file() for p in report["pictures"])
+
+
+def test_json_is_the_only_output_and_holds_what_the_table_shows(carom):
+    report = report_of(carom("run", "gas2d", "--steps", "20", "--json", "--no-pictures", "--seed", "4"))
+    assert report["scene"] == "gas2d"
+    assert report["seed"] == 4
+    assert report["steps"] == 20
+    assert report["simulated_seconds"] == pytest.approx(20 / 60)
+    assert report["bodies"] == {"total": 1004, "dynamic": 1000, "kinematic": 0, "static": 4}
+    assert report["contacts"]["impacts"] > 0
+    assert report["step_milliseconds"] > 0
+    assert sum(report["system_milliseconds"].values()) > 0
+    assert abs(report["energy"]["relative"]) < 1e-11
+    assert report["escaped"] == {"outside": 0, "non_finite": 0}
+    assert report["deepest_overlap"] < 1.0
+    assert report["pictures"] == []
+
+
+def test_energy_drift_is_measured_against_the_largest_kinetic_energy(carom, ball):
+    """Explicit Euler gains m g (g dt t / 2) in free fall, by position; the scale is m (g t)^2 / 2."""
+    explicit = ("--set", "integrator=explicit_euler")
+    report = report_of(carom("run", "ball.py", "--steps", "30", *explicit, "--json", "--no-pictures"))
+    assert report["energy"]["relative"] == pytest.approx((1 / 60) / 0.5, rel=1e-9)
+
+
+def test_bodies_beyond_the_walls_and_broken_ones_count_as_escaped(carom, ball):
+    ball.write_text(
+        ball.read_text().replace(
+            "    return world",
+            "    bullet = RigidBody(linear_velocity=(0, -1e4))\n"
+            "    world.create_entity(Transform((9, 10)), bullet, SphereCollider(radius=0.5))\n"
+            "    return world",
+        )
+    )
+    report = report_of(carom("run", "ball.py", "--steps", "10", "--json", "--no-pictures"))
+    assert report["escaped"] == {"outside": 1, "non_finite": 0}  # through the floor; the upper side is open
+
+
+def test_bodies_that_are_not_finite_are_counted_and_the_rest_is_still_drawn(carom, ball):
+    """1e200 m/s: the kinetic energy overflows at once, the position after some steps of 1e150 s."""
+    fast = "    world.create_entity(Transform((5, 5)), RigidBody(linear_velocity=(1e200, 0)))"
+    ball.write_text(ball.read_text().replace("    return world", f"{fast}\n    return world"))
+    result = carom("run", "ball.py", "--steps", "3", "--set", "dt=1e150", "--json")
+    report = report_of(result)
+    assert "NaN" not in result.stdout
+    assert "Infinity" not in result.stdout
+    assert report["energy"]["start"] is None
+    assert report["escaped"]["non_finite"] >= 1
+
+
+def test_to_jump_over_an_obstacle_is_no_escape(carom):
+    report = report_of(carom("run", "jump", "--json", "--no-pictures"))
+    assert report["escaped"] == {"outside": 0, "non_finite": 0}
+
+
+def test_the_worlds_faults_are_shown(carom, ball):
+    """A body between two elastic walls that leave it no room bounces more often than a step allows."""
+    text = ball.read_text().replace(
+        "SphereCollider(radius=0.5)", "SphereCollider(radius=0.5, restitution=1.0)"
+    )
+    text = text.replace("gravity=(0.0, -9.81)", "gravity=(0.0, 0.0)").replace("(seed, 10)", "(0, 1.001)")
+    text = text.replace("mass=2.0", "linear_velocity=(0, 20)")
+    wall = "    world.create_entity(Transform((0, 2.01)), AABBCollider(half_extents=(50, 0.5)))"
+    ball.write_text(text.replace("    return world", f"{wall}\n    return world"))
+    result = carom("run", "ball.py", "--steps", "3", "--no-pictures")
+    assert result.exit_code == 0, result.stderr
+    assert "! step 0: " in result.stdout or "! step 1: " in result.stdout
+
+
+def test_settings_come_from_the_scene_then_the_preset_then_set(carom):
+    def settings(*arguments):
+        return report_of(carom("run", "billiards", "--steps", "1", "--json", "--no-pictures", *arguments))[
+            "settings"
+        ]
+
+    assert settings()["dt"] == pytest.approx(1 / 960)
+    assert settings("--settings", "accurate")["substeps"] == Settings.accurate().substeps
+    changed = settings("--set", "substeps=7", "--set", "restitution_threshold=0.25")
+    assert (changed["dt"], changed["substeps"], changed["restitution_threshold"]) == (1 / 960, 7, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("dt=1/120", 1 / 120),
+        ("dt=0.01", 0.01),
+        ("substeps=8", 8),
+        ("slop=none", None),
+        ("slop=1e-3", 1e-3),
+        ("debug=yes", True),
+        ("restitution_mixing=min", "min"),
+        ("integrator = rk4", "rk4"),
+    ],
+)
+def test_set_takes_the_types_of_the_fields(text, value):
+    assert list(parse_assignments([text]).values()) == [value]
+
+
+def test_seconds_and_steps(carom, ball):
+    def steps(*arguments):
+        return report_of(carom("run", "ball.py", "--json", "--no-pictures", *arguments))["steps"]
+
+    assert steps("--seconds", "0.5") == 30
+    assert steps("--seconds", "0.5", "--set", "dt=1/120") == 60
+    assert steps("--steps", "0") == 0
+
+
+def test_the_seed_reaches_the_scene_and_equal_seeds_give_equal_bits(carom):
+    def state(seed):
+        return report_of(
+            carom("run", "asteroids", "--steps", "5", "--json", "--no-pictures", "--seed", seed)
+        )["state_hash"]
+
+    assert state("1") == state("1") != state("2")
+
+
+def test_a_file_imports_its_neighbours_and_tells_how_long_it_runs(carom, tmp_path, ball):
+    (tmp_path / "components.py").write_text("SPEED = 3.0\n")  # a name that carom has a package of, too
+    text = ball.read_text().replace("def build", "from components import SPEED\nSECONDS = 0.2\n\ndef build")
+    ball.write_text(text.replace("RigidBody(mass=2.0)", "RigidBody(linear_velocity=(SPEED, 0))"))
+    report = report_of(carom("run", "ball.py", "--json", "--no-pictures"))
+    assert report["steps"] == 12
+    assert report["momentum"]["start"] == [3.0, 0.0]
+    assert not (tmp_path / "__pycache__" / "ball.cpython-311.pyc").exists()
+
+
+def test_scenes_lists_all_with_their_descriptions(carom):
+    result = carom("scenes")
+    assert result.exit_code == 0
+    for name in scenes.names():
+        assert name in result.stdout
+
+
+def test_alone_it_shows_what_it_can_do(carom):
+    result = carom()
+    assert result.exit_code == 0
+    assert "Commands:" in result.stdout
+
+
+def test_version_and_python_dash_m():
+    result = subprocess.run(
+        [sys.executable, "-m", "carom", "--version"], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() == f"carom, version {__version__}"
+
+
+def test_without_matplotlib_the_run_goes_on_and_says_what_is_missing(tmp_path):
+    code = "import sys; sys.modules['matplotlib'] = None; import carom.lab.cli as c; c.main()"
+    command = [sys.executable, "-c", code, "run", "jump", "--steps", "2", "--json"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert "carom[plot]" in result.stderr
+    assert json.loads(result.stdout)["pictures"] == []
+
+
+def test_the_progress_says_what_compiles(tmp_path, monkeypatch):
+    """With an empty cache of its own: the names of kernels appear while they compile."""
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich then animates into the pipe
+    command = [sys.executable, "-m", "carom", "run", "jump", "--no-pictures", "--steps", "60"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert "compiling" in result.stderr
+    assert "60/60" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "asteroid"], ["no scene named 'asteroid'", "did you mean 'asteroids'?"]),
+        (["run", "xyz"], ["no scene named 'xyz'", "gas2d"]),
+        (["run", "folder/thing"], ["no file 'folder/thing'"]),
+        (["run"], ["Missing argument"]),
+        (["rum", "jump"], ["no command 'rum'", "did you mean 'run'?"]),
+        (["run", "jump", "--step", "3"], ["--step", "--steps"]),
+        (["run", "jump", "--steps", "-1"], ["--steps", "-1"]),
+        (["run", "jump", "--steps", "many"], ["--steps", "many"]),
+        (["run", "jump", "--seconds", "-1"], ["--seconds", "-1"]),
+        (["run", "jump", "--seconds", "nan"], ["--seconds", "nan"]),
+        (["run", "jump", "--steps", "3", "--seconds", "1"], ["--steps and --seconds"]),
+        (["run", "jump", "--seed", "-4"], ["--seed"]),
+        (["run", "jump", "--settings", "acurate"], ["'acurate'", "did you mean 'accurate'?"]),
+        (["run", "jump", "--set", "substep=3"], ["no field 'substep'", "did you mean 'substeps'?"]),
+        (["run", "jump", "--set", "substeps=three"], ["substeps takes a whole number, not 'three'"]),
+        (["run", "jump", "--set", "substeps=2.5"], ["substeps takes a whole number, not '2.5'"]),
+        (["run", "jump", "--set", "dt=fast"], ["dt takes a number, not 'fast'"]),
+        (["run", "jump", "--set", "dt=1/0"], ["dt takes a number, not '1/0'"]),
+        (["run", "jump", "--set", "dt=-1"], ["dt", "-1"]),
+        (["run", "jump", "--set", "dt=nan"], ["dt", "nan"]),
+        (["run", "jump", "--set", "substeps"], ["field=value"]),
+        (["run", "jump", "--set", "debug=perhaps"], ["debug takes true or false"]),
+        (["run", "jump", "--set", "dt=1", "--set", "dt=2"], ["dt twice"]),
+        (["run", "jump", "--set", "restitution_mixing=maxx"], ["'maxx'", "did you mean 'max'"]),
+        (["run", "jump", "--set", "collision=discreet"], ["'discreet'", "discrete"]),
+        (["run", "jump", "--set", "integrator=verlet"], ["verlet", "velocity_verlet"]),
+    ],
+    ids=lambda value: " ".join(value[1:]) if value and value[0] in {"run", "rum"} else "",
+)
+def test_wrong_names_and_values(carom, arguments, words):
+    line = refusal(carom(*arguments))
+    for word in words:
+        assert word in line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("def build(settings=None, seed=0)\n    pass\n", ["scene.py, line 1"]),
+        ("x = 1\n\nraise RuntimeError('no luck')\n", ["scene.py, line 3", "RuntimeError", "no luck"]),
+        ("import numppy\n", ["scene.py, line 1", "numppy"]),
+        ("import sys\nsys.exit(3)\n", ["scene.py, line 2", "SystemExit"]),
+        ("def biuld(settings=None, seed=0): ...\n", ["defines no build(settings, seed=0)", "'biuld'"]),
+        ("build = 3\n", ["defines no build(settings, seed=0)"]),
+        ("\ndef build(world): ...\n", ["line 2", "build must take (settings, seed=0)"]),
+        ("def build(settings=None, seed=0): pass\n", ["build returned nothing (None), not a World"]),
+        ("def build(settings=None, seed=0):\n    return [1]\n", ["build returned a list, not a World"]),
+        (
+            "def build(settings=None, seed=0):\n    return 1 / seed\n",
+            ["scene.py, line 2", "ZeroDivisionError"],
+        ),
+        (
+            "from carom.framework import World\ndef build(settings=None, seed=0):\n    return World()\n",
+            ["no physics in this world"],
+        ),
+    ],
+)
+def test_wrong_files(carom, tmp_path, text, words):
+    (tmp_path / "scene.py").write_text(text)
+    line = refusal(carom("run", "scene.py", "--no-pictures"))
+    for word in words:
+        assert word in line
+
+
+def test_a_wrong_value_inside_build_names_its_line(carom, ball):
+    ball.write_text(ball.read_text().replace("mass=2.0", "mass=-2.0"))
+    line = refusal(carom("run", "ball.py", "--no-pictures"))
+    assert "ball.py, line 9" in line
+    assert "mass" in line
+
+
+def test_an_error_in_the_middle_of_a_run_names_its_line(carom, ball):
+    ball.write_text(
+        ball.read_text().replace(
+            "    return world",
+            "    from carom.framework import Phase, System\n"
+            "    class Bomb(System):\n"
+            "        phase = Phase.END\n"
+            "        def process(self, dt):\n"
+            "            if self.world.step_count >= 3:\n"
+            "                raise RuntimeError('boom')\n"
+            "    world.add_system(Bomb())\n"
+            "    return world",
+        )
+    )
+    result = carom("run", "ball.py", "--no-pictures")
+    assert result.exit_code == 2
+    line = result.stderr.splitlines()[-1]
+    assert line.startswith("carom: ball.py, line 15")
+    assert "boom" in line
+    assert "Traceback" not in result.stderr
+
+
+def test_missing_file_suggests_its_neighbour(carom, ball):
+    assert "did you mean 'ball.py'?" in refusal(carom("run", "bal.py"))
+
+
+def test_traceback_on_request(carom, tmp_path):
+    (tmp_path / "scene.py").write_text("raise RuntimeError('no luck')\n")
+    result = carom("run", "scene.py", "--traceback")
+    assert result.exit_code != 0
+    assert result.exception is not None
+    assert "no luck" in str(result.exception)
+
+
+def test_pictures_into_a_file_are_refused_before_the_run(carom, tmp_path):
+    (tmp_path / "out").write_text("in the way")
+    assert "--out" in refusal(carom("run", "jump"))

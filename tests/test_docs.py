@@ -1,0 +1,201 @@
+"""The manual is true: every Python block of README.md and docs/ runs, and every link between pages leads somewhere.
+
+The blocks of one page run in order and share one namespace, as a reader would paste them. They are compiled under the
+page's own name and lines, so a traceback shows the line of the page.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+import traceback
+import types
+from dataclasses import dataclass
+from pathlib import Path
+
+import esper
+import pytest
+
+from carom.framework import World
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+FENCE = re.compile(r"^(?P<indent> *)(?P<marks>`{3,}|~{3,})(?P<info>[^`]*)$")
+LINK = re.compile(r"\]\(\s*(?P<target>[^()\s]*(?:\([^()\s]*\)[^()\s]*)*)[^()]*\)")  # of links in links both
+
+
+@dataclass
+class Block:
+    """A fenced block: what stands behind the fence, the number of its first line, its text."""
+
+    info: list[str]
+    line: int
+    text: str
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix() if page.is_relative_to(ROOT) else page.name
+
+
+def split(text: str, name: str) -> tuple[list[Block], list[str]]:
+    """The fenced blocks of a page, and its lines with those of blocks left empty."""
+    blocks: list[Block] = []
+    prose: list[str] = []
+    fence: re.Match[str] | None = None
+    start, inside = 0, []
+    for number, line in enumerate(text.splitlines(), 1):
+        match = FENCE.match(line)
+        if fence is None and match:
+            fence, start, inside = match, number + 1, []
+        elif fence is not None and match and not match["info"].strip() and match["marks"].startswith(fence["marks"]):
+            indent = len(fence["indent"])
+            blocks.append(Block(fence["info"].split(), start, "".join(inner[indent:] + "\n" for inner in inside)))
+            fence = None
+        elif fence is not None:
+            inside.append(line)
+        prose.append("" if fence is not None or match else line)
+    assert fence is None, f"{name}:{start - 1}: this block is never closed"
+    return blocks, prose
+
+
+def python_blocks(page: Path) -> list[Block]:
+    """Those to run. A misspelt mark is an error: it would take a block out of the tests without a word."""
+    blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
+    for block in blocks:
+        info = block.info[:1] + [mark for mark in block.info[1:] if mark != "no-run"]
+        assert not info or "py" not in info[0] or info == ["python"], (
+            f"{name_of(page)}:{block.line - 1}: write ```python or ```python no-run, not ```{' '.join(block.info)}"
+        )
+    return [block for block in blocks if block.info == ["python"]]
+
+
+def run(blocks: list[Block], page: Path, namespace: dict[str, object]) -> None:
+    """Execute blocks of a page one after the other; AssertionError names page and line of what fails."""
+    for block in blocks:
+        try:
+            exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), namespace)
+        except Exception as error:
+            line = line_of(error, page) or block.line
+            shown = page.read_text(encoding="utf-8").splitlines()[line - 1].strip()
+            raise AssertionError(
+                f"{name_of(page)}:{line}: {type(error).__name__}: {error}\n    {shown}\n\n"
+                + "".join(traceback.format_exception(error))
+            ) from None
+
+
+def line_of(error: Exception, page: Path) -> int | None:
+    """The innermost line of the page on the error's traceback."""
+    if isinstance(error, SyntaxError) and error.filename == str(page):
+        return error.lineno
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(page)]
+    return lines[-1] if lines else None
+
+
+@pytest.fixture
+def namespace(monkeypatch, tmp_path):
+    """A module for the page to run in, in an empty folder; its worlds are closed afterwards."""
+    module = types.ModuleType("page_of_the_manual")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.chdir(tmp_path)
+    worlds = set(esper.list_worlds())
+    yield vars(module)
+    for value in list(vars(module).values()):
+        if isinstance(value, World):
+            value.close()
+    esper.switch_world("default")
+    for left in set(esper.list_worlds()) - worlds:  # of functions, that no name of the page holds
+        esper.delete_world(left)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if python_blocks(page)], ids=name_of)
+def test_the_python_blocks_run(page, namespace):
+    run(python_blocks(page), page, namespace)
+
+
+# -- links ------------------------------------------------------------------------------------------------------------
+
+
+def links(page: Path) -> list[tuple[int, str]]:
+    """(line, target) of the page's links and pictures, outside of code."""
+    _, prose = split(page.read_text(encoding="utf-8"), name_of(page))
+    found = []
+    for number, line in enumerate(prose, 1):
+        found += [(number, match["target"]) for match in LINK.finditer(re.sub(r"`[^`]*`", "``", line))]
+    return found
+
+
+def anchors(page: Path) -> set[str]:
+    """The names under which a page's headings can be linked to, made as code hosts make them."""
+    _, prose = split(page.read_text(encoding="utf-8"), name_of(page))
+    found: set[str] = set()
+    for line in prose:
+        heading = re.match(r"^#{1,6}\s+(.*?)\s*#*$", line)
+        if not heading:
+            continue
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading[1]).lower()
+        anchor = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+        number = 0
+        while (anchor if not number else f"{anchor}-{number}") in found:
+            number += 1
+        found.add(anchor if not number else f"{anchor}-{number}")
+    return found
+
+
+def dead_links(page: Path, root: Path = ROOT) -> list[str]:
+    """The page's relative links that lead nowhere, with their lines."""
+    dead = []
+    for line, target in links(page):
+        if re.match(r"[a-z][a-z0-9+.-]*:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        goal = (page.parent / path).resolve() if path else page
+        if not goal.exists():
+            dead.append(f"{name_of(page)}:{line}: {target} does not exist")
+        elif not goal.is_relative_to(root):
+            dead.append(f"{name_of(page)}:{line}: {target} leads out of the project")
+        elif anchor and goal.suffix == ".md" and anchor not in anchors(goal):
+            dead.append(f"{name_of(page)}:{line}: {target}: {name_of(goal)} has no such heading")
+    return dead
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_the_links_lead_somewhere(page):
+    assert dead_links(page) == []
+
+
+# -- the tests' own machinery -----------------------------------------------------------------------------------------
+
+
+def test_a_failing_block_is_reported_with_its_page_and_line(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Page\n\n```python\nx = 1\n```\n\nText.\n\n```python\ny = x + 1\nassert y == 3, 'wrong'\n```\n")
+    blocks, _ = split(page.read_text(), "page.md")
+    with pytest.raises(AssertionError, match=r"^page\.md:11: AssertionError: wrong\n    assert y == 3"):
+        run(blocks, page, {})
+    page.write_text("```python\nx = (\n```\n")
+    blocks, _ = split(page.read_text(), "page.md")
+    with pytest.raises(AssertionError, match=r"^page\.md:2: SyntaxError"):
+        run(blocks, page, {})
+
+
+def test_blocks_links_and_headings_are_told_apart():
+    text = "a [b](c.md)\n~~~python\n[no](x.md)\n```\n~~~\n- list\n  ```sh\n  ls\n  ```\n"
+    blocks, prose = split(text, "text")
+    assert [(block.info, block.line, block.text) for block in blocks] == [
+        (["python"], 3, "[no](x.md)\n```\n"),
+        (["sh"], 8, "ls\n"),
+    ]
+    assert [line for line in prose if line] == ["a [b](c.md)", "- list"]
+    with pytest.raises(AssertionError, match="text:1: this block is never closed"):
+        split("```python\nx\n", "text")
+    targets = [match["target"] for match in LINK.finditer("[![p](q.png)](r.md) [s](t.md#u 'v') [w](x_(y).md)")]
+    assert targets == ["q.png", "r.md", "t.md#u", "x_(y).md"]
+
+
+def test_a_dead_link_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# One `two`, three\n\n[a](page.md) [b](#one-two-three) [c](gone.md)\n[d](#gone) `[e](x.md)`\n")
+    assert dead_links(page, tmp_path) == [
+        "page.md:3: gone.md does not exist",
+        "page.md:4: #gone: page.md has no such heading",
+    ]

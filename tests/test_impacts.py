@@ -1,0 +1,382 @@
+"""Impacts of the discrete mode against closed forms: B9, B10, B11, B12, B16 of the accuracy list, and the two ways to
+bounce wrongly: sticking together, and sending both bodies backwards."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from worlds import EPS, Conserved, ball, box, floor, make_world, position, run, velocity
+
+DT = 1 / 60
+LAG = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5}  # they keep v^2/2 + g y + lag g dt v in free fall
+RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]
+makers = pytest.mark.parametrize("maker", [ball, box])
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+integrators = pytest.mark.parametrize(
+    "integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4"]
+)
+
+
+# -- the two failures -----------------------------------------------------------------------------------------------------
+
+
+@makers
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_stuck_pair(maker, e):
+    """Slow bodies overlap for many frames: they bounce once and part, instead of being turned round every frame."""
+    world = make_world()
+    a, b = maker(world, -0.35, 0.1, restitution=e), maker(world, 0.35, -0.1, restitution=e)  # 0.3 deep: 90 frames
+    kept, gaps, speeds = Conserved(world), [], []
+    for _ in range(200):
+        world.step()
+        gaps.append(position(world, b)[0] - position(world, a)[0])
+        speeds.append(velocity(world, b)[0] - velocity(world, a)[0])
+    # Restitution: relative speed after = e times before, from the first frame on, and no frame turns it again.
+    np.testing.assert_allclose(speeds, 0.2 * e, atol=1e-15)
+    assert (np.diff(gaps) >= 0).all()
+    assert gaps[-1] >= (0.7 + 0.2 * e * 200 * DT if e else 0.99) - 1e-12  # e = 0: pushed out but for the slop
+    kept.check()
+
+
+@makers
+@pytest.mark.parametrize("mass", [1.0, 10.0, 0.1])
+def test_rear_end_catch_up(maker, mass):
+    """A faster body catches a slower one: both go on forwards, with the speeds of the closed form (B9)."""
+    world = make_world()
+    a, b = maker(world, 0.0, 5.0, mass=mass, restitution=0.2), maker(world, 1.5, 2.0, restitution=0.2)
+    kept = Conserved(world)
+    run(world, 60)
+    before = 5.0 * mass + 2.0
+    # v1' = (p - e m2 w) / M, v2' = (p + e m1 w) / M
+    slow, fast = (before - 0.2 * 3.0) / (mass + 1), (before + 0.2 * mass * 3.0) / (mass + 1)
+    np.testing.assert_allclose([velocity(world, a)[0], velocity(world, b)[0]], [slow, fast], rtol=1e-14)
+    assert slow > 0
+    assert fast > slow
+    kept.check()
+
+
+# -- B9: two bodies on a line ---------------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_two_body_impact(d, e, ratio):
+    """v1' = v1 - (1+e) m2/(m1+m2) w, v2' = v2 + (1+e) m1/(m1+m2) w: 4 eps of the speeds, of the momentum for it."""
+    world = make_world(d)
+    v1, v2 = 1.0, -0.5
+    a = ball(world, -0.51, v1, restitution=e)
+    b = ball(world, 0.51, v2, mass=ratio, restitution=e)
+    run(world, 3)
+    m1, m2, w = Fraction(1), Fraction(ratio), Fraction(v1) - Fraction(v2)
+    share = (1 + Fraction(e)) * w / (m1 + m2)
+    after = velocity(world, a), velocity(world, b)
+    for found, exact in zip(after, (Fraction(v1) - share * m2, Fraction(v2) + share * m1), strict=True):
+        assert abs(Fraction(found[0]) - exact) <= 4 * EPS * (abs(v1) + abs(v2))
+        assert (found[1:] == 0).all()
+    total = Fraction(after[0][0]) + m2 * Fraction(after[1][0])
+    assert abs(total - (Fraction(v1) + m2 * Fraction(v2))) <= 4 * EPS * (abs(v1) + ratio * abs(v2))
+
+
+@both_dimensions
+@makers
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize(("kind", "speed"), [("static", 0.0), ("kinematic", 0.0), ("kinematic", -0.5)])
+def test_infinitely_heavy_partner(d, maker, e, kind, speed):
+    """B9 for m2 -> infinity: v1' = v2 - e (v1 - v2), v2' = v2; the partner keeps its course to the bit."""
+    world = make_world(d)
+    a = maker(world, -0.51, 1.0, restitution=e)
+    b = maker(world, 0.51, speed, kind=kind)
+    run(world, 3)
+    assert velocity(world, a)[0] == pytest.approx(speed - e * (1.0 - speed), abs=4 * EPS * 2)
+    assert velocity(world, b)[0] == speed
+    assert position(world, b)[0] == pytest.approx(0.51 + 3 * DT * speed, abs=1e-15)
+
+
+def test_kinematic_bodies_pass_through_each_other_and_through_walls():
+    """Neither reacts to anything: contacts are reported, nothing is pushed."""
+    world = make_world()
+    a, b = ball(world, -1, 1, kind="kinematic"), ball(world, 1, -1, kind="kinematic")
+    wall = box(world, 0, kind="static")
+    run(world, 90)
+    for entity, speed in ((a, 1), (b, -1), (wall, 0)):
+        assert velocity(world, entity)[0] == speed
+    assert position(world, a)[0] == pytest.approx(0.5, abs=1e-13)
+    assert len(world.contacts.of(wall)) == 2
+
+
+# -- B10: off the centre line ---------------------------------------------------------------------------------------------
+
+# p1, toi, normal, then (e, m2, v1', v2'): rational answers, the other body at rest at the origin, radii sum to 1
+OBLIQUE = {
+    2: ((-3, 0.6), 2.2, (0.8, -0.6), ((1.0, 1, (0.36, 0.48), (0.64, -0.48)), (0.5, 3, (0.28, 0.54), (0.24, -0.18)))),
+    3: (
+        (-3, 3 / 7, 6 / 7), 3 - 2 / 7, (2 / 7, -3 / 7, -6 / 7),
+        ((1.0, 1, (45 / 49, 6 / 49, 12 / 49), (4 / 49, -6 / 49, -12 / 49)),),
+    ),
+}  # fmt: skip
+
+
+@both_dimensions
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 60, 1 / 3])
+@pytest.mark.parametrize("radius", [0.5, 0.2])
+def test_oblique_impact(d, dt, radius):
+    """Over 64 phases of the step: time, normal, point and state after are exact, because impacts are back-dated.
+
+    Discrete mode needs the overlap at the end of a step: the chord through the sum of the spheres is 1.6 (2D) or 4/7
+    (3D) long, v dt at most 1/3. Tolerance: rounding of p1 + v t, 1e-12.
+    """
+    start, toi, normal, cases = OBLIQUE[d]
+    direction = np.eye(d)[0]
+    for e, m2, v1, v2 in cases:
+        world = make_world(d, dt=dt)
+        lanes = 10.0 * np.arange(64)[:, None] * np.eye(d)[1]  # one pair each, out of reach of the others
+        shifts = np.arange(64) / 64 * dt
+        first = [
+            ball(world, start - shift * direction + lane, 1.0, radius=radius, restitution=e)
+            for shift, lane in zip(shifts, lanes, strict=True)
+        ]
+        second = [ball(world, lane, radius=1 - radius, mass=m2) for lane in lanes]
+        impacts = []
+        world.on("impact", impacts.append)
+        steps = math.ceil(4 / dt)
+        run(world, steps)
+        assert sorted((hit.entity_a, hit.entity_b) for hit in impacts) == list(zip(first, second, strict=True))
+        where = start + toi * direction
+        for hit in impacts:
+            k = first.index(hit.entity_a)
+            assert hit.step * dt + hit.time_of_impact == pytest.approx(toi + shifts[k], abs=1e-12)
+            np.testing.assert_allclose(hit.normal, normal, atol=1e-12)
+            np.testing.assert_allclose(hit.point - lanes[k], where + radius * np.array(normal), atol=1e-12)
+        after = steps * dt - toi - shifts
+        for entities, origin, new in ((first, where, v1), (second, np.zeros(d), v2)):
+            rows = [world.bodies.row_of(entity) for entity in entities]
+            np.testing.assert_allclose(world.bodies.linear_velocity[rows], np.tile(new, (64, 1)), atol=1e-12)
+            expected = lanes + origin + np.array(new) * after[:, None]
+            np.testing.assert_allclose(world.bodies.position[rows], expected, atol=2e-12)
+
+
+def test_state_at_three_seconds():
+    """B10's published state: (-0.512, 0.984) and (0.512, -0.384) at t = 3."""
+    world = make_world()
+    a, b = ball(world, (-3, 0.6), 1.0, restitution=1.0), ball(world, 0.0, restitution=1.0)
+    run(world, 180)
+    np.testing.assert_allclose(position(world, a), (-0.512, 0.984), atol=1e-12)
+    np.testing.assert_allclose(position(world, b), (0.512, -0.384), atol=1e-12)
+
+
+@both_dimensions
+@integrators
+def test_impact_time_on_the_path_of_the_integrator(d, integrator):
+    """A ball falls on a floor: sqrt(2 h / g) where the path is the parabola; a line's time, to O(dt), with Euler.
+
+    A lagging Euler height is wrong by g dt t / 2, so the time by dt / 2, and the chord within the step by less than dt.
+    """
+    world = make_world(d, gravity=9.81, integrator=integrator)
+    floor(world)
+    ball(world, (0, 4.9 + 0.5, 0)[:d], restitution=1.0)
+    impacts = []
+    world.on("impact", impacts.append)
+    run(world, 75)
+    (hit,) = impacts
+    found, exact = hit.step * DT + hit.time_of_impact, math.sqrt(2 * 4.9 / 9.81)
+    assert found == pytest.approx(exact, abs=1e-12 if "euler" not in integrator else DT)
+    np.testing.assert_allclose(hit.point[1], 0, atol=1e-13)
+    assert abs(hit.normal[1]) == 1
+
+
+# -- B11: bouncing ball, e < 1 --------------------------------------------------------------------------------------------
+
+
+@integrators
+@makers
+def test_bouncing_ball_comes_to_rest(maker, integrator):
+    """Impacts die out at T0 (1+e)/(1-e) (Zeno), from any height; then the ball stands on the floor: no sinking, v = 0.
+
+    An approach below 2 g dt is no bounce: what that leaves out lasts 2 * 2 dt / (1-e) at most. Euler's threshold is on
+    the speed of the path, up to g dt / 2 from that of the flight. Rest shows at a step's end: two steps more.
+    """
+    h, g = np.repeat(np.linspace(0.1, 8.0, 25), 10), 9.81
+    e = np.tile(np.arange(10) / 10, 25)
+    world = make_world(gravity=g, integrator=integrator)
+    floor(world)
+    balls = [maker(world, (1.5 * k, h[k] + 0.5), restitution=e[k]) for k in range(len(h))]
+    over = np.sqrt(2 * h / g) * (1 + e) / (1 - e)
+    rows = [world.bodies.row_of(b) for b in balls]
+    rest, lowest = np.zeros(len(balls)), 0.0
+    for step in range(1, int(over.max() / DT) + 60):
+        world.step()
+        heights = world.bodies.position[rows, 1] - 0.5
+        lowest = min(lowest, heights.min())
+        rest[(world.bodies.linear_velocity[rows] != 0).any(axis=1)] = step * DT  # it moved: not yet
+        if step % 60 == 0:
+            before = heights
+    assert lowest > -0.005  # the slop
+    left_out = (5 if integrator in LAG else 4) / (1 - e) * DT
+    assert (rest >= over - left_out - 2 * DT).all()
+    assert (rest <= over + 2 * DT).all()
+    np.testing.assert_array_equal(heights, before)  # no creeping
+    assert (np.abs(heights) < 0.005).all()
+
+
+def test_a_floor_takes_any_number_of_impacts():
+    """The cap on impacts is per moving body: 200 balls bounce on one floor within one step."""
+    world = make_world(gravity=9.81)
+    floor(world)
+    balls = [ball(world, (1.5 * k, 0.55), (0, -10), restitution=0.5) for k in range(200)]
+    world.step()
+    assert len(world.contacts.impacts) == 200
+    assert world.stats().counters["capped_impacts"] == 0
+    assert all(velocity(world, b)[1] > 4.5 for b in balls)
+
+
+@pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4"])
+@pytest.mark.parametrize("e", [0.5, 0.8, 1.0, 1.5])
+def test_flights_follow_the_square_of_restitution(e, integrator):
+    """Apex n = h e^(2 n): energy of flight n, in units of m g h.
+
+    Right to rounding where the path is the parabola. Euler (with the energy it keeps, see B12) takes the speed from
+    the chord's middle: each bounce is off by (1 - e^2) (g s)^2 / 2, s up to dt / 2 from there; at e = 1 it reflects the
+    chord: up to u dt.
+    """
+    h, g = 4.9, 9.81
+    world = make_world(gravity=g, integrator=integrator)
+    floor(world)
+    bouncing = ball(world, (0, h + 0.5), restitution=e)
+    lag = LAG.get(integrator, 0.0) * g * DT
+    energies, bounces = [], []
+    world.on("impact", lambda hit: bounces.append(hit.step))
+    while len(bounces) < 4:
+        world.step()
+        v = velocity(world, bouncing)[1]
+        energies.append((v * v / 2 + g * (position(world, bouncing)[1] - 0.5) + lag * v) / (g * h))
+    for n in range(3):
+        expected = e ** (2 * n + 2)
+        error = abs(1 - e * e) * (g * DT) ** 2 / 8 / (g * h) * (n + 1) * max(1, expected)
+        if e == 1:
+            error = math.sqrt(2 * g * h) * DT / h
+        np.testing.assert_allclose(energies[bounces[n] : bounces[n + 1]], expected, atol=error if lag else 1e-12, rtol=1e-11)
+
+
+# -- B12: no drift at e = 1 -----------------------------------------------------------------------------------------------
+
+
+@integrators
+@pytest.mark.parametrize("rate", [60, 240])
+def test_no_energy_drift_of_a_bouncing_ball(integrator, rate):
+    """100 s at e = 1, five heights at once: the energy that the method keeps in flight may not drift over the bounces.
+
+    Verlet, RK4 and Yoshida fly the parabola: E = v^2/2 + g y, 1e-10. Euler keeps v^2/2 + g y -+ g dt v/2 (explicit,
+    semi-implicit) in flight; a bounce moves it by g u (dt - 2 t), t the time in the step, so up to u dt of the height:
+    a cycle. Drift: mean of the last ten bounces against that of the first ten, 2 % as B12 asks.
+    """
+    g, dt = 9.81, 1 / rate
+    heights = np.array([4.9, 3.1, 2.7, 6.3, 8.8])
+    world = make_world(gravity=g, dt=dt, integrator=integrator)
+    floor(world)
+    balls = [ball(world, (2.0 * k, h + 0.5), restitution=1.0) for k, h in enumerate(heights)]
+    rows = [world.bodies.row_of(b) for b in balls]
+    lag = LAG.get(integrator, 0.0)
+    energies, hits = [], 0
+    for _ in range(100 * rate):
+        world.step()
+        hits += len(world.contacts.impacts)
+        v = world.bodies.linear_velocity[rows, 1]
+        energies.append((v * v / 2 + g * (world.bodies.position[rows, 1] - 0.5) + lag * g * dt * v) / (g * heights))
+    energies = np.array(energies)
+    expected = (100 / (2 * np.sqrt(2 * heights / g))).sum()
+    assert hits == pytest.approx(expected, abs=len(balls) * 1.5)
+    if lag == 0:
+        np.testing.assert_allclose(energies, 1, atol=1e-10)
+        return
+    tenth = len(energies) // 10
+    drift = energies[-tenth:].mean(axis=0) - energies[:tenth].mean(axis=0)
+    assert np.abs(drift).max() < 0.02
+    impact_speed = np.sqrt(2 * g * heights)
+    assert (np.abs(energies - 1).max(axis=0) < 2 * impact_speed * dt / heights).all()
+
+
+# -- B16: Newton's cradle -------------------------------------------------------------------------------------------------
+
+
+@makers
+@pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
+@pytest.mark.parametrize("arriving", [1, 2, 3, 4])
+def test_cradle_gives_the_sequential_answer(maker, gap, arriving):
+    """k balls arrive, k leave. Equal bodies on a line exchange velocities, so without their widths they pass through
+    each other: positions at any time are the sorted free flights plus the widths."""
+    world = make_world()
+    count = 5
+    start = np.arange(count) * (1 + gap)
+    start[:arriving] -= 0.3 + np.arange(arriving)[::-1] * gap
+    speeds = np.where(np.arange(count) < arriving, 1.0, 0.0)
+    balls = [maker(world, x, v, restitution=1.0) for x, v in zip(start, speeds, strict=True)]
+    kept = Conserved(world)
+    for step in range(1, 61):
+        world.step()
+        if step in (15, 20, 60):
+            flown = np.sort(start - np.arange(count) + speeds * step * DT) + np.arange(count)
+            np.testing.assert_allclose([position(world, b)[0] for b in balls], flown, atol=1e-12)
+    assert [round(velocity(world, b)[0], 12) for b in balls] == sorted(speeds)
+    kept.check()
+
+
+def test_impacts_beyond_the_cap_are_counted_and_reported():
+    """With one impact per body and step the cradle cannot be finished in the step: it is said, and nothing is lost."""
+    world = make_world(max_impacts_per_step=1)
+    for x, v in ((-1.005, 1.0), (0.0, 0.0), (1.0, 0.0), (2.0, 0.0)):
+        ball(world, x, v, restitution=1.0)
+    kept = Conserved(world)
+    run(world, 2)
+    assert world.stats().counters["capped_impacts"] > 0
+    assert any("impacts beyond 1 of a body in one step" in fault for fault in world.faults)
+    run(world, 60)
+    kept.check()
+
+
+# -- settings that decide an impact ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("rule", "mixed"), [("max", 0.9), ("min", 0.4), ("average", 0.65), ("multiply", 0.36), ("geometric_mean", 0.6)]
+)
+@pytest.mark.parametrize("swapped", [False, True])
+def test_restitution_mixing(rule, mixed, swapped):
+    """Relative speed after = mixed(e1, e2) times before."""
+    world = make_world(restitution_mixing=rule)
+    e1, e2 = (0.4, 0.9) if swapped else (0.9, 0.4)
+    a, b = ball(world, -0.51, 1.0, restitution=e1), ball(world, 0.51, -1.0, restitution=e2)
+    run(world, 3)
+    assert velocity(world, b)[0] - velocity(world, a)[0] == pytest.approx(2 * mixed, abs=8 * EPS)
+
+
+def test_restitution_mixes_by_maximum_unless_told():
+    world = make_world()
+    a, b = ball(world, -0.51, 1.0, restitution=0.2), ball(world, 0.51, -1.0)
+    run(world, 3)
+    assert velocity(world, b)[0] - velocity(world, a)[0] == pytest.approx(0.4, abs=8 * EPS)
+
+
+@pytest.mark.parametrize(("speed", "bounces"), [(0.99, False), (1.01, True)])
+def test_restitution_threshold(speed, bounces):
+    """Just below the threshold a contact is at rest, just above it bounces with the full restitution."""
+    world = make_world(restitution_threshold=1.0)
+    box(world, 0.0, kind="static")
+    a = ball(world, -1.0001, speed, restitution=0.8)
+    run(world, 2)
+    assert velocity(world, a)[0] == pytest.approx(-0.8 * speed if bounces else 0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(("factor", "bounces"), [(1.9, False), (2.1, True)])
+def test_default_threshold_is_twice_gravitys_share(factor, bounces):
+    """2 |a| dt: of a contact at rest gravity alone makes |a| dt of approach in every step."""
+    world = make_world(gravity=9.81)
+    floor(world)
+    share = 9.81 * DT
+    a = ball(world, (0.0, 0.5), (0.0, -(factor - 1) * share), restitution=1.0)  # the step adds one share
+    world.step()
+    assert len(world.contacts.impacts) == bounces
+    assert (velocity(world, a)[1] > 0) == bounces

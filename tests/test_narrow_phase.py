@@ -1,0 +1,295 @@
+"""The narrow phase against the plain oracle: every pair of shapes in 2D and 3D, wherever they stand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from oracles import narrow_naive
+from worlds import EPS, ball, box, floor, make_world, run
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Phase
+
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+lengths = st.one_of(st.sampled_from([0.0, 0.25, 0.5, 1.0, 2.0]), st.floats(1e-3, 3))
+coordinates = st.one_of(st.integers(-4, 4).map(lambda k: k / 2), st.floats(-3, 3))
+
+
+def vectors(d, elements=coordinates):
+    return st.tuples(*[elements] * d).map(np.array)
+
+
+@st.composite
+def bodies(draw, d, shape):
+    """A shape somewhere, off its Transform and turned: (position, offset, rotation, size)."""
+    position, offset = draw(vectors(d)), draw(st.one_of(st.just(np.zeros(d)), vectors(d)))
+    if d == 2:
+        rotation = draw(st.one_of(st.just(0.0), st.floats(-4, 4)))
+    else:
+        rotation = draw(st.one_of(st.just(0.0), st.tuples(*[st.floats(-1, 1)] * 4)))
+        assume(np.ndim(rotation) == 0 or np.linalg.norm(rotation) > 0.1)
+    return shape, position, offset, rotation, draw(lengths if shape == "sphere" else vectors(d, lengths))
+
+
+def components(body):
+    shape, position, offset, rotation, size = body
+    collider = SphereCollider(size, offset=offset) if shape == "sphere" else AABBCollider(size, offset=offset)
+    return Transform(position, rotation), RigidBody(), collider
+
+
+def in_world(body):
+    """Where the oracle says the shape is: the offset turns with the body, a box stretches."""
+    shape, position, offset, rotation, size = body
+    centre = position + narrow_naive.rotation_matrix(rotation, len(position)) @ offset
+    return centre, size if shape == "sphere" else narrow_naive.stretched(size, rotation)
+
+
+def expected(a, b):
+    """(depth, normal, point) of the oracle, from a to b."""
+    if (a[0], b[0]) == ("box", "sphere"):
+        depth, normal, point = expected(b, a)
+        return depth, None if normal is None else -normal, point
+    meet = getattr(narrow_naive, f"{a[0]}_{b[0]}")
+    return meet(*in_world(a), *in_world(b))
+
+
+def contacts_of(bodies):
+    d = len(bodies[0][1])
+    world = make_world(d)
+    for body in bodies:
+        world.create_entity(*components(body))
+    world.run(Phase.NARROW)
+    return world.contacts
+
+
+@both_dimensions
+@pytest.mark.parametrize("first", ["sphere", "box"])
+@pytest.mark.parametrize("second", ["sphere", "box"])
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_any_pair_equals_the_oracle(d, first, second, data):
+    """hit, depth, unit normal from the smaller entity id to the larger, point. Tolerance: 100 eps of the sizes (< 20);
+    within it of touching, either answer."""
+    a, b = data.draw(bodies(d, first)), data.draw(bodies(d, second))
+    depth, normal, point = expected(a, b)
+    found = contacts_of([a, b])
+    tolerance = 100 * EPS * 20
+    if abs(depth) > tolerance:
+        assert len(found) == (depth > 0)
+    if not len(found):
+        return
+    assert found.entity_a[0] < found.entity_b[0]
+    assert found.depth[0] == pytest.approx(depth, abs=tolerance)
+    assert np.linalg.norm(found.normal[0]) == pytest.approx(1, abs=4 * EPS)
+    apart = np.linalg.norm(in_world(a)[0] - in_world(b)[0])
+    if normal is not None and apart > 1e-3 and (first == second or abs(depth - radius_of(a, b)) > 1e-3):
+        np.testing.assert_allclose(found.normal[0], normal, atol=1e-9)
+        np.testing.assert_allclose(found.point[0], point, atol=1e-9)
+
+
+def radius_of(a, b):
+    """Of the sphere in a pair with a box: at that depth its centre is on the surface and the direction ill defined."""
+    return next(body[4] for body in (a, b) if body[0] == "sphere")
+
+
+@both_dimensions
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_both_orders_give_the_same_contact(d, data):
+    """Created the other way round, a pair has the opposite normal and the same depth and point."""
+    a = data.draw(bodies(d, data.draw(st.sampled_from(["sphere", "box"]))))
+    b = data.draw(bodies(d, data.draw(st.sampled_from(["sphere", "box"]))))
+    one, other = contacts_of([a, b]), contacts_of([b, a])
+    tolerance = 100 * EPS * 20
+    if abs(expected(a, b)[0]) > tolerance:
+        assert len(one) == len(other)
+    if len(one) and len(other) and expected(a, b)[1] is not None:
+        np.testing.assert_allclose(one.depth, other.depth, atol=tolerance)
+        if np.linalg.norm(in_world(a)[0] - in_world(b)[0]) > 1e-3:
+            np.testing.assert_allclose(one.normal, -other.normal, atol=1e-9)
+            np.testing.assert_allclose(one.point, other.point, atol=1e-9)
+
+
+@both_dimensions
+def test_crowd_equals_the_oracle_pair_by_pair(d):
+    """All pairs of 120 mixed bodies; the static ones never with each other."""
+    rng = np.random.default_rng(4)
+    world = make_world(d)
+    crowd = []
+    for k in range(120):
+        shape = "sphere" if k % 2 else "box"
+        rotation = rng.uniform(-3, 3) if d == 2 else rng.normal(size=4)
+        size = rng.uniform(0, 0.8) if shape == "sphere" else rng.uniform(0, 0.8, d)
+        body = shape, rng.uniform(-3, 3, d), rng.uniform(-0.5, 0.5, d), rotation, size
+        parts = components(body)
+        if k % 5 == 0:
+            parts = parts[0], parts[2]  # a collider without RigidBody is static
+        crowd.append((world.create_entity(*parts), body, k % 5 == 0))
+    world.run(Phase.NARROW)
+    pairs = {}
+    for i, (entity, body, fixed) in enumerate(crowd):
+        for other, partner, both in crowd[i + 1 :]:
+            depth = expected(body, partner)[0]
+            if depth >= 0 and not (fixed and both):
+                pairs[entity, other] = depth
+    found = world.contacts
+    assert list(zip(found.entity_a.tolist(), found.entity_b.tolist(), strict=True)) == sorted(pairs)
+    np.testing.assert_allclose(found.depth, [pairs[key] for key in sorted(pairs)], atol=1e-13)
+    assert len(pairs) > 100
+
+
+# -- what the oracle leaves open ------------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@pytest.mark.parametrize("first", [ball, box])
+@pytest.mark.parametrize("second", [ball, box])
+@pytest.mark.parametrize("scale", [1.0, 2.0**-40, 2.0**40])
+def test_touching_exactly_counts(d, first, second, scale):
+    """Half sizes are powers of two: at the exact distance a contact of depth 0, one ulp further none."""
+    for factor, hits in ((1.0, 1), (1 + EPS, 0), (1 - EPS / 2, 1)):
+        world = make_world(d)
+        sizes = [{"radius" if maker is ball else "half": 0.5 * scale} for maker in (first, second)]
+        first(world, 0.0, **sizes[0])
+        second(world, scale * factor, **sizes[1])
+        world.run(Phase.NARROW)
+        assert len(world.contacts) == hits
+        if factor == 1.0:
+            assert world.contacts.depth[0] == 0
+            np.testing.assert_array_equal(world.contacts.normal[0], np.eye(d)[0])
+            np.testing.assert_array_equal(world.contacts.point[0], 0.5 * scale * np.eye(d)[0])
+
+
+@both_dimensions
+@pytest.mark.parametrize("first", [ball, box])
+@pytest.mark.parametrize("second", [ball, box])
+def test_coincident_centres_have_a_definite_normal(d, first, second):
+    """No direction between them: a unit normal along the first axis, the full depth, the point at the centre's side."""
+    world = make_world(d)
+    first(world, 0.25)
+    second(world, 0.25)
+    world.run(Phase.NARROW)
+    assert np.abs(world.contacts.normal[0]).tolist() == np.eye(d)[0].tolist()
+    assert world.contacts.depth[0] == 1
+    assert np.isfinite(world.contacts.point).all()
+
+
+@both_dimensions
+def test_points_and_empty_boxes(d):
+    """Radius 0 is a point, zero extents a point, a line or a sheet: they touch what they lie on or in."""
+    thin = tuple(np.eye(d)[0])  # from -1 to 1 along x
+    for make, hit in (
+        (lambda w: (ball(w, 0.5, radius=0), box(w, 0.0)), True),  # a point on a face
+        (lambda w: (ball(w, 0.5 * (1 + 2 * EPS), radius=0), box(w, 0.0)), False),
+        (lambda w: (ball(w, 0.1, radius=0), ball(w, 0.1, radius=0)), True),  # a point on a point
+        (lambda w: (ball(w, 0.1, radius=0), ball(w, 0.1 + 1e-16, radius=0)), False),
+        (lambda w: (ball(w, 0.7, radius=0), box(w, 0.0, half=thin)), True),  # a point on a line
+        (lambda w: (ball(w, (0.7, 1e-300, 0)[:d], radius=0), box(w, 0.0, half=thin)), False),
+        (lambda w: (box(w, 0.0, half=thin), box(w, 0.3, half=tuple(np.eye(d)[1]))), True),  # two lines cross
+        (lambda w: (box(w, 0.0, half=0.0), box(w, 0.0, half=0.0)), True),
+    ):
+        world = make_world(d)
+        make(world)
+        world.run(Phase.NARROW)
+        assert len(world.contacts) == hit
+
+
+def test_a_turned_box_stretches():
+    """2D: a unit square at 45 degrees reaches sqrt(1/2); 3D: a cube turned onto its corner |R| h."""
+    world = make_world()
+    box(world, 0.0, rotation=math.pi / 4)
+    ball(world, math.sqrt(0.5) + 0.1 - 1e-12, radius=0.1)
+    ball(world, (0, math.sqrt(0.5) + 0.1 + 1e-12), radius=0.1)
+    world.run(Phase.NARROW)
+    assert len(world.contacts) == 1
+    world = make_world(3)
+    quaternion = (math.cos(math.pi / 6), *(math.sin(math.pi / 6) / math.sqrt(3),) * 3)  # 60 degrees about (1, 1, 1)
+    box(world, 0.0, rotation=quaternion)
+    reach = (2 / 3 + 2 / 3 + 1 / 3) / 2  # rows of that rotation are (2, -1, 2) / 3, permuted
+    ball(world, reach + 0.1 - 1e-12, radius=0.1)
+    ball(world, (0, reach + 0.1 + 1e-12, 0), radius=0.1)
+    world.run(Phase.NARROW)
+    assert len(world.contacts) == 1
+
+
+def test_rotation_is_read_anew_in_every_step():
+    """Turned between steps, a body's box and offset follow at once, and go back at once."""
+    world = make_world()
+    turning = box(world, 0.0, half=(1, 0.1), offset=(1, 0), kind="kinematic")
+    right, up = ball(world, (1.9, 0.0), radius=0.05), ball(world, (0.0, 1.9), radius=0.05)
+    for angle, expected_partner in ((0.0, right), (math.pi / 2, up), (0.0, right), (math.pi / 2, up)):
+        world.component_for_entity(turning, Transform).rotation = angle
+        world.run(Phase.NARROW)
+        assert world.contacts.entity_b.tolist() == [expected_partner]
+
+
+# -- layers, masks, sensors -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("maker", [ball, box])
+@pytest.mark.parametrize(
+    ("one", "two", "meet"),
+    [
+        ({}, {}, True),
+        ({"layer": 1, "mask": 2}, {"layer": 2, "mask": 1}, True),
+        ({"layer": 1, "mask": 2}, {"layer": 2, "mask": 4}, False),  # only one accepts
+        ({"layer": 1, "mask": 4}, {"layer": 2, "mask": 1}, False),
+        ({"mask": 0}, {}, False),
+        ({"layer": 0}, {}, False),
+        ({"layer": 6, "mask": 2}, {"layer": 2, "mask": 4}, True),
+        ({"layer": 1 << 62, "mask": -1}, {"layer": 1, "mask": 1 << 62}, True),
+    ],
+)
+def test_layers_and_masks(maker, one, two, meet):
+    """Two colliders meet if each one's layer has a bit in the other's mask; else they pass through each other."""
+    world = make_world()
+    a, b = maker(world, -1, 1.0, restitution=1.0, **one), maker(world, 1, -1.0, restitution=1.0, **two)
+    seen = 0
+    for _ in range(120):
+        world.step()
+        seen += len(world.contacts)
+    assert (seen > 0) == meet
+    speed = world.bodies.linear_velocity[world.bodies.row_of(a), 0]
+    assert speed == (-1 if meet else 1)
+    assert world.bodies.linear_velocity[world.bodies.row_of(b), 0] == -speed
+
+
+def test_layers_may_change_between_steps():
+    world = make_world()
+    ball(world, 0.0)
+    b = ball(world, 0.5)
+    for mask, hits in ((-1, 1), (2, 0), (1, 1)):
+        world.component_for_entity(b, SphereCollider).mask = mask
+        world.step()
+        assert len(world.contacts) == hits
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_sensors_report_and_do_not_react(both):
+    """A ball flies through a sensor at its own speed; begin, stay and end are told, no impact, no impulse."""
+    world = make_world()
+    sensor = box(world, 0.0, kind="static", sensor=True, restitution=1.0)
+    flying = ball(world, -2.0, 3.0, radius=0.1, sensor=both, restitution=1.0)
+    told = []
+    for name in ("contact_begin", "contact_stay", "contact_end", "impact"):
+        world.on(name, lambda contact, name=name: told.append((name, contact.normal_impulse)))
+    run(world, 80)
+    assert [name for name, _ in told if name != "contact_stay"] == ["contact_begin", "contact_end"]
+    assert all(impulse == 0 for _, impulse in told)
+    assert 20 < len(told) < 30  # 1.2 m at 0.05 m a step
+    assert world.bodies.linear_velocity[world.bodies.row_of(flying), 0] == 3.0
+    assert world.entity_exists(sensor)
+
+
+def test_static_bodies_do_not_meet_each_other():
+    world = make_world()
+    floor(world)
+    floor(world)
+    box(world, 0.0, kind="static")
+    ball(world, (0.0, 5.0))
+    world.step()
+    assert len(world.contacts) == 0

@@ -1,0 +1,143 @@
+"""The package as it is shipped: what is listed, what a wheel holds, and who imports whom."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+SETUPTOOLS = PROJECT["tool"]["setuptools"]
+FLOORS = (
+    "framework",
+    "components",
+    "systems",
+    "plugins",
+    "scenes",
+    "lab",
+)  # each imports from those before it
+
+
+def python_files(folder: str) -> list[Path]:
+    return [p for p in sorted((ROOT / folder).rglob("*.py")) if "__pycache__" not in p.parts]
+
+
+def package_of(folder: Path) -> str:
+    """The package that a folder of sources is installed as: the nearest mapped folder above it decides."""
+    relative = folder.relative_to(ROOT)
+    mapped = {Path(place): name for name, place in SETUPTOOLS["package-dir"].items()}
+    for parent in (relative, *relative.parents):
+        if parent in mapped:
+            return ".".join((mapped[parent], *relative.relative_to(parent).parts))
+    raise AssertionError(f"{relative} belongs to no package")
+
+
+def test_every_folder_with_modules_is_a_listed_package():
+    folders = {path.parent for floor in FLOORS for path in python_files(floor)}
+    assert {package_of(folder) for folder in folders} == set(SETUPTOOLS["packages"])
+    for folder in folders:
+        assert (folder / "__init__.py").is_file(), f"{folder} lacks __init__.py"
+
+
+def test_the_root_package_stays_bare():
+    root = ROOT / "framework" / "carom"
+    assert {p.name for p in root.iterdir() if p.name != "__pycache__"} == {
+        "__init__.py",
+        "__main__.py",
+        "py.typed",
+    }
+
+
+def imported_floors(path: Path) -> set[str]:
+    """The floors that a module imports from, however the import is written."""
+    package = package_of(path.parent).split(".")
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            targets = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            base = base + (node.module.split(".") if node.module else [])
+            targets = [[*base, alias.name] for alias in node.names]
+        else:
+            continue
+        for target in targets:
+            assert target[0] not in FLOORS, f"{path} imports {'.'.join(target)}: only carom.* is a package"
+            if target[0] == "carom" and len(target) > 1 and target[1] in FLOORS:
+                found.add(target[1])
+    return found
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_each_floor_imports_only_from_the_floors_below(floor):
+    allowed = set(FLOORS[: FLOORS.index(floor) + 1])
+    for path in python_files(floor):
+        if path.name == "__main__.py":  # it alone reaches up, to the command line
+            continue
+        above = imported_floors(path) - allowed
+        assert not above, f"{path.relative_to(ROOT)} imports from {sorted(above)}"
+
+
+def test_importing_physics_imports_no_drawing_and_no_command_line():
+    code = "import sys, carom.plugins; print('\\n'.join(sys.modules))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules = result.stdout.split()
+    unwanted = ("click", "rich", "matplotlib", "carom.lab", "carom.scenes")
+    assert "carom.plugins" in modules
+    assert not [m for m in modules if m in unwanted or m.startswith(tuple(f"{name}." for name in unwanted))]
+
+
+@pytest.fixture(scope="module")
+def source_copy(tmp_path_factory) -> Path:
+    """The sources alone, so that building leaves nothing behind in the checkout."""
+    copy = tmp_path_factory.mktemp("source") / "carom"  # the name a clone is likely to have
+    hidden = shutil.ignore_patterns(".*", "build", "dist", "out", "*.egg-info", "__pycache__", "uv.lock")
+    shutil.copytree(ROOT, copy, ignore=hidden)
+    return copy
+
+
+def build(kind: str, source: Path, target: Path) -> Path:
+    """Call setuptools' own build hooks, the ones pip calls: no network, no isolated environment."""
+    code = f"import sys, setuptools.build_meta as b; print(b.build_{kind}(sys.argv[1]))"
+    command = [sys.executable, "-c", code, str(target)]
+    result = subprocess.run(
+        command, cwd=source, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""}
+    )
+    assert result.returncode == 0, result.stderr
+    return target / result.stdout.strip().splitlines()[-1]
+
+
+def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
+    wheel = build("wheel", source_copy, tmp_path)
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+        metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/entry_points.txt"))
+        entry_points = archive.read(metadata).decode()
+    expected = {"carom/py.typed"}
+    for floor in FLOORS:
+        for path in python_files(floor):
+            expected.add("/".join((*package_of(path.parent).split("."), path.name)))
+    assert names == expected
+    assert "carom = carom.lab.cli:main" in entry_points
+
+
+def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
+    archive = build("sdist", source_copy, tmp_path)
+    with tarfile.open(archive) as tar:
+        names = {name.partition("/")[2] for name in tar.getnames()}
+    assert {
+        "tests/test_packaging.py",
+        "LICENSE",
+        "README.md",
+        "framework/carom/py.typed",
+        "lab/cli.py",
+    } <= names
