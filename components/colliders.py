@@ -6,11 +6,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..framework.columns import REQUIRED, column
+from ..framework.columns import REQUIRED, Column, column
 from ..framework.component import Component
 from ..framework.vectors import item, replace
 
 ALL_LAYERS = -1  # every bit set
+# Arguments, checked as fields are.
+LOWER = Column(item="vector", owner="AABBCollider", name="from_bounds lower")
+UPPER = Column(item="vector", owner="AABBCollider", name="from_bounds upper")
 
 
 class Collider(Component, abstract=True):
@@ -107,7 +110,7 @@ class AABBCollider(Collider):
 
         ValueError if a minimum exceeds its maximum.
         """
-        low, high = np.asarray(lower, float), np.asarray(upper, float)
+        low, high = np.asarray(LOWER.checked(lower)), np.asarray(UPPER.checked(upper))
         if low.shape != high.shape or not (low <= high).all():
             raise ValueError(f"AABBCollider.from_bounds: lower must not exceed upper, got {lower!r} and {upper!r}")
         return cls((high - low) / 2, offset=(low + high) / 2, **common)

@@ -7,11 +7,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..framework.columns import column
+from ..framework import esper_bridge
+from ..framework.columns import Column, column
 from ..framework.component import Component
 from ..framework.table import KINDS
 
 Kind = Literal["dynamic", "kinematic", "static"]
+# Arguments, checked as fields are.
+FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
+IMPULSE = Column(item="vector", owner="RigidBody", name="apply_impulse")
 
 
 def _kind_written(table: Any, row: int) -> None:
@@ -48,6 +52,7 @@ class RigidBody(Component, flat=True):
     kind = dataclasses.replace(column("dynamic", choices=KINDS), on_write=_kind_written)
     max_linear_speed = column(None, optional=True, minimum=0.0)
     applied_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # until the window's end
+    applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False)  # that applied_force was set in
     step_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # for one step
 
     def __init__(
@@ -76,29 +81,32 @@ class RigidBody(Component, flat=True):
     def apply_impulse(self, impulse: Any) -> None:
         """Change the velocity at once by impulse / mass; (d,) N s. Kinematic and static bodies do not react."""
         if self.kind == "dynamic":
-            self.linear_velocity = self.linear_velocity + self._vector(impulse, "impulse") / self.mass
+            self.linear_velocity = self.linear_velocity + self._vector(IMPULSE, impulse) / self.mass
 
     def apply_force(self, force: Any) -> None:
         """Push with ``force``, (d,) N.
 
         Inside a system: for that step, or for the next one if this step has moved the bodies already. Outside: in
-        every step of the next ``step()`` or ``advance()`` that takes one.
+        every step of the next ``step()`` or ``advance()`` that takes one. Forces of one frame add up; those of a frame
+        that took no step give way to the next frame's, so a push held down is the same at any frame rate. Kinematic
+        and static bodies do not react.
         """
-        force = self._vector(force, "force")
+        force = self._vector(FORCE, force)
         store = self._store
-        if store is None or not getattr(store, "in_step", False):
-            self.applied_force = self.applied_force + force
-        elif store.forces_summed:
-            row = store.find(self._entity)
-            store.arrays["force"][row] += force
-        else:
-            self.step_force = self.step_force + force
+        if self.kind != "dynamic":
+            return
+        if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
+            if hasattr(store, "in_step") and store.forces_summed:
+                store.arrays["force"][store.find(self._entity)] += force
+            else:
+                self.step_force = self.step_force + force
+            return
+        frame = getattr(store, "frame", 0)
+        self.applied_force = self.applied_force + force if self.applied_frame == frame else 0.0 + force
+        self.applied_frame = frame
 
-    def _vector(self, value: Any, name: str) -> np.ndarray:
-        vector = np.asarray(value, float)
-        velocity = np.asarray(self.linear_velocity)
-        if vector.ndim > 1 or not np.isfinite(vector).all() or (
-            vector.ndim == velocity.ndim == 1 and vector.shape != velocity.shape
-        ):
-            raise ValueError(f"{name} must be {velocity.shape[0] if velocity.ndim else 'd'} finite numbers, got {value!r}")
+    def _vector(self, argument: Column, value: Any) -> Any:
+        vector, velocity = argument.checked(value, self._entity), self.linear_velocity
+        if np.ndim(velocity):
+            argument.check_dimensions(vector, len(velocity), self._entity)
         return vector

@@ -54,7 +54,7 @@ class Adoption:
         for component, members in self._members.items():
             self._let_go(component, set(members))
 
-    # -- what has changed -------------------------------------------------------------------------------------------
+    # -- what has changed -------------------------------------------------------------------------
 
     def _gather(self, touched: dict[type[Any], Ids], cleared: bool) -> None:
         if cleared:
@@ -111,7 +111,7 @@ class Adoption:
                 fresh[component] = new
         return gone, fresh
 
-    # -- checks: every error is found before anything is written -------------------------------------------------------
+    # -- checks: every error is found before anything is written ----------------------------------
 
     def _check(self, fresh: dict[type[Component], Handles]) -> None:
         dimensions = self.table.dimensions
@@ -149,7 +149,7 @@ class Adoption:
         if owner != entity and esper_bridge.all_components().get(owner, {}).get(component) is handle:
             raise ValueError(_second_use(component, f"entities {owner} and {entity}"))
 
-    # -- bringing the table up to date --------------------------------------------------------------------------------
+    # -- bringing the table up to date ------------------------------------------------------------
 
     def _apply(
         self, gone: dict[type[Component], Ids], come: Ids, left: Ids, fresh: dict[type[Component], Handles]

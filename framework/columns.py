@@ -55,7 +55,7 @@ class Column:
             return 0
         return self.checked(self.default)
 
-    # -- checks ---------------------------------------------------------------------------------------------------
+    # -- checks -----------------------------------------------------------------------------------
 
     def checked(self, value: Any, entity: int | None = None) -> Any:
         """``value`` as it is stored; ValueError (or TypeError) names entity, field and value if it cannot be."""
@@ -191,7 +191,7 @@ class Column:
         text = shown if isinstance(shown, str) and shown.startswith("an array") else repr(shown)
         return ValueError(f"{prefix}{self.owner}.{self.name} {rule}, got {text}")
 
-    # -- descriptor -----------------------------------------------------------------------------------------------
+    # -- descriptor -------------------------------------------------------------------------------
 
     def __get__(self, handle: Any, owner: type | None = None) -> Any:
         if handle is None:

@@ -214,7 +214,8 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
     elif isinstance(value, types.ModuleType):
         digest.update(value.__name__.encode())
     else:
-        digest.update(f"{type(value).__qualname__}{value!r}".encode() if _is_plain(value) else type(value).__qualname__.encode())
+        digest.update(f"{type(value).__qualname__}{value!r}".encode() if _is_plain(value) else b"")
+        digest.update(type(value).__qualname__.encode())
 
 
 def _is_plain(value: Any) -> bool:

@@ -33,7 +33,8 @@ class Component:
             if issubclass(base, Component) and not base._abstract:
                 raise TypeError(f"{base.__name__} is final: esper finds components by their exact type, not by a base")
         cls._abstract = abstract
-        cls.prefix = "" if flat else re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower() + "."
+        snake = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", cls.__name__).lower()
+        cls.prefix = "" if flat else snake + "."
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Column)}
         for name in own:
             if hasattr(Component, name):
@@ -80,7 +81,7 @@ class Component:
             stored[name] = column.checked(value)
         self._values = stored
 
-    # -- being adopted and let go -----------------------------------------------------------------------------------
+    # -- being adopted and let go -----------------------------------------------------------------
 
     @property
     def entity(self) -> int | None:
@@ -138,7 +139,8 @@ class Component:
             raise TypeError(f"{cls.__name__}.many got {', '.join(twice)} twice")
         unknown = [name for name in values if name not in names]
         if unknown or len(args) > len(names):
-            raise TypeError(f"{cls.__name__}.many takes {', '.join(names)}; got {', '.join(unknown) or 'too many values'}")
+            got = ", ".join(unknown) or "too many values"
+            raise TypeError(f"{cls.__name__}.many takes {', '.join(names)}; got {got}")
         given.update(values)
         for name in names:
             if name not in given and cls.columns[name].default is REQUIRED:
@@ -159,7 +161,8 @@ class Many:
         for name, column in self.component.columns.items():
             array = np.empty((count, *column.item_shape(dimensions)), column.dtype)
             given = name in self.values
-            array[...] = column.checked_many(self.values[name], count, dimensions) if given else column.empty_value(dimensions)
+            default = column.empty_value(dimensions)
+            array[...] = column.checked_many(self.values[name], count, dimensions) if given else default
             arrays[column.key] = array
         return arrays
 

@@ -100,17 +100,23 @@ class Contacts(ContactRows):
     """The last step's contacts, with ``enabled`` that systems between NARROW and RESPONSE may clear.
 
     A contact is a pair that touched in the step: overlapping at the end of its motion or struck within it.
+
+    ``begin``, ``end`` and ``impacts`` hold everything since the start of the last ``step()`` or ``advance()``; inside
+    a step they hold that step's rows only, so that a system sees each event once, however many steps a frame takes.
     """
 
     HISTORIES = ("begin", "end", "impacts")
 
-    def __init__(self, dimensions: int, lookup: EntityLookup) -> None:
+    def __init__(
+        self, dimensions: int, lookup: EntityLookup, running_step: Callable[[], int | None] = lambda: None
+    ) -> None:
         super().__init__(empty_columns(dimensions, enabled=True), lookup)
+        self._running_step = running_step  # the number of the step that is running, None between steps
         self.dimensions = dimensions
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
         self._stay = empty_columns(dimensions)
 
-    # -- what users read ----------------------------------------------------------------------------------------------
+    # -- what users read --------------------------------------------------------------------------
 
     @property
     def begin(self) -> ContactRows:
@@ -132,7 +138,7 @@ class Contacts(ContactRows):
         """Pairs that touched in the last step and in the one before."""
         return ContactRows(self._stay, self._lookup)
 
-    # -- what the systems write -----------------------------------------------------------------------------------------
+    # -- what the systems write -------------------------------------------------------------------
 
     def open_window(self) -> None:
         """Forget what the last window held."""
@@ -159,11 +165,15 @@ class Contacts(ContactRows):
         self._chunks = {name: list(rows) for name, rows in chunks.items()}
 
     def _history(self, name: str) -> ContactRows:
-        chunks = self._chunks[name]
+        chunks, step = self._chunks[name], self._running_step()
+        if step is not None:
+            chunks = [chunk for chunk in chunks if chunk["step"][0] == step]
         if not chunks:
             return ContactRows(empty_columns(self.dimensions, impact=name == "impacts"), self._lookup)
         if len(chunks) > 1:
             joined = {key: np.concatenate([chunk[key] for chunk in chunks]) for key in chunks[0]}
+            if step is not None:
+                return ContactRows(joined, self._lookup)
             chunks[:] = [joined]
         return ContactRows(chunks[0], self._lookup)
 

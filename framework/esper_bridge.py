@@ -17,7 +17,7 @@ for _name in _NAMES:
         raise ImportError(f"carom cannot work with esper {esper.version}: it has no {_name}")
 
 
-# -- contexts -----------------------------------------------------------------------------------------------------------
+# -- contexts ------------------------------------------------------------------------------------
 
 
 def context_exists(name: str) -> bool:
@@ -43,7 +43,7 @@ def leave(before: str) -> None:
     esper.switch_world(before if context_exists(before) else "default")
 
 
-# -- what has changed ---------------------------------------------------------------------------------------------------
+# -- what has changed ----------------------------------------------------------------------------
 
 
 class ChangeLog:
@@ -178,7 +178,7 @@ def _check_that_nothing_escapes() -> None:
 _check_that_nothing_escapes()
 
 
-# -- entities -----------------------------------------------------------------------------------------------------------
+# -- entities ------------------------------------------------------------------------------------
 
 
 def create_many(types: list[type[Any]], columns: list[list[Any]], count: int) -> range:
@@ -232,7 +232,7 @@ def forget_unknown_dead() -> None:
         esper._dead_entities.intersection_update(esper._entities)
 
 
-# -- processors and events ----------------------------------------------------------------------------------------------
+# -- processors and events -----------------------------------------------------------------------
 
 
 def processors() -> list[esper.Processor]:
@@ -272,3 +272,13 @@ def event_handlers(name: str) -> Iterator[Any]:
 def has_event_handlers(name: str | None = None) -> bool:
     """Whether plain esper has handlers for that event, or for any."""
     return bool(esper.event_registry if name is None else esper.event_registry.get(name))
+
+
+# -- steps ---------------------------------------------------------------------------------------
+
+running: set[str] = set()  # the contexts that are inside a step
+
+
+def step_is_running() -> bool:
+    """Whether the current context is inside a step; for components that no world has adopted yet."""
+    return esper.current_world in running

@@ -63,7 +63,7 @@ class Lineup:
     def world(self) -> Any:
         return self._pipeline.world
 
-    # -- adding -----------------------------------------------------------------------------------------------------------
+    # -- adding -----------------------------------------------------------------------------------
 
     def add(self, system: Any, before: Any, after: Any, frame: bool) -> None:
         if isinstance(system, type):
@@ -151,7 +151,7 @@ class Lineup:
 
         self._soon(action)
 
-    # -- removing ---------------------------------------------------------------------------------------------------------
+    # -- removing ---------------------------------------------------------------------------------
 
     def has(self, system: Any) -> bool:
         """Whether that very system is here or about to come."""
@@ -173,13 +173,14 @@ class Lineup:
 
     def remove_processor(self, processor: Any) -> None:
         """By instance, or the last one added of a type; KeyError if there is none."""
-        hits = [s for s in self._wanted if s is processor or type(s) is processor]
-        if hits:
-            self.remove(hits[-1])
-            return
         with esper_bridge.context(self.world.name):
+            self.reconcile()
+            hits = [s for s in self._wanted if s is processor or type(s) is processor]
+            if hits:
+                self.remove(hits[-1])
+                return
             plain = [p for p in esper_bridge.processors() if p is processor or type(p) is processor]
-        if not plain or type(plain[-1]) in self._pipeline.OWN:
+        if not plain or isinstance(plain[-1], (System, *self._pipeline.OWN)):
             raise KeyError(f"no such processor in this world: {processor!r}")
 
         def action() -> None:
@@ -189,7 +190,7 @@ class Lineup:
 
         self._soon(action)
 
-    # -- bringing it about --------------------------------------------------------------------------------------------------
+    # -- bringing it about ------------------------------------------------------------------------
 
     @property
     def changed(self) -> bool:
@@ -263,7 +264,7 @@ class Lineup:
             return True
         return any(not type(system).__module__.startswith("carom.systems") for system in self.systems)
 
-    # -- guards -----------------------------------------------------------------------------------------------------------
+    # -- guards -----------------------------------------------------------------------------------
 
     def _guard(self, processor: esper.Processor) -> None:
         if type(processor) in self._pipeline.OWN:

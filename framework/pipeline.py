@@ -62,7 +62,7 @@ class Pipeline:
         if self.in_step:
             raise CaromError(f"{what} between steps only, not inside one")
 
-    # -- stepping ---------------------------------------------------------------------------------------------------------
+    # -- stepping ---------------------------------------------------------------------------------
 
     def step(self) -> None:
         self.must_be_between_steps("a step can be taken")
@@ -85,6 +85,9 @@ class Pipeline:
     def _take(self, steps: int) -> None:
         """Some steps whose events are gathered together."""
         self._open_window()
+        if not steps:  # new bodies are taken in all the same, so that they know which frame it is
+            self.synchronize()
+            return
         self._in_window = True
         try:
             with esper_bridge.context(self.world.name):
@@ -95,8 +98,7 @@ class Pipeline:
             self._in_window = False
             if self.in_step:  # a processor without a guard raised: added to esper itself while the step was running
                 self.roll_back()
-        if steps:
-            self._close_window()
+        self._close_window()
 
     def open_step(self, *args: Any) -> None:
         if self.in_step and self.running:
@@ -116,7 +118,7 @@ class Pipeline:
 
     def _begin(self) -> None:
         physics = self.world.physics
-        self.in_step = True
+        self._set_in_step(True)
         if physics is None:
             return
         everything = self.lineup.foreign() or self.world.events.any_handlers()
@@ -133,7 +135,7 @@ class Pipeline:
         if physics is not None:
             physics.table.in_step = False
             physics.end_step()
-        self.in_step = False
+        self._set_in_step(False)
         self._unfinished = None
         self.clock.step_count += 1
         self._steps_measured += 1
@@ -142,9 +144,14 @@ class Pipeline:
         if self.lineup.changed:
             self.lineup.apply_after_step()
 
+    def _set_in_step(self, running: bool) -> None:
+        self.in_step = running
+        (esper_bridge.running.add if running else esper_bridge.running.discard)(self.world.name)
+
     def _open_window(self) -> None:
         if self.world.physics is not None:
             self.world.physics.contacts.open_window()
+            self.world.physics.table.frame += 1
 
     def _close_window(self) -> None:
         if self.world.physics is not None:
@@ -168,12 +175,12 @@ class Pipeline:
             for system in [s for s in self.lineup.systems if s.phase == phase]:
                 system.process(self.world.settings.dt)
         self._unfinished = None
-        self.in_step = False
+        self._set_in_step(False)
         if self.world.physics is not None:
             self.world.physics.table.in_step = False
         self.lineup.apply()
 
-    # -- when something raises ----------------------------------------------------------------------------------------------
+    # -- when something raises --------------------------------------------------------------------
 
     def fail(self, name: str, error: BaseException) -> None:
         """A processor has raised: back to the start of the step, and an error that names it."""
@@ -191,7 +198,7 @@ class Pipeline:
         """Back to the start of an unfinished step, if there is one."""
         if not self.in_step:
             return False
-        self.in_step = False
+        self._set_in_step(False)
         state, self._unfinished = self._unfinished, None
         physics = self.world.physics
         if state is not None and physics is not None:
@@ -201,7 +208,7 @@ class Pipeline:
         self.lineup.apply()
         return True
 
-    # -- statistics ---------------------------------------------------------------------------------------------------------
+    # -- statistics -------------------------------------------------------------------------------
 
     def stats(self) -> Stats:
         steps = self._steps_measured

@@ -119,19 +119,23 @@ def _named(references: Sequence[Any], members: list[System], system: System) -> 
 
 
 def _topological(members: list[System], edges: dict[int, set[int]]) -> list[int]:
-    sorter: graphlib.TopologicalSorter[int] = graphlib.TopologicalSorter(edges)
+    """Each where it was added, pulling before it what must run earlier: a system that goes before a built-in one holds
+    up nothing else, so those that follow it by addition still do."""
     try:
-        sorter.prepare()
+        graphlib.TopologicalSorter(edges).prepare()
     except graphlib.CycleError as error:
         names = " -> ".join(members[index].name for index in reversed(error.args[1]))
         raise ScheduleError(f"systems cannot be ordered, before/after form a cycle: {names}") from None
     ordered: list[int] = []
-    ready: list[int] = []
-    while sorter.is_active():
-        ready = sorted([*ready, *sorter.get_ready()])
-        index = ready.pop(0)
-        ordered.append(index)
-        sorter.done(index)
+
+    def visit(index: int) -> None:
+        if index not in ordered:
+            for earlier in sorted(edges[index]):
+                visit(earlier)
+            ordered.append(index)
+
+    for index in range(len(members)):
+        visit(index)
     return ordered
 
 

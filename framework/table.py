@@ -31,6 +31,7 @@ class Table:
         self.static_version = 0  # changes whenever a static body does
         self.stops = (0, 0, 0)  # first row after the dynamic, kinematic and static bodies
         self.in_step = False
+        self.frame = 0  # counts the calls of step() and advance()
         self.kind_changed = False
         self.arrays: dict[str, np.ndarray] = {}
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
@@ -41,7 +42,7 @@ class Table:
         self._stacked_types: dict[str, list[type[Component]]] = {}
         self.add_array("entity", dtype=np.int64)
 
-    # -- columns ----------------------------------------------------------------------------------------------------
+    # -- columns ----------------------------------------------------------------------------------
 
     def add_array(self, key: str, item: str = "scalar", dtype: Any = float, fill: Any = 0) -> None:
         """A column that belongs to no component."""
@@ -120,7 +121,7 @@ class Table:
         """The rows in use of that column, a view."""
         return self.arrays[key][: self.count]
 
-    # -- rows -------------------------------------------------------------------------------------------------------
+    # -- rows -------------------------------------------------------------------------------------
 
     def find(self, entity: int) -> int:
         """The row of that entity; KeyError if it has none."""
@@ -220,7 +221,7 @@ class Table:
         arrays = {column.key: self.arrays[column.key][rows] for column in component.columns.values()}
         return RowStore(arrays, self.dimensions)
 
-    # -- written through handles ------------------------------------------------------------------------------------
+    # -- written through handles ------------------------------------------------------------------
 
     def is_frozen(self, row: int) -> bool:
         """Static rows are read in place and written by assignment only, so that no change goes unseen."""
@@ -232,7 +233,7 @@ class Table:
         if column.on_write is not None:
             column.on_write(self, row)
 
-    # -- copies -----------------------------------------------------------------------------------------------------
+    # -- copies -----------------------------------------------------------------------------------
 
     def copy_columns(self, keys: Iterable[str] | None = None) -> dict[str, np.ndarray]:
         """Copies of the rows in use, of all columns or of those named."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import numbers
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Any, Self
@@ -19,8 +20,8 @@ from .contacts import Contacts
 from .entities import EntityVerbs
 from .errors import CaromError, NoPhysicsError
 from .events import Events
-from .pipeline import Pipeline
 from .hits import Hits
+from .pipeline import Pipeline
 from .plan import Plan
 from .registry import Plugin, Registry
 from .schedule import ForceSystem, Phase, System
@@ -79,7 +80,7 @@ class World(EntityVerbs):
             self._give_back()
             raise
 
-    # -- being an esper context -----------------------------------------------------------------------------------------
+    # -- being an esper context -------------------------------------------------------------------
 
     def __enter__(self) -> Self:
         self._open()
@@ -123,7 +124,7 @@ class World(EntityVerbs):
         if self.closed:
             raise CaromError(f"world {self.name!r} is closed")
 
-    # -- settings and physics -----------------------------------------------------------------------------------------
+    # -- settings and physics ---------------------------------------------------------------------
 
     @property
     def settings(self) -> Settings:
@@ -193,7 +194,7 @@ class World(EntityVerbs):
         self._pipeline.synchronize()
         return services
 
-    # -- systems --------------------------------------------------------------------------------------------------------
+    # -- systems ----------------------------------------------------------------------------------
 
     def add_system(
         self, system: System | ForceSystem | esper.Processor, *, before: Any = (), after: Any = (), frame: bool = False
@@ -242,7 +243,7 @@ class World(EntityVerbs):
         """carom's systems in the order in which they run."""
         return list(self._pipeline.lineup.systems)
 
-    # -- time -----------------------------------------------------------------------------------------------------------
+    # -- time -------------------------------------------------------------------------------------
 
     def step(self) -> None:
         """One fixed step of ``settings.dt``."""
@@ -256,9 +257,9 @@ class World(EntityVerbs):
         ``stats().counters["dropped_steps"]``. What is less than a step is kept: ``alpha``.
         """
         self._open()
-        if not (isinstance(seconds, (int, float)) and math.isfinite(seconds) and seconds >= 0):
+        if not (isinstance(seconds, numbers.Real) and math.isfinite(seconds) and seconds >= 0):
             raise ValueError(f"advance takes seconds, finite and not negative, got {seconds!r}")
-        return self._pipeline.advance(seconds)
+        return self._pipeline.advance(float(seconds))
 
     @property
     def alpha(self) -> float:
@@ -288,7 +289,7 @@ class World(EntityVerbs):
         """Compile ahead what bodies of these component types will need, so that nothing stalls in mid-game."""
         self._services.prepare(component_types)
 
-    # -- events -----------------------------------------------------------------------------------------------------------
+    # -- events -----------------------------------------------------------------------------------
 
     def on(self, name: str, handler: Callable[..., None]) -> Callable[..., None]:
         """Call ``handler(contact)`` on contact_begin, contact_stay, contact_end or impact; or on events of your own."""
@@ -307,7 +308,7 @@ class World(EntityVerbs):
     def events(self) -> Events:
         return self._events
 
-    # -- queries ----------------------------------------------------------------------------------------------------------
+    # -- queries ----------------------------------------------------------------------------------
 
     def query_point(self, point: Any, mask: int = -1) -> list[int]:
         """Entities whose collider contains the point, by id."""
@@ -358,7 +359,7 @@ class World(EntityVerbs):
             raise ValueError(f"{name} must be {self._services.dimensions} finite numbers, got {value!r}")
         return point
 
-    # -- looking inside -----------------------------------------------------------------------------------------------------
+    # -- looking inside ---------------------------------------------------------------------------
 
     def stats(self) -> Stats:
         """Time per system and counters since the world began (or ``reset_stats``)."""

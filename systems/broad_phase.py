@@ -113,7 +113,8 @@ class BroadPhase(System):
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         state.kernels.box_motion(
             start, stop, before, arrays["position"], scratch["shape"], state.slots, state.shapes,
-            state.world_shapes, state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
+            state.world_shapes, state.turned and state.code.turns, state.turned, state.axes,
+            state.table.stacks["collider.offset"],
             scratch["offset"], scratch["size"], scratch["lower"], scratch["upper"], state.like,
         )  # fmt: skip
 

@@ -231,7 +231,8 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
 
         The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[-1] are the contacts found.
         share (n,): see gravity_share. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
-        the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see EVENTS.
+        the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see
+        EVENTS.
         Returns False if the queue or the log may not suffice: call again with larger ones to go on.
         """
         bodies = len(rank)
@@ -279,7 +280,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
 
 @inlined
 def gravity_share(i, share, velocity, start_velocity, like):
-    """What forces change of a body's speed in one step; computed when first asked for (-1 before), before any impact."""
+    """What forces change of a body's speed in a step; computed when first asked for (-1 before), before any impact."""
     if share[i] < 0.0:
         share[i] = length(sub(row(velocity, i, like), row(start_velocity, i, like)))
     return share[i]

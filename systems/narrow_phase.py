@@ -25,7 +25,8 @@ def make_narrow_kernel(evaluate: Any) -> Callable[..., tuple[int, int]]:
     ):  # fmt: skip
         """Sort each pair by entity, drop pairs whose layers do not meet, test the rest; (pairs kept, hits).
 
-        pair_a, pair_b, responds (m,): the pairs kept, and whether they push each other. hits: their indices that touch, with depth, normal and point in the world.
+        pair_a, pair_b, responds (m,): the pairs kept, and whether they push each other.
+        hits: their indices that touch, with depth, normal and point in the world.
         """
         kept = 0
         found = 0
@@ -87,7 +88,8 @@ class NarrowPhase(System):
         kept, found = state.kernels.find_contacts(
             first, second, arrays["entity"], arrays["position"], scratch["offset"], scratch["shape"], state.slots,
             state.world_shapes, stacks["collider.layer"], stacks["collider.mask"], state.all_layers_meet(),
-            stacks["collider.sensor"], arrays["inverse_mass"], state.pair_a, state.pair_b, state.responds, state.hits, state.depths, state.normals, state.points, state.like,
+            stacks["collider.sensor"], arrays["inverse_mass"], state.pair_a, state.pair_b, state.responds, state.hits,
+            state.depths, state.normals, state.points, state.like,
         )  # fmt: skip
         state.set_pairs(kept, found)
 

@@ -83,6 +83,7 @@ class Queries:
             raise ValueError(f"no plugin has registered the shape that {kernel_name} needs")
         stamp = (state.motion_stamp, state.table.version, state.table.static_version)
         if stamp != self._stamp:
+            state.refresh_rotation()
             state.broad_phase.trees_now()
             self._stamp = stamp
         lower, upper = centres - sizes, centres + sizes

@@ -128,7 +128,8 @@ def _evaluate_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[
                     f"{indent}point = sub(point, negative(d))",
                 ]
     if many:
-        lines += ["    if swapped:", "        normal = negative(normal)", "        point = sub(point, negative(direction))"]
+        lines += ["    if swapped:", "        normal = negative(normal)"]
+        lines += ["        point = sub(point, negative(direction))"]
     return [*lines, "    return hit, depth, normal, point", ""]
 
 

@@ -54,7 +54,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.adoption = Adoption(self.table, Transform, _makes_body)
         self.bodies = Bodies(self.table)
         self.lookup = EntityLookup(self._living_with)
-        self.contacts = Contacts(dimensions, self.lookup)
+        self.contacts = Contacts(dimensions, self.lookup, self._running_step)
         self.queries = Queries(self)
         PairBuffers.__init__(self, dimensions)
         self._integrators: dict[str, Integrator] = {}
@@ -73,7 +73,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.path_degree = 1
         self.motion_stamp = 0
 
-    # -- structure ------------------------------------------------------------------------------------------------------
+    # -- structure --------------------------------------------------------------------------------
 
     def refresh_structure(self) -> None:
         """What follows from which bodies and colliders there are."""
@@ -117,6 +117,15 @@ class PhysicsState(PairBuffers, PhysicsServices):
             world_shapes.append(tuple(self.scratch[key] for key in keys))
         self.shapes, self.world_shapes = tuple(shapes), tuple(world_shapes)
 
+    def refresh_rotation(self) -> None:
+        """Axes of the bodies, if any is turned; the shapes' parameters as they are in the world then."""
+        if self.code is None:
+            return
+        rotation = self.table.column("rotation")
+        self.turned = bool((rotation if self.dimensions == 2 else rotation[:, 1:]).any())
+        self.axes = axes_of(rotation, self.dimensions) if self.turned else self.axes[:0]
+        self._bind_shapes()
+
     def _allocate_scratch(self) -> None:
         """Room for every row the table can hold."""
         capacity = self.table.capacity
@@ -157,7 +166,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         vector.flags.writeable = False
         self.gravity = vector
 
-    # -- around a step ----------------------------------------------------------------------------------------------------
+    # -- around a step ----------------------------------------------------------------------------
 
     def begin_step(self) -> None:
         self.refresh_structure()
@@ -166,12 +175,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         np.divide(1.0, arrays["mass"][:dynamic], out=arrays["inverse_mass"][:dynamic])
         arrays["inverse_mass"][dynamic : table.count] = 0.0
         self.limits_speed = not bool(np.isnan(arrays["max_linear_speed"][:dynamic]).all())
-        self.turned = bool(self.collides and table.column("rotation").reshape(table.count, -1)[:, -1].any())
-        if self.dimensions == 3 and self.collides:
-            self.turned = bool(table.column("rotation")[:, 1:].any())
-        self.axes = axes_of(table.column("rotation"), self.dimensions) if self.turned else self.axes[:0]
-        if self.collides:
-            self._bind_shapes()
+        self.refresh_rotation()
         self.moved = False
         table.forces_summed = False  # type: ignore[attr-defined]
         self.motion_stamp += 1
@@ -195,6 +199,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     def end_window(self) -> None:
         self.table.arrays["applied_force"][: self.table.stops[0]] = 0.0
+        self.table.arrays["applied_frame"][: self.table.stops[0]] = -1  # else state_hash would tell frame rates apart
 
     def tracking_state(self) -> Any:
         return self.contact_events.touching
@@ -202,7 +207,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def restore_tracking(self, state: Any) -> None:
         self.contact_events.touching = state
 
-    # -- answers ------------------------------------------------------------------------------------------------------------
+    # -- answers ----------------------------------------------------------------------------------
 
     def kinetic_energy(self) -> float:
         return kinetic_energy(self.bodies.dynamic)
@@ -245,6 +250,9 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     def refresh_queries(self) -> None:
         self.queries.forget()
+
+    def _running_step(self) -> int | None:
+        return self.world.step_count if self.table.in_step else None
 
     def _living_with(self, entity: int, component: type[Any]) -> bool:
         return self.world.entity_exists(entity) and self.world.has_component(entity, component)
