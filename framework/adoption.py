@@ -137,8 +137,8 @@ class Adoption:
     def _refuse_other_types(self, component: type[Component], handles: Handles) -> None:
         entity, handle = next((e, h) for e, h in handles.items() if type(h) is not component)
         raise ValueError(
-            f"entity {entity} has a {type(handle).__name__} under the type {component.__name__}: carom's components are "
-            f"final and cannot be added under another type"
+            f"entity {entity} has a {type(handle).__name__} under the type {component.__name__}: carom's components "
+            f"are final and cannot be added under another type"
         )
 
     def _check_owner(self, component: type[Component], handle: Component, entity: int) -> None:

@@ -14,8 +14,8 @@ class Bodies:
     """Columns as zero-copy views: ``bodies.position``, and ``bodies.charge.value`` of a component of one's own.
 
     ``dynamic``, ``kinematic`` and ``static`` are the same for the bodies of one kind. Views hold until the next
-    structural change. Columns of static bodies are read-only, and so are ``entity`` and ``kind`` of all. Assigning writes
-    into the column: ``bodies.linear_velocity = 0``.
+    structural change. Columns of static bodies are read-only, and so are ``entity`` and ``kind`` of all. Assigning
+    writes into the column: ``bodies.linear_velocity = 0``.
     """
 
     __slots__ = ("_kind", "_table")

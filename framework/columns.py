@@ -88,7 +88,8 @@ class Column:
         kind = type(value)
         if kind is float or kind is int:
             if self.dtype is np.int64:
-                return value if kind is int and abs(value) < 2**63 and self.minimum is None and not self.positive else None
+                bounded = self.positive or self.minimum is not None
+                return value if kind is int and abs(value) < 2**63 and not bounded else None
             if -LARGEST <= value <= LARGEST and self._within(value):
                 return float(value)
         elif self.item == "vector" and (kind is tuple or kind is list) and len(value) in (2, 3):
@@ -99,7 +100,9 @@ class Column:
         return None
 
     def _within(self, number: float) -> bool:
-        return (self.minimum is None or number >= self.minimum) and (not self.positive or number >= SMALLEST_WITH_INVERSE)
+        if self.positive and number < SMALLEST_WITH_INVERSE:
+            return False
+        return self.minimum is None or number >= self.minimum
 
     def checked_many(self, values: Any, count: int, dimensions: int) -> np.ndarray:
         """An array for ``count`` rows, from one value for all or one per row."""
@@ -182,8 +185,9 @@ class Column:
                 raise ValueError
             return array.astype(self.dtype)
         except (ValueError, TypeError, OverflowError):
-            wanted = {"i": "an integer", "u": "an integer", "b": "True or False"}.get(np.dtype(self.dtype).kind, "a number")
-            raise self._error(value, f"must be {wanted}" if self.item == "scalar" else "must be numbers", entity) from None
+            wanted = {"i": "an integer", "b": "True or False"}.get(np.dtype(self.dtype).kind, "a number")
+            rule = f"must be {wanted}" if self.item == "scalar" else "must be numbers"
+            raise self._error(value, rule, entity) from None
 
     def _error(self, value: Any, rule: str, entity: int | None) -> ValueError:
         prefix = "" if entity is None else f"entity {entity}: "

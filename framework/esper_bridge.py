@@ -59,7 +59,7 @@ class ChangeLog:
         self._touched: dict[type[Any], _Touched] = {}
 
     def __bool__(self) -> bool:
-        return self.cleared or any([touched.entities for touched in self._touched.values()])
+        return self.cleared or any(touched.entities for touched in self._touched.values())
 
     def of(self, component: type[Any]) -> _Touched:
         return self._touched.setdefault(component, _Touched())
@@ -125,7 +125,7 @@ class _WatchedComponents(dict[type[Any], set[int]]):
 
 
 def watch(base: type[Any]) -> None:
-    """Log changes of components derived from ``base`` in the current context from now on; what is there counts as new."""
+    """Log changes of components derived from ``base`` in the current context; what is there already counts as new."""
     esper._components = _WatchedComponents(esper._components, ChangeLog(base))
 
 

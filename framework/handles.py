@@ -19,7 +19,7 @@ class Sources:
         self._loose: list[int] = []  # indices of handles that hold their values themselves
         self._values: list[dict[str, Any]] = []
         store = handles[0]._store
-        if store is not None and all([handle._store is store for handle in handles]):  # made in bulk, all of them
+        if store is not None and all(handle._store is store for handle in handles):  # made in bulk, all of them
             self._groups = [(store, np.arange(self._count), np.array([handle._row for handle in handles]))]
             return
         groups: dict[int, tuple[RowStore, list[int], list[int]]] = {}
@@ -51,7 +51,13 @@ def _vectors(values: list[Any], column: Column, dimensions: int) -> np.ndarray:
     """Rows from values of which some may be a single number that stands for all (0: no rotation)."""
     width = column.item_shape(dimensions)[0]
     whole = column.empty_value(dimensions) if column.item == "rotation" else None
-    rows = [value if isinstance(value, np.ndarray) else (whole if whole is not None else (value,) * width) for value in values]
+
+    def row(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            return value
+        return whole if whole is not None else (value,) * width
+
+    rows = [row(value) for value in values]
     return np.array(rows, column.dtype).reshape(len(rows), width)
 
 

@@ -19,7 +19,7 @@ PLACED = ("before", "after", "phase")  # attributes of a system that being added
 
 
 class Guard:
-    """A processor's ``process`` with its time taken and its errors named; stands on the instance, where esper finds it."""
+    """A processor's ``process`` with its time taken and its errors named; set on the instance, where esper finds it."""
 
     def __init__(self, processor: esper.Processor) -> None:
         self.replaced = vars(processor).get("process")  # what somebody else had put there
@@ -36,6 +36,8 @@ class Guard:
         pipeline.running += 1
         try:
             self._process(*args, **kwargs)
+            if pipeline.world.settings.debug and pipeline.world.physics is not None:
+                pipeline.world.physics.report_faults(f"after {self.name}: ")
         except BaseException as error:
             pipeline.fail(self.name, error)
             raise
@@ -78,7 +80,9 @@ class Lineup:
             self._add_system(system, before, after)
         elif before != () or after != ():
             name = type(system).__name__
-            raise TypeError(f"{name} is a plain processor: instead of before and after, add_processor gives it a priority")
+            raise TypeError(
+                f"{name} is a plain processor: add_processor gives it a priority instead of before and after"
+            )
         else:
             self.add_plain(system, 0)
 

@@ -39,6 +39,10 @@ class PhysicsServices(ABC):
     def end_step(self) -> None: ...
 
     @abstractmethod
+    def report_faults(self, prefix: str) -> None:
+        """Add what is wrong with the bodies' state to the world's faults."""
+
+    @abstractmethod
     def end_window(self) -> None:
         """The last step of a ``step()`` or ``advance()`` is over: forces applied from outside have done their work."""
 

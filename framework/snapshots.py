@@ -12,7 +12,8 @@ import numpy as np
 from .clock import Clock
 from .services import PhysicsServices
 
-MOVING = ("position", "previous_position", "linear_velocity", "applied_force", "step_force")  # what carom's systems write
+# What carom's own systems write.
+MOVING = ("position", "previous_position", "linear_velocity", "applied_force", "step_force")
 
 
 @dataclass
@@ -63,7 +64,7 @@ def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
         was = state.columns.get(table.mask_name(component), np.zeros(len(rows), bool))
         if not np.array_equal(mask, was):
             entity = int(state.entities[np.flatnonzero(mask != was)[0]])
-            raise ValueError(f"entity {entity}: {component.__name__} was added or removed since this snapshot was taken")
+            raise ValueError(f"entity {entity}: {component.__name__} was added or removed since this snapshot")
     for key, column in state.columns.items():
         table.arrays[key][rows] = column
     table.set_kinds(rows, state.columns["kind"])

@@ -83,9 +83,8 @@ class Table:
         taken = self.arrays.keys() & {column.key for column in component.columns.values()}
         name = component.prefix.rstrip(".")
         if taken or name in self.arrays or name in RESERVED:
-            raise ValueError(
-                f"component {component.__name__}: bodies have {', '.join(sorted(taken)) or name} already; give it another name"
-            )
+            clash = ", ".join(sorted(taken)) or name
+            raise ValueError(f"component {component.__name__}: bodies have {clash} already; give it another name")
 
     @staticmethod
     def mask_name(component: type[Component]) -> str:

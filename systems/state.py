@@ -189,13 +189,17 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def end_step(self) -> None:
         self.moved = False
         self.motion_stamp += 1
+        self.report_faults("")
+
+    def report_faults(self, prefix: str) -> None:
+        """Name the bodies whose state is not finite in the world's faults; they disturb no others."""
         moving = self.table.stops[1]
         for name in ("position", "linear_velocity"):
             column = self.table.arrays[name][:moving]
             if not np.isfinite(column.sum()):
                 for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
                     entity = int(self.table.arrays["entity"][row])
-                    self.world.report_fault(f"entity {entity}: {name} is {column[row].tolist()}")
+                    self.world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
 
     def end_window(self) -> None:
         self.table.arrays["applied_force"][: self.table.stops[0]] = 0.0

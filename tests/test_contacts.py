@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 
 import esper
 import numpy as np
@@ -30,6 +31,10 @@ def listen(world, told, *names):
         world.on(name, lambda contact, name=name: told.append((name, contact.step, contact.entity_a, contact.entity_b)))
 
 
+def ids(rows):
+    return list(zip(rows.entity_a.tolist(), rows.entity_b.tolist(), strict=True))
+
+
 def rain(restitution=0.5, **settings):
     """Twelve balls falling on a floor and on each other: begins, stays, ends and impacts of all kinds."""
     world = make_world(gravity=9.81, **settings)
@@ -40,7 +45,7 @@ def rain(restitution=0.5, **settings):
     return world
 
 
-# -- columns --------------------------------------------------------------------------------------------------------------
+# -- columns -------------------------------------------------------------------------------------
 
 
 @both_dimensions
@@ -48,7 +53,8 @@ def test_columns_and_their_shapes(d):
     """Before any step and after, empty or not: the same columns, dtypes and shapes; impacts also have their time."""
     world = make_world(d)
     for _ in range(3):
-        for rows in (world.contacts, world.contacts.begin, world.contacts.stay, world.contacts.end, world.contacts.impacts):
+        contacts = world.contacts
+        for rows in (contacts, contacts.begin, contacts.stay, contacts.end, contacts.impacts):
             for name, rank in COLUMNS.items():
                 values = getattr(rows, name)
                 assert values.shape == ((len(rows), d) if rank == 2 else (len(rows),))
@@ -76,15 +82,12 @@ def test_canonical_order_whatever_the_history():
     for k in range(10):
         ball(world, rng.uniform(-3, 3, 2), kind=kinds[k % 3])
     world.step()
-    pairs = list(zip(world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist(), strict=True))
+    pairs = ids(world.contacts)
     assert len(pairs) > 100
     assert all(a < b for a, b in pairs)
     assert pairs == sorted(set(pairs))
     assert not {entities[k] for k in (3, 10, 17, 30, 44)} & {entity for pair in pairs for entity in pair}
-    assert sorted(pairs) == sorted([*zip(world.contacts.begin.entity_a.tolist(), world.contacts.begin.entity_b.tolist(),
-                                         strict=True),
-                                    *zip(world.contacts.stay.entity_a.tolist(), world.contacts.stay.entity_b.tolist(),
-                                         strict=True)])  # fmt: skip
+    assert pairs == sorted([*ids(world.contacts.begin), *ids(world.contacts.stay)])
 
 
 def test_normal_impulse_is_the_momentum_exchanged():
@@ -105,7 +108,7 @@ def test_normal_impulse_is_the_momentum_exchanged():
     np.testing.assert_allclose(world.contacts.normal_impulse, load, rtol=1e-3)
 
 
-# -- begin, stay, end, impacts ---------------------------------------------------------------------------------------------
+# -- begin, stay, end, impacts -------------------------------------------------------------------
 
 
 def test_begin_stay_end_in_order():
@@ -129,8 +132,7 @@ def test_begin_stay_end_in_order():
                 case "contact_end":
                     assert pair in touching
                     touching.remove(pair)
-        now = set(zip(world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist(), strict=True))
-        assert now == touching
+        assert set(ids(world.contacts)) == touching
     assert touching
 
 
@@ -163,7 +165,8 @@ def test_no_step_no_events():
     assert world.advance(1 / 60) == 1
     assert len(world.contacts.begin) == len(world.contacts.impacts) == 1
     assert world.advance(1 / 600) == 0
-    assert not len(world.contacts.begin) + len(world.contacts.end) + len(world.contacts.impacts) + len(world.contacts.stay)
+    contacts = world.contacts
+    assert [len(rows) for rows in (contacts.begin, contacts.stay, contacts.end, contacts.impacts)] == [0, 0, 0, 0]
     assert world.advance(1 / 60) == 1
     assert len(world.contacts.end) == 1
 
@@ -229,7 +232,7 @@ def test_deleting_everything_ends_everything():
     assert len(world.contacts) == 0
 
 
-# -- pairs and of ---------------------------------------------------------------------------------------------------------
+# -- pairs and of --------------------------------------------------------------------------------
 
 
 def duel():
@@ -264,7 +267,7 @@ def test_pairs_of_one_kind_come_once():
     found = [(a, b) for a, b, _ in world.contacts.pairs(Missile, Missile)]
     assert found == [(entities[0], entities[1]), (entities[1], entities[2])]
     everybody = [(a, b) for a, b, _ in world.contacts.pairs(SphereCollider, RigidBody)]
-    assert everybody == list(zip(entities, entities[1:], strict=False))
+    assert everybody == list(itertools.pairwise(entities))
 
 
 @pytest.mark.parametrize("immediate", [False, True])
@@ -302,7 +305,7 @@ def test_of_looks_from_the_entity():
     assert world.contacts.of(12345) == []
 
 
-# -- handlers --------------------------------------------------------------------------------------------------------------
+# -- handlers ------------------------------------------------------------------------------------
 
 
 def test_handlers_run_in_order_and_are_kept_alive():
@@ -358,7 +361,7 @@ def test_a_handler_may_delete_and_create(immediate):
     world.on("contact_begin", shatter)
     world.step()
     begun = [pair for name, _, *pair in told if name == "contact_begin"]
-    assert begun == [[a, b] for a, b in zip(entities, entities[1:], strict=False)]
+    assert begun == [[a, b] for a, b in itertools.pairwise(entities)]
     told.clear()
     world.step()
     assert [pair for name, _, *pair in told if name == "contact_end"] == begun
@@ -378,6 +381,9 @@ def test_espers_own_handlers_get_the_same_events():
         for name, handler in zip(EVENTS, handlers, strict=True):
             esper.set_handler(name, handler)
     run(world, 60)
+    with world:
+        for name, handler in zip(EVENTS, handlers, strict=True):
+            esper.remove_handler(name, handler)
     assert told == from_esper
     assert {name for name, *_ in told} == set(EVENTS)
 
@@ -401,7 +407,7 @@ def test_a_handler_that_fails_is_named_and_the_step_undone():
     assert len(world.contacts.begin) == len(world.contacts.impacts) == 1
 
 
-# -- enabled ----------------------------------------------------------------------------------------------------------------
+# -- enabled -------------------------------------------------------------------------------------
 
 
 class OneWay(System):

@@ -112,7 +112,7 @@ def test_the_python_blocks_run(page, namespace):
     run(python_blocks(page), page, namespace)
 
 
-# -- links ------------------------------------------------------------------------------------------------------------
+# -- links ---------------------------------------------------------------------------------------
 
 
 def links(page: Path) -> list[tuple[int, str]]:
@@ -163,7 +163,7 @@ def test_the_links_lead_somewhere(page):
     assert dead_links(page) == []
 
 
-# -- the tests' own machinery -----------------------------------------------------------------------------------------
+# -- the tests' own machinery --------------------------------------------------------------------
 
 
 def test_a_failing_block_is_reported_with_its_page_and_line(tmp_path):

@@ -42,7 +42,7 @@ def gas(dt, seed):
 
 
 def measure(dt, seconds, seed=1, discard=20):
-    """Z from the impulses on the walls, collisions per disc and second, the change of energy, the deepest overlap."""
+    """Z from the impulses on the walls, collisions per disc and second, drift of the energy, deepest overlap."""
     world, side = gas(dt, seed)
     energy = world.kinetic_energy()
     warm_up = int(discard / RATE / dt)
@@ -71,7 +71,7 @@ def measure(dt, seconds, seed=1, discard=20):
 
 @pytest.mark.parametrize("dt", [0.3, 0.1, 0.03])
 def test_pressure_and_rate_of_an_elastic_gas(dt):
-    """v dt / sigma = dt. Energy to 1e-12. Z and the rate may fall short by 2 v dt / sigma (B20, discrete), never exceed.
+    """v dt / sigma = dt. Energy to 1e-12. Z and the rate may fall short by 2 v dt / sigma (B20), never exceed.
 
     Noise: 24 s are 11,500 collisions and 2,200 hits on walls; relative error of Z 2 / sqrt(11500), 3 sigma: 5.6 %.
     """

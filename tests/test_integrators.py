@@ -14,7 +14,7 @@ from worlds import EPS, make_world
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem
 
-# -- constant force: A7 (a) (b), B1, C7 -------------------------------------------------------------------------------
+# -- constant force: A7 (a) (b), B1, C7 -----------------------------------------------------------
 
 
 def throw(method, dt, steps, *, v0, g, vx=0.0, d=2, **settings):
@@ -125,7 +125,7 @@ def test_substeps_never_change_free_flight(method):
     assert np.array_equal(paths[0], paths[2])
 
 
-# -- springs: A7 (c) (d), B2, B3 --------------------------------------------------------------------------------------
+# -- springs: A7 (c) (d), B2, B3 -----------------------------------------------------------------
 
 
 def matrix_powers(method, stiffness, drag, dt, steps, x0=1.0, v0=0.0):
@@ -328,7 +328,7 @@ def test_forces_that_depend_on_time(method):
         np.testing.assert_allclose(velocities[:, 0, 0], 3 * t**2, rtol=1e-12, atol=1e-13)
 
 
-# -- orbits: B4, B5 ---------------------------------------------------------------------------------------------------
+# -- orbits: B4, B5 ------------------------------------------------------------------------------
 
 
 class NewtonianGravity(ForceSystem):
@@ -450,7 +450,7 @@ def test_figure_eight_with_ten_thousand_steps(method):
     assert np.abs(x - x0).max() < 1.25 * FIGURE_EIGHT[method][1]
 
 
-# -- stability: B6, C16 -----------------------------------------------------------------------------------------------
+# -- stability: B6, C16 --------------------------------------------------------------------------
 
 # limits of z = omega dt without damping, of drag dt without spring, and of z at three damping ratios
 LIMITS = {
@@ -562,7 +562,7 @@ def test_what_explodes_is_reported():
     assert np.array_equal(world.bodies.position[1], alone.bodies.position[0])
 
 
-# -- drag: B7 ---------------------------------------------------------------------------------------------------------
+# -- drag: B7 ------------------------------------------------------------------------------------
 
 TAU, G = 0.8, 9.81
 V_T = G * TAU  # terminal speed
@@ -703,7 +703,7 @@ class SpringForce(ForceSystem):
         bodies.force[:] -= bodies.oscillator.stiffness[:, None] * bodies.position
 
 
-# -- time reversal: B8 ------------------------------------------------------------------------------------------------
+# -- time reversal: B8 ---------------------------------------------------------------------------
 
 
 class Network(ForceSystem):

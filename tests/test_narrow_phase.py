@@ -142,7 +142,7 @@ def test_crowd_equals_the_oracle_pair_by_pair(d):
     assert len(pairs) > 100
 
 
-# -- what the oracle leaves open ------------------------------------------------------------------------------------------
+# -- what the oracle leaves open -----------------------------------------------------------------
 
 
 @both_dimensions
@@ -227,7 +227,7 @@ def test_rotation_is_read_anew_in_every_step():
         assert world.contacts.entity_b.tolist() == [expected_partner]
 
 
-# -- layers, masks, sensors -----------------------------------------------------------------------------------------------
+# -- layers, masks, sensors ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("maker", [ball, box])

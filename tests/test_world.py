@@ -36,7 +36,7 @@ def esper_is_left_as_it_was():
     assert not list(esper.get_entities()), "the default context was touched"
 
 
-# -- contexts -----------------------------------------------------------------------------------------------------------
+# -- contexts ------------------------------------------------------------------------------------
 
 
 def test_names_are_unique_by_default_and_may_be_given():
@@ -198,7 +198,7 @@ def test_a_system_may_step_another_world():
     assert outer.component_for_entity(e, Transform).x == inner.component_for_entity(1, Transform).x == 2.0
 
 
-# -- without physics ----------------------------------------------------------------------------------------------------
+# -- without physics -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -242,7 +242,7 @@ class Counter(System):
         self.count += 1
 
 
-# -- the verbs ----------------------------------------------------------------------------------------------------------
+# -- the verbs -----------------------------------------------------------------------------------
 
 
 def test_the_verbs_mean_what_esper_means():
@@ -326,7 +326,7 @@ def test_entities_may_be_deleted_while_iterating():
     assert len(world.bodies) == 0
 
 
-# -- traps of esper -----------------------------------------------------------------------------------------------------
+# -- traps of esper ------------------------------------------------------------------------------
 
 
 def test_deleting_and_then_deleting_at_once():
@@ -458,7 +458,7 @@ def test_a_handler_is_not_called_after_another_one_removed_it_from_esper():
     assert len(log) == 1
 
 
-# -- time ---------------------------------------------------------------------------------------------------------------
+# -- time ----------------------------------------------------------------------------------------
 
 
 def test_settings_are_replaced_between_steps_and_time_goes_on():
@@ -520,7 +520,7 @@ def test_a_step_inside_a_step_is_refused(inner):
     assert world.alpha == 0.0
 
 
-def test_an_empty_world_and_a_single_body_step(d=2):  # ACCURACY C25
+def test_an_empty_world_and_a_single_body_step():  # ACCURACY C25
     world = make_world()
     world.step()
     assert len(world.bodies) == len(world.contacts) == 0

@@ -1,0 +1,719 @@
+"""Systems: phases and their order, before and after, plain processors, adding and removing, and what errors undo."""
+
+from __future__ import annotations
+
+import esper
+import numpy as np
+import pytest
+from worlds import ball, make_world
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import (
+    CaromError,
+    Component,
+    ForceSystem,
+    NoPhysicsError,
+    Phase,
+    ScheduleError,
+    Settings,
+    StepError,
+    System,
+    World,
+    column,
+)
+from carom.systems import BroadPhase, ContactEvents, ForceAccumulation, Integration, NarrowPhase, Response
+
+BUILT_IN = {
+    Phase.FORCES: "ForceAccumulation",
+    Phase.INTEGRATION: "Integration",
+    Phase.BROAD: "BroadPhase",
+    Phase.NARROW: "NarrowPhase",
+    Phase.RESPONSE: "Response",
+}
+
+
+class Note(System):
+    """Writes its label into a log."""
+
+    def __init__(self, log=None, label=""):
+        self.log, self.label = [] if log is None else log, label
+
+    def process(self, dt):
+        self.log.append(self.label)
+
+
+class PlainNote(esper.Processor):
+    def __init__(self, log, label):
+        self.log, self.label = log, label
+
+    def process(self, dt):
+        self.log.append(self.label)
+
+
+class A(Note):
+    pass
+
+
+class B(Note):
+    pass
+
+
+class C(Note):
+    pass
+
+
+def in_phase(base, phase, **attributes):
+    return type(base.__name__, (base,), {"phase": phase, **attributes})
+
+
+def order(world):
+    return [system.name for system in world.systems]
+
+
+def trace(world, log):
+    """Make every built-in system write its name into the log when it runs."""
+    for system in world.systems:
+        if type(system).__module__.startswith("carom."):
+            inner = system.process
+
+            def process(dt, inner=inner, name=system.name):
+                log.append(name)
+                inner(dt)
+
+            system.process = process
+    return log
+
+
+# -- order -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_built_in_systems_are_esper_processors_in_the_order_of_the_step():
+    world = make_world()
+    expected = [ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, ContactEvents]
+    with world:
+        found = [esper.get_processor(system) for system in expected]
+    assert [type(system) for system in found] == expected
+    assert world.systems == found
+    priorities = [system.priority for system in found]
+    assert priorities == sorted(priorities, reverse=True)
+    for system in found:
+        assert system.phase.priority - 1000 < system.priority < system.phase.priority
+    assert [phase.priority for phase in Phase] == [7000, 6000, 5000, 4000, 3000, 2000, 1000]
+
+
+@pytest.mark.parametrize("phase", list(Phase))
+def test_a_system_runs_in_its_phase_after_the_built_in_one(phase):
+    world, log = make_world(), []
+    world.add_system(in_phase(A, phase)(log, phase.name))
+    trace(world, log)
+    world.step()
+    expected = []
+    for p in Phase:
+        expected += [BUILT_IN[p]] if p in BUILT_IN else []
+        expected += ["ContactEvents"] if p == Phase.RESPONSE else []
+        expected += [phase.name] if p == phase else []
+    assert log == expected
+
+
+def test_plain_processors_run_after_response_or_between_phases():
+    world, log = make_world(), []
+    trace(world, log)
+    world.add_processor(PlainNote(log, "zero"))
+    world.add_system(PlainNote(log, "added as a system"))
+    world.add_processor(PlainNote(log, "before narrow"), priority=Phase.NARROW.priority)
+    world.add_processor(PlainNote(log, "after all"), priority=-5)
+    world.add_system(Note(log, "end"))
+    world.add_processor(PlainNote(log, "first"), priority=Phase.START.priority + 1)
+    world.step()
+    assert log == [
+        "first", "ForceAccumulation", "Integration", "BroadPhase", "before narrow", "NarrowPhase", "Response",
+        "ContactEvents", "end", "zero", "added as a system", "after all",
+    ]  # fmt: skip
+    assert world.step_count == 1
+
+
+def test_ties_run_in_order_of_addition():
+    world, log = make_world(), []
+    for label in "cab":
+        world.add_system(Note(log, label))
+    world.step()
+    assert log == ["c", "a", "b"]
+
+
+def test_before_and_after_by_type_and_by_instance_in_the_class_and_at_the_call():
+    world, log = make_world(), []
+    a, b = A(log, "a"), B(log, "b")
+    world.add_system(a)
+    world.add_system(b, before=A)
+    world.add_system(C(log, "c"), before=b)
+    world.add_system(type("D", (Note,), {"after": (B,)})(log, "d"), before=a)
+    world.step()
+    assert log == ["c", "b", "d", "a"]
+
+
+def test_a_system_without_phase_goes_where_its_neighbour_is():
+    world = make_world()
+    world.add_system(A(), before=Response)
+    world.add_system(B(), after=Integration)
+    assert order(world) == [
+        "ForceAccumulation", "Integration", "B", "BroadPhase", "NarrowPhase", "A", "Response", "ContactEvents",
+    ]  # fmt: skip
+
+
+def test_an_order_across_phases_may_be_stated_and_must_be_possible():
+    world = make_world()
+    world.add_system(in_phase(A, Phase.START)(), before=Response)
+    world.add_system(in_phase(B, Phase.END)(), after=Response)
+    assert order(world)[0] == "A"
+    assert order(world)[-1] == "B"
+    with pytest.raises(ScheduleError, match="START and cannot run after Response of phase RESPONSE"):
+        world.add_system(in_phase(C, Phase.START)(), after=Response)
+
+    class Base(Note):
+        phase = Phase.START
+
+    class Derived(Base):  # its phase is its base's, not one to be moved
+        pass
+
+    with pytest.raises(ScheduleError, match="Derived"):
+        world.add_system(Derived(), after=Response)
+    assert len(order(world)) == 8
+
+
+def test_cycles_and_unknown_neighbours_are_errors_and_leave_nothing_behind():
+    world, log = make_world(), []
+    a, b = A(log, "a"), B(log, "b")
+    world.add_system(a)
+    with pytest.raises(ScheduleError, match=r"cycle: .*A.*B|cycle: .*B.*A"):
+        world.add_system(b, before=A, after=A)
+    with pytest.raises(ScheduleError, match="before C, which is not in this world"):
+        world.add_system(b, before=C)
+    world.add_system(b, before=A)  # what failed has left no trace in it
+    world.step()
+    assert log == ["b", "a"]
+
+
+def test_two_writers_of_one_column_need_an_order():
+    world = make_world()
+    writer = type("Writer", (Note,), {"phase": Phase.END, "writes": ("position",)})
+    second = type("Second", (Note,), {"phase": Phase.END, "writes": ["mass", "position"]})
+    world.add_system(writer())
+    with pytest.raises(ScheduleError, match="Writer and Second both write position in phase END"):
+        world.add_system(second())
+    world.add_system(second(), after=writer)
+    third = type("Third", (Note,), {"phase": Phase.END, "writes": ("position",)})
+    with pytest.raises(ScheduleError):
+        world.add_system(third(), after=writer)  # but neither before nor after Second
+    world.add_system(third(), after=second)  # after Writer too then, through Second
+    world.add_system(type("Elsewhere", (Note,), {"phase": Phase.START, "writes": ("position",)})())
+    assert order(world)[-3:] == ["Writer", "Second", "Third"]
+
+
+def test_the_plan_shows_the_order_and_the_reasons():
+    world = make_world(gravity=9.81)
+    world.add_system(A(), before=Response)
+    ball(world, 0.0)
+    plan = world.plan()
+    assert [entry.system for entry in plan.entries] == order(world)
+    assert [entry.priority for entry in plan.entries] == [system.priority for system in world.systems]
+    text = str(plan)
+    assert "gravity" in text
+    assert "nobody listens" in text
+    with world:
+        esper.set_handler("contact_begin", _handler)
+    assert "handlers of contact_begin" in str(world.plan())
+
+
+def _handler(contact):
+    pass
+
+
+# -- once per step, once per frame -----------------------------------------------------------------------------------
+
+
+def test_systems_run_once_per_step_and_frame_systems_once_per_advance():
+    world, log = make_world(dt=0.1), []
+
+    class Frame(System):
+        def process(self, dt):
+            log.append(("frame", dt, self.world.step_count))
+
+    class Drawing(esper.Processor):
+        def process(self, dt):
+            log.append("drawn")
+
+    world.add_system(Note(log, "step"))
+    frame = Frame()
+    world.add_system(frame, frame=True)
+    world.add_system(Drawing(), frame=True)
+    assert world.advance(0.25) == 2
+    assert log == ["step", "step", ("frame", 0.25, 2), "drawn"]
+    log.clear()
+    assert world.advance(0.01) == 0
+    assert log == [("frame", 0.01, 2), "drawn"]
+    log.clear()
+    world.step()
+    assert log == ["step"]
+    world.remove_system(frame)
+    world.advance(0.0)
+    assert log == ["step", "drawn"]
+
+
+def test_what_cannot_be_added():
+    world = make_world()
+    with pytest.raises(TypeError, match=r"instance: add_system\(Note\(\)\)"):
+        world.add_system(Note)
+    with pytest.raises(TypeError, match="System"):
+        world.add_system(print)
+    with pytest.raises(TypeError, match="ForceSystem"):
+        world.add_system(ForceSystem(), frame=True)
+    with pytest.raises(TypeError, match="priority"):
+        world.add_system(PlainNote([], ""), before=Response)
+    with pytest.raises(TypeError, match="instance"):
+        world.add_processor(PlainNote)
+    with pytest.raises(NoPhysicsError):
+        World().add_system(ForceSystem())
+    note, field = Note(), ForceSystem()
+    for system in (note, field):
+        world.add_system(system)
+        with pytest.raises(ValueError, match="already"):
+            world.add_system(system)
+        with pytest.raises(ValueError, match="belongs to one world"):
+            make_world().add_system(system)
+        world.remove_system(system)
+        make_world().add_system(system)  # free again
+
+
+# -- adding and removing ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("plain_process", [False, True], ids=["step", "esper.process"])
+def test_what_is_added_or_removed_inside_a_step_joins_or_leaves_at_its_end(plain_process):
+    world, log = make_world(), []
+
+    def step():
+        with world:
+            esper.process(world.settings.dt) if plain_process else world.step()
+
+    late, plain, leaving, kept = Note(log, "late"), PlainNote(log, "plain"), Note(log, "leaving"), Note(log, "kept")
+
+    class Change(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            if self.world.step_count == 0:
+                self.world.add_system(late)
+                self.world.add_system(B(log, "after late"), after=late)
+                self.world.add_processor(plain)
+                self.world.remove_system(leaving)
+                self.world.remove_system(kept)
+                self.world.add_system(kept)  # thought better of it
+                with pytest.raises(ValueError, match="already"):
+                    self.world.add_system(late)
+                with pytest.raises(KeyError):
+                    self.world.remove_system(leaving)
+                assert self.world.has_system(late)
+
+    world.add_system(Change())
+    world.add_system(leaving)
+    world.add_system(kept)
+    step()
+    assert log == ["leaving", "kept"]
+    assert world.step_count == 1
+    log.clear()
+    step()
+    assert log == ["late", "after late", "kept", "plain"]  # in order of addition: ``kept`` was added again last
+    assert world.step_count == 2
+
+
+def test_force_systems_added_inside_a_step_join_at_its_end():
+    class Push(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force[:, 0] += 1.0
+
+    world, push = make_world(dt=1.0), Push()
+
+    class Change(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            if self.world.step_count < 2:
+                (self.world.remove_system if self.world.step_count else self.world.add_system)(push)
+
+    ball(world, 0.0)
+    change = Change()
+    world.add_system(change)
+    world.step()
+    assert world.bodies.linear_velocity[0, 0] == 0.0
+    world.step()
+    assert world.bodies.linear_velocity[0, 0] == 1.0
+    world.step()
+    assert world.bodies.linear_velocity[0, 0] == 1.0
+
+
+def test_two_instances_of_a_type_are_removed_one_by_one():
+    world, log = make_world(), []
+    first, second = Note(log, 1), Note(log, 2)
+    world.add_system(first)
+    world.add_system(second)
+    world.remove_system(first)
+    world.step()
+    assert log == [2]
+    with world:
+        assert esper.get_processor(Note) is second
+    world.remove_processor(Note)
+    world.step()
+    assert log == [2]
+    assert "process" not in vars(first)  # as it was before it was added
+
+
+def test_plain_esper_calls_add_and_remove_systems_as_well():
+    world, log = make_world(), []
+    early = in_phase(A, Phase.START)(log, "early")
+    with world:
+        esper.add_processor(PlainNote(log, "plain"))
+        esper.add_processor(early, priority=-3)
+        esper.process(world.settings.dt)
+        assert log == ["early", "plain"]  # a System runs in its phase
+        assert early.world is world
+        assert world.systems[0] is early
+        esper.remove_processor(type(early))
+        esper.process(world.settings.dt)
+    assert log == ["early", "plain", "plain"]
+    world.add_system(Note(log, "new"))  # arranging them anew does not bring it back
+    world.step()
+    assert log[3:] == ["new", "plain"]
+
+
+def test_a_built_in_system_can_be_taken_out():
+    world = make_world(gravity=10.0, dt=1.0)
+    ball(world, 0.0, 1.0)
+    with world:
+        forces = esper.get_processor(ForceAccumulation)
+    world.remove_system(forces)
+    world.step()
+    assert world.bodies.linear_velocity.tolist() == [[1.0, 0.0]]
+    world.add_system(forces)
+    world.step()
+    assert world.bodies.linear_velocity.tolist() == [[1.0, -10.0]]
+
+
+# -- one phase alone -------------------------------------------------------------------------------------------------
+
+
+def test_run_forces_alone():
+    world = make_world(gravity=10.0)
+    ball(world, 0.0, mass=2.0)
+    world.run(Phase.FORCES)
+    assert world.bodies.force.tolist() == [[0.0, -20.0]]
+    assert world.bodies.position.tolist() == [[0.0, 0.0]]
+    assert (world.step_count, world.time) == (0, 0.0)
+
+
+def test_run_integration_alone():
+    world = make_world(dt=0.5)
+    ball(world, 0.0, 4.0)
+    world.run(Phase.INTEGRATION)
+    assert world.bodies.position.tolist() == [[2.0, 0.0]]
+    assert world.bodies.previous_position.tolist() == [[0.0, 0.0]]
+
+
+def test_run_narrow_alone_after_placing_two_bodies():
+    world = make_world()
+    a, b = ball(world, 0.0), ball(world, 0.9)
+    world.run(Phase.NARROW)
+    assert [(c.entity_a, c.entity_b) for c in world.contacts] == [(a, b)]
+    assert world.contacts.depth[0] == pytest.approx(0.1)
+    assert world.contacts.normal.tolist() == [[1.0, 0.0]]
+    world.component_for_entity(b, Transform).x = 1.1
+    world.run(Phase.NARROW)
+    assert len(world.contacts) == 0
+
+
+def test_run_response_alone_bounces_what_overlaps():
+    world = make_world()
+    ball(world, 0.0, 1.0, restitution=1.0)
+    ball(world, 0.9, -1.0, restitution=1.0)
+    world.run(Phase.RESPONSE)
+    assert world.bodies.linear_velocity[:, 0].tolist() == pytest.approx([-1.0, 1.0])
+
+
+def test_run_has_the_systems_of_that_phase_alone_and_undoes_what_fails():
+    world, log = make_world(), []
+    ball(world, 0.0)
+    world.add_system(in_phase(A, Phase.FORCES)(log, "forces"))
+    world.add_system(Note(log, "end"))
+    world.run(Phase.FORCES)
+    assert log == ["forces"]
+
+    class Bad(System):
+        phase = Phase.INTEGRATION
+
+        def process(self, dt):
+            self.world.bodies.position = 9.0
+            self.world.run(Phase.FORCES)
+
+    world.add_system(Bad())
+    with pytest.raises(CaromError, match="inside"):
+        world.run(Phase.INTEGRATION)
+    assert world.bodies.position.tolist() == [[0.0, 0.0]]
+    world.run(Phase.FORCES)
+
+
+# -- errors ----------------------------------------------------------------------------------------------------------
+
+
+class Fuel(Component):
+    left = column(10.0)
+
+
+class Health:
+    points = 100
+
+
+class Failing:
+    """Does damage everywhere, then raises."""
+
+    def act(self, world):
+        bodies = world.bodies
+        for name in bodies.column_names():
+            view = getattr(bodies, name)
+            if view.flags.writeable and view.dtype == float:
+                view += 1.0
+        for _, health in world.get_component(Health):
+            health.points -= 1
+        raise RuntimeError("out of luck")
+
+
+class FailingSystem(System, Failing):
+    def process(self, dt):
+        self.act(self.world)
+
+
+class FailingForce(ForceSystem, Failing):
+    def add_forces(self, bodies, time):
+        self.act(self.world)
+
+
+class FailingProcessor(esper.Processor, Failing):
+    world = None
+
+    def process(self, dt):
+        self.act(self.world)
+
+
+def damaged_world(integrator="semi_implicit_euler"):
+    """Something of everything, a few steps in."""
+    world = make_world(gravity=9.81, integrator=integrator)
+    for x in range(4):
+        e = ball(world, (0.95 * x, 0.5), (x, 0.0), restitution=0.5)
+        world.add_component(e, Fuel(x))
+        world.add_component(e, Health())
+    ball(world, (0.0, -10.0), kind="static", radius=10.0)
+    for _ in range(3):
+        world.step()
+    world.component_for_entity(1, RigidBody).apply_force((3.0, 0.0))
+    return world
+
+
+def columns(world):
+    return {name: getattr(world.bodies, name).copy() for name in world.bodies.column_names()}
+
+
+def failing(world, kind):
+    if kind == "force system":
+        bad = FailingForce()
+    elif kind == "processor":
+        bad = FailingProcessor()
+        bad.world = world
+    elif kind == "handler":
+        bad = FailingSystem()
+        world.on("contact_stay", lambda contact: bad.act(world))
+        return None
+    else:
+        bad = in_phase(FailingSystem, Phase[kind])()
+    world.add_system(bad)
+    return bad
+
+
+def same_columns(now, before):
+    derived = {"force", "inverse_mass"}  # computed anew from the others in every step
+    for name in before.keys() - derived:
+        np.testing.assert_array_equal(now[name], before[name], err_msg=name)
+    return True
+
+
+KINDS = ["START", "FORCES", "INTEGRATION", "BROAD", "NARROW", "RESPONSE", "END", "force system", "processor", "handler"]
+
+
+@pytest.mark.parametrize("how", ["step", "advance", "esper.process"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_error_leads_back_to_the_start_of_the_step(kind, how):
+    world = damaged_world()
+    undisturbed = damaged_world()
+    bad = failing(world, kind)
+    before, digest = columns(world), world.state_hash()
+    clock = (world.time, world.step_count)
+    touching = [(c.entity_a, c.entity_b, c.normal_impulse) for c in world.contacts]
+    name = {"processor": "FailingProcessor", "force system": "FailingForce", "handler": "contact_stay"}.get(
+        kind, "FailingSystem"
+    )
+    go = {"step": lambda dt: world.step(), "advance": world.advance, "esper.process": esper.process}[how]
+    with pytest.raises(StepError, match=f"{name}.*RuntimeError: out of luck") as caught, world:
+        go(world.settings.dt)
+    assert isinstance(caught.value.__cause__, RuntimeError)
+    assert world.state_hash() == digest
+    assert same_columns(columns(world), before)
+    assert (world.time, world.step_count) == clock
+    assert [(c.entity_a, c.entity_b, c.normal_impulse) for c in world.contacts] == touching
+    assert all(health.points < 100 for _, health in world.get_component(Health))  # theirs stay as they were left
+    if bad is None:
+        return
+    world.remove_system(bad)
+    for w in (world, undisturbed):
+        for _ in range(5):
+            w.step()
+    assert world.state_hash() == undisturbed.state_hash()  # as if nothing had happened
+    assert [c.entity_b for c in world.contacts.begin] == [c.entity_b for c in undisturbed.contacts.begin]
+
+
+def test_an_error_of_any_type_is_named():
+    for error in (ValueError("v"), KeyError("k"), CaromError("c"), NoPhysicsError("n"), ZeroDivisionError("z")):
+        world = make_world()
+
+        class Bad(esper.Processor):
+            def process(self, dt, error=error):
+                raise error
+
+        world.add_processor(Bad())
+        with pytest.raises(StepError, match=f"system Bad failed in step 0 .*{type(error).__name__}"):
+            world.step()
+
+
+def test_an_interrupt_goes_through_as_it_is_and_undoes_the_step():
+    world = make_world()
+    e = ball(world, 0.0, 60.0)
+
+    class Interrupt(System):
+        def process(self, dt):
+            raise KeyboardInterrupt
+
+    interrupt = Interrupt()
+    world.add_system(interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        world.step()
+    assert world.component_for_entity(e, Transform).x == 0.0
+    world.remove_system(interrupt)
+    world.step()
+    assert world.component_for_entity(e, Transform).x == 1.0
+
+
+def test_the_time_of_steps_that_were_not_taken_is_kept():
+    world = make_world(dt=0.25)
+    ball(world, 0.0, 1.0)
+
+    class Second(System):
+        healed = False
+
+        def process(self, dt):
+            if self.world.step_count == 1 and not self.healed:
+                raise RuntimeError
+
+    system = Second()
+    world.add_system(system)
+    with pytest.raises(StepError):
+        world.advance(0.8)
+    assert world.step_count == 1
+    system.healed = True
+    assert world.advance(0.0) == 2
+    assert world.alpha == pytest.approx(0.2)
+
+
+def test_an_error_in_a_world_stepped_by_a_system_undoes_both():
+    inner, outer = make_world(), make_world()
+    ball(inner, 0.0, 60.0)
+    ball(outer, 0.0, 60.0)
+    inner.add_system(FailingSystem())
+
+    class Inner(System):
+        def process(self, dt):
+            inner.step()
+
+    outer.add_system(Inner())
+    with pytest.raises(StepError):
+        outer.step()
+    for world in (inner, outer):
+        assert world.bodies.position.tolist() == [[0.0, 0.0]]
+        assert world.step_count == 0
+
+
+def test_one_plain_processor_may_serve_two_worlds():
+    log = []
+    shared = PlainNote(log, "shared")
+    worlds = [make_world() for _ in range(2)]
+    for world in worlds:
+        world.add_processor(shared)
+        world.step()
+    assert log == ["shared", "shared"]
+    shared.log = None
+    for world in worlds:
+        e = ball(world, 0.0, 60.0)
+        with pytest.raises(StepError, match=f"PlainNote failed .*{world.name}"):
+            world.step()
+        assert world.component_for_entity(e, Transform).x == 0.0
+    worlds[0].close()
+    shared.log = log
+    worlds[1].step()
+    assert len(log) == 3
+
+
+def test_a_processor_added_and_failing_within_one_plain_step_does_not_lock_the_world():
+    """esper runs it at once, before the world has looked at it."""
+    world = make_world()
+    e = ball(world, 0.0, 60.0)
+
+    class Adds(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            bad = FailingProcessor()
+            bad.world = self.world
+            esper.add_processor(bad)
+
+    world.add_system(Adds())
+    with world, pytest.raises(RuntimeError):
+        esper.process(world.settings.dt)
+    with world:
+        esper.remove_processor(FailingProcessor)
+        esper.remove_processor(Adds)
+        esper.process(world.settings.dt)
+    assert world.component_for_entity(e, Transform).x == 1.0
+    assert world.step_count == 1
+
+
+def test_stats_know_every_system_and_can_be_reset():
+    world = make_world()
+    world.add_system(Note())
+    world.add_processor(PlainNote([], ""))
+    world.step()
+    stats = world.stats()
+    assert stats.steps == 1
+    assert {"Integration", "Response", "Note", "PlainNote"} <= stats.milliseconds.keys()
+    assert stats.total > 0
+    world.reset_stats()
+    assert world.stats().steps == 0
+    assert world.stats().total == 0
+
+
+def test_settings_for_a_world_without_physics_are_kept():
+    assert World(settings=Settings(dt=0.5)).settings.dt == 0.5
+
+
+def test_sphere_colliders_are_needed_only_if_there_are_any():
+    world = make_world()
+    world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(60.0, 0)))
+    world.step()
+    assert "no colliders" in str(world.plan())
+    world.create_entity(Transform((9, 9)), RigidBody(), SphereCollider(1.0))
+    world.step()
+    assert "no colliders" not in str(world.plan())
