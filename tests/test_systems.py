@@ -222,6 +222,8 @@ def test_the_plan_shows_the_order_and_the_reasons():
     with world:
         esper.set_handler("contact_begin", _handler)
     assert "handlers of contact_begin" in str(world.plan())
+    with world:
+        esper.remove_handler("contact_begin", _handler)
 
 
 def _handler(contact):
