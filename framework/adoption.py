@@ -58,6 +58,7 @@ class Adoption:
 
     def _gather(self, touched: dict[type[Any], Ids], cleared: bool) -> None:
         if cleared:
+            self.table.generation += 1
             for component, members in self._members.items():
                 touched.setdefault(component, set()).update(members)
         if self._pending:

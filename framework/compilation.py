@@ -210,7 +210,7 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
     elif isinstance(value, type):
         digest.update(f"{value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}".encode())
     elif isinstance(value, np.ndarray):
-        digest.update(value.tobytes())
+        digest.update(repr((value.dtype.str, value.shape)).encode() + value.tobytes())
     elif isinstance(value, types.ModuleType):
         digest.update(value.__name__.encode())
     else:

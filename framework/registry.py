@@ -131,6 +131,6 @@ class Registry:
             for second in components[index:]:
                 if self.pair(first, second) is None:
                     raise UnhandledPairError(
-                        f"{first.__name__} and {second.__name__} can meet in this world, but no plugin has registered the "
-                        f"pair: register it with @plugin.pair, or keep them apart with layer and mask"
+                        f"{first.__name__} and {second.__name__} can meet in this world, but no plugin has registered "
+                        f"the pair: register it with @plugin.pair, or keep them apart with layer and mask"
                     )

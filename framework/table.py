@@ -31,6 +31,7 @@ class Table:
         self.static_version = 0  # changes whenever a static body does
         self.stops = (0, 0, 0)  # first row after the dynamic, kinematic and static bodies
         self.in_step = False
+        self.generation = 0  # counts esper.clear_database(): after it, ids mean other entities
         self.frame = 0  # counts the calls of step() and advance()
         self.kind_changed = False
         self.arrays: dict[str, np.ndarray] = {}

@@ -46,20 +46,22 @@ class ContactEvents(System):
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
         self.touching: Columns = empty_columns(state.dimensions)
+        self._generation = state.table.generation
 
     def process(self, dt: float) -> None:
         contacts = self._state.contacts
         now = self._state.contact_columns
+        if not len(now["entity_a"]) and not len(self.touching["entity_a"]):
+            return
         if len(now["entity_a"]) and not now["enabled"].all():
             now = {key: column[now["enabled"]] for key, column in now.items()}
         before = self.touching
-        if not len(now["entity_a"]) and not len(before["entity_a"]):
-            self._tell(self._state.step_impacts, "impact")
-            return
         stayed_before, stayed = np.zeros(len(before["entity_a"]), bool), np.zeros(len(now["entity_a"]), bool)
-        compare_pairs(
-            before["entity_a"], before["entity_b"], now["entity_a"], now["entity_b"], stayed_before, stayed
-        )
+        if self._generation == self._state.table.generation:
+            compare_pairs(
+                before["entity_a"], before["entity_b"], now["entity_a"], now["entity_b"], stayed_before, stayed
+            )
+        self._generation = self._state.table.generation
         begin, stay = _select(now, ~stayed), _select(now, stayed)
         end = _select(before, ~stayed_before)
         end["step"] = np.full(len(end["entity_a"]), self.world.step_count)

@@ -37,7 +37,8 @@ class PairBuffers:
         self.resting = np.empty(0, np.int64)
         self.impact_pairs = np.empty(0, np.int64)
         self.step_impacts: dict[str, np.ndarray] | None = None
-        self.contact_columns = empty_columns(dimensions, enabled=True)
+        self._no_contacts = empty_columns(dimensions, enabled=True)
+        self.contact_columns = self._no_contacts
         self._contact_pairs = np.empty(0, np.int64)  # the pair behind each row of the contacts
         names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "resting_contacts")
         self.pair_counters = dict.fromkeys(names, 0)
@@ -74,6 +75,8 @@ class PairBuffers:
         self.pairs, self.found = pairs, found
         self.contacts_ready = True
         self.pair_counters["pairs"] += pairs
+        if not found:
+            return
         hits = self.hits[:found]
         order = order_of_pairs(self.pair_a[hits], self.pair_b[hits], self.rank)
         for array in (self.hits, self.depths, self.normals, self.points):
@@ -96,6 +99,10 @@ class PairBuffers:
 
     def publish_contacts(self, final: bool = False) -> None:
         """Make the contacts' columns: after NARROW those found; ``final``: also those that impacts led to."""
+        if not self.found:
+            self._contact_pairs, self.contact_columns = self.no_pairs, self._no_contacts
+            self.contacts.set_current(self.contact_columns)
+            return
         pairs = self.hits[: self.found]
         if not final:
             depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))

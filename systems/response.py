@@ -34,10 +34,9 @@ class Response(System):
         state = self._state
         if not state.contacts_ready:
             state.narrow_phase.process(dt)
-        state.take_enabled()
         if not state.found:
-            state.publish_contacts(final=True)
             return
+        state.take_enabled()
         self._start_paths()
         struck = self._impacts(dt)
         self._resting(dt, struck)

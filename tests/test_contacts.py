@@ -475,3 +475,18 @@ def test_disabled_contacts_push_nobody_and_end():
     world.add_system(off)
     world.step()
     assert ("contact_end", 61, *rest) in told
+
+
+def test_pairs_end_when_their_ids_come_to_mean_others():
+    """After esper.clear_database() the same two ids are other balls: the old pair ends, the new one begins."""
+    world = make_world()
+    told = []
+    for event in ("contact_begin", "contact_stay", "contact_end"):
+        world.on(event, lambda contact, event=event: told.append(event))
+    for _ in range(2):
+        with world:
+            esper.clear_database()
+            for x in (0.0, 0.9):
+                esper.create_entity(Transform((x, 0.0)), RigidBody(), SphereCollider(0.5, sensor=True))
+        world.step()
+    assert sorted(told) == ["contact_begin", "contact_begin", "contact_end"]
