@@ -92,7 +92,7 @@ class RigidBody(Component, flat=True):
         and static bodies do not react.
         """
         force = self._vector(FORCE, force)
-        store = self._store
+        store: Any = self._store
         if self.kind != "dynamic":
             return
         if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
