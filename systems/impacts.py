@@ -136,7 +136,8 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         """Put the pair's next impact into the queue, if it has one: e > 0, overlap at the end, a fast approach.
 
         The time is when the pair begins to touch, ``since`` if it does then already. It is found between a time
-        apart and one in touch by secants on the separation (Illinois), every eighth time by halving the bracket.
+        apart and one in touch by Newton's method on the separation, whose rate is the speed along the normal; where
+        that leads out of the bracket, and every eighth time, the bracket is halved instead.
         """
         origin, path, second, third, degree = motion
         a, b = pair_a[c], pair_b[c]
@@ -144,7 +145,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         e = mix(rule, restitution[slots[shape_a], a], restitution[slots[shape_b], b])
         if e <= 0.0:
             return
-        low, high, at_low, at_high, side = since, dt, 0.0, 0.0, 0
+        low, high, guess = since, dt, dt
         # b's path as a sees it
         x0, x1 = sub(row(origin, b, like), row(origin, a, like)), sub(row(path, b, like), row(path, a, like))
         x0 = add(x0, sub(row(offset, b, like), row(offset, a, like)))
@@ -155,33 +156,24 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         for look in range(TIME_ITERATIONS):  # one place that calls evaluate: it is what takes time to compile
             middle = dt if look == 0 else since
             if look > 1:
-                middle = 0.5 * (low + high)
-                if at_low < 0.0 < at_high and look % 8 != 7:
-                    secant = high - (high - low) * (at_high / (at_high - at_low))
-                    if low < secant < high:
-                        middle = secant
+                middle = guess if low < guess < high and look % 8 != 7 else 0.5 * (low + high)
                 if not low < middle < high:
                     break
             d = along(middle, x0, x1, x2, x3)
             hit, depth, n, p = evaluate(shape_a, a, shape_b, b, d, shapes, like)
             near = look > 1 and abs(depth) <= ROUNDING * length(d)
+            guess = middle + depth / dot(along_rate(middle, x1, x2, x3), n)
             if hit or near:
                 t, normal, point, apart = middle, n, p, d
                 if near:
                     break
-                if look > 1:
-                    at_low = 0.5 * at_low if side == 1 else at_low
-                    side = 1
-                high, at_high = middle, depth
+                high = middle
                 if look == 1:
                     break
             elif look == 0 and not looked_at:
                 return
             else:
-                if look > 1:
-                    at_high = 0.5 * at_high if side == -1 else at_high
-                    side = -1
-                low, at_low = middle, depth
+                low = middle
         w = along_rate(t, x1, x2, x3)
         if dot(apart, apart) == 0.0 and length(apart) == 0.0 and length(w) > 0.0:
             if pair_impulse[c] > 0.0:  # it has parted already
