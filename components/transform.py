@@ -30,6 +30,8 @@ class Transform(Component, flat=True):
     rotation = column(0.0, item="rotation")
 
     def __init__(self, position: Any, rotation: Any = 0.0) -> None:
+        if np.ndim(position) == 0:
+            raise ValueError(f"Transform.position must be 2 or 3 numbers, got {position!r}")
         self._fill({"position": position, "rotation": rotation})
 
     @property

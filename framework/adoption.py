@@ -29,7 +29,12 @@ class Adoption:
         self.anchor = anchor
         self._is_partner = is_partner  # component type -> whether it makes a body together with the anchor
         self._members: dict[type[Component], Handles] = {}
+        self._log: esper_bridge.ChangeLog | None = None  # of this world's context
         self._pending: dict[type[Any], Ids] = {}  # changes that could not be taken in yet
+
+    def settled(self) -> bool:
+        """Whether nothing has changed since the last synchronize; needs no switch of contexts to find out."""
+        return self._log is not None and not self._log and not self._pending and not self.table.kind_changed
 
     def synchronize(self) -> bool:
         """Bring the table up to date; True if anything has changed.
@@ -37,7 +42,7 @@ class Adoption:
         Raises MissingComponentError or ValueError, naming the entity, before anything has been written; what is amiss
         is looked at again the next time.
         """
-        log = esper_bridge.changes()
+        log = self._log = esper_bridge.changes()
         if not log and not self._pending and not self.table.kind_changed:
             return False
         self._gather(*log.take())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import re
 from collections.abc import Iterator
 from typing import Any, ClassVar, Self
@@ -52,6 +53,8 @@ class Component:
             setattr(cls, name, field)
             fields[name] = field
         cls.columns = fields
+        if "__slots__" not in vars(cls):
+            cls.__setattr__ = _set_field  # type: ignore[method-assign]
         cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
 
     def __init__(self, *args: Any, **values: Any) -> None:
@@ -108,6 +111,15 @@ class Component:
         for column in self._shaped:
             value = self._values[column.name] if self._store is None else getattr(self, column.name)
             column.check_dimensions(value, dimensions, entity)
+
+    def expand(self, dimensions: int) -> None:
+        """Make whole vectors of single numbers that stand for one, now that the dimensions are known."""
+        if self._store is None:
+            for column in self._shaped:
+                value = self._values[column.name]
+                if np.ndim(value) == 0 and column.item_shape(dimensions):
+                    whole = column.empty_value(dimensions) if column.item == "rotation" else value
+                    self._values[column.name] = np.full(column.item_shape(dimensions), whole)
 
     def copy(self) -> Self:
         """An unbound component with the same values, for another entity (prefabs)."""
@@ -193,3 +205,12 @@ def components_in(components: Any) -> Iterator[Component]:
 
 def _copy_of(column: Column) -> Column:
     return dataclasses.replace(column)
+
+
+def _set_field(component: Component, name: str, value: Any) -> None:
+    """A class of one's own may keep more than columns; but what is nearly a column's name is a slip of the pen."""
+    if not hasattr(type(component), name) and name not in vars(component):
+        near = difflib.get_close_matches(name, component.columns, 1, cutoff=0.75)
+        if near:
+            raise AttributeError(f"{type(component).__name__} has no field {name!r}: did you mean {near[0]!r}?")
+    object.__setattr__(component, name, value)

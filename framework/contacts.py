@@ -6,6 +6,8 @@ number of the step, so that what a game does with them never depends on its fram
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -66,7 +68,12 @@ class ContactRows:
         )  # fmt: skip
 
     def __iter__(self) -> Iterator[Contact]:
-        return (self.row(index) for index in range(len(self)))
+        c = self._columns
+        names = ("entity_a", "entity_b", "depth", "normal_impulse", "step")
+        a, b, depth, impulse, step = (c[name].tolist() for name in names)
+        times = c["time_of_impact"].tolist() if "time_of_impact" in c else itertools.repeat(math.nan)
+        rows = zip(a, b, c["point"].copy(), c["normal"].copy(), depth, impulse, step, times, strict=False)
+        return (Contact(*row) for row in rows)
 
     def pairs(self, first: type[Any], second: type[Any]) -> Iterator[tuple[int, int, Contact]]:
         """(a, b, contact) for contacts of an entity that has ``first`` with one that has ``second``.

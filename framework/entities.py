@@ -149,6 +149,12 @@ class EntityVerbs:
 
     def _check(self, components: Iterable[Any], entity: int | None) -> None:
         dimensions = self.dimensions
+        for component in components:
+            if isinstance(component, type):
+                raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
+            if isinstance(component, (list, tuple, Many)):
+                raise TypeError(f"components are given one by one, got {component!r}")
         if dimensions is not None:
             for component in components_in(components):
                 component.check_dimensions(dimensions, entity)
+                component.expand(dimensions)

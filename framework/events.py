@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from . import esper_bridge
@@ -37,6 +37,15 @@ class Events:
     def any_handlers(self) -> bool:
         """Whether anybody listens to anything."""
         return any(self._handlers.values()) or esper_bridge.has_event_handlers()
+
+    def dispatch_many(self, name: str, records: Iterable[Any]) -> None:
+        """One event for each record; quick where a single handler listens, which is usual."""
+        for record in records:
+            handlers = self._handlers.get(name, ())
+            if len(handlers) == 1 and not esper_bridge.has_event_handlers(name):
+                _call(name, handlers[0], (record,))
+            else:
+                self.dispatch(name, record)
 
     def dispatch(self, name: str, *args: Any) -> None:
         """Call the handlers that were set when the event began and have not been removed since."""

@@ -72,6 +72,9 @@ class Lineup:
             raise TypeError(f"add_system takes an instance: add_system({system.__name__}())")
         if not isinstance(system, (ForceSystem, esper.Processor)):
             raise TypeError(f"add_system takes a System, a ForceSystem or an esper.Processor, got {system!r}")
+        if isinstance(system, System) and not isinstance(system.phase, Phase):
+            known = ", ".join(f"Phase.{phase.name}" for phase in Phase)
+            raise TypeError(f"{system.name}.phase must be one of {known}, got {system.phase!r}")
         if frame:
             self._add_frame_system(system)
         elif isinstance(system, ForceSystem):

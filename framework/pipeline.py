@@ -160,7 +160,7 @@ class Pipeline:
     def synchronize(self) -> None:
         """Bring the table in step with esper, unless a step is running: its rows stand still."""
         physics = self.world.physics
-        if physics is None or self.in_step:
+        if physics is None or self.in_step or physics.adoption.settled():
             return
         with esper_bridge.context(self.world.name):
             physics.adoption.synchronize()

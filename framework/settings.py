@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any, Literal, Self
@@ -86,10 +88,7 @@ class Settings:
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed; TypeError for a field that does not exist."""
-        known = [field.name for field in dataclasses.fields(self)]
-        for name in changes:
-            if name not in known:
-                raise TypeError(f"Settings has no field {name!r}; it has {', '.join(known)}")
+        _refuse_unknown(changes)
         return dataclasses.replace(self, **changes)
 
     @classmethod
@@ -106,3 +105,24 @@ class Settings:
     def accurate(cls) -> Self:
         """Velocity Verlet, a smaller step, 32 substeps for what rests."""
         return cls(dt=1 / 240, integrator="velocity_verlet", substeps=32)
+
+
+def _refuse_unknown(values: dict[str, Any]) -> None:
+    known = [field.name for field in dataclasses.fields(Settings)]
+    for name in values:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            raise TypeError(f"Settings has no field {name!r}{hint}; it has {', '.join(known)}")
+
+
+_generated = Settings.__init__
+
+
+@functools.wraps(_generated)
+def _init(self: Settings, *args: Any, **values: Any) -> None:
+    _refuse_unknown(values)
+    _generated(self, *args, **values)
+
+
+Settings.__init__ = _init  # type: ignore[method-assign]

@@ -51,6 +51,9 @@ class World(EntityVerbs, QueryVerbs):
         for plugin in plugins:
             if not isinstance(plugin, Plugin):
                 raise TypeError(f"World takes plugins, got {plugin!r}; settings go by name: World(..., settings=...)")
+        names = [plugin.name for plugin in plugins]
+        for twice in (n for n in names if names.count(n) > 1):
+            raise ValueError(f"a world takes one plugin named {twice!r}, got {names.count(twice)}")
         if name is None:
             name = next(n for n in (f"carom-{i}" for i in _numbers) if not esper_bridge.context_exists(n))
         elif name != "default" and esper_bridge.context_exists(name):
@@ -323,8 +326,9 @@ class World(EntityVerbs, QueryVerbs):
         return self._pipeline.faults
 
     def report_fault(self, text: str) -> None:
-        """Add to :attr:`faults`, which hold the last 100."""
-        self._pipeline.faults.append(text)
+        """Add to :attr:`faults`, which hold the last 100 different ones."""
+        if text not in self._pipeline.faults:
+            self._pipeline.faults.append(text)
         del self._pipeline.faults[:-100]
 
     def plan(self) -> Plan:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..framework.compilation import kernel
-from ..framework.contacts import ContactRows, EntityLookup, empty_columns
+from ..framework.contacts import ContactRows, empty_columns
 from ..framework.schedule import Phase, System
 
 if TYPE_CHECKING:
@@ -76,8 +76,7 @@ class ContactEvents(System):
     def _tell(self, columns: Columns | None, event: str) -> None:
         if columns is None or not len(columns["entity_a"]) or not self.world.events.wanted(event):
             return
-        for contact in ContactRows(columns, EntityLookup(lambda entity, component: False)):
-            self.world.events.dispatch(event, contact)
+        self.world.events.dispatch_many(event, ContactRows(columns, self._state.lookup))
 
     def reason(self) -> str:
         wanted = [event for event in EVENTS if self.world.events.wanted(event)]

@@ -65,6 +65,11 @@ class FewBoxes:
         query, found = np.nonzero(meet.all(axis=2))
         return np.searchsorted(query, np.arange(len(query_lower) + 1)), self.rows[found]
 
+    def query_one(self, lower: tuple[float, ...], upper: tuple[float, ...]) -> np.ndarray:
+        """Rows that overlap one box, ascending."""
+        meet = (self.boxes[:, : self.dimensions] <= upper) & (lower <= self.boxes[:, self.dimensions :])
+        return self.rows[meet.all(axis=1)]
+
     def _as_tree(self) -> SpatialTree:
         if self._tree is None:
             self._tree = SpatialTree(self.dimensions)

@@ -14,6 +14,8 @@ from ..framework.vectors import add, row, sub
 if TYPE_CHECKING:
     from .state import PhysicsState
 
+Point = tuple[float, ...]
+
 
 def make_query_kernel(meets: Any) -> Callable[..., int]:
     """The kernel that tests the candidates of many queries with one shape, over the shapes of a scene."""
@@ -67,29 +69,64 @@ class Queries:
 
     def spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
         """What touches each sphere."""
-        return self._ask(centres, np.repeat(radii[:, None], centres.shape[1], axis=1), mask, "touching_sphere")
+        return self._many(centres, np.repeat(radii[:, None], centres.shape[1], axis=1), mask, "touching_sphere")
 
     def boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
         """What touches each box."""
-        return self._ask((lower + upper) / 2, (upper - lower) / 2, mask, "touching_box")
+        return self._many((lower + upper) / 2, (upper - lower) / 2, mask, "touching_box")
 
-    def _ask(self, centres: np.ndarray, sizes: np.ndarray, mask: int, kernel_name: str) -> Hits:
+    def sphere(self, centre: Point, radius: float, mask: int) -> list[int]:
+        """What touches one sphere; the quick way for a single one."""
+        return self._one(centre, (radius,) * len(centre), mask, "touching_sphere")
+
+    def box(self, lower: Point, upper: Point, mask: int) -> list[int]:
+        """What touches one box."""
+        centre = tuple((low + high) / 2 for low, high in zip(lower, upper, strict=True))
+        size = tuple((high - low) / 2 for low, high in zip(lower, upper, strict=True))
+        return self._one(centre, size, mask, "touching_box")
+
+    def _one(self, centre: Point, size: Point, mask: int, kernel_name: str) -> list[int]:
+        touching = self._kernel(kernel_name)
+        if touching is None:
+            return []
+        lower = tuple(c - s for c, s in zip(centre, size, strict=True))
+        upper = tuple(c + s for c, s in zip(centre, size, strict=True))
+        moving, fixed = (boxes.query_one(lower, upper) for boxes in self._state.broad_phase.partitions)
+        ends = np.array((0, len(moving))), np.array((0, len(fixed)))
+        hits = self._touching(
+            touching, ends[0], moving, ends[1], fixed, np.array((centre,)), np.array((size,)), mask
+        )
+        return hits.entities.tolist()
+
+    def _many(self, centres: np.ndarray, sizes: np.ndarray, mask: int, kernel_name: str) -> Hits:
+        touching = self._kernel(kernel_name)
+        if touching is None:
+            return Hits(np.zeros(len(centres) + 1, np.int64), np.empty(0, np.int64))
+        lower, upper = centres - sizes, centres + sizes
+        moving, fixed = (boxes.query(lower, upper) for boxes in self._state.broad_phase.partitions)
+        return self._touching(touching, *moving, *fixed, centres, sizes, mask)
+
+    def _kernel(self, name: str) -> Any:
+        """The kernel of that name, with the boxes made ready for it; None if the world has no colliders."""
         state = self._state
         state.refresh_structure()
         if state.code is None:
-            return Hits(np.zeros(len(centres) + 1, np.int64), np.empty(0, np.int64))
-        touching = getattr(state.kernels, kernel_name)
+            return None
+        touching = getattr(state.kernels, name)
         if touching is None:
-            raise ValueError(f"no plugin has registered the shape that {kernel_name} needs")
+            raise ValueError(f"no plugin has registered the shape that {name} needs")
         stamp = (state.motion_stamp, state.table.version, state.table.static_version)
         if stamp != self._stamp:
             state.refresh_rotation()
             state.broad_phase.trees_now()
             self._stamp = stamp
-        lower, upper = centres - sizes, centres + sizes
-        (offsets, rows), (other_offsets, other_rows) = (
-            boxes.query(lower, upper) for boxes in state.broad_phase.partitions
-        )
+        return touching
+
+    def _touching(
+        self, touching: Any, offsets: Any, rows: Any, other_offsets: Any, other_rows: Any, centres: Any, sizes: Any,
+        mask: int,
+    ) -> Hits:  # fmt: skip
+        state = self._state
         found = np.empty(len(rows) + len(other_rows), np.int64)
         bounds = np.zeros(len(offsets), np.int64)
         arrays, scratch = state.table.arrays, state.scratch

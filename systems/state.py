@@ -232,11 +232,20 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
         return self.queries.spheres(centres, radii, mask)
 
+    def query_sphere(self, centre: tuple[float, ...], radius: float, mask: int) -> list[int]:
+        return self.queries.sphere(centre, radius, mask)
+
+    def query_box(self, lower: tuple[float, ...], upper: tuple[float, ...], mask: int) -> list[int]:
+        return self.queries.box(lower, upper, mask)
+
     def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
         return self.queries.boxes(lower, upper, mask)
 
     def prepare(self, components: tuple[type[Any], ...]) -> None:
         """Step a small world of such bodies, so that all they need is compiled."""
+        for component in components:
+            if not (isinstance(component, type) and issubclass(component, Component)):
+                raise TypeError(f"prepare takes component types, got {component!r}")
         colliders = [c for c in components if issubclass(c, Collider)]
         if not colliders:
             colliders = [c for c in self.table.stacked_types(Collider.stack) if self.table.has_mask(c).any()]

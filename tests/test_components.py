@@ -129,11 +129,9 @@ def test_x_y_z_in_three_dimensions():
 
 def test_one_number_stands_for_a_whole_vector():
     world = make_world(3)
-    e = world.create_entity(Transform(2.0), RigidBody(linear_velocity=1.5))
-    assert world.bodies.position.tolist() == [[2.0, 2.0, 2.0]]
+    e = world.create_entity(Transform((2, 2, 2)), RigidBody(linear_velocity=1.5))
     assert world.component_for_entity(e, RigidBody).linear_velocity.tolist() == [1.5, 1.5, 1.5]
-    unbound = Transform(2.0)
-    assert (unbound.x, unbound.y) == (2.0, 2.0)
+    assert world.bodies.linear_velocity.tolist() == [[1.5, 1.5, 1.5]]
 
 
 def test_static_bodies_are_read_only_but_for_assignment():
@@ -663,3 +661,43 @@ def test_handles_are_read_and_written_inside_a_system():
     for _ in range(3):
         world.step()
     assert world.bodies.position.tolist() == [[4.0, 0.0]]
+
+
+# -- mistakes that would be lost in silence ------------------------------------------------------
+
+
+def test_classes_and_lists_are_no_components():
+    world = make_world()
+    with pytest.raises(TypeError, match=r"RigidBody\(\.\.\.\), got the class itself"):
+        world.create_entity(Transform((0, 0)), RigidBody)
+    with pytest.raises(TypeError, match="one by one"):
+        world.create_entity([Transform((0, 0)), RigidBody()])
+    assert len(world.bodies) == 0
+
+
+def test_a_bare_number_is_no_position():
+    """Transform(3, 7) would mean position (3, 3) and a rotation of 7 rad."""
+    with pytest.raises(ValueError, match=r"Transform\.position must be 2 or 3 numbers, got 3"):
+        Transform(3, 7)  # type: ignore[arg-type]
+
+
+def test_misspelt_fields_of_own_components_are_refused():
+    class Fuel(Component):
+        litres = column(1.0)
+
+    fuel = Fuel()
+    with pytest.raises(AttributeError, match="Fuel has no field 'liters': did you mean 'litres'"):
+        fuel.liters = 3.0
+    fuel.litres = 3.0
+    assert fuel.litres == 3.0
+
+
+def test_vectors_are_whole_as_soon_as_the_entity_exists():
+    """A default of 0 stands for (0, 0) from the call on, so that a spawned body can be changed at once."""
+    world = make_world()
+    entity = world.create_entity(Transform((0, 0)), RigidBody())
+    rigid = world.component_for_entity(entity, RigidBody)
+    rigid.linear_velocity += (1, 0)
+    rigid.linear_velocity[1] = 2
+    world.step()
+    assert rigid.linear_velocity.tolist() == [1, 2]

@@ -21,6 +21,7 @@ from carom.framework import World
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^(?P<indent> *)(?P<marks>`{3,}|~{3,})(?P<info>[^`]*)$")
+MARKS = ("no-run", "game")  # not to be run; a part of a game whose lines are counted
 LINK = re.compile(r"\]\(\s*(?P<target>[^()\s]*(?:\([^()\s]*\)[^()\s]*)*)[^()]*\)")  # of links in links both
 
 
@@ -62,11 +63,11 @@ def python_blocks(page: Path) -> list[Block]:
     """Those to run. A misspelt mark is an error: it would take a block out of the tests without a word."""
     blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
     for block in blocks:
-        info = block.info[:1] + [mark for mark in block.info[1:] if mark != "no-run"]
+        info = block.info[:1] + [mark for mark in block.info[1:] if mark not in MARKS]
         assert not info or "py" not in info[0] or info == ["python"], (
-            f"{name_of(page)}:{block.line - 1}: write ```python or ```python no-run, not ```{' '.join(block.info)}"
+            f"{name_of(page)}:{block.line - 1}: write ```python, alone or with {' or '.join(MARKS)}, not ```{' '.join(block.info)}"
         )
-    return [block for block in blocks if block.info == ["python"]]
+    return [block for block in blocks if block.info[:1] == ["python"] and "no-run" not in block.info]
 
 
 def run(blocks: list[Block], page: Path, namespace: dict[str, object]) -> None:
@@ -110,6 +111,16 @@ def namespace(monkeypatch, tmp_path):
 @pytest.mark.parametrize("page", [page for page in PAGES if python_blocks(page)], ids=name_of)
 def test_the_python_blocks_run(page, namespace):
     run(python_blocks(page), page, namespace)
+
+
+def lines_of_code(text: str) -> int:
+    """Lines that are neither blank nor only a comment."""
+    return sum(1 for line in text.splitlines() if line.strip() and not line.strip().startswith("#"))
+
+
+def test_asteroids_is_a_game_in_60_lines():
+    game = [block for block in python_blocks(ROOT / "docs" / "asteroids.md") if "game" in block.info]
+    assert 40 < sum(lines_of_code(block.text) for block in game) <= 60
 
 
 # -- links ---------------------------------------------------------------------------------------
