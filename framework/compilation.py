@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import getpass
 import hashlib
+import operator
 import os
 import pickle
 import tempfile
@@ -30,6 +31,8 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+machine_code = operator.attrgetter("library")  # of numba's compile result
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
 
@@ -156,7 +159,7 @@ class KernelCache(_Cache):
             name = self._dispatcher.py_func.__qualname__
             log.compiled.append((name, time.perf_counter() - started))
         path = self._path(sig, data.codegen)
-        if not self._enabled or path is None or data.library.has_dynamic_globals or data.lifted:
+        if not self._enabled or path is None or machine_code(data).has_dynamic_globals or data.lifted:
             return
         with contextlib.suppress(OSError):  # a full or vanished disk costs speed, never the run
             handle, temporary = tempfile.mkstemp(dir=path.parent)
