@@ -27,10 +27,13 @@ class StepState:
     tracking: Any
 
 
-def capture(physics: PhysicsServices, clock: Clock, everything: bool) -> StepState:
-    """The state now; ``everything``: all columns, else only those that carom's own systems write."""
+def capture(physics: PhysicsServices, clock: Clock, everything: bool, lasting: bool = False) -> StepState:
+    """The state now; ``everything``: all columns, else only those that carom's own systems write.
+
+    Unless it is ``lasting``, the next capture takes its memory.
+    """
     table = physics.table
-    columns = table.copy_columns(None if everything else MOVING)
+    columns = (table.copy_columns if lasting else table.keep_columns)(None if everything else MOVING)
     entities = columns.pop("entity", table.column("entity"))
     return StepState(entities, columns, clock.state(), physics.contacts.state(), physics.tracking_state())
 
@@ -45,7 +48,7 @@ def put_back(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
 
 def snapshot(physics: PhysicsServices, clock: Clock) -> StepState:
     """A capture that shares nothing with the world."""
-    state = capture(physics, clock, everything=True)
+    state = capture(physics, clock, everything=True, lasting=True)
     state.contacts, state.tracking = copy.deepcopy((state.contacts, state.tracking))
     return state
 

@@ -16,7 +16,10 @@ TESTS_AT_MOST = 1 << 17  # between two sets; beyond it a tree pays even for few 
 
 @kernel
 def test_all(boxes_a, rows_a, boxes_b, rows_b, within, first, second):
-    """Write the rows of overlapping pairs (``within``: of one set given twice, each pair once); returns how many."""
+    """Write the rows of overlapping pairs (``within``: of one set given twice, each pair once); returns how many.
+
+    Of more than ``first`` and ``second`` have room for, the rest is counted only.
+    """
     d = boxes_a.shape[1] // 2
     found = 0
     for i in range(len(rows_a)):
@@ -25,8 +28,9 @@ def test_all(boxes_a, rows_a, boxes_b, rows_b, within, first, second):
             while k < d and boxes_a[i, k] <= boxes_b[j, d + k] and boxes_b[j, k] <= boxes_a[i, d + k]:
                 k += 1
             if k == d:
-                first[found] = rows_a[i]
-                second[found] = rows_b[j]
+                if found < len(first):
+                    first[found] = rows_a[i]
+                    second[found] = rows_b[j]
                 found += 1
     return found
 
@@ -84,9 +88,13 @@ class FewBoxes:
 def _tested(
     one: FewBoxes | SpatialTree, other: FewBoxes | SpatialTree, within: bool, tests: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    first, second = np.empty(tests, np.int32), np.empty(tests, np.int32)
-    found = test_all(one.boxes, one.rows, other.boxes, other.rows, within, first, second) if tests else 0
-    return first[:found], second[:found]
+    room = min(tests, 4 * (one.count + other.count))
+    while True:
+        first, second = np.empty(room, np.int32), np.empty(room, np.int32)
+        found = test_all(one.boxes, one.rows, other.boxes, other.rows, within, first, second) if tests else 0
+        if found <= room:
+            return first[:found], second[:found]
+        room = found
 
 
 def pairs_between(
