@@ -20,6 +20,7 @@ WALL_EDGE = "#475569"
 TEXT = "#e6edf3"
 MUTED = "#8b98a8"
 CONTACT = "#ffffff"
+SENSOR = "#7dd3c0"
 SPEED = LinearSegmentedColormap.from_list("speed", ["#3f66e0", "#1fb6c9", "#a6d854", "#ffd43b", "#ff6b5e"])
 BODY_COLOURS = (
     "#ff6b6b", "#ffa94d", "#ffd43b", "#a9e34b", "#51cf66", "#20c997",

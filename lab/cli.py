@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from rich.table import Table
 from .. import __version__, scenes
 from .bench import bench_gas
 from .choices import parse_assignments, preset
-from .loading import Loaded, load
+from .loading import Loaded, load, stdout_kept_clean
 from .problems import Problem, did_you_mean
 from .progress import StepProgress
 from .report import print_report
@@ -78,7 +79,7 @@ def cli(context: click.Context) -> None:
     help="Set one field of Settings; repeatable.",
 )
 @click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Which variant of the scene."
+    "--seed", default="0", show_default=True, metavar="NUMBER", help="Which variant of the scene: 0, 1, 2, ..."
 )
 @click.option(
     "--out",
@@ -98,7 +99,7 @@ def run_command(
     seconds: float | None,
     preset_name: str | None,
     assignments: tuple[str, ...],
-    seed: int,
+    seed: str,
     out: Path,
     as_json: bool,
     no_pictures: bool,
@@ -112,20 +113,23 @@ def run_command(
         raise Problem("--steps and --seconds exclude each other")
     if seconds is not None and not (math.isfinite(seconds) and seconds >= 0):
         raise Problem(f"--seconds takes a number of at least 0, not {seconds:g}")
+    number = _seed(seed)
     loaded = load(target)
     draw = _drawing(no_pictures, out)
     screen = Console(stderr=True)
 
-    world = loaded.build(settings, changes, seed)
+    world = loaded.build(settings, changes, number)
+    if loaded.view is not None and len(loaded.view[0]) != world.dimensions:
+        raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
         steps = _steps_for(loaded, seconds, world.settings.dt)
-    finished = _run_with_progress(loaded, world, steps, seed, screen)
+    finished = _run_with_progress(loaded, world, steps, number, screen)
     if draw is not None:
         with screen.status("drawing ..."):
-            finished.report.pictures = [str(path) for path in draw(finished, out, loaded.view)]
+            finished.report.pictures = _pictures(draw, finished, out, loaded)
 
     if as_json:
-        click.echo(json.dumps(finished.report.as_dict(), indent=2))
+        click.echo(json.dumps(finished.report.as_dict(), indent=2, allow_nan=False))
         return
     console = Console()
     print_report(finished.report, console)
@@ -189,7 +193,22 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Problem(f"--out {out}: {error.strerror or error}") from error
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise Problem(f"--out {out}: no permission to write there")
     return draw_run
+
+
+def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:
+    try:
+        return [str(path) for path in draw(finished, out, loaded.view)]
+    except OSError as error:
+        raise Problem(f"--out {out}: {error.strerror or error}") from error
+
+
+def _seed(text: str) -> int:
+    if not text.strip().isdecimal():
+        raise Problem(f"--seed takes a whole number of at least 0, not {text!r}")
+    return int(text)
 
 
 def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
@@ -198,7 +217,7 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
 
 
 def _run_with_progress(loaded: Loaded, world: Any, steps: int, seed: int, screen: Console) -> Run:
-    with StepProgress(screen, loaded.name, steps) as progress, loaded.blame():
+    with StepProgress(screen, loaded.name, steps) as progress, loaded.blame(), stdout_kept_clean():
         return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done)
 
 

@@ -30,7 +30,7 @@ class Enclosure:
         dimensions = dimensions_of(world)
         lower, upper = np.full(dimensions, -np.inf), np.full(dimensions, np.inf)
         shapes = shapes_of(world)
-        bodies, walls = shapes.where(~shapes.static), shapes.where(shapes.static & ~shapes.round)
+        bodies, walls = shapes.where(~shapes.static), shapes.where(shapes.static & ~shapes.round & ~shapes.sensor)
         if len(bodies.entity) and len(walls.entity):
             for axis in range(dimensions):
                 for sign, bounds in ((-1.0, lower), (1.0, upper)):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import importlib.machinery
 import importlib.util
 import inspect
@@ -12,6 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from .. import scenes
 from ..framework import Settings, World
@@ -32,7 +36,9 @@ class Loaded:
     view: Bounds | None = None
 
     def build(self, settings: Settings | None, changes: dict[str, Any], seed: int) -> World:
-        """A world with ``settings`` (None: the scene's own) and fields changed; Problem if it fails."""
+        """A world with ``settings`` (None: the scene's own, for a file the default); Problem if it fails."""
+        if settings is None and self.file is not None:
+            settings = Settings()
         world = self._call(settings, seed)
         if changes:  # the scene's own settings are known only once it is built
             changed = apply(world.settings, changes)
@@ -41,7 +47,7 @@ class Loaded:
         return world
 
     def _call(self, settings: Settings | None, seed: int) -> World:
-        with self.blame():
+        with self.blame(), stdout_kept_clean():
             world = self.function(settings, seed=seed)
         if not isinstance(world, World):
             raise Problem(f"{self.name}: build returned {_a(world)}, not a World")
@@ -60,13 +66,22 @@ class Loaded:
             raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
 
 
+def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
+    """What a user's code prints goes to stderr: stdout holds the result and nothing else."""
+    return contextlib.redirect_stdout(sys.stderr)
+
+
 def load(target: str) -> Loaded:
     """The scene named ``target``, or the file at that path; Problem if there is neither."""
     if target in scenes.names():
         scene = scenes.get(target)
         return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view)
     path = Path(target)
-    if path.suffix == ".py" or path.is_file():
+    if path.is_dir():
+        raise Problem(f"{target!r} is a folder, not a scene or a file")
+    if path.is_file() and path.suffix != ".py":
+        raise Problem(f"{target!r} is not a Python file: a file of one's own ends in .py")
+    if path.suffix == ".py":
         return _load_file(path)
     if path.parent != Path():
         raise Problem(f"no file {target!r}: a file of one's own ends in .py")
@@ -82,19 +97,70 @@ def _load_file(path: Path) -> Loaded:
         raise Problem(f"no file {str(path)!r}{hint if 'mean' in hint else ''}")
     if not path.is_file():
         raise Problem(f"{str(path)!r} is not a file")
+    _check_source(path)
     module = _execute(path)
     function = getattr(module, "build", None)
     if not callable(function):
-        own = [
-            name
-            for name, value in vars(module).items()
-            if inspect.isfunction(value) and value.__module__ == module.__name__
-        ]
-        hint = did_you_mean("build", own) if own else ""
-        raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
+        raise Problem(f"{path.name} defines no build(settings, seed=0)")
     _check_signature(path, function)
-    seconds = getattr(module, "SECONDS", None)
-    return Loaded(path.name, function, file=path.resolve(), seconds=float(seconds) if seconds else None)
+    return Loaded(path.name, function, path.resolve(), _seconds_of(path, module), _view_of(path, module))
+
+
+def _check_source(path: Path) -> None:
+    """A file without a build is not executed: it may be a whole game."""
+    try:
+        tree = ast.parse(path.read_bytes(), str(path))
+    except SyntaxError as error:
+        raise Problem(f"{path.name}, line {error.lineno}: {error.msg}") from error
+    except (OSError, ValueError) as error:
+        raise Problem(f"{path.name}: {one_line(error)}") from error
+    functions, names = [], set()
+    for node in _top_level(tree.body):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            functions.append(node.name)
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            names |= {alias.asname or alias.name for alias in node.names}
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            names |= {name.id for name in ast.walk(node) if isinstance(name, ast.Name)}
+    if not {"build", "*"} & {*functions, *names}:
+        hint = did_you_mean("build", functions) if functions else ""
+        raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
+
+
+def _top_level(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """The statements of a module, with those under its ``if``, ``try`` and ``with``."""
+    for node in body:
+        yield node
+        if isinstance(node, (ast.If, ast.Try, ast.With)):
+            inner = [getattr(node, part, []) for part in ("body", "orelse", "finalbody")]
+            inner += [handler.body for handler in getattr(node, "handlers", [])]
+            for part in inner:
+                yield from _top_level(part)
+
+
+def _seconds_of(path: Path, module: Any) -> float | None:
+    """What the file recommends, as ``seconds`` or ``SECONDS``."""
+    value = getattr(module, "seconds", getattr(module, "SECONDS", None))
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < float("inf"):
+        raise Problem(f"{path.name}: seconds must be a number of at least 0, not {value!r}")
+    return float(value)
+
+
+def _view_of(path: Path, module: Any) -> Bounds | None:
+    """The file's ``view``: its lower and its upper corner."""
+    value = getattr(module, "view", getattr(module, "VIEW", None))
+    if value is None or callable(value):
+        return None
+    try:
+        lower, upper = (tuple(float(x) for x in end) for end in value)
+    except (TypeError, ValueError):
+        lower, upper = (), ()
+    good = len(lower) == len(upper) in (2, 3) and np.isfinite([lower, upper]).all()
+    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+        raise Problem(f"{path.name}: view must be (lower corner, upper corner), not {value!r}")
+    return lower, upper
 
 
 def _execute(path: Path) -> Any:
@@ -108,7 +174,8 @@ def _execute(path: Path) -> Any:
     if folder not in sys.path:
         sys.path.insert(0, folder)
     try:
-        loader.exec_module(module)
+        with stdout_kept_clean():
+            loader.exec_module(module)
     except SyntaxError as error:
         file = Path(error.filename).name if error.filename else path.name
         raise Problem(f"{file}, line {error.lineno}: {error.msg}") from error

@@ -15,14 +15,17 @@ from .shapes import Floats, Shapes
 
 MOST_ARROWS = 1500  # in 2D; more could not be told apart
 MOST_ARROWS_3D = 400  # the nearest
-MOST_SEGMENTS = 80_000
+MOST_SEGMENTS = 160_000
+MOST_CONTACTS_3D = 200  # more only hide the bodies
 ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
 FACE_SHADE = (0.3, 0.0, 0.5)  # of boxes, by the axis of the face's normal: light from above
 OUTLINED = 6.0  # points: smaller bodies have no outline
 
 
 def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
-    """Static geometry: filled in 2D, the edges in 3D."""
+    """Static geometry: filled in 2D, the edges in 3D; sensors dashed."""
+    draw_sensors(panel, walls.where(walls.sensor), projection, canvas.SENSOR, zorder=1.2)
+    walls = walls.where(~walls.sensor)
     if projection.flat:
         colours = np.tile(to_rgba_array(canvas.WALL), (len(walls.entity), 1))
         _draw_flat(panel, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
@@ -42,7 +45,12 @@ def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
 def draw_bodies(
     panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3
 ) -> None:
-    """Moving shapes in their ``colours`` (n, 4); in 3D from the back to the front, the far ones dimmed."""
+    """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors dashed."""
+    if bodies.sensor.any():
+        draw_sensors(panel, bodies.where(bodies.sensor), projection, colours[bodies.sensor], zorder)
+        colours, bodies = colours[~bodies.sensor], bodies.where(~bodies.sensor)
+    if not len(bodies.entity):
+        return
     outline = 0.7 if bodies.typical_diameter * panel.points > OUTLINED else 0.0
     if projection.flat:
         _draw_flat(panel, bodies, colours, canvas.PANEL, outline, zorder)
@@ -50,6 +58,27 @@ def draw_bodies(
         _draw_balls(panel, bodies, colours, projection, outline, zorder)
     else:
         _draw_solids(panel, bodies, colours, projection, outline, zorder)
+
+
+def draw_sensors(panel: Panel, sensors: Shapes, projection: Projection, colour: Any, zorder: float) -> None:
+    """Hollow, with a dashed edge, in one ``colour`` or (n, 4) of them."""
+    if not len(sensors.entity):
+        return
+    colours = np.broadcast_to(to_rgba_array(colour), (len(sensors.entity), 4))
+    dashed: dict[str, Any] = {"linewidths": 1.1, "linestyles": "--", "zorder": zorder}
+    discs, boxes = sensors.where(sensors.round), sensors.where(~sensors.round)
+    if len(discs.entity):
+        places, magnification, _ = projection.plane(discs.centre)
+        widths = 2 * discs.half[:, 0] * magnification
+        _ellipses(panel, places, widths, facecolors="none", edgecolors=colours[sensors.round], **dashed)
+    segments, edge_colours = [], []
+    ends_of_edges = [(0, 1), (1, 3), (3, 2), (2, 0)] if projection.flat else edges()
+    for low, high, edge_colour in zip(boxes.lower, boxes.upper, colours[~sensors.round], strict=True):
+        places, _, _ = projection.plane(corners(low, high))
+        segments += [places[list(edge)] for edge in ends_of_edges]
+        edge_colours += [edge_colour] * len(ends_of_edges)
+    if segments:
+        _lines(panel, segments, colors=edge_colours, **dashed)
 
 
 def _draw_balls(
@@ -108,7 +137,7 @@ def draw_contacts(
     panel: Panel, points: Floats, normals: Floats, diameter: float, projection: Projection
 ) -> None:
     """A dot at each contact point, with a stroke along its normal; ``diameter`` is a typical body's."""
-    if not len(points):
+    if not len(points) or (not projection.flat and len(points) > MOST_CONTACTS_3D):
         return
     size = float(np.clip(0.16 * diameter * panel.points, 1.6, 5.0))
     length = float(np.clip(0.28 * diameter * panel.points, 2.5, 12.0)) / panel.points

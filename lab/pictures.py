@@ -11,9 +11,9 @@ from matplotlib.colors import to_rgba_array
 
 from . import canvas
 from .canvas import Panel, Sheet
-from .marks import draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
+from .marks import MOST_CONTACTS_3D, draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
 from .projection import Projection, corners
-from .run import QUIET, Run, Traces
+from .run import QUIET, Run, RunReport, Traces
 from .shapes import Floats, Shapes, shapes_of
 
 SMALLEST_LEGIBLE = 5.0  # points: below this typical diameter a second panel magnifies a part
@@ -24,6 +24,7 @@ FEW = 3  # bodies whose shapes are repeated along their path
 GHOSTS = 14  # times that they are
 DRAWABLE = 1e30  # farther out there is no picture
 UNTRACED = "#1b2431"
+HUGE = 5.0  # times the extent of everything smaller: such static bodies are cut off by the view
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
 
 
 def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
-    """Where the bodies have been, with what stands close by."""
+    """Where the bodies have been, and what stands; of what is huge, the part that is close by."""
     shapes, moving = still.shapes, still.shapes.where(still.moving)
     d = shapes.centre.shape[1]
     lows, highs = [moving.lower], [moving.upper]
@@ -86,17 +87,26 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
     low, high = np.concatenate(lows), np.concatenate(highs)
     if not len(low):
         low, high = (
-            (shapes.lower, shapes.upper) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
+            _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
         )
     lower, upper = low.min(axis=0), high.max(axis=0)
+    fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
+    for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # the smaller ones first
+        if 2 * fixed.half[k].max() <= HUGE * float((upper - lower).max()):
+            lower, upper = np.minimum(lower, fixed.lower[k]), np.maximum(upper, fixed.upper[k])
     room = 0.12 * max(float((upper - lower).max()), 1e-9)
     near_low, near_high = lower - 2 * room, upper + 2 * room
-    fixed = shapes.where(shapes.static)
     close = fixed.where(np.all((fixed.upper >= near_low) & (fixed.lower <= near_high), axis=1))
     for box_low, box_high in zip(close.lower, close.upper, strict=True):
         lower = np.minimum(lower, np.maximum(box_low, near_low))
         upper = np.maximum(upper, np.minimum(box_high, near_high))
     return lower - room / 2, upper + room / 2
+
+
+def _smallest(shapes: Shapes) -> tuple[Floats, Floats]:
+    """The lower and the upper corner (1, d each) of the smallest shape."""
+    k = int(np.argmin(shapes.half.max(axis=1)))
+    return shapes.lower[k : k + 1], shapes.upper[k : k + 1]
 
 
 def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas.View:
@@ -122,8 +132,8 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
     norm = canvas.speed_norm(bodies.speed)
     part = _magnified(bodies, projection)
     subtitle = (
-        f"{report.bodies['dynamic']:,} bodies after {report.simulated_seconds:.4g} s ({report.steps:,} steps)"
-        f"   ·   {len(still.points):,} contacts   ·   {report.settings['integrator']}"
+        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({_counted(report.steps, 'step')})"
+        f"   ·   {_counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
     )
     views = [frame, *([part] if part else [])]
     sheet = Sheet.new(report.scene, subtitle, views, numbered=projection.flat)
@@ -138,7 +148,7 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
         sheet.panels[0].outline(*part)
 
     legend = [("->", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
-    if len(still.points):
+    if len(still.points) > 0 and (projection.flat or len(still.points) <= MOST_CONTACTS_3D):
         legend.append(("o", canvas.CONTACT, "contact"))
     sheet.legend(legend)
     sheet.speed_scale(norm)
@@ -148,11 +158,17 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
 def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
     """The paths, each body in its colour, the past fading; the traced bodies where they are now."""
     traces, shapes, report = run.traces, still.shapes, run.report
-    count, all_bodies = len(traces.entities), report.bodies["dynamic"]
-    some = (
-        f"the {count:,} of {all_bodies:,} bodies that went farthest" if count < all_bodies else "all bodies"
-    )
-    subtitle = f"paths of {some} over {report.simulated_seconds:.4g} s, fading into the past"
+    count, moved = len(traces.entities), traces.moved
+    over = f"{report.simulated_seconds:.4g} s"
+    if not report.bodies["total"] and not count:
+        subtitle = "no bodies"
+    elif not count:
+        subtitle = f"nothing moved in {over}"
+    elif count < moved:
+        subtitle = f"paths of {count:,} of the {moved:,} bodies that moved, those that went farthest, over {over}"
+    else:
+        subtitle = f"{'path' if count == 1 else 'paths'} of {_that_moved(count)}, over {over}"
+    subtitle += ", fading into the past" if count else ""
     sheet = Sheet.new(report.scene, subtitle, [frame], numbered=projection.flat)
     panel = sheet.panels[0]
     draw_walls(panel, shapes.where(shapes.static), projection)
@@ -169,17 +185,37 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
     if 0 < count <= SOME:
         _draw_starts(panel, traces, followed, own, projection)
-    if count <= FEW:
+    if 0 < count <= FEW:
         _draw_ghosts(panel, traces, followed, own, projection)
     draw_bodies(panel, followed, own, projection)
     return sheet
+
+
+def _counted(count: int, what: str, plural: str = "") -> str:
+    return f"{count:,} {what if count == 1 else plural or what + 's'}"
+
+
+def _that_moved(count: int) -> str:
+    return "the one body that moved" if count == 1 else f"the {count:,} bodies that moved"
+
+
+def _moving_bodies(report: RunReport) -> str:
+    """`12 bodies and 2 kinematic ones`, static ones apart."""
+    dynamic, kinematic = report.bodies["dynamic"], report.bodies["kinematic"]
+    if not dynamic and not kinematic:
+        return "no bodies" if not report.bodies["total"] else "only static bodies"
+    parts = [_counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
+    parts += [_counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
+    return " and ".join(parts)
 
 
 def _draw_starts(
     panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
 ) -> None:
     """Where the bodies began, faintly."""
-    places = traces.positions[0, np.searchsorted(traces.entities, followed.entity)]
+    paths = traces.positions[:, np.searchsorted(traces.entities, followed.entity)]
+    first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have come later
+    places = paths[first, np.arange(len(first))]
     faint = colours.copy()
     faint[:, 3] = 0.16
     draw_bodies(panel, replace(followed, centre=places), faint, projection, zorder=2.2)

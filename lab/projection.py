@@ -64,8 +64,8 @@ class Projection:
         return (self.lower + self.upper) / 2 + self.distance * self.axes[2]
 
     def frame(self, points: Floats | None = None) -> tuple[Floats, Floats]:
-        """The corners of the rectangle in the plane that holds the view, or only ``points`` (n, d)."""
-        places, _, _ = self.plane(corners(self.lower, self.upper) if points is None else points)
+        """The corners of the rectangle in the plane that holds the view, or only ``points`` (n, d), if any."""
+        places, _, _ = self.plane(corners(self.lower, self.upper) if points is None or not len(points) else points)
         return places.min(axis=0), places.max(axis=0)
 
     def _relative(self, points: Floats) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -37,7 +39,8 @@ def summary(report: RunReport) -> Text:
     text.append(report.scene, style="bold")
     text.append(f"  {report.dimensions}D, {', '.join(kinds) or 'no bodies'}\n")
     text.append(
-        f"{report.steps:,} steps of {number(report.settings['dt'])} s = {report.simulated_seconds:.4g} s"
+        f"{report.steps:,} step{'s' * (report.steps != 1)}"
+        f" of {number(report.settings['dt'])} s = {report.simulated_seconds:.4g} s"
         f" in {report.wall_seconds:.3g} s"
     )
     if report.kernels_compiled:
@@ -54,13 +57,19 @@ def cost(report: RunReport) -> Table:
     table.add_column("system")
     table.add_column("ms per step", justify="right")
     table.add_column("share", justify="right")
-    total = sum(report.system_milliseconds.values())
-    for name, milliseconds in report.system_milliseconds.items():
-        share = f"{100 * milliseconds / total:.0f} %" if total else ""
-        table.add_row(name, f"{milliseconds:.4f}", share)
+    total = report.step_milliseconds_mean
+    rest = total - sum(report.system_milliseconds.values())
+    for name, milliseconds in {**report.system_milliseconds, "everything else": rest}.items():
+        share = f"{100 * milliseconds / total:.0f} %" if total > 0 else ""
+        table.add_row(name, _milliseconds(milliseconds), share)
     table.add_section()
-    table.add_row("whole step (median)", f"{report.step_milliseconds:.4f}", "", style="bold")
+    table.add_row("whole step (mean)", _milliseconds(total), "", style="bold")
     return table
+
+
+def _milliseconds(value: float) -> str:
+    """A dash for what was not measured: every step compiled or loaded kernels."""
+    return f"{max(value, 0.0):.4f}" if math.isfinite(value) else "-"
 
 
 def quality(report: RunReport) -> Table:
@@ -81,15 +90,19 @@ def quality(report: RunReport) -> Table:
         table.add_row(
             "energy drift",
             _percent(report.energy),
-            _drift_remark(report.energy, "peak kinetic energy"),
+            _energy_remark(report),
         )
     if report.momentum:
         remark = _drift_remark(report.momentum, "all mass times speed")
-        if not report.momentum_conserved:
+        if not math.isfinite(report.momentum.relative):
+            remark = "momentum overflows"
+        elif not report.momentum_conserved:
             remark = "not conserved here: gravity or walls act"
-        table.add_row("momentum drift", f"{100 * report.momentum.relative:.3g} %", remark)
+        momentum = f"{100 * report.momentum.relative:.3g} %"
+        finite = math.isfinite(report.momentum.relative)
+        table.add_row("momentum drift", momentum if finite else "not representable", remark)
     step = f"in step {report.deepest_overlap_step:,}" if report.deepest_overlap_step else ""
-    table.add_row("deepest overlap", number(report.deepest_overlap), step)
+    table.add_row("deepest overlap", f"{report.deepest_overlap:.4g}", step)
     outside, broken = report.escaped["outside"], report.escaped["non_finite"]
     parts = [f"{outside:,} beyond the walls"] * bool(outside) + [f"{broken:,} not finite"] * bool(broken)
     table.add_row(
@@ -109,7 +122,17 @@ def number(value: float) -> str:
     return f"{value:.4g}"
 
 
+def _energy_remark(report: RunReport) -> str:
+    if report.energy is None or not math.isfinite(report.energy.relative):
+        return "energy overflows"
+    if report.energy_changes:
+        return f"not conserved here: {', '.join(report.energy_changes)}"
+    return _drift_remark(report.energy, "peak kinetic energy")
+
+
 def _percent(drift: Drift) -> str:
+    if not math.isfinite(drift.relative):
+        return "not representable"
     return f"{100 * drift.relative:+.3g} %"
 
 

@@ -13,15 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..components import AABBCollider, SphereCollider
 from ..framework import World
 from ..framework.compilation import log
 from .escape import Enclosure
-from .shapes import dimensions_of
+from .shapes import dimensions_of, sensor_entities
 
 TRACED_BODIES = 200  # in a picture
 CANDIDATES = 12_000  # bodies that are followed, to choose from
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported, not warned about
-SAMPLES = 600  # of a path and of the energy, at most
+SAMPLES = 600  # of the energy, at most; of a path if there are many
+PATH_POINTS = 80_000  # of all paths; as long as they do, paths are sampled in every step, so that corners stay
 
 
 @dataclass(frozen=True)
@@ -57,9 +59,11 @@ class RunReport:
     contacts: dict[str, float] = field(
         default_factory=dict
     )  # at the end, mean and most per step, impacts in total
-    step_milliseconds: float = 0.0  # median
+    step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
+    step_milliseconds_mean: float = math.nan
     system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, compiling left out
     energy: Drift | None = None
+    energy_changes: list[str] = field(default_factory=list)  # why the scene does not keep its energy
     momentum: Drift | None = None
     momentum_conserved: bool = True  # whether the scene lets it be: nothing fixed, no force from outside
     deepest_overlap: float = 0.0
@@ -81,6 +85,7 @@ class Traces:
 
     entities: NDArray[np.int64]
     samples: list[NDArray[np.float32]] = field(default_factory=list)
+    moved: int = 0  # how many bodies did, these among them
 
     @property
     def places(self) -> NDArray[np.float64]:
@@ -92,36 +97,53 @@ class Traces:
     def positions(self) -> NDArray[np.float64]:
         return np.array(self.samples, np.float64)
 
-    @classmethod
-    def of(cls, world: World) -> Traces:
-        """Follows the dynamic bodies, or CANDIDATES of them."""
-        ids = np.sort(np.asarray(world.bodies.dynamic.entity))
-        if len(ids) > CANDIDATES:
-            ids = np.sort(np.random.default_rng(0).choice(ids, CANDIDATES, replace=False))
-        return cls(ids)
-
-    def record(self, world: World) -> None:
-        """Add a sample."""
-        ids = np.asarray(world.bodies.entity)
-        order = np.argsort(ids, kind="stable")
-        place = np.searchsorted(ids, self.entities, sorter=order)
-        sample = np.full((len(self.entities), dimensions_of(world)), np.nan, np.float32)
-        if len(ids):
-            row = order[np.minimum(place, len(ids) - 1)]
-            there = ids[row] == self.entities
-            sample[there] = world.bodies.position[row[there]]
-        self.samples.append(sample)
-
     @QUIET
     def farthest(self, count: int) -> Traces:
-        """The ``count`` bodies that travelled farthest."""
-        if len(self.entities) <= count:
-            return self
+        """The ``count`` bodies that travelled farthest, of those that moved; ``moved`` stays what it is."""
         travelled = np.zeros(len(self.entities))
         for before, after in itertools.pairwise(self.samples):
             travelled += np.nan_to_num(np.linalg.norm(after - before, axis=1))
-        chosen = np.sort(np.argsort(-travelled, kind="stable")[:count])
-        return Traces(self.entities[chosen], [sample[chosen] for sample in self.samples])
+        moved = int((travelled > 0).sum())
+        chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
+        return Traces(self.entities[chosen], [sample[chosen] for sample in self.samples], moved)
+
+
+class Recorder:
+    """Follows what moves, those created on the way too, up to CANDIDATES bodies."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they were met
+        self.samples: list[NDArray[np.float32]] = []  # of those known then
+
+    @QUIET
+    def record(self) -> None:
+        """Add a sample."""
+        bodies = self.world.bodies
+        ids = np.asarray(bodies.entity)
+        moving = np.concatenate([bodies.dynamic.entity, bodies.kinematic.entity])
+        new = np.setdiff1d(moving, self.entities)
+        room = CANDIDATES - len(self.entities)
+        if len(new) > room:
+            new = np.sort(np.random.default_rng(0).choice(new, room, replace=False))
+        self.entities = np.concatenate([self.entities, new])
+        sample = np.full((len(self.entities), dimensions_of(self.world)), np.nan, np.float32)
+        if len(ids):
+            order = np.argsort(ids, kind="stable")
+            row = order[np.minimum(np.searchsorted(ids, self.entities, sorter=order), len(ids) - 1)]
+            there = ids[row] == self.entities
+            sample[there] = bodies.position[row[there]]
+        self.samples.append(sample)
+
+    def traces(self) -> Traces:
+        """What was recorded, NaN where a body was not there."""
+        order = np.argsort(self.entities, kind="stable")
+        filled = []
+        for sample in self.samples:
+            whole = np.full((len(self.entities), sample.shape[1]), np.nan, np.float32)
+            whole[: len(sample)] = sample
+            filled.append(whole[order])
+        return Traces(self.entities[order], filled)
 
 
 @dataclass
@@ -136,9 +158,11 @@ class Run:
 class Meter:
     """Looks at a world between its steps; nothing here is inside the measured time of a step."""
 
-    def __init__(self, world: World, every: int) -> None:
-        self.world, self.every = world, every
-        self.traces = Traces.of(world)
+    def __init__(self, world: World, every: int, path_every: int) -> None:
+        self.world, self.every, self.path_every = world, every, path_every
+        self.recorder = Recorder(world)
+        self.came_or_went = False
+        self._entities = np.sort(np.asarray(world.bodies.entity))
         self.enclosure = Enclosure.around(world)
         self.step_seconds: list[float] = []
         self.contact_counts: list[int] = []
@@ -148,18 +172,19 @@ class Meter:
         self.kinetic_most = 0.0
         self.momenta: list[NDArray[np.float64]] = []
         self.momentum_scale = 0.0
-        self._stats_base: tuple[int, dict[str, float]] = (0, {})
+        self.system_totals: dict[str, float] = {}  # milliseconds, of the steps in step_seconds
         self._kernels_seen = _kernels()
         started = time.perf_counter()
+        self.recorder.record()
         self.sample()
         self.compile_seconds = time.perf_counter() - started if _kernels() != self._kernels_seen else 0.0
         self._kernels_seen = _kernels()
 
     @QUIET
     def sample(self) -> None:
-        """Paths, energy and momentum: every few steps."""
+        """Energy and momentum: every few steps."""
         world = self.world
-        self.traces.record(world)
+        self.came_or_went |= not np.array_equal(np.sort(np.asarray(world.bodies.entity)), self._entities)
         kinetic = float(world.kinetic_energy())
         self.kinetic_most = max(self.kinetic_most, kinetic)
         self.energies.append(kinetic + float(world.potential_energy()))
@@ -171,21 +196,26 @@ class Meter:
     def step(self) -> None:
         """One step, timed; then what must be seen after every step."""
         world = self.world
+        before = _totals(world)
         started = time.perf_counter()
         world.step()
         seconds = time.perf_counter() - started
         if _kernels() != self._kernels_seen:  # this step compiled or loaded kernels: its time says nothing
             self._kernels_seen = _kernels()
             self.compile_seconds += seconds
-            stats = world.stats()
-            self._stats_base = (stats.steps, dict(stats.milliseconds))
         else:
             self.step_seconds.append(seconds)
+            for name, total in _totals(world).items():
+                self.system_totals[name] = self.system_totals.get(name, 0.0) + total - before.get(name, 0.0)
         depth = np.asarray(world.contacts.depth)
         self.contact_counts.append(len(depth))
         self.impacts += len(world.contacts.impacts)
         if len(depth) and float(depth.max()) > self.deepest:
-            self.deepest, self.deepest_step = float(depth.max()), world.step_count
+            deepest = self._deepest_of_solids(depth)
+            if deepest > self.deepest:
+                self.deepest, self.deepest_step = deepest, world.step_count
+        if world.step_count % self.path_every == 0:
+            self.recorder.record()
         if world.step_count % self.every == 0:
             self.sample()
 
@@ -209,9 +239,15 @@ class Meter:
             "most": max(counts),
             "impacts": self.impacts,
         }
-        report.step_milliseconds = 1e3 * float(np.median(self.step_seconds)) if self.step_seconds else 0.0
-        report.system_milliseconds = self._milliseconds_by_system()
+        if self.step_seconds:
+            report.step_milliseconds = 1e3 * float(np.median(self.step_seconds))
+            report.step_milliseconds_mean = 1e3 * float(np.mean(self.step_seconds))
+        measured = len(self.step_seconds)
+        report.system_milliseconds = {
+            name: self.system_totals.get(name, 0.0) / measured if measured else math.nan for name in _totals(world)
+        }
         report.energy = self._energy_drift()
+        report.energy_changes = self._energy_changes()
         report.momentum = self._momentum_drift()
         report.momentum_conserved = not (len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity))
         report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
@@ -225,17 +261,31 @@ class Meter:
         report.faults = list(world.faults)
         report.state_hash = world.state_hash()
 
-    def _milliseconds_by_system(self) -> dict[str, float]:
-        """Means over the steps since the last one that compiled; over all, if that was the very last."""
-        stats = self.world.stats()
-        base_steps, base = self._stats_base
-        steps = stats.steps - base_steps
-        if steps <= 0:
-            return dict(stats.milliseconds)
-        return {
-            name: (mean * stats.steps - base.get(name, 0.0) * base_steps) / steps
-            for name, mean in stats.milliseconds.items()
-        }
+    def _deepest_of_solids(self, depth: NDArray[np.float64]) -> float:
+        """Sensors are there to be overlapped."""
+        sensors, contacts = sensor_entities(self.world), self.world.contacts
+        if len(sensors):
+            depth = depth[~(np.isin(contacts.entity_a, sensors) | np.isin(contacts.entity_b, sensors))]
+        return float(depth.max()) if len(depth) else 0.0
+
+    def _energy_changes(self) -> list[str]:
+        """What in this world, as it stands, adds energy or takes it away."""
+        bodies = self.world.bodies
+        dynamic, reasons = bodies.dynamic, []
+        any_pair = self.world.settings.restitution_mixing != "max"  # the larger of two: a body's own is the least
+        touched = bodies if any_pair else dynamic
+        met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
+        if met and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
+            reasons.append("restitution below 1")
+        if np.any(dynamic.linear_damping):
+            reasons.append("damping")
+        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force):
+            reasons.append("forces")
+        if np.any(bodies.kinematic.linear_velocity):
+            reasons.append("kinematic bodies that move")
+        if self.came_or_went:
+            reasons.append("bodies that came or went")
+        return reasons
 
     def _energy_drift(self) -> Drift:
         """In units of the largest kinetic energy seen: a potential has no natural zero to compare with."""
@@ -272,17 +322,21 @@ def run(
     report = RunReport(scene, seed, dimensions_of(world), plain_settings(world))
     compiled, loaded = _kernels()
     started = time.perf_counter()
-    meter = Meter(world, max(1, math.ceil(steps / SAMPLES)))
+    every = max(1, math.ceil(steps / SAMPLES))
+    moving = len(world.bodies.dynamic) + len(world.bodies.kinematic)
+    meter = Meter(world, every, max(1, min(every, math.ceil(steps * max(moving, 1) / PATH_POINTS))))
     for done in range(1, steps + 1):
         meter.step()
         if after_step is not None:
             after_step(done)
-    if steps % meter.every:
+    if world.step_count % meter.every:
         meter.sample()
+    if world.step_count % meter.path_every:
+        meter.recorder.record()
     report.wall_seconds = time.perf_counter() - started
     report.kernels_compiled, report.kernels_loaded = _kernels()[0] - compiled, _kernels()[1] - loaded
     meter.fill(report)
-    return Run(report, meter.traces.farthest(TRACED_BODIES), world)
+    return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world)
 
 
 def plain_settings(world: World) -> dict[str, Any]:
@@ -290,6 +344,23 @@ def plain_settings(world: World) -> dict[str, Any]:
     plain = (bool, int, float, str, type(None))
     values = {f.name: getattr(world.settings, f.name) for f in dataclasses.fields(world.settings)}
     return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
+
+
+def _totals(world: World) -> dict[str, float]:
+    """Milliseconds by system, since the world began."""
+    stats = world.stats()
+    return {name: mean * stats.steps for name, mean in stats.milliseconds.items()}
+
+
+def _restitutions(bodies: Any) -> list[NDArray[np.float64]]:
+    """The restitutions of those of ``bodies`` that have the collider, by collider."""
+    found = []
+    for collider in (SphereCollider, AABBCollider):
+        has = np.asarray(bodies.has(collider), bool)
+        if has.any():
+            fields = bodies.sphere_collider if collider is SphereCollider else bodies.aabb_collider
+            found.append(np.asarray(fields.restitution)[has])
+    return found
 
 
 def _kernels() -> tuple[int, int]:

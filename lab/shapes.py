@@ -22,7 +22,7 @@ class Shapes:
     """One row per collider. A box has half extents (d); a sphere has its radius in each of them.
 
     ``entity (n,)``, ``centre (n, d)``, ``half (n, d)``, ``speed (n,)``, ``round (n,)`` true for spheres,
-    ``static (n,)`` true for what never moves.
+    ``static (n,)`` true for what never moves, ``sensor (n,)`` for what only reports.
     """
 
     entity: NDArray[np.int64]
@@ -31,6 +31,7 @@ class Shapes:
     speed: Floats
     round: NDArray[np.bool_]
     static: NDArray[np.bool_]
+    sensor: NDArray[np.bool_]
 
     @property
     def lower(self) -> Floats:
@@ -69,7 +70,7 @@ def dimensions_of(world: World) -> int:
 def shapes_of(world: World) -> Shapes:
     """All built-in colliders of ``world`` as they stand now."""
     dimensions = dimensions_of(world)
-    entities, centres, halves, rounds = [], [], [], []
+    entities, centres, halves, rounds, sensors = [], [], [], [], []
     for entity, (transform, sphere) in world.get_components(Transform, SphereCollider):
         entities.append(entity)
         centres.append(
@@ -77,11 +78,13 @@ def shapes_of(world: World) -> Shapes:
         )
         halves.append(np.full(dimensions, float(sphere.radius)))
         rounds.append(True)
+        sensors.append(bool(sphere.sensor))
     for entity, (transform, box) in world.get_components(Transform, AABBCollider):
         entities.append(entity)
         centres.append(np.asarray(transform.position) + _turned(transform.rotation, box.offset, dimensions))
         halves.append(_stretched(transform.rotation, box.half_extents, dimensions))
         rounds.append(False)
+        sensors.append(bool(box.sensor))
 
     entity = np.array(entities, np.int64)
     speed, static = np.zeros(len(entity)), np.ones(len(entity), bool)
@@ -97,7 +100,19 @@ def shapes_of(world: World) -> Shapes:
         speed,
         np.array(rounds, bool),
         static,
+        np.array(sensors, bool),
     )
+
+
+def sensor_entities(world: World) -> NDArray[np.int64]:
+    """The ids of what has a collider that is a sensor."""
+    bodies = world.bodies
+    found = np.zeros(len(bodies), bool)
+    for name in bodies.column_names():
+        collider, dot, column = name.partition(".")
+        if dot and column == "sensor":
+            found |= np.asarray(getattr(getattr(bodies, collider), column), bool)
+    return np.asarray(bodies.entity)[found]
 
 
 def rotation_matrix(rotation: object, dimensions: int) -> Floats:

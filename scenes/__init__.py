@@ -7,7 +7,7 @@ own default. The same protocol holds for a file given to ``carom run FILE.py``.
 >>> world = scenes.get("billiards").build(seed=3)
 """
 
-from . import asteroids, billiards, gas, jump, player
+from . import asteroids, billiards, gas2d, gas3d, jump, player
 from .protocol import Build, Scene
 
 _SCENES: dict[str, Scene] = {
@@ -16,8 +16,8 @@ _SCENES: dict[str, Scene] = {
         jump.SCENE,
         asteroids.SCENE,
         billiards.SCENE,
-        gas.SCENE_2D,
-        gas.SCENE_3D,
+        gas2d.SCENE,
+        gas3d.SCENE,
         player.SCENE,
     )
 }

@@ -12,10 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 from carom import __version__, scenes
-from carom.framework import Settings
+from carom.components import RigidBody, Transform
+from carom.framework import Settings, World
 from carom.lab.choices import parse_assignments
 from carom.lab.cli import cli
-from carom.lab.run import Traces
+from carom.lab.run import Traces, run
+from carom.plugins import Physics
 
 FALLING_BALL = """
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -314,9 +316,12 @@ def test_wrong_names_and_values(carom, arguments, words):
     ("text", "words"),
     [
         ("def build(settings=None, seed=0)\n    pass\n", ["scene.py, line 1"]),
-        ("x = 1\n\nraise RuntimeError('no luck')\n", ["scene.py, line 3", "RuntimeError", "no luck"]),
-        ("import numppy\n", ["scene.py, line 1", "numppy"]),
-        ("import sys\nsys.exit(3)\n", ["scene.py, line 2", "SystemExit"]),
+        (
+            "x = 1\n\nraise RuntimeError('no luck')\ndef build(settings, seed=0): ...\n",
+            ["scene.py, line 3", "RuntimeError", "no luck"],
+        ),
+        ("import numppy\ndef build(settings, seed=0): ...\n", ["scene.py, line 1", "numppy"]),
+        ("import sys\nsys.exit(3)\ndef build(settings, seed=0): ...\n", ["scene.py, line 2", "SystemExit"]),
         ("def biuld(settings=None, seed=0): ...\n", ["defines no build(settings, seed=0)", "'biuld'"]),
         ("build = 3\n", ["defines no build(settings, seed=0)"]),
         ("\ndef build(world): ...\n", ["line 2", "build must take (settings, seed=0)"]),
@@ -373,7 +378,7 @@ def test_missing_file_suggests_its_neighbour(carom, ball):
 
 
 def test_traceback_on_request(carom, tmp_path):
-    (tmp_path / "scene.py").write_text("raise RuntimeError('no luck')\n")
+    (tmp_path / "scene.py").write_text("raise RuntimeError('no luck')\ndef build(settings, seed=0): ...\n")
     result = carom("run", "scene.py", "--traceback")
     assert result.exit_code != 0
     assert result.exception is not None
@@ -383,3 +388,109 @@ def test_traceback_on_request(carom, tmp_path):
 def test_pictures_into_a_file_are_refused_before_the_run(carom, tmp_path):
     (tmp_path / "out").write_text("in the way")
     assert "--out" in refusal(carom("run", "jump"))
+
+
+def test_an_empty_world_is_drawn_too(carom, tmp_path):
+    for dimensions in (2, 3):
+        text = (
+            "from carom.framework import World\nfrom carom.plugins import Physics\n"
+            f"def build(settings, seed=0):\n    return World(Physics(dimensions={dimensions}), settings=settings)\n"
+        )
+        (tmp_path / "empty.py").write_text(text)
+        report = report_of(carom("run", "empty.py", "--steps", "3", "--json"))
+        assert all((tmp_path / p).is_file() for p in report["pictures"])
+        assert "no bodies" in carom("run", "empty.py", "--steps", "3").stdout
+
+
+def test_a_file_gets_settings_to_change(carom, ball):
+    text = ball.read_text().replace("settings=settings or Settings.balanced()", "settings=settings.replace(dt=1 / 30)")
+    ball.write_text(text)
+    report = report_of(carom("run", "ball.py", "--steps", "1", "--json", "--no-pictures"))
+    assert report["settings"]["dt"] == 1 / 30
+
+
+def test_a_file_without_build_is_not_executed(carom, tmp_path):
+    (tmp_path / "game.py").write_text("open('played', 'w').close()\nwhile True: pass\n")
+    assert "defines no build" in refusal(carom("run", "game.py"))
+    assert not (tmp_path / "played").exists()
+
+
+def test_what_a_file_prints_stays_out_of_the_json(carom, ball):
+    text = "print('at import')\n" + ball.read_text()
+    system = (
+        "    print('in build')\n"
+        "    from carom.framework import Phase, System\n"
+        "    class Loud(System):\n"
+        "        phase = Phase.END\n"
+        "        def process(self, dt):\n"
+        "            print('in a step')\n"
+        "    world.add_system(Loud())\n"
+    )
+    ball.write_text(text.replace("    return world", system + "    return world"))
+    result = carom("run", "ball.py", "--steps", "2", "--json", "--no-pictures")
+    assert report_of(result)["steps"] == 2
+    for words in ("at import", "in build", "in a step"):
+        assert words in result.stderr
+
+
+def test_energy_that_overflows_is_said_to(carom, ball):
+    fast = "    world.create_entity(Transform((5, 5)), RigidBody(linear_velocity=(1e200, 0)))"
+    ball.write_text(ball.read_text().replace("    return world", f"{fast}\n    return world"))
+    result = carom("run", "ball.py", "--steps", "3", "--no-pictures")
+    assert "not representable" in result.stdout
+    assert "nan" not in result.stdout
+
+
+def test_energy_that_is_not_conserved_says_why(carom):
+    assert "restitution below 1" in carom("run", "jump", "--no-pictures").stdout
+    report = report_of(carom("run", "gas2d", "--steps", "9", "--json", "--no-pictures"))
+    assert report["energy_changes"] == []
+    report = report_of(carom("run", "billiards", "--steps", "300", "--json", "--no-pictures"))
+    assert report["energy_changes"] == ["restitution below 1", "damping"]
+
+
+def test_sensors_do_not_overlap(carom, ball):
+    sensor = "    world.create_entity(Transform((0, 9)), AABBCollider(half_extents=(3, 3), sensor=True))"
+    ball.write_text(ball.read_text().replace("    return world", f"{sensor}\n    return world"))
+    report = report_of(carom("run", "ball.py", "--steps", "9", "--json"))
+    assert report["contacts"]["end"] == 1
+    assert report["deepest_overlap"] == 0
+
+
+def test_a_file_says_its_view_and_its_seconds(carom, ball):
+    text = ball.read_text()
+    ball.write_text(f"{text}\nseconds = 0.25\nview = ((-5, -1), (5, 12))\n")
+    assert report_of(carom("run", "ball.py", "--json"))["steps"] == 15
+    ball.write_text(f"{text}\nview = ((-5, -1, 0), (5, 12, 1))\n")
+    assert "3 dimensions" in refusal(carom("run", "ball.py"))
+    ball.write_text(f"{text}\nview = 7\n")
+    assert "view must be" in refusal(carom("run", "ball.py"))
+
+
+def test_bodies_created_on_the_way_and_kinematic_ones_are_traced():
+    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)))
+    lift = world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic", linear_velocity=(0, 1)))
+    world.create_entity(Transform((9, 0)), RigidBody())  # stays where it is
+    created = []
+
+    def create(step: int) -> None:
+        if step == 5:
+            created.append(world.create_entity(Transform((3, 3)), RigidBody(linear_velocity=(5, 0))))
+
+    traces = run(world, 10, after_step=create).traces
+    assert traces.entities.tolist() == sorted([lift, *created])
+    assert traces.moved == 2
+    world.close()
+
+
+def test_the_rows_of_the_step_add_up(carom):
+    report = report_of(carom("run", "gas2d", "--steps", "30", "--json", "--no-pictures"))
+    assert 0 < sum(report["system_milliseconds"].values()) <= report["step_milliseconds_mean"]
+    assert "everything else" in carom("run", "jump", "--steps", "30", "--no-pictures").stdout
+
+
+def test_other_targets_and_seeds_are_refused_clearly(carom, tmp_path):
+    (tmp_path / "notes.txt").write_text("def build")
+    assert "not a Python file" in refusal(carom("run", "notes.txt"))
+    assert "is a folder" in refusal(carom("run", "."))
+    assert "--seed takes a whole number of at least 0, not 'x'" in refusal(carom("run", "jump", "--seed", "x"))

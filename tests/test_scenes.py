@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import math
 
 import numpy as np
@@ -189,3 +190,10 @@ def test_settings_of_a_scene_can_be_replaced():
     world = scenes.get("billiards").build()
     assert dataclasses.replace(world.settings, dt=1 / 60) == Settings.balanced()
     world.close()
+
+
+def test_every_scene_is_a_module_with_build():
+    for name in scenes.names():
+        world = importlib.import_module(f"carom.scenes.{name}").build(Settings(), seed=1)
+        assert isinstance(world, World)
+        world.close()
