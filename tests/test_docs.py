@@ -6,6 +6,7 @@ page's own name and lines, so a traceback shows the line of the page.
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 import traceback
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import esper
 import pytest
+from click.testing import CliRunner
 
 from carom.framework import World
 
@@ -65,7 +67,8 @@ def python_blocks(page: Path) -> list[Block]:
     for block in blocks:
         info = block.info[:1] + [mark for mark in block.info[1:] if mark not in MARKS]
         assert not info or "py" not in info[0] or info == ["python"], (
-            f"{name_of(page)}:{block.line - 1}: write ```python, alone or with {' or '.join(MARKS)}, not ```{' '.join(block.info)}"
+            f"{name_of(page)}:{block.line - 1}: write ```python, alone or with {' or '.join(MARKS)}, "
+            f"not ```{' '.join(block.info)}"
         )
     return [block for block in blocks if block.info[:1] == ["python"] and "no-run" not in block.info]
 
@@ -121,6 +124,33 @@ def lines_of_code(text: str) -> int:
 def test_asteroids_is_a_game_in_60_lines():
     game = [block for block in python_blocks(ROOT / "docs" / "asteroids.md") if "game" in block.info]
     assert 40 < sum(lines_of_code(block.text) for block in game) <= 60
+
+
+def test_the_game_of_the_readme_prints_what_the_page_says(namespace, capsys):
+    page = ROOT / "README.md"
+    run(python_blocks(page), page, namespace)
+    blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
+    assert capsys.readouterr().out == "".join(block.text for block in blocks if block.info == ["text"])
+
+
+def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
+    from carom.lab.cli import cli
+
+    monkeypatch.chdir(tmp_path)
+    block, *_ = python_blocks(ROOT / "docs" / "scene-files.md")
+    Path("funnel.py").write_text(block.text, encoding="utf-8")
+    result = CliRunner().invoke(cli, ["run", "funnel.py", "--json", "--no-pictures", "--set", "dt=1/120"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["steps"] == 4 * 120
+
+
+def test_the_scene_file_page_has_every_option():
+    from carom.lab.cli import cli
+
+    text = (ROOT / "docs" / "scene-files.md").read_text(encoding="utf-8")
+    parameters = cli.commands["run"].params
+    options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
+    assert set(re.findall(r"^\| `(--[a-z-]+)", text, re.MULTILINE)) == options - {"--help"}
 
 
 # -- links ---------------------------------------------------------------------------------------
