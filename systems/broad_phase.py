@@ -144,7 +144,7 @@ class BroadPhase(System):
         moving, count = self._state.table.stops[1], self._state.table.count
         tree = "quadtree" if self._state.dimensions == 2 else "octree"
         if max(moving, count - moving) <= FEW:
-            return f"every pair of {moving} moving and {count - moving} static bodies; a {tree} from {FEW} on"
+            return f"every pair of {moving} moving and {count - moving} static bodies; a {tree} above {FEW}"
         return f"{tree} of {moving} moving bodies against itself" + (
             f" and against that of {count - moving} static ones" if count > moving else ""
         )
