@@ -211,11 +211,6 @@ def all_components() -> dict[int, dict[type[Any], Any]]:
     return esper._entities
 
 
-def components_of(entity: int) -> dict[type[Any], Any]:
-    """esper's own dict of an entity's components: do not change it."""
-    return esper._entities[entity]
-
-
 def known_entity(entity: int) -> bool:
     """Whether the entity is in the database, dead or not."""
     return entity in esper._entities

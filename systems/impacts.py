@@ -91,7 +91,7 @@ def heap_pop(heap, size, times, keys):
 @part
 def bounce(
     event, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, origin, path, struck, pair_impulse,
-    pair_normal, pair_point, pair_depth, pair_times, events, event_values, log_pair, log_value, counts, like,
+    pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
 ):  # fmt: skip
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
     c = events[event, 0]
@@ -115,7 +115,6 @@ def bounce(
             store(velocity, i, add(row(velocity, i, like), dv))
     pair_impulse[c] += impulse
     pair_depth[c] = 0.0
-    pair_times[c] = now
     logged = counts[LOGGED]
     log_pair[logged] = c
     for k in range(2 + 2 * len(like)):
@@ -216,7 +215,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
     def resolve_impacts(
         dt, pair_a, pair_b, responds, offsets, neighbours, rank, shape_of, offset, shapes, position, velocity,
         start_velocity, inverse_mass, motion, restitution, slots, rule, fixed_threshold, cap, share, struck,
-        pair_impulse, pair_normal, pair_point, pair_depth, pair_times, events, event_times, event_keys, event_values,
+        pair_impulse, pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values,
         heap, log_pair, log_value, counts, like,
     ):  # fmt: skip
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
@@ -263,7 +262,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
             counts[CURRENT], counts[LAST] = chosen, events[chosen, 0]
             bounce(
                 chosen, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion[0], motion[1],
-                struck, pair_impulse, pair_normal, pair_point, pair_depth, pair_times, events, event_values, log_pair,
+                struck, pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair,
                 log_value, counts, like,
             )  # fmt: skip
 

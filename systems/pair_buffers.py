@@ -19,7 +19,7 @@ class PairBuffers:
 
     candidates: rows (first, second) from the broad phase. pair_a, pair_b, responds (m,): the pairs whose layers meet,
     a's entity id the smaller. hits (found,): indices of the pairs that touch at the end of their motion, with depths,
-    normals, points. pair_impulse, pair_normal, pair_point, pair_depth, pair_times: per pair, what the response made
+    normals, points. pair_impulse, pair_normal, pair_point, pair_depth: per pair, what the response made
     of it.
     """
 
@@ -50,7 +50,7 @@ class PairBuffers:
         self.responds = np.empty(size, bool)
         self.hits, self.depths = np.empty(size, np.int64), np.empty(size)
         self.normals, self.points = np.empty((size, d)), np.empty((size, d))
-        self.pair_impulse, self.pair_depth, self.pair_times = np.empty(size), np.empty(size), np.empty(size)
+        self.pair_impulse, self.pair_depth = np.empty(size), np.empty(size)
         self.pair_normal, self.pair_point = np.empty((size, d)), np.empty((size, d))
 
     def reserve_pairs(self, count: int) -> None:
@@ -86,7 +86,6 @@ class PairBuffers:
         """Nothing has been done to the pairs yet; those in contact start with the geometry found."""
         hits = self.hits[: self.found]
         self.pair_impulse[: self.pairs] = 0.0
-        self.pair_times[: self.pairs] = np.nan
         self.pair_depth[hits] = self.depths[: self.found]
         self.pair_normal[hits] = self.normals[: self.found]
         self.pair_point[hits] = self.points[: self.found]

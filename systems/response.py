@@ -74,7 +74,7 @@ class Response(System):
             scratch["start_velocity"], arrays["inverse_mass"], motion, state.table.stacks["collider.restitution"],
             state.slots, MIXING_RULES.index(settings.restitution_mixing), -1.0 if threshold is None else threshold,
             settings.max_impacts_per_step, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
-            state.pair_point, state.pair_depth, state.pair_times, *queue.arrays, state.like,
+            state.pair_point, state.pair_depth, *queue.arrays, state.like,
         ):  # fmt: skip
             queue.grow(state.found)
         state.log_impacts(queue.log_pair, queue.log_value, queue.counts)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from oracles import integrators_naive as naive
 from worlds import make_world
 
 from carom.components import RigidBody, Transform
@@ -62,3 +65,27 @@ def record(world, steps):
             world.step()
         positions[n], velocities[n] = position, velocity
     return positions, velocities
+
+
+STIFFNESS = 4 * math.pi**2  # period 1 s
+
+
+def matrix_powers(method, stiffness, drag, dt, steps, x0=1.0, v0=0.0):
+    """The textbook method's (x, v) at steps 0 ... steps, by repeated multiplication with its step matrix."""
+    matrix = naive.oscillator_matrix(method, stiffness, drag, dt)
+    states = np.empty((steps + 1, 2))
+    states[0] = x0, v0
+    for n in range(steps):
+        states[n + 1] = matrix @ states[n]
+    return states
+
+
+def damped_oscillation(zeta, t):
+    """B3: exact (x, v) from (1, 0) of x'' = -w^2 x - 2 zeta w x', by the matrix exponential's eigenvalues."""
+    w = math.sqrt(STIFFNESS)
+    if zeta == 1.0:
+        return (1 + w * t) * math.exp(-w * t), -w * w * t * math.exp(-w * t)
+    root = np.sqrt(complex(zeta * zeta - 1))
+    s1, s2 = w * (-zeta + root), w * (-zeta - root)
+    e1, e2 = np.exp(s1 * t), np.exp(s2 * t)
+    return ((s1 * e2 - s2 * e1) / (s1 - s2)).real, (s1 * s2 * (e2 - e1) / (s1 - s2)).real

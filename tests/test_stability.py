@@ -1,0 +1,316 @@
+"""Limits of stability of the integrators, drag up to and beyond them, and time reversal."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_motion import (
+    METHODS,
+    ORDERS,
+    STIFFNESS,
+    Oscillator,
+    all_methods,
+    damped_oscillation,
+    matrix_powers,
+    oscillators,
+    record,
+)
+from oracles import integrators_naive as naive
+from worlds import EPS, make_world
+
+from carom.components import RigidBody, Transform
+from carom.framework import ForceSystem
+
+# -- stability: B6, C16 --------------------------------------------------------------------------
+
+# limits of z = omega dt without damping, of drag dt without spring, and of z at three damping ratios
+LIMITS = {
+    "explicit_euler": (0, 2, 0.1, 1.0, 2.0),
+    "semi_implicit_euler": (2, 2, 1.902, 1.236, 0.828),
+    "velocity_verlet": (2, 2, 1.91, 2.0, 1.0),
+    "rk4": (2 * math.sqrt(2), 2.7853, 2.91, 2.62, 2.7853),
+}
+ROWS = [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1), (1.0, 1.0), (1.0, 2.0)]  # (stiffness, drag) of those columns, omega = 1
+
+
+def at_share_of_limit(method, share):
+    """(stiffness, drag) in steps of 1 s that lie at that share of each limit above zero."""
+    limits = [naive.stability_limit(method, *row) for row in ROWS]
+    return np.array(
+        [(k * (share * h) ** 2, c * share * h) for (k, c), h in zip(ROWS, limits, strict=True) if h > 1e-3]
+    )
+
+
+@pytest.mark.parametrize("method", LIMITS)
+def test_textbook_limits_are_the_published_ones(method):
+    """B6: the table has three or four digits; the tests below use the textbook's step matrix."""
+    limits = [naive.stability_limit(method, *row) for row in ROWS]
+    np.testing.assert_allclose(limits, LIMITS[method], rtol=0, atol=3e-3)
+
+
+def step_matrices(method, stiffness, drag):
+    """The engine's own (x, v) -> (x, v) of one step of 1 s, for each oscillator: one step of both basis states."""
+    columns = []
+    for x0, v0 in ((1.0, 0.0), (0.0, 1.0)):
+        positions, velocities = record(oscillators(method, 1.0, stiffness, drag, x0=x0, v0=v0), 1)
+        columns.append(np.stack((positions[1, :, 0], velocities[1, :, 0]), axis=-1))
+    return np.stack(columns, axis=-1)
+
+
+@all_methods
+def test_stability_limits(method):
+    """B6: at 0.999 of a limit no eigenvalue of the engine's step leaves the unit circle (a million steps stay bounded);
+    at 1.01 one does, far enough for a millionfold growth in a million steps."""
+    for share, stable in ((0.999, True), (1.01, False)):
+        stiffness, drag = at_share_of_limit(method, share).T
+        matrices = step_matrices(method, stiffness, drag)
+        textbook = [naive.oscillator_matrix(method, k, c, 1.0) for k, c in zip(stiffness, drag, strict=True)]
+        np.testing.assert_allclose(matrices, textbook, rtol=0, atol=1e-13)
+        radius = np.abs(np.linalg.eigvals(matrices)).max(axis=1)
+        if stable:
+            assert (radius <= 1 + 1e-13).all()
+        else:
+            assert (1e6 * np.log(radius) > math.log(1e6)).all()
+
+
+def check_stable_run(method, steps):
+    stiffness, drag = at_share_of_limit(method, 0.999).T
+    world = oscillators(method, 1.0, stiffness, drag, v0=1.0)
+    for _ in range(steps // 1000):
+        positions, _ = record(world, 1000)
+        # critical damping has a double eigenvalue, whose n lambda^n first reaches 1 / (e (1 - 0.999)) = 368 times z
+        assert np.abs(positions).max() < 2000
+    assert not world.faults
+
+
+@all_methods
+def test_bounded_just_below_the_limit(method):
+    """B6, C16."""
+    check_stable_run(method, 2000)
+
+
+@pytest.mark.slow
+@all_methods
+def test_bounded_just_below_the_limit_for_long(method):
+    """B6, C16: 30,000 steps; the eigenvalues say the rest."""
+    check_stable_run(method, 30_000)
+
+
+@all_methods
+def test_growth_just_above_the_limit(method):
+    """B6, C16: at 1.01 the run grows as its matrix power says (1e-6: double eigenvalues of critical damping magnify
+    rounding by n^2); explicit Euler grows at any z without damping."""
+    stiffness, drag = at_share_of_limit(method, 1.01).T
+    if method == "explicit_euler":
+        stiffness, drag = np.append(stiffness, 0.01), np.append(drag, 0.0)
+    steps = 600
+    positions, velocities = record(oscillators(method, 1.0, stiffness, drag, v0=1.0), steps)
+    got = np.stack((positions[-1, :, 0], velocities[-1, :, 0]), axis=-1)
+    for i, (k, c) in enumerate(zip(stiffness, drag, strict=True)):
+        expected = np.linalg.matrix_power(naive.oscillator_matrix(method, k, c, 1.0), steps) @ (1.0, 1.0)
+        np.testing.assert_allclose(got[i], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_double_root_of_semi_implicit_euler():
+    """C16: exactly at z = 2 the amplitude grows linearly, x_n = (-1)^n (1 + 2 n) from (1, 0)."""
+    x = record(oscillators("semi_implicit_euler", 1.0, 4.0), 200)[0][:, 0, 0]
+    n = np.arange(201)
+    assert np.array_equal(x, (-1.0) ** n * (1 + 2 * n))
+
+
+def test_what_explodes_is_reported():
+    """B6, B7: explicit Euler with drag at dt = 2.5 tau grows by 1.5 per step; once not finite, a fault names the body
+    and the other bodies are as they would be without it."""
+    world = oscillators("explicit_euler", 1.0, 0.0, [2.5, 0.5], v0=1.0)
+    alone = oscillators("explicit_euler", 1.0, 0.0, 0.5, v0=1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(1800):  # 1.5^1750 > 1.8e308
+            world.step()
+            alone.step()
+    entity = int(world.bodies.entity[0])
+    assert any(f"entity {entity}:" in fault for fault in world.faults)
+    assert not any(f"entity {entity + 1}:" in fault for fault in world.faults)
+    assert np.array_equal(world.bodies.position[1], alone.bodies.position[0])
+
+
+# -- drag: B7 ------------------------------------------------------------------------------------
+
+TAU, G = 0.8, 9.81
+V_T = G * TAU  # terminal speed
+
+
+@pytest.mark.parametrize("method", METHODS[:2])
+def test_drag_force_of_the_euler_methods(method):
+    """B7: F = -k v with k = m / tau: v_n = v_t (1 - (1 - dt/tau)^n); the position is the sum of old (EE) or new (SI)
+    velocities."""
+    dt, steps, mass = 1 / 60, 600, 2.5
+    world = oscillators(method, dt, 0.0, mass / TAU, x0=0.0, mass=mass, gravity=(G, 0.0))
+    positions, velocities = record(world, steps)
+    expected = V_T * (1 - (1 - dt / TAU) ** np.arange(steps + 1))
+    np.testing.assert_allclose(velocities[:, 0, 0], expected, rtol=0, atol=1e-13 * V_T)
+    moved = dt * (expected[:-1] if method == "explicit_euler" else expected[1:])
+    np.testing.assert_allclose(positions[1:, 0, 0], np.cumsum(moved), rtol=1e-12)
+
+
+@all_methods
+def test_drag_force_of_every_method_is_the_textbooks(method):
+    """B7: the n-step answer of x'' = g - v / tau: with u = v - v_t the problem is linear, u' = -u / tau."""
+    dt, steps = 1 / 20, 200
+    velocities = record(oscillators(method, dt, 0.0, 1 / TAU, x0=0.0, gravity=(G, 0.0)), steps)[1]
+    factor = naive.oscillator_matrix(method, 0.0, 1 / TAU, dt)[1, 1]
+    expected = V_T * (1 - factor ** np.arange(steps + 1))
+    np.testing.assert_allclose(velocities[:, 0, 0], expected, rtol=0, atol=1e-13 * V_T)
+    if method in ("velocity_verlet", "rk4"):  # and near the true speed, as the order says
+        true = -V_T * np.expm1(-dt * np.arange(steps + 1) / TAU)
+        np.testing.assert_allclose(velocities[:, 0, 0], true, rtol=0, atol=V_T * (dt / TAU) ** ORDERS[method])
+
+
+@all_methods
+@pytest.mark.parametrize("dt", [1e-3, 1 / 60, 0.5 * TAU])
+def test_terminal_speed_is_a_fixed_point(method, dt):
+    """B7: a body at terminal speed stays there, 1e-14, with drag as a force and as linear_damping.
+
+    Where steps are short, half ulps gather until they are pulled back: tau / dt of them.
+    """
+    world = oscillators(method, dt, 0.0, 1 / TAU, x0=0.0, v0=V_T, gravity=(G, 0.0))
+    damped = world.create_entity(Transform((0, 0)), RigidBody(1.0, (V_T, 0.0), linear_damping=1 / TAU))
+    _, velocities = record(world, 500)
+    assert world.bodies.row_of(damped) == 1
+    np.testing.assert_allclose(velocities[..., 0], V_T, rtol=max(1e-14, EPS * TAU / dt))
+
+
+class Nothing(ForceSystem):
+    """Its presence alone makes the integrators evaluate every stage."""
+
+    def add_forces(self, bodies, time):
+        pass
+
+
+def damped_fall(method, dt, steps, staged=False):
+    """Positions and velocities along x of a body from rest under g and linear_damping 1 / tau."""
+    world = make_world(gravity=(G, 0.0), dt=dt, integrator=method)
+    world.create_entity(Transform((0, 0)), RigidBody(3.0, linear_damping=1 / TAU))
+    if staged:
+        world.add_system(Nothing())
+    positions, velocities = record(world, steps)
+    return positions[:, 0, 0], velocities[:, 0, 0]
+
+
+staged_or_not = pytest.mark.parametrize("staged", [False, True], ids=["constant", "staged"])
+
+
+@all_methods
+@staged_or_not
+@pytest.mark.parametrize("dt", [1e-9, 1 / 60, 2.5 * TAU, 100 * TAU])
+def test_linear_damping_has_the_exact_velocity(method, dt, staged):
+    """B7: v = v_t (1 - e^(-t/tau)) for every method and step; a nanosecond loses no force, 2.5 tau stays monotone.
+
+    Yoshida's middle step goes back in time: e^(1.7 * 2.5) = 70 times the rounding.
+    """
+    steps = 200
+    _, velocity = damped_fall(method, dt, steps, staged)
+    t = dt * np.arange(steps + 1)
+    magnified = 70 if method == "yoshida4" and staged else 1
+    np.testing.assert_allclose(velocity, -V_T * np.expm1(-t / TAU), rtol=magnified * 10 * steps * EPS)
+    assert (np.diff(velocity) >= -magnified * 4 * EPS * V_T).all()
+
+
+@pytest.mark.parametrize(
+    ("method", "staged"),
+    [("velocity_verlet", False), ("rk4", False), ("yoshida4", False), ("velocity_verlet", True), ("yoshida4", True)],
+)
+@pytest.mark.parametrize("dt", [1 / 60, 2.5 * TAU, 100 * TAU])
+def test_linear_damping_has_the_exact_position(method, staged, dt):
+    """B7: y = v_t (t - tau (1 - e^(-t/tau))): where no force depends on the state, and in every Verlet step."""
+    y, _ = damped_fall(method, dt, 200, staged)
+    t = dt * np.arange(201)
+    np.testing.assert_allclose(y, V_T * (t + TAU * np.expm1(-t / TAU)), rtol=1e-11, atol=1e-15)
+
+
+@pytest.mark.parametrize("method", ["explicit_euler", "semi_implicit_euler", "rk4"])
+def test_linear_damping_has_the_methods_order_in_position(method):
+    """B7: the position error falls by 2^p, p within 5 %."""
+    errors = []
+    for steps in (40, 80):
+        y, _ = damped_fall(method, 2.0 / steps, steps, staged=True)
+        errors.append(abs(y[-1] - V_T * (2.0 + TAU * math.expm1(-2.0 / TAU))))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(ORDERS[method], rel=0.05)
+
+
+@all_methods
+def test_linear_damping_has_the_methods_order_with_a_spring(method):
+    """Damping beside a force that depends on position keeps the method's order: exact solution of B3, zeta = 0.5."""
+    w, errors = math.sqrt(STIFFNESS), []
+    for steps in (200, 400):
+        world = make_world(dt=1 / steps, integrator=method)
+        world.create_entity(Transform((1, 0)), RigidBody(linear_damping=w), Oscillator(STIFFNESS))
+        world.add_system(SpringForce())
+        positions, velocities = record(world, steps)
+        x, v = damped_oscillation(0.5, 1.0)
+        errors.append(math.hypot(positions[-1, 0, 0] - x, (velocities[-1, 0, 0] - v) / w))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(ORDERS[method], rel=0.05)
+
+
+@all_methods
+def test_heavily_damped_bodies_creep(method):
+    """c = 600 / s at 60 Hz on a spring of 600 N/m: x = e^(-t) to the first order, (k / c) dt = 1/60.
+
+    A body without damping beside it does not notice.
+    """
+    world = make_world(dt=1 / 60, integrator=method)
+    world.create_entity(Transform((1, 0)), RigidBody(linear_damping=600.0), Oscillator(600.0))
+    world.create_entity(Transform((1, 0)), RigidBody(), Oscillator(1.0))
+    world.add_system(SpringForce())
+    positions, _ = record(world, 60)
+    np.testing.assert_allclose(positions[:, 0, 0], np.exp(-np.arange(61) / 60), rtol=0.05)
+    expected = matrix_powers(method, 1.0, 0.0, 1 / 60, 60)[:, 0]
+    np.testing.assert_allclose(positions[:, 1, 0], expected, rtol=0, atol=1e-13)
+
+
+class SpringForce(ForceSystem):
+    requires = (Oscillator,)
+
+    def add_forces(self, bodies, time):
+        bodies.force[:] -= bodies.oscillator.stiffness[:, None] * bodies.position
+
+
+# -- time reversal: B8 ---------------------------------------------------------------------------
+
+
+class Network(ForceSystem):
+    """Springs between bodies: F = -K x."""
+
+    def __init__(self, stiffness):
+        self.stiffness = stiffness
+
+    def add_forces(self, bodies, time):
+        bodies.force[:] -= self.stiffness @ bodies.position
+
+
+def return_error(method, steps=1000):
+    """Forward, velocities turned round, back: how far from the start, relative to the largest coordinate."""
+    rng = np.random.default_rng(8)
+    n = 100
+    springs = np.triu(rng.random((n, n)) < 0.05, 1) * rng.uniform(1.0, 5.0, (n, n))
+    springs = springs + springs.T
+    start = rng.uniform(-1, 1, (n, 2))
+    world = make_world(dt=1 / 60, integrator=method)
+    world.create_entities(n, Transform.many(start), RigidBody.many(rng.uniform(0.5, 2, n), rng.normal(size=(n, 2))))
+    world.add_system(Network(np.diag(springs.sum(axis=1)) - springs))
+    for _ in range(2):
+        for _ in range(steps):
+            world.step()
+        world.bodies.linear_velocity[:] *= -1
+    return np.abs(world.bodies.position - start).max()
+
+
+@all_methods
+def test_time_reversal(method):
+    """B8: 100 bodies, springs, no collisions. VV and YO4 are their own adjoints and come back; the others do not."""
+    error = return_error(method)
+    if method in ("velocity_verlet", "yoshida4"):
+        assert error < 1e-12
+    else:
+        assert error > 1e-9  # else the test would not tell
