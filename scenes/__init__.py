@@ -7,7 +7,29 @@ own default. The same protocol holds for a file given to ``carom run FILE.py``.
 >>> world = scenes.get("billiards").build(seed=3)
 """
 
-from . import asteroids, billiards, gas2d, gas3d, jump, player
+from . import (
+    asteroids,
+    billiards,
+    conveyor,
+    cradle,
+    fastgas,
+    freefall,
+    galperin,
+    gas2d,
+    gas3d,
+    jump,
+    lift,
+    maze,
+    mixed2d,
+    pile2d,
+    pile3d,
+    platforms,
+    player,
+    player_query,
+    pyramid,
+    stack,
+    static_world,
+)
 from .protocol import Build, Scene
 
 _SCENES: dict[str, Scene] = {
@@ -18,7 +40,22 @@ _SCENES: dict[str, Scene] = {
         billiards.SCENE,
         gas2d.SCENE,
         gas3d.SCENE,
+        mixed2d.SCENE,
+        fastgas.SCENE,
         player.SCENE,
+        player_query.SCENE,
+        maze.SCENE,
+        static_world.SCENE,
+        freefall.SCENE,
+        pile2d.SCENE,
+        pile3d.SCENE,
+        pyramid.SCENE,
+        stack.SCENE,
+        platforms.SCENE,
+        conveyor.SCENE,
+        lift.SCENE,
+        cradle.SCENE,
+        galperin.SCENE,
     )
 }
 

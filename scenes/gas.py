@@ -4,6 +4,7 @@ thousands.
 The benchmark scene: no gravity, restitution 1, so kinetic energy must stay what it is. Radius 0.5, density 1.
 Discs fill a quarter of the area, spheres a tenth of the volume. Each body starts in its own cell of a
 lattice, moved at random by as much as keeps neighbours apart, with velocity components between -5 and 5.
+Other scenes take this start and change one thing: mixed2d, fastgas and player_query.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..framework import Settings, World
 from ..plugins import Physics
 from .protocol import Scene
 from .random_numbers import uniform
+from .sizes import ceil_root, whole
 from .walls import enclose
 
 RADIUS = 0.5
@@ -43,43 +45,46 @@ def side(n: int, dimensions: int) -> float:
 
 def initial_state(n: int, dimensions: int, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Positions and velocities, (n, d) each: body k in cell (k mod m, k div m, ...) of m cells a side."""
-    cells = math.ceil(
-        n ** (1 / dimensions) - 1e-9
-    )  # 1000^(1/3) is 9.999...; and a cube root may come out above
+    cells = ceil_root(n, dimensions)
     spacing = side(n, dimensions) / cells
     index = np.arange(n)
     cell = np.stack([index // cells**axis % cells for axis in range(dimensions)], axis=1)
-    draws = uniform(n * 2 * dimensions, seed).reshape(
-        n, 2, dimensions
-    )  # body by body: its jitter, its velocity
+    draws = uniform(n * 2 * dimensions, seed).reshape(n, 2, dimensions)  # body by body: its jitter, its velocity
     jitter = 0.45 * (spacing - 2 * RADIUS)
     positions = (cell + 0.5) * spacing + jitter * (2 * draws[:, 0] - 1)
     velocities = -5 + 10 * draws[:, 1]
     return positions, velocities
 
 
-def _gas(settings: Settings | None, seed: int, n: int, dimensions: int) -> World:
-    if n < 1:
-        raise ValueError(f"n must be at least 1, not {n}")
-    world = World(
-        Physics(dimensions=dimensions, gravity=(0.0,) * dimensions), settings=settings or Settings.balanced()
-    )
-    length = side(n, dimensions)
-    enclose(world, (0.0,) * dimensions, (length,) * dimensions, restitution=1.0)
-    positions, velocities = initial_state(n, dimensions, seed)
-    world.create_entities(
-        n,
-        Transform.many(positions),
-        RigidBody.many(mass=BODY_VOLUME[dimensions], linear_velocity=velocities),
-        SphereCollider.many(radius=RADIUS, restitution=1.0),
-    )
+def empty_box(settings: Settings | None, n: int, dimensions: int, thickness: float = 1.0) -> World:
+    """The world for ``n`` bodies, no gravity, with its elastic walls and nothing in it."""
+    length = side(whole(n, "n"), dimensions)
+    settings = settings or Settings.balanced()
+    world = World(Physics(dimensions=dimensions, gravity=(0.0,) * dimensions), settings=settings)
+    enclose(world, (0.0,) * dimensions, (length,) * dimensions, thickness=thickness, restitution=1.0)
     return world
 
 
-def _view(dimensions: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    length = side(BODIES[dimensions], dimensions)
-    return (-1.0,) * dimensions, (length + 1.0,) * dimensions
+def add_spheres(world: World, positions: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
+    """Elastic discs or spheres, in the order of their positions (n, d)."""
+    world.create_entities(
+        len(positions),
+        Transform.many(positions),
+        RigidBody.many(mass=BODY_VOLUME[positions.shape[1]], linear_velocity=velocities),
+        SphereCollider.many(radius=RADIUS, restitution=1.0),
+    )
 
 
-SCENE_2D = Scene("gas2d", "1,000 elastic discs in a square box", gas2d, 10.0, _view(2))
-SCENE_3D = Scene("gas3d", "10,000 elastic spheres in a cube", gas3d, 5.0, _view(3))
+def _gas(settings: Settings | None, seed: int, n: int, dimensions: int) -> World:
+    world = empty_box(settings, n, dimensions)
+    add_spheres(world, *initial_state(n, dimensions, seed))
+    return world
+
+
+def view(n: int, dimensions: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The box and its walls: what a picture of it shows."""
+    return (-1.0,) * dimensions, (side(n, dimensions) + 1.0,) * dimensions
+
+
+SCENE_2D = Scene("gas2d", "1,000 elastic discs in a square box", gas2d, 10.0, view(BODIES[2], 2))
+SCENE_3D = Scene("gas3d", "10,000 elastic spheres in a cube", gas3d, 5.0, view(BODIES[3], 3))

@@ -1,0 +1,185 @@
+"""What the scenes are there to show: what stands stands, what is carried comes along, what counts counts right."""
+
+from __future__ import annotations
+
+import importlib
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider
+from carom.framework import Settings
+from carom.scenes import conveyor, cradle, galperin, lift, pile, platforms, pyramid, stack
+
+G = 9.81
+SLOP = 0.005  # of a size: what the solver leaves alone
+
+
+def steps(world, seconds):
+    for _ in range(round(seconds / world.settings.dt)):
+        world.step()
+
+
+def kinetic_energy_per_body(world):
+    """In units of m g d: how high, in diameters, the motion that is left could lift a body."""
+    dynamic = world.bodies.dynamic
+    return 0.5 * (np.asarray(dynamic.linear_velocity) ** 2).sum(axis=1).mean() / G
+
+
+def solid_depths(world):
+    return np.maximum(np.asarray(world.contacts.depth), 0.0)
+
+
+# -- impacts ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
+def test_as_many_balls_fly_off_as_arrive(gap, dt):
+    """B16: equal masses and e = 1 exchange velocities, one impact at a time, at any gap: only 0 and 1 are left.
+
+    Each line is alone with its five balls, so all four are judged at once. Rounding: 20 exchanges of 0 and 1.
+    """
+    with cradle.build(Settings(dt=dt), gap=gap) as world:
+        start = world.bodies.dynamic.position.reshape(4, 5, 2).copy()
+        steps(world, 6.0)
+        velocity = world.bodies.dynamic.linear_velocity.reshape(4, 5, 2)
+        position = world.bodies.dynamic.position.reshape(4, 5, 2)
+        for k, line in enumerate(velocity, 1):
+            np.testing.assert_allclose(line[:, 0], np.arange(5) >= 5 - k, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(velocity[..., 1], 0.0)
+        for k, (was, now) in enumerate(zip(start, position, strict=True), 1):
+            index = np.arange(5)
+            free = was[:, 0] - index  # diameters removed: points that pass through each other
+            points = np.sort(np.where(index < k, free + 6.0 * cradle.SPEED, free))
+            np.testing.assert_allclose(now[:, 0], points + index, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("digits", "settings", "seconds"),
+    [(0, Settings(), 5.0), (1, Settings(), 5.0), (1, Settings(dt=1 / 1000), 5.0), (2, None, 9.0)],
+)
+def test_the_blocks_count_the_digits_of_pi(digits, settings, seconds):
+    """B17: a step with many impacts takes them all, in order, so even 60 Hz counts right while nothing tunnels."""
+    with galperin.build(settings, digits=digits) as world:
+        counter = next(system for system in world.systems if isinstance(system, galperin.ImpactCounter))
+        energy = world.kinetic_energy()
+        steps(world, seconds)
+        assert counter.count == galperin.impacts(digits)
+        assert world.kinetic_energy() == pytest.approx(energy, rel=1e-12)
+        light, heavy = world.bodies.dynamic.linear_velocity[:, 0]
+        assert 0 <= light <= heavy  # no more to come
+
+
+# -- at rest ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "n", "dimensions"), [("pile2d", 400, 2), ("pile3d", 343, 3)])
+def test_a_pile_comes_to_rest(name, n, dimensions):
+    """The demands on piles of 10,000, on small ones: less than 1e-4 m g d a body, mean overlap below 2 %."""
+    with importlib.import_module(f"carom.scenes.{name}").build(n=n) as world:
+        steps(world, 10.0)
+        position = world.bodies.dynamic.position
+        inside = (position > 0.4) & (position < pile.width(n, dimensions) - 0.4)
+        inside[:, pile.UP] = position[:, pile.UP] > 0.4
+        assert inside.all()
+        assert kinetic_energy_per_body(world) < 1e-4
+        assert solid_depths(world).mean() < 0.02
+        touching = np.concatenate([world.contacts.entity_a, world.contacts.entity_b])
+        assert np.isin(world.bodies.dynamic.entity, touching).mean() > 0.99  # nobody hangs in the air
+
+
+@pytest.mark.parametrize("balls", [False, True])
+def test_a_stack_stays_as_it_is(balls):
+    """B18: no sideways drift at all, overlap up to slop + 25 %, speed below 1e-6 after 5 s."""
+    with stack.build(balls=balls) as world:
+        steps(world, 5.0)
+        np.testing.assert_array_equal(world.bodies.dynamic.position[:, 0], 0.0)
+        assert np.abs(world.bodies.dynamic.linear_velocity).max() < 1e-6
+        assert solid_depths(world).max() < 1.25 * SLOP
+        height = world.bodies.dynamic.position[:, 1].copy()
+        steps(world, 5.0)
+        np.testing.assert_allclose(world.bodies.dynamic.position[:, 1], height, rtol=0, atol=1e-5)
+
+
+def test_a_heavy_box_on_a_light_one():
+    """B19: a ratio of 100 may not sink in by more than 1.5 % at four substeps, at any time."""
+    with stack.build(n=2, top_mass=100.0) as world:
+        deepest = 0.0
+        for _ in range(300):
+            world.step()
+            deepest = max(deepest, solid_depths(world).max(initial=0.0))
+        assert deepest < 0.015
+
+
+@pytest.mark.parametrize("spacing", [1.0, 1.1])
+def test_a_pyramid_stands(spacing):
+    """20 rows, 5 s: nothing slides by a hundredth of a box, and the top sinks by no more than 20 times the slop."""
+    with pyramid.build(rows=20, spacing=spacing) as world:
+        start = pyramid.initial_positions(20, spacing)
+        steps(world, 5.0)
+        moved = world.bodies.dynamic.position - start
+        assert np.abs(moved[:, 0]).max() < 0.01
+        assert moved[:, 1].min() > -20 * SLOP
+        assert moved[:, 1].max() < 0.01
+        assert kinetic_energy_per_body(world) < 1e-8
+
+
+def test_crates_come_to_rest_on_the_platforms():
+    with platforms.build() as world:
+        steps(world, 10.0)
+        position = world.bodies.dynamic.position
+        assert kinetic_energy_per_body(world) < 1e-4
+        assert solid_depths(world).mean() < 0.02
+        assert ((position[:, 0] > 0) & (position[:, 0] < platforms.WIDTH) & (position[:, 1] > 0)).all()
+        x, y = position.T
+        for start, end, height in platforms.PLATFORMS:  # no centre inside of one, and somebody on each
+            assert not ((x > start) & (x < end) & (y > height - platforms.THICKNESS) & (y < height)).any()
+            assert ((x > start) & (x < end) & (y > height) & (y < height + 2)).any()
+
+
+# -- carried ------------------------------------------------------------------------------------
+
+
+def test_the_lift_and_the_ferry_take_their_crates_along():
+    """One round and a half: each crate keeps its place on what carries it to a twentieth of its size.
+
+    The load changes between 0.75 and 1.25 of the weight: the solver's give of a stack of three is below that.
+    """
+    with lift.build() as world:
+        steps(world, 0.5)
+        offsets = []
+        for _ in range(round(1.5 * lift.LIFT_PERIOD * 60)):
+            world.step()
+            lifted, ferried = world.bodies.kinematic.position
+            crates = world.bodies.dynamic.position
+            offsets.append(np.concatenate([crates[:3] - lifted, crates[3:] - ferried]))
+        offsets = np.array(offsets)
+        assert np.ptp(offsets, axis=0).max() < 0.05
+        np.testing.assert_array_equal(offsets[:, :3, 0], 0.0)
+        np.testing.assert_allclose(
+            offsets[0, :, 1], lift.THICKNESS / 2 + 0.5 + np.array([0, 1, 2, 0]), rtol=0, atol=4 * 1.25 * SLOP
+        )
+
+
+def test_the_conveyor_brings_every_crate_to_the_bin():
+    """A crate reaches the belt's speed within v / (mu g) = 0.34 s of its landing and keeps it to the end."""
+    with conveyor.build() as world:
+        riding = []
+        for _ in range(25 * 60):
+            world.step()
+            dynamic = world.bodies.dynamic
+            x, y = dynamic.position.T
+            rides = (x > conveyor.DROP[1][0] + 3.0) & (x < conveyor.LENGTH - 3.0) & (y > 0)
+            riding += dynamic.linear_velocity[rides, 0].tolist()
+        assert len(riding) > 1000
+        np.testing.assert_allclose(riding, conveyor.SPEED, rtol=0, atol=0.05)
+        position = world.bodies.dynamic.position
+        half = np.array(
+            [world.component_for_entity(int(crate), AABBCollider).half_extents for crate in world.bodies.dynamic.entity]
+        )
+        assert len(position) == conveyor.CRATES
+        assert (position[:, 0] - half[:, 0] > conveyor.BIN[0] - 0.02).all()
+        assert (position[:, 0] + half[:, 0] < conveyor.BIN[1] + 0.02).all()
+        assert (position[:, 1] < 0).all()
+        assert np.abs(world.bodies.dynamic.linear_velocity[:, 1]).max() < 1e-3  # on the slick floor some still slide

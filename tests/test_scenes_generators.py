@@ -1,0 +1,313 @@
+"""The benchmark scenes are what their definition says: every number again by a plain loop, body by body."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from carom import scenes
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.scenes import player_query, pyramid, static_world
+from carom.scenes.sizes import ceil_root, floor_root
+
+GENERATORS = ["gas2d", "gas3d", "mixed2d", "fastgas", "pile2d", "pile3d", "static_world", "freefall", "player_query"]
+CIRCLE, SPHERE = math.pi / 4, math.pi / 6
+
+
+def draws(seed=0):
+    """The published sequence, one number after the other."""
+    x = 12345 + seed
+    while True:
+        x = (1664525 * x + 1013904223) % 2**32
+        yield (x >> 8) / 2**24
+
+
+def make(name, **options):
+    return importlib.import_module(f"carom.scenes.{name}").build(**options)
+
+
+def gas(n, dimensions, seed=0):
+    """Lists of positions and velocities."""
+    side = math.sqrt(n * math.pi) if dimensions == 2 else (n * SPHERE / 0.1) ** (1 / 3)
+    cells = next(m for m in itertools.count(1) if m**dimensions >= n)
+    s = side / cells
+    a = 0.45 * (s - 1)
+    u = draws(seed)
+    positions, velocities = [], []
+    for k in range(n):
+        cell = [k % cells, k // cells % cells, k // cells**2][:dimensions]
+        positions.append([(c + 0.5) * s + a * (2 * next(u) - 1) for c in cell])
+        velocities.append([-5 + 10 * next(u) for _ in range(dimensions)])
+    return np.array(positions), np.array(velocities)
+
+
+def assert_bodies(world, positions, velocities, masses):
+    """The dynamic bodies, in the order of their ids; the same numbers up to the rounding of other formulas."""
+    dynamic = world.bodies.dynamic
+    assert np.all(np.diff(dynamic.entity) > 0)
+    np.testing.assert_allclose(dynamic.position, positions, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(dynamic.linear_velocity, velocities, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(dynamic.mass, masses, rtol=1e-15)
+
+
+def material(world, entity):
+    """(radius or half extents, restitution, friction) of an entity's one collider."""
+    for kind, size in ((SphereCollider, "radius"), (AABBCollider, "half_extents")):
+        collider = world.try_component(entity, kind)
+        if collider is not None:
+            return np.ravel(getattr(collider, size)).tolist(), collider.restitution, collider.friction
+    raise AssertionError(f"entity {entity} has no collider")
+
+
+@pytest.mark.parametrize(("n", "seed"), [(1, 0), (10, 0), (1000, 0), (1001, 3)])
+@pytest.mark.parametrize(("name", "dimensions"), [("gas2d", 2), ("gas3d", 3)])
+def test_gas(name, dimensions, n, seed):
+    with make(name, n=n, seed=seed) as world:
+        assert_bodies(world, *gas(n, dimensions, seed), CIRCLE if dimensions == 2 else SPHERE)
+        assert material(world, world.bodies.dynamic.entity[0]) == ([0.5], 1.0, None)
+        assert not np.any(world.gravity)
+
+
+@pytest.mark.parametrize("n", [1, 2, 999])
+def test_mixed2d_is_the_gas_with_boxes_at_the_odd_places(n):
+    positions, velocities = gas(n, 2)
+    with make("mixed2d", n=n) as world:
+        order = [*range(0, n, 2), *range(1, n, 2)]
+        mass = [1.0 if k % 2 else CIRCLE for k in order]
+        assert_bodies(world, positions[order], velocities[order], mass)
+        for k, entity in zip(order, world.bodies.dynamic.entity, strict=True):
+            assert material(world, entity) == ([0.5, 0.5] if k % 2 else [0.5], 1.0, None)
+
+
+def test_fastgas_is_the_gas_thirty_times_as_fast():
+    positions, velocities = gas(1000, 2)
+    with make("fastgas") as world:
+        assert_bodies(world, positions, 30 * velocities, CIRCLE)
+
+
+@pytest.mark.parametrize(("n", "seed"), [(1, 0), (10, 2), (1000, 0), (1024, 0)])
+def test_pile2d(n, seed):
+    width, per_row, u = 1.2 * math.sqrt(n), math.isqrt(n), draws(seed)
+    positions = []
+    for k in range(n):
+        i, j = k % per_row, k // per_row
+        x = width / 2 + (i - (per_row - 1) / 2) * 1.2 + 0.09 * (2 * next(u) - 1)
+        positions.append((x, 0.6 + 1.2 * j + 0.09 * (2 * next(u) - 1)))
+    with make("pile2d", n=n, seed=seed) as world:
+        assert_bodies(world, positions, np.zeros((n, 2)), CIRCLE)
+        assert material(world, world.bodies.dynamic.entity[0]) == ([0.5], 0.0, None)
+        assert world.gravity.tolist() == [0.0, -9.81]
+
+
+@pytest.mark.parametrize(("n", "seed"), [(1, 0), (30, 2), (1000, 0)])
+def test_pile3d(n, seed):
+    width, u = 1.2 * n ** (1 / 3), draws(seed)
+    per_row = max(m for m in range(1, 11) if m**3 <= n)
+    positions = []
+    for k in range(n):
+        i, j, l = k % per_row, k // per_row**2, k // per_row % per_row  # noqa: E741
+        x = width / 2 + (i - (per_row - 1) / 2) * 1.2 + 0.09 * (2 * next(u) - 1)
+        y = 0.6 + 1.2 * j + 0.09 * (2 * next(u) - 1)
+        positions.append((x, y, width / 2 + (l - (per_row - 1) / 2) * 1.2 + 0.09 * (2 * next(u) - 1)))
+    with make("pile3d", n=n, seed=seed) as world:
+        assert_bodies(world, positions, np.zeros((n, 3)), SPHERE)
+        assert world.gravity.tolist() == [0.0, -9.81, 0.0]
+
+
+@pytest.mark.parametrize(("rows", "friction", "spacing"), [(50, 0.6, 1.0), (50, 0.0, 1.1), (3, 0.6, 1.0)])
+def test_pyramid(rows, friction, spacing):
+    positions = []
+    for j in range(rows):
+        m = rows - j
+        positions += [((i - (m - 1) / 2) * spacing, 0.5 + j) for i in range(m)]
+    with make("pyramid", rows=rows, friction=friction, spacing=spacing) as world:
+        assert_bodies(world, positions, np.zeros((len(positions), 2)), 1.0)
+        assert material(world, world.bodies.dynamic.entity[0]) == ([0.5, 0.5], 0.0, friction)
+        assert material(world, world.bodies.static.entity[0]) == ([100.0, 0.5], 0.0, friction)
+        assert world.bodies.static.position.tolist() == [[0.0, -0.5]]
+
+
+def test_a_large_pyramid_has_ground_to_stand_on():
+    with make("pyramid", rows=150, spacing=1.1) as world:
+        half = material(world, world.bodies.static.entity[0])[0][0]
+        assert np.abs(world.bodies.dynamic.position[:, 0]).max() + 0.5 < half
+
+
+def test_static_world():
+    u = draws()
+    positions, velocities = [], []
+    for k in range(1000):
+        cell = (3 * (k % 33) + 1, 3 * (k // 33) + 1)
+        positions.append([4 * c + 0.5 * (2 * next(u) - 1) for c in cell])
+        velocities.append([-5 + 10 * next(u) for _ in range(2)])
+    with make("static_world") as world:
+        assert_bodies(world, positions, velocities, CIRCLE)
+        centres = {(4 * i + 2.0, 4 * j + 2.0) for i in range(100) for j in range(100)}
+        assert {tuple(p) for p in world.bodies.static.position[4:].tolist()} == centres
+        assert all(material(world, e) == ([0.5, 0.5], 1.0, None) for e in world.bodies.static.entity[4:])
+        assert len(world.bodies.static) == 4 + len(centres)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 100, 10_000, 100_000])
+def test_static_world_has_room_for_any_number(n):
+    positions, _ = static_world.initial_state(n)
+    assert positions.min() > 3
+    assert positions.max() < 4 * static_world.boxes_a_side(n) - 3
+    assert len(np.unique(np.round(positions / 4), axis=0)) == n  # a crossing for each
+
+
+def test_freefall():
+    u = draws()
+    velocities = [[-5 + 10 * next(u) for _ in range(2)] for _ in range(1000)]
+    with make("freefall", n=1000) as world:
+        assert_bodies(world, [(2 * (k % 317), 2 * (k // 317)) for k in range(1000)], velocities, CIRCLE)
+        assert not world.get_components(SphereCollider)
+        assert not world.get_components(AABBCollider)
+        assert world.gravity.tolist() == [0.0, -9.81]
+        for _ in range(60):
+            world.step()
+        assert world.stats().counters["candidates"] == 0
+
+
+def test_player_query_is_the_gas_at_rest_and_asks_inside_of_it():
+    positions, _ = gas(500, 2)
+    with make("player_query", n=500) as world:
+        assert_bodies(world, positions, np.zeros((500, 2)), CIRCLE)
+    places, u = player_query.places(500, 7), draws()
+    for _ in range(4 * 500):
+        next(u)
+    np.testing.assert_allclose(places, [[math.sqrt(500 * math.pi) * next(u) for _ in "xy"] for _ in range(7)])
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "thickness", "sides"),
+    [
+        ("gas2d", math.sqrt(300 * math.pi), 1.0, 4),
+        ("gas3d", (300 * SPHERE / 0.1) ** (1 / 3), 1.0, 6),
+        ("mixed2d", math.sqrt(300 * math.pi), 1.0, 4),
+        ("fastgas", math.sqrt(300 * math.pi), 0.2, 4),
+        ("player_query", math.sqrt(300 * math.pi), 1.0, 4),
+        ("pile2d", 1.2 * math.sqrt(300), 1.0, 3),
+        ("pile3d", 1.2 * 300 ** (1 / 3), 1.0, 5),
+    ],
+)
+def test_walls_stand_on_the_edge_and_overlap_in_the_corners(name, side, thickness, sides):
+    with make(name, n=300) as world:
+        static = world.bodies.static
+        assert len(static) == sides
+        half = np.array([material(world, entity)[0] for entity in static.entity])
+        restitution = {material(world, entity)[1] for entity in static.entity}
+        assert restitution == {0.0 if "pile" in name else 1.0}
+        lower, upper = static.position - half, static.position + half
+        normal = half.argmin(axis=1)
+        for axis in range(world.dimensions):
+            faces = [(lower[w, axis], upper[w, axis]) for w in np.flatnonzero(normal == axis)]
+            expected = [(-thickness, 0.0)]
+            if not ("pile" in name and axis == 1):
+                expected.append((side, side + thickness))
+            np.testing.assert_allclose(sorted(faces), expected, rtol=1e-13, atol=1e-13)
+        for a, b in itertools.combinations(range(sides), 2):
+            if normal[a] != normal[b]:  # neighbours: common to both is more than an edge
+                common = np.minimum(upper[a], upper[b]) - np.maximum(lower[a], lower[b])
+                assert common.min() > 0.99 * thickness
+
+
+def gaps(world):
+    """{entity: free distance to the nearest other one} of the dynamic bodies, brute force; below 0: they overlap."""
+    rows = [
+        (entity, transform.position, np.broadcast_to(getattr(collider, size), world.dimensions), kind is SphereCollider)
+        for kind, size in ((SphereCollider, "radius"), (AABBCollider, "half_extents"))
+        for entity, (transform, collider) in world.get_components(Transform, kind)
+    ]
+    centre, extent, sphere = (np.array([row[column] for row in rows]) for column in (1, 2, 3))
+    dynamic = set(world.bodies.dynamic.entity.tolist())
+    found = {}
+    for k, (entity, *_) in enumerate(rows):
+        if entity not in dynamic:
+            continue
+        apart = np.abs(centre - centre[k])
+        if sphere[k]:
+            to_spheres = np.linalg.norm(apart, axis=1) - extent[:, 0]
+            to_boxes = np.linalg.norm(np.maximum(apart - extent, 0.0), axis=1)
+            gap = np.where(sphere, to_spheres, to_boxes) - extent[k, 0]
+        else:
+            to_spheres = np.linalg.norm(np.maximum(apart - extent[k], 0.0), axis=1) - extent[:, 0]
+            gap = np.where(sphere, to_spheres, (apart - extent - extent[k]).max(axis=1))
+        gap[k] = np.inf
+        found[entity] = gap.min()
+    return found
+
+
+SMALL = {name: {"n": 400} for name in (*GENERATORS, "maze", "platforms")} | {"pyramid": {"rows": 12}}
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("name", sorted(set(scenes.names()) - {"freefall", "conveyor", "player"}))
+def test_nothing_overlaps_at_the_start(name, seed):
+    """What stands on something touches it: a gap of 0, to rounding."""
+    with make(name, seed=seed, **SMALL.get(name, {})) as world:
+        assert min(gaps(world).values()) > -1e-12
+
+
+def test_gaps_sees_an_overlap():
+    with make("stack", n=2) as world:
+        upper = int(world.bodies.dynamic.entity[1])
+        for position, gap in (((0.0, 1.5), 0.0), ((0.2, 1.4), -0.1), ((0.9, 1.2), -0.1), ((2.0, 3.0), 1.5)):
+            world.component_for_entity(upper, Transform).position = position
+            assert gaps(world)[upper] == pytest.approx(gap)
+        ball = world.create_entity(Transform((0.0, 6.0)), RigidBody(), SphereCollider(0.5))
+        world.refresh_queries()
+        for position, gap in (((2.0, 5.0), 1.0), ((3.5, 4.5), math.hypot(1, 1) - 0.5), ((2.0, 3.7), -0.3)):
+            world.component_for_entity(ball, Transform).position = position
+            assert gaps(world)[ball] == gaps(world)[upper] == pytest.approx(gap)
+
+
+@pytest.mark.parametrize("name", [*GENERATORS, "maze", "platforms", "conveyor", "stack"])
+@pytest.mark.parametrize(
+    ("n", "error", "message"),
+    [
+        (0, ValueError, "n must be at least 1, got 0"),
+        (2.5, TypeError, "n must be a whole number, got 2.5"),
+        (True, TypeError, "n must be a whole number, got True"),
+    ],
+)
+def test_a_bad_number_of_bodies_is_refused(name, n, error, message):
+    with pytest.raises(error, match=f"^{message}$"):
+        make(name, n=n)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("pyramid", {"rows": 0}, "rows must be at least 1, got 0"),
+        ("pyramid", {"friction": -1.0}, "friction must be at least 0, got -1.0"),
+        ("pyramid", {"spacing": 0.9}, "spacing must be at least 1, got 0.9"),
+        ("stack", {"top_mass": 0.0}, "top_mass must be above 0, got 0.0"),
+        ("stack", {"friction": math.nan}, "friction must be at least 0, got nan"),
+        ("cradle", {"gap": -0.1}, "gap must be at least 0, got -0.1"),
+        ("cradle", {"arriving": (5,)}, "arriving must leave one of the 5 balls at rest, got 5"),
+        ("galperin", {"digits": -1}, "digits must be at least 0, got -1"),
+        ("lift", {"crates": -1}, "crates must be at least 0, got -1"),
+    ],
+)
+def test_bad_options_are_refused(name, options, message):
+    with pytest.raises(ValueError, match=f"^{message}$"):
+        make(name, **options)
+
+
+def test_roots_of_whole_numbers_are_exact():
+    for degree in (2, 3):
+        for m in (1, 2, 10, 99, 1000, 12345):
+            assert floor_root(m**degree, degree) == ceil_root(m**degree, degree) == m
+            assert (floor_root(m**degree + 1, degree), ceil_root(m**degree + 1, degree)) == (m, m + 1)
+            assert ceil_root(m**degree - 1, degree) == (m if m > 1 else 0)
+
+
+def test_the_bench_can_have_what_it_wants():
+    assert len(pyramid.initial_positions(50)) == 1275
+    with make("static_world", n=10) as world:
+        assert len(world.bodies.dynamic) == 10

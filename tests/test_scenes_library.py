@@ -1,0 +1,149 @@
+"""What the game-like scenes promise before any contact is solved: mazes, belts, lifts, repeatability."""
+
+from __future__ import annotations
+
+import importlib
+import itertools
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, Transform
+from carom.framework import Settings
+from carom.scenes import conveyor, galperin, lift, maze, platforms
+
+
+def reached(right, above):
+    """The cells that can be reached from (0, 0), by walking."""
+    side = len(right)
+    seen, todo = set(), [(0, 0)]
+    while todo:
+        x, y = todo.pop()
+        if (x, y) in seen:
+            continue
+        seen.add((x, y))
+        if x + 1 < side and not right[x, y]:
+            todo.append((x + 1, y))
+        if x > 0 and not right[x - 1, y]:
+            todo.append((x - 1, y))
+        if y + 1 < side and not above[x, y]:
+            todo.append((x, y + 1))
+        if y > 0 and not above[x, y - 1]:
+            todo.append((x, y - 1))
+    return seen
+
+
+@pytest.mark.parametrize(("side", "seed"), [(1, 0), (2, 0), (7, 3), (32, 0)])
+def test_the_maze_has_one_way_to_every_cell(side, seed):
+    """All cells are reached, by one passage less than there are cells: a tree. The rim is closed."""
+    right, above = maze.cut(side, np.random.default_rng(seed))
+    assert len(reached(right, above)) == side**2
+    assert (~right).sum() + (~above).sum() == side**2 - 1
+    assert right[-1].all()
+    assert above[:, -1].all()
+
+
+@pytest.mark.parametrize(("side", "seed"), [(1, 0), (6, 1), (12, 2)])
+def test_the_boxes_are_the_walls_and_nothing_else(side, seed):
+    right, above = maze.cut(side, np.random.default_rng(seed))
+    centres, halves = maze.wall_boxes(side, np.random.default_rng(seed))
+
+    def covered(x, y):
+        return bool((np.abs(centres - (x * maze.CELL, y * maze.CELL)) <= halves).all(axis=1).any())
+
+    for x in range(side):
+        for y in range(side):
+            assert not covered(x + 0.5, y + 0.5)
+            assert covered(x + 1, y + 0.5) == right[x, y]
+            assert covered(x + 0.5, y + 1) == above[x, y]
+    assert all(covered(0, k + 0.5) and covered(k + 0.5, 0) for k in range(side))
+    assert len(centres) < (right.sum() + above.sum() + 2 * side) or side == 1  # runs of wall are one box
+
+
+@pytest.mark.parametrize("n", [1, 10, 100])
+def test_each_mover_starts_in_a_cell_of_its_own(n):
+    with maze.build(n=n) as world:
+        cells = world.bodies.dynamic.position // maze.CELL
+        assert len(np.unique(cells, axis=0)) == n
+        speed = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1)
+        assert ((speed > maze.SPEEDS[0]) & (speed < maze.SPEEDS[1])).all()
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 37, 1 / 200])
+def test_the_belt_never_tears_and_the_chute_keeps_its_time(dt):
+    """Slats stay a slat apart and cover the belt; crate k drops in the step that holds k EVERY."""
+    with conveyor.build(Settings(dt=dt), n=4) as world:
+        for step in range(round(4.0 / dt)):
+            dropped = min(4, int(world.time / conveyor.EVERY + 1e-9) + 1)
+            on_their_way = 0 if step == 0 else len(world.bodies.dynamic)
+            assert dropped - on_their_way in (0, 1)
+            world.step()
+            x = np.sort(world.bodies.kinematic.position[:, 0])
+            np.testing.assert_allclose(np.diff(x), conveyor.SLAT, rtol=0, atol=1e-11)
+            assert x[0] - conveyor.SLAT / 2 <= conveyor.SPEED * dt + 1e-9
+            assert x[-1] + conveyor.SLAT / 2 >= conveyor.LENGTH - conveyor.SLAT
+        assert len(world.bodies.dynamic) == 4
+
+
+def test_lift_and_ferry_are_where_their_schedule_says():
+    """At every step's end, to rounding, however long it has been going: no drift from adding velocities."""
+    with lift.build() as world:
+        for _ in range(600):
+            world.step()
+            for _, (shuttle, transform) in world.get_components(lift.Shuttle, Transform):
+                np.testing.assert_allclose(transform.position, shuttle.place(world.time), rtol=0, atol=1e-12)
+        travel = {tuple(s.travel.tolist()) for _, (s,) in world.get_components(lift.Shuttle)}
+        assert travel == {(0.0, lift.LIFT_HEIGHT), (lift.FERRY_WIDTH, 0.0)}
+
+
+def test_what_rides_can_stay_on_by_the_accelerations():
+    """x = A (1 - cos w t) / 2 accelerates by at most A w^2 / 2: below g on the lift, below friction on the ferry."""
+    for travel, period, limit in (
+        (lift.LIFT_HEIGHT, lift.LIFT_PERIOD, 0.26 * lift.GRAVITY),
+        (lift.FERRY_WIDTH, lift.FERRY_PERIOD, 0.55 * lift.FRICTION * lift.GRAVITY),
+    ):
+        assert travel * (2 * np.pi / period) ** 2 / 2 < limit
+
+
+def test_platforms_leave_ways_down_for_every_crate():
+    widest = 2 * platforms.EXTENTS[1]
+    spans = sorted(platforms.PLATFORMS)
+    assert any(b[0] - a[1] >= widest for a, b in itertools.pairwise(spans))
+    with platforms.build(n=200) as world:
+        bottoms = world.bodies.dynamic.position[:, 1] - platforms.EXTENTS[1]
+        assert bottoms.min() > max(height for *_, height in platforms.PLATFORMS)
+        half = np.array([c.half_extents for _, (c,) in world.get_components(AABBCollider)])[-200:]
+        np.testing.assert_allclose(world.bodies.dynamic.mass, 4 * half[:, 0] * half[:, 1], rtol=1e-15)
+
+
+def test_pi_in_counts():
+    assert [galperin.impacts(digits) for digits in range(8)] == [
+        3, 31, 314, 3141, 31415, 314159, 3141592, 31415926
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("mixed2d", {"n": 100}),
+        ("pile2d", {"n": 100}),
+        ("pile3d", {"n": 64}),
+        ("pyramid", {"rows": 8}),
+        ("static_world", {"n": 10}),
+        ("maze", {"n": 100}),
+        ("platforms", {}),
+        ("conveyor", {}),
+        ("lift", {}),
+        ("cradle", {}),
+    ],
+)
+def test_the_same_seed_gives_the_same_bits(name, options):
+    """After 90 steps, with everything that systems add on the way."""
+    build = importlib.import_module(f"carom.scenes.{name}").build
+    hashes = []
+    for _ in range(2):
+        with build(Settings(), seed=4, **options) as world:
+            for _ in range(90):
+                world.step()
+            hashes.append(world.state_hash())
+    assert hashes[0] == hashes[1]
