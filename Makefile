@@ -1,6 +1,7 @@
 # carom: every target works on a fresh clone with python3 (3.11 or newer), pip and make.
 #   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
 #   make test    the tests, without the slow ones
+#   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
 
 PYTHON ?= python3
 SCENE ?= asteroids
@@ -13,6 +14,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
 HERE := $(shell pwd | cksum | cut -d " " -f 1)
 VENV := .venv/made-$(HERE)
 RUN := .venv/run-$(HERE)
+BENCH := .venv/bench-$(HERE)
 TEST := .venv/test-$(HERE)
 DEV := .venv/dev-$(HERE)
 
@@ -27,7 +29,7 @@ test: $(TEST)
 test-slow: $(TEST)
 	$(BIN)/pytest -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
 
-bench: $(RUN)
+bench: $(BENCH)
 	$(BIN)/carom bench $(ARGS)
 
 # Checkers and editors do not follow the import hooks of an editable install; they follow links.
@@ -57,6 +59,10 @@ $(VENV):
 
 $(RUN): $(VENV) pyproject.toml
 	$(PIP) -e ".[plot]"
+	touch $@
+
+$(BENCH): $(VENV) pyproject.toml
+	$(PIP) -e ".[bench]"
 	touch $@
 
 $(TEST): $(VENV) pyproject.toml

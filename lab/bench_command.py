@@ -1,0 +1,152 @@
+"""``carom bench``, ``carom bench scaling`` and ``carom bench startup``: measure, and show as asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from . import bench_report, bench_scaling, bench_startup
+from .bench import bench
+from .bench_output import Output
+from .bench_progress import Bar
+from .bench_suite import LARGE, SIZES, SUITE, subjects
+from .commands import Commands
+from .peer_pymunk import pymunk_module
+from .problems import Problem
+
+QUICK_SIZES, QUICK_REPEATS = (1000,), 2
+REPEATS = 5
+NAMES = ", ".join(dict.fromkeys(subject.scene for subject in SUITE))
+
+Option = Callable[[Any], Any]
+
+
+def _shown(function: Any) -> Any:
+    """The options that say how the result is shown."""
+    options: tuple[Option, ...] = (
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."),
+        click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown."),
+        click.option(
+            "--into",
+            type=click.Path(path_type=Path, dir_okay=False),
+            help="Also put the tables between the marks of this page.",
+        ),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def _repeats(default: int) -> Option:
+    return click.option(
+        "--repeats", type=click.IntRange(min=1), default=default, show_default=True, help="Runs; the median counts."
+    )
+
+
+def _chart() -> Option:
+    return click.option(
+        "--out", type=click.Path(path_type=Path, file_okay=False), help="Draw a chart into this folder."
+    )
+
+
+@click.group("bench", cls=Commands, invoke_without_command=True, short_help="Time carom on this machine.")
+@click.option("--scenes", "scene_names", metavar="NAME,NAME", help=f"Only these of {NAMES}.")
+@click.option("--sizes", metavar="N,N", help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}).")
+@click.option(
+    "--repeats", type=click.IntRange(min=1), help=f"Runs of everything; the median counts (default: {REPEATS})."
+)
+@click.option("--large", is_flag=True, help=f"{LARGE:,} bodies too: takes long, above all pile2d.")
+@click.option("--quick", is_flag=True, help=f"{QUICK_SIZES[0]:,} bodies only, {QUICK_REPEATS} repeats.")
+@click.option("--no-peer", is_flag=True, help="carom alone, without pymunk.")
+@_chart()
+@_shown
+@click.pass_context
+def bench_command(
+    context: click.Context,
+    scene_names: str | None,
+    sizes: str | None,
+    repeats: int | None,
+    large: bool,
+    quick: bool,
+    no_peer: bool,
+    out: Path | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+) -> None:
+    """Time scenes of the library in carom and in pymunk, on the same bodies, in one process.
+
+    `carom bench scaling` and `carom bench startup` measure other things.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    if quick and (sizes or large):
+        raise Problem("--quick chooses the sizes: leave out --sizes and --large")
+    wanted = subjects(filter(None, (scene_names or "").replace(" ", "").split(",")))
+    asked = QUICK_SIZES if quick else _sizes(sizes) if sizes else SIZES
+    if large:
+        asked = tuple(sorted({*asked, LARGE}))
+    repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
+    output = Output.checked("carom bench", as_json, as_markdown, into, out)
+    peer = not no_peer and _peer_there()
+    with Bar(Console(stderr=True)) as bar:
+        result = bench(wanted, asked, repeats, peer, bar)
+    output.show(result, bench_report.tables(result), bench_report.remarks(result))
+    output.draw("draw_ratios", result)
+
+
+@bench_command.command("scaling", short_help="How the time per body grows with their number.")
+@click.option("--sizes", metavar="N,N", help="Numbers of bodies (default: 1,000 to 100,000).")
+@click.option("--million", is_flag=True, help=f"{bench_scaling.LARGEST:,} bodies too: needs some gigabytes.")
+@_repeats(3)
+@_chart()
+@_shown
+def scaling_command(
+    sizes: str | None,
+    million: bool,
+    repeats: int,
+    out: Path | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+) -> None:
+    """Time the elastic gas from 1,000 to 100,000 bodies: nanoseconds per body per step."""
+    asked = _sizes(sizes) if sizes else bench_scaling.SIZES
+    output = Output.checked("carom bench scaling", as_json, as_markdown, into, out)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_scaling.scaling((*asked, *[bench_scaling.LARGEST] * million), repeats, bar)
+    output.show(result, [bench_scaling.table(result)], [])
+    output.draw("draw_scaling", result)
+
+
+@bench_command.command("startup", short_help="The time to the first step of a new process.")
+@_repeats(3)
+@_shown
+def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time new processes up to their first step: with an empty cache of compiled kernels, then with a filled one."""
+    output = Output.checked("carom bench startup", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_startup.startup(repeats=repeats, progress=bar)
+    output.show(result, [bench_startup.table(result)], [])
+
+
+def _sizes(text: str) -> tuple[int, ...]:
+    """"1000,10000" as numbers."""
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdecimal() and int(part) > 0 for part in parts):
+        raise Problem(f"--sizes takes whole numbers from 1 with commas between them, not {text!r}")
+    return tuple(sorted({int(part) for part in parts}))
+
+
+def _peer_there() -> bool:
+    """Whether pymunk is; says so if not."""
+    try:
+        pymunk_module()
+    except Problem as problem:
+        click.echo(f"carom: timing carom alone: {problem.message}", err=True)
+        return False
+    return True

@@ -1,0 +1,303 @@
+"""``carom bench``: what is timed and what is not, results that can be kept, and the command.
+
+Nothing here asserts a time: on a busy machine any figure is possible. What is asserted is what the figures mean.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+from carom import scenes
+from carom.framework.compilation import CompilationLog
+from carom.lab import bench_clock, bench_report, bench_results, bench_scaling, bench_startup, peer_pymunk
+from carom.lab.bench import bench
+from carom.lab.bench_clock import Spread
+from carom.lab.bench_progress import Progress
+from carom.lab.bench_queries import QUESTIONS
+from carom.lab.bench_suite import LARGE, SUITE, Subject, Window, subjects
+from carom.lab.cli import cli
+from carom.lab.problems import Problem
+
+SHORT_GAS = Subject("gas2d", (Window("first", 2, 12), Window("later", 20, 40)), targets={("later", 30): 2.0})
+
+
+@pytest.fixture
+def carom(tmp_path, monkeypatch):
+    """Runs the command in an empty folder; the result has exit_code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str):
+        return CliRunner().invoke(cli, list(arguments))
+
+    return run
+
+
+@pytest.fixture
+def no_pymunk(monkeypatch):
+    """As if pymunk were not installed."""
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+
+
+# -- the runs ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def result() -> bench_results.Result:
+    return bench([SHORT_GAS], (30,), repeats=3)
+
+
+def test_a_row_for_each_window_with_ratios_within_repeats(result):
+    assert [row.window for row in result.rows] == ["first", "later"]
+    assert [row.timed for row in result.rows] == [10, 20]
+    assert [row.target for row in result.rows] == [None, 2.0]
+    for row in result.rows:
+        assert row.bodies == 30
+        assert row.peer_index in peer_pymunk.INDEXES
+        assert len(row.ratio.values) == len(row.carom_ms.values) == len(row.peer_ms.values) == 3
+        for ratio, own, other in zip(row.ratio.values, row.carom_ms.values, row.peer_ms.values, strict=True):
+            assert ratio == pytest.approx(other / own)
+        assert row.ratio.low <= row.ratio.median <= row.ratio.high
+        for figures in row.quality.values():
+            assert figures["kinetic_end"] == pytest.approx(figures["kinetic_start"], rel=0.05)
+            assert figures["escaped"] == 0
+
+
+def test_both_engines_start_from_the_same_energy(result):
+    starts = {row.quality[engine]["kinetic_start"] for row in result.rows for engine in ("carom", "pymunk")}
+    assert len(starts) == 1
+
+
+def test_settings_of_both_are_stated(result):
+    assert result.settings["carom"]["dt"] == 1 / 60
+    peer = dict(result.settings["pymunk"])
+    assert peer.pop("collision_slop") == pytest.approx(0.1)
+    assert peer.pop("collision_bias") == pytest.approx(0.9**60, rel=1e-4)
+    assert peer == {"iterations": 10, "damping": 1.0, "threads": 1, "sleeping": False}
+    text = "\n".join(bench_report.remarks(result))
+    for word in ("dt 1/60", "substeps", "iterations 10", "collision_slop 0.1", "pymunk 7", "compiling"):
+        assert word in text
+
+
+def test_results_go_through_json_and_back(result):
+    assert bench_results.Result.from_dict(json.loads(json.dumps(result.as_dict()))) == result
+
+
+def test_tables_have_all_their_cells(result):
+    for table in bench_report.tables(result):
+        assert {len(row) for row in table.rows} == {len(table.headings)}
+        lines = table.markdown().splitlines()[2:]
+        assert len(lines) == 2 + len(table.rows)
+        assert len({line.count("|") for line in lines}) == 1
+
+
+def test_carom_alone(no_pymunk):
+    alone = bench([SHORT_GAS], (30,), repeats=1, peer=False)
+    assert [row.ratio for row in alone.rows] == [None, None]
+    assert list(alone.settings) == ["carom"]
+    assert list(alone.rows[0].quality) == ["carom"]
+    assert bench_report.tables(alone)[0].rows[0][2:6] == ("-",) * 4
+
+
+def test_questions_find_the_same_in_both_engines():
+    """But for boxes: pymunk tests the bounding boxes of the discs, and finds a few more."""
+    rows = bench(subjects(["player_query"]), (300,), repeats=1).rows
+    assert [row.window for row in rows] == [question.name for question in QUESTIONS]
+    for row in rows:
+        (own,), (other,) = (figures.values() for figures in row.quality.values())
+        if row.window.startswith("box"):
+            assert own <= other <= 1.05 * own
+        else:
+            assert own == pytest.approx(other, rel=1e-9)
+
+
+def test_blocks_in_which_kernels_came_do_not_count(monkeypatch):
+    """The first block of each window is disturbed: its time is left out, for both engines."""
+    calls = itertools.count()
+
+    def timed(work):
+        work()
+        number = next(calls)
+        return (1000.0, False, None) if number == 0 else (3.0, True, None)
+
+    monkeypatch.setattr("carom.lab.bench.timed", timed)
+    subject = Subject("gas2d", (Window("", 0, 10),))
+    row = bench([subject], (10,), repeats=1).rows[0]
+    assert row.ratio is not None
+    assert row.carom_ms.median == pytest.approx(3000.0)  # blocks of one step
+    assert row.ratio.median == pytest.approx(1.0)
+    monkeypatch.setattr("carom.lab.bench.timed", lambda work: (1.0, False, None))
+    with pytest.raises(Problem, match="run it once more"):
+        bench([subject], (10,), repeats=1)
+
+
+def test_progress_ends_where_it_said():
+    class Recorder(Progress):
+        total = 0.0
+
+        def begin(self, total):
+            self.total = total
+
+    recorder = Recorder()
+    bench([SHORT_GAS], (10, 20), repeats=2, peer=False, progress=recorder)
+    assert recorder.done == pytest.approx(recorder.total)
+
+
+def test_the_suite_names_scenes_and_many_bodies_have_fewer_steps():
+    assert {subject.scene for subject in SUITE} <= set(scenes.names())
+    for subject in subjects(["gas2d"]):
+        assert subject.windows[0].shortened(LARGE).last < subject.windows[0].last
+        assert subject.windows[0].shortened(1000) == subject.windows[0]
+        assert [subject.target("", n) for n in (1000, 10_000, LARGE, 7)] == [2, 5, 8, None]
+    assert next(iter(subjects(["pyramid"]))).target("", 50) == 3
+
+
+def test_spread_is_the_median_and_the_ends():
+    assert Spread.of([3.0, 1.0, 2.0]) == Spread(2.0, 1.0, 3.0, (3.0, 1.0, 2.0))
+
+
+def test_timed_says_what_came_meanwhile(monkeypatch):
+    log = CompilationLog()
+    monkeypatch.setattr(bench_clock, "log", log)
+    assert bench_clock.timed(lambda: 7)[1:] == (True, 7)
+    assert bench_clock.timed(lambda: setattr(log, "waited", 0.1))[1] is False
+
+
+# -- scaling and startup ----------------------------------------------------------------------------------------
+
+
+def test_scaling_grows_from_the_first_size():
+    series = bench_scaling.scaling((40, 10, 40), repeats=2, body_steps=400)
+    assert [point.bodies for point in series.points] == [10, 40]
+    assert [point.steps for point in series.points] == [40, 10]
+    assert series.points[0].growth == 1.0
+    assert series.points[1].growth == pytest.approx(series.grown(10, 40))
+    assert series.grown(10, 50) is None
+    assert bench_scaling.Scaling.from_dict(json.loads(json.dumps(series.as_dict()))) == series
+    assert len(bench_scaling.table(series).rows) == 2
+
+
+def test_startup_times_processes_with_caches_of_their_own(monkeypatch):
+    """The order matters: each repeat fills an empty cache first."""
+    caches = []
+
+    def seconds(code, cache):
+        caches.append((cache, "step()" in code))
+        return float(len(caches))
+
+    monkeypatch.setattr(bench_startup, "_seconds", seconds)
+    found = bench_startup.startup(repeats=2)
+    assert [steps for _, steps in caches] == [True, True, False] * 2
+    assert len({cache for cache, _ in caches}) == 2
+    assert found.seconds["empty cache"].values == (1.0, 4.0)
+    assert found.seconds["warm cache"].values == (2.0, 5.0)
+    assert bench_startup.Startup.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+
+
+def test_a_process_that_fails_is_no_measurement(tmp_path):
+    assert bench_startup._seconds("pass", tmp_path) > 0
+    with pytest.raises(Problem, match="no luck"):
+        bench_startup._seconds("raise RuntimeError('no luck')", tmp_path)
+
+
+# -- the command ------------------------------------------------------------------------------------------------
+
+TINY = ("bench", "--scenes", "fastgas", "--repeats", "1")
+
+
+@pytest.fixture
+def tiny(monkeypatch):
+    """One scene, 20 bodies, 10 steps."""
+    monkeypatch.setattr("carom.lab.bench_suite.SUITE", (Subject("fastgas", (Window("", 0, 10),), sizes=(20,)),))
+
+
+def test_json_is_all_there_is_on_stdout(carom, tiny):
+    done = carom(*TINY, "--json")
+    assert done.exit_code == 0, done.stderr
+    read = bench_results.Result.from_dict(json.loads(done.stdout))
+    assert read.rows[0].scene == "fastgas"
+
+
+def test_tables_pages_and_charts(carom, tiny, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- carom bench -->\nold\n<!-- end of carom bench -->\nafter\n")
+    done = carom(*TINY, "--markdown", "--into", "page.md", "--out", "pictures")
+    assert done.exit_code == 0, done.stderr
+    assert "| fastgas 20 |" in done.stdout
+    text = page.read_text()
+    assert text.startswith("before\n<!-- carom bench -->\n\n**ms per step")
+    assert text.endswith("\n\n<!-- end of carom bench -->\nafter\n")
+    assert "old" not in text
+    assert done.stdout.strip() in text
+    assert (tmp_path / "pictures" / "bench.png").stat().st_size > 1000
+    plain = carom(*TINY)
+    assert "fastgas 20" in plain.stdout
+    assert "quality" in plain.stdout
+
+
+def test_scaling_by_command(carom, tmp_path):
+    done = carom("bench", "scaling", "--sizes", "20,10", "--repeats", "1", "--json", "--out", "p")
+    assert done.exit_code == 0, done.stderr
+    assert [point["bodies"] for point in json.loads(done.stdout)["points"]] == [10, 20]
+    assert (tmp_path / "p" / "scaling.png").exists()
+
+
+def test_startup_by_command(carom, monkeypatch):
+    monkeypatch.setattr(bench_startup, "_seconds", lambda code, cache: 0.5)
+    done = carom("bench", "startup", "--repeats", "1", "--markdown")
+    assert "| empty cache | 0.500 | 0.500 .. 0.500 | 5 |" in done.stdout
+
+
+def test_without_pymunk_it_times_carom_and_says_what_is_missing(carom, tiny, no_pymunk):
+    done = carom(*TINY, "--json")
+    assert done.exit_code == 0, done.stderr
+    assert "carom[bench]" in done.stderr
+    assert json.loads(done.stdout)["rows"][0]["ratio"] is None
+    alone = carom(*TINY, "--no-peer", "--out", "p").stderr
+    assert "carom[bench]" not in alone
+    assert "no chart: nothing is compared" in alone
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["bench", "--scenes", "gas2"], ["'gas2' is not measured", "did you mean 'gas2d'?"]),
+        (["bench", "--scenes", "jump"], ["'jump' is not measured"]),
+        (["bench", "--sizes", "many"], ["--sizes", "'many'"]),
+        (["bench", "--sizes", "0"], ["--sizes", "'0'"]),
+        (["bench", "--quick", "--large"], ["--quick"]),
+        (["bench", "--json", "--markdown"], ["exclude each other"]),
+        (["bench", "--into", "nowhere.md"], ["--into nowhere.md"]),
+        (["bench", "scalling"], ["no command 'scalling'", "did you mean 'scaling'?"]),
+        (["bench", "scaling", "--repeats", "0"], ["--repeats"]),
+    ],
+    ids=lambda value: " ".join(value[1:]) if value and value[0] == "bench" else "",
+)
+def test_wrong_names_and_values(carom, arguments, words):
+    done = carom(*arguments)
+    assert done.exit_code == 2
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1
+    for word in words:
+        assert word in lines[0]
+
+
+def test_a_page_without_the_marks_is_refused_before_the_run(carom, tmp_path):
+    (tmp_path / "page.md").write_text("nothing\n")
+    done = carom("bench", "--into", "page.md")
+    assert done.exit_code == 2
+    assert "<!-- carom bench -->" in done.stderr
+
+
+def test_ctrl_c_stops_with_one_line(carom, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("carom.lab.bench_command.bench", interrupted)
+    done = carom("bench")
+    assert done.exit_code == 130
+    assert done.stderr.strip().splitlines()[-1] == "carom: stopped"

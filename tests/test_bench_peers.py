@@ -1,0 +1,193 @@
+"""The same bodies in carom and in pymunk, and the same measure of quality for both."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from carom import scenes
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import World
+from carom.lab import peer_pymunk
+from carom.lab.bench import CaromWorld
+from carom.lab.bench_bodies import BodyArrays, NotPlainError, moving_and_fixed
+from carom.lab.bench_quality import Quality, kinetic_energy, overlaps
+from carom.lab.bench_suite import SUITE
+from carom.lab.escape import Enclosure
+from carom.lab.peer_pymunk import PymunkSpace
+from carom.plugins import Physics
+from carom.scenes.walls import enclose
+
+
+def plane(gravity=(0.0, 0.0)) -> World:
+    return World(Physics(dimensions=2, gravity=gravity))
+
+
+# -- the same bodies in both engines ----------------------------------------------------------------------------
+
+
+def test_every_subject_translates():
+    """Number, places, velocities and kinetic energy of the bodies are what the scene says, in both engines."""
+    for subject in SUITE:
+        size = 5 if subject.size_option == "rows" else 40
+        world = scenes.get(subject.scene).build(None, 3, **subject.build_options(size))  # type: ignore[call-arg]
+        own, peer = CaromWorld(world), PymunkSpace(world)
+        for ours, theirs in zip(own.state(), peer.state(), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+        mass = np.array([body.mass for body in peer.bodies])
+        assert kinetic_energy(mass, peer.state()[1]) == pytest.approx(world.kinetic_energy())
+        assert len(peer.space.shapes) == sum(int(part.shaped.sum()) for part in moving_and_fixed(world))
+        assert all(math.isinf(body.moment) for body in peer.bodies)
+        own.close()
+
+
+@pytest.mark.parametrize("index", peer_pymunk.INDEXES)
+def test_a_disc_and_a_box_fall_and_bounce_alike(index):
+    """Dropped from 3 m with restitution 1, both engines bring them back near 3 m after 2 sqrt(2 h / g) = 1.4 s.
+
+    pymunk finds the contact up to a step late (v dt = 0.12 m) and moves with the old velocity, carom with the new one
+    (g t dt / 2 = 0.1 m at 1.4 s): half a metre apart is the most that could be.
+    """
+    world = plane((0.0, -9.81))
+    world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5), restitution=1.0))
+    world.create_entity(Transform((0, 3.5)), RigidBody(mass=2.0), SphereCollider(0.5, restitution=1.0))
+    world.create_entity(Transform((4, 3.25)), RigidBody(mass=0.1), AABBCollider((1.0, 0.25), restitution=1.0))
+    own, peer = CaromWorld(world), PymunkSpace(world, index)
+    lowest = np.full(2, np.inf)
+    for _ in range(84):  # 1.4 s
+        own.step(1)
+        peer.step(1)
+        lowest = np.minimum(lowest, peer.state()[0][:, 1])
+        np.testing.assert_allclose(own.state()[0], peer.state()[0], atol=0.5)
+    assert np.all(lowest < [0.75, 0.5])
+    np.testing.assert_allclose(peer.state()[0], [(0, 3.5), (4, 3.25)], atol=0.3)
+    own.close()
+
+
+def test_friction_means_the_same_in_both_engines():
+    """Sliding at 3 m/s on a floor of 0.4 under a body of 0.9: mu = sqrt(0.36) = 0.6, so 3^2 / (2 mu g) = 0.76 m."""
+    world = plane((0.0, -9.81))
+    world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5), friction=0.4))
+    world.create_entity(Transform((0, 0.5)), RigidBody(linear_velocity=(3, 0)), AABBCollider((0.5, 0.5), friction=0.9))
+    peer = PymunkSpace(world)
+    peer.step(90)
+    assert peer.state()[0][0, 0] == pytest.approx(9 / (2 * 0.6 * 9.81), rel=0.05)  # a step at 3 m/s is 0.05 m
+    assert np.abs(peer.state()[1]).max() < 1e-6
+    world.close()
+
+
+def test_without_friction_of_its_own_a_floor_takes_the_partners():
+    world = plane((0.0, -9.81))
+    world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5)))
+    world.create_entity(Transform((0, 0.5)), RigidBody(), AABBCollider((0.5, 0.5), friction=0.6))
+    floor, box = sorted(PymunkSpace(world).space.shapes, key=lambda shape: shape.body.body_type, reverse=True)
+    assert floor.friction * box.friction == pytest.approx(0.6)
+    world.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        ("sensors", (RigidBody(), SphereCollider(0.5, sensor=True))),
+        ("two colliders", (RigidBody(), SphereCollider(0.75), AABBCollider((0.5, 0.5)))),
+        ("damping", (RigidBody(linear_damping=0.1), SphereCollider(0.5))),
+        ("constant forces", (RigidBody(constant_force=(0, 1)),)),
+        ("gravity scale", (RigidBody(gravity_scale=2),)),
+        ("limits of speed", (RigidBody(max_linear_speed=3),)),
+        ("kinematic", (RigidBody(kind="kinematic"), SphereCollider(0.5))),
+        ("layers", (RigidBody(), SphereCollider(0.5, layer=2))),
+        ("offsets", (RigidBody(), SphereCollider(0.5, offset=(0.1, 0)))),
+        ("restitutions", (SphereCollider(0.5, restitution=0.9),)),
+    ],
+)
+def test_what_does_not_translate_is_refused(words, parts):
+    world = plane()
+    world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
+    world.create_entity(Transform((5, 5)), *parts)
+    with pytest.raises(NotPlainError, match=words):
+        PymunkSpace(world)
+    world.close()
+
+
+def test_a_turned_box_and_space_are_refused():
+    world = plane()
+    world.create_entity(Transform((0, 0), rotation=0.5), RigidBody(), AABBCollider((1, 1)))
+    with pytest.raises(NotPlainError, match="turned"):
+        PymunkSpace(world)
+    world.close()
+    world = World(Physics(dimensions=3))
+    with pytest.raises(NotPlainError, match="3 dimensions"):
+        PymunkSpace(world)
+    world.close()
+
+
+# -- the same measure for both ----------------------------------------------------------------------------------
+
+
+def bodies_of(kinds: str, half: np.ndarray) -> BodyArrays:
+    count = len(half)
+    return BodyArrays(
+        np.zeros((count, 2)), np.zeros((count, 2)), np.ones(count), half,
+        np.array([kind == "o" for kind in kinds], bool), np.array([kind != "." for kind in kinds], bool),
+        np.zeros(count), np.zeros(count),
+    )  # fmt: skip
+
+
+def overlap_of_two(a: str, b: str, place_a, place_b, half_a, half_b) -> float:
+    """In plain words: discs by their centres, boxes by the axis of least overlap, a disc by its way out of a box."""
+    if a == b == "o":
+        return half_a[0] + half_b[0] - math.dist(place_a, place_b)
+    apart = [abs(p - q) for p, q in zip(place_a, place_b, strict=True)]
+    if a == b == "#":
+        return min(h + k - d for h, k, d in zip(half_a, half_b, apart, strict=True))
+    radius, box = (half_a[0], half_b) if a == "o" else (half_b[0], half_a)
+    beyond = math.hypot(*(max(d - h, 0.0) for d, h in zip(apart, box, strict=True)))
+    return radius - beyond if beyond > 0 else radius + min(h - d for h, d in zip(box, apart, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_overlaps_are_those_of_all_pairs(seed):
+    """Against every pair taken one by one: discs, boxes, bodies without a shape, small static boxes and a wall."""
+    random = np.random.default_rng(seed)
+    kinds = "".join(random.choice(list("oo##."), 60))
+    half = random.uniform(0.2, 0.6, (60, 2))
+    half[[kind == "o" for kind in kinds], 1] = half[[kind == "o" for kind in kinds], 0]
+    moving, places = bodies_of(kinds, half), random.uniform(-4, 4, (60, 2))
+    places[7] = math.nan
+    fixed_half = np.array([(0.5, 0.5), (0.3, 0.9), (9.0, 0.5)])
+    fixed = bodies_of("###", fixed_half)
+    fixed.position[:] = [(0, 0), (1, 2), (0, -4)]
+
+    everything = [*zip(kinds, places, half, strict=True), *zip("###", fixed.position, fixed_half, strict=True)]
+    expected = []
+    for (i, (a, p, h)), (j, (b, q, k)) in itertools.combinations(enumerate(everything), 2):
+        if "." in (a, b) or 7 in (i, j) or i >= 60:
+            continue
+        depth = overlap_of_two(a, b, p, q, h, k)
+        if depth > 0:
+            expected.append(depth / (2 * min(*h, *k)))
+    assert len(expected) > 20
+    np.testing.assert_allclose(np.sort(overlaps(moving, places, fixed)), np.sort(expected), rtol=1e-12)
+
+
+def test_quality_counts_what_left_and_how_far_it_went():
+    """Three discs in a box of 10: one stays, one is thrown through the wall, one is no number any more."""
+    world = plane()
+    enclose(world, (0, 0), (10, 10))
+    places = Transform.many([(1, 1), (5, 5), (8, 8)])
+    world.create_entities(3, places, RigidBody.many(mass=2.0), SphereCollider.many(0.5))
+    seen = Quality(*moving_and_fixed(world), Enclosure.around(world))
+    after = np.array([(1.5, 0.75), (50.0, 5.0), (math.nan, 0.0)])
+    seen.begin()
+    seen.sample(np.array([(1.5, 0.25), (5, 5), (8, 8)]))  # 0.25 in the floor: a quarter of a diameter
+    seen.sample(after)
+    figures = seen.figures(after, np.array([(3.0, 0.0), (0.0, 0.0), (0.0, 0.0)]))
+    assert figures["escaped"] == 2
+    assert figures["kinetic_end"] == pytest.approx(9.0)
+    assert figures["overlap_max"] == pytest.approx(0.25)
+    assert figures["overlap_mean"] == pytest.approx(0.125)
+    assert (figures["drift"], figures["sink"]) == (45.0, 0.25)
+    world.close()
