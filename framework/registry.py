@@ -42,12 +42,17 @@ class Shape:
 
 @dataclass(frozen=True)
 class Pair:
-    """How two shapes meet: (a, b, d) -> (hit, depth, normal, point), d from a's centre to b's, compiled."""
+    """How two shapes meet: (a, b, d) -> (hit, depth, normal, point), d from a's centre to b's, compiled.
+
+    corner
+        compiled, or None; (a, b, d, slop) -> whether they touch by less than the slop, and only at a corner or an edge
+    """
 
     first: type[Component]
     second: type[Component]
     function: Any
     plugin: str
+    corner: Any | None = None
 
 
 class Plugin:
@@ -75,11 +80,18 @@ class Plugin:
 
         return register
 
-    def pair(self, first: type[Component], second: type[Component]) -> Callable[[Any], Any]:
-        """Register the function for two shapes; the registry swaps order and flips the normal itself."""
+    def pair(
+        self, first: type[Component], second: type[Component], *, corner: Any | None = None
+    ) -> Callable[[Any], Any]:
+        """Register the function for two shapes; the registry swaps order and flips the normal itself.
+
+        ``corner(a, b, d, slop)`` may tell a touch of two corners, which pushes nobody: what slides over a row of such
+        shapes would catch there.
+        """
 
         def register(function: Any) -> Any:
-            self.pairs.append(Pair(first, second, inlined(function), self.name))
+            compiled = None if corner is None else inlined(corner)
+            self.pairs.append(Pair(first, second, inlined(function), self.name, compiled))
             return function
 
         return register

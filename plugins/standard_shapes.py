@@ -68,7 +68,17 @@ def sphere_box(a, b, d):
     return True, depth, normal, scale(normal, -room)
 
 
-@standard_shapes.pair(AABBCollider, AABBCollider)
+def box_corner(a, b, d, slop):
+    """Whether two boxes overlap by less than ``slop`` along more than one axis, or are as near: corners, or edges."""
+    shallow = 0
+    for k in range(len(d)):
+        overlap = item(a.half_extents, k) + item(b.half_extents, k) - abs(item(d, k))
+        if overlap < slop:
+            shallow += 1
+    return shallow > 1
+
+
+@standard_shapes.pair(AABBCollider, AABBCollider, corner=box_corner)
 def box_box(a, b, d):
     """On no axis may the intervals be apart (separating axes); the normal is the axis of least overlap.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,53 +15,65 @@ from .few_boxes import FEW, FewBoxes, pairs_between
 from .spatial_tree import SpatialTree
 
 if TYPE_CHECKING:
+    from .shape_code import ShapeCode
     from .state import PhysicsState
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
 MARGIN = 0.1
 
 
-def make_box_kernel(shape_bounds: Any, write_world: Any) -> Callable[..., None]:
-    """The kernel that boxes bodies, over the shapes of a scene."""
+def make_box_kernel(shape_bounds: Any, write_world: Any, several: bool = False) -> Callable[..., None]:
+    """The kernel that boxes bodies, over the shapes of a scene; ``several``: some body has several levels."""
 
     @kernel
     def box_motion(
-        start, stop, before, after, shape_of, slots, shapes, world, turns, turned, axes, offsets, offset, size,
+        start, stop, before, after, levels, slots, shapes, world, turns, turned, axes, offsets, level_offsets, size,
         lower, upper, like,
     ):  # fmt: skip
         """Offsets as they are in the world, sizes, and the boxes around the motion of rows start..stop-1.
 
-        turns: whether any shape changes when turned; turned: whether any body is. A row without shape gets NaN.
+        turns: whether any shape changes when turned; turned: whether any body is. A row without shape gets NaN. A box
+        holds every level of its body, so that what the first one meets is looked at; the size is that of the last.
         """
         for i in range(start, stop):
-            shape = shape_of[i]
-            if shape < 0:
+            for level in range(len(levels) if several else 1):
+                shape = levels[level, i]
+                if shape < 0:
+                    for k in range(len(like)):
+                        lower[i, k] = upper[i, k] = np.nan
+                    break
+                at = row(offsets[slots[shape]], i, like)
+                if turned:
+                    local = at
+                    for k in range(len(like)):
+                        total = 0.0
+                        for j in range(len(like)):
+                            total += axes[i, k, j] * item(local, j)
+                        at = replace(at, k, total)
+                if turns:
+                    write_world(shape, i, shapes, world, turned, axes, like)
+                store(level_offsets[level], i, at)
+                half = shape_bounds(shape, i, world, like)
+                smallest = half[0]
+                for k in range(1, len(like)):
+                    smallest = min(smallest, item(half, k))
+                size[i] = 2.0 * smallest
+                margin = MARGIN * smallest
+                first, last = add(row(before, i, like), at), add(row(after, i, like), at)
                 for k in range(len(like)):
-                    lower[i, k] = upper[i, k] = np.nan
-                continue
-            at = row(offsets[slots[shape]], i, like)
-            if turned:
-                local = at
-                for k in range(len(like)):
-                    total = 0.0
-                    for j in range(len(like)):
-                        total += axes[i, k, j] * item(local, j)
-                    at = replace(at, k, total)
-            if turns:
-                write_world(shape, i, shapes, world, turned, axes, like)
-            store(offset, i, at)
-            half = shape_bounds(shape, i, world, like)
-            smallest = half[0]
-            for k in range(1, len(like)):
-                smallest = min(smallest, item(half, k))
-            size[i] = 2.0 * smallest
-            margin = MARGIN * smallest
-            first, last = add(row(before, i, like), at), add(row(after, i, like), at)
-            for k in range(len(like)):
-                lower[i, k] = min(item(first, k), item(last, k)) - item(half, k) - margin
-                upper[i, k] = max(item(first, k), item(last, k)) + item(half, k) + margin
+                    low = min(item(first, k), item(last, k)) - item(half, k) - margin
+                    high = max(item(first, k), item(last, k)) + item(half, k) + margin
+                    if level == 0 or low < lower[i, k]:
+                        lower[i, k] = low
+                    if level == 0 or high > upper[i, k]:
+                        upper[i, k] = high
 
     return box_motion
+
+
+@lru_cache(maxsize=64)
+def box_kernel_with_levels(code: ShapeCode) -> Callable[..., None]:
+    return make_box_kernel(code.shape_bounds, code.write_world, several=True)
 
 
 class BroadPhase(System):
@@ -84,6 +97,7 @@ class BroadPhase(System):
         state, table = self._state, self._state.table
         first, second = state.no_pairs, state.no_pairs
         if state.collides:
+            state.queries.forget()  # these boxes hold whole motions
             self.box_all()
             moving = table.stops[1]
             self._moving = self._partition(self._moving_tree, 0, moving)
@@ -101,7 +115,7 @@ class BroadPhase(System):
         position, before = table.arrays["position"], table.arrays["previous_position"]
         self._box(0, moving, before if state.moved else position)
         fixed = position[moving:count]
-        seen = (table.static_version, table.version, state.code, state.turned)
+        seen = (table.static_version, state.structure, state.turned)
         if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
             before[moving:count] = fixed
             self._box(moving, count, position)
@@ -111,11 +125,11 @@ class BroadPhase(System):
 
     def _box(self, start: int, stop: int, before: np.ndarray) -> None:
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
-        state.kernels.box_motion(
-            start, stop, before, arrays["position"], scratch["shape"], state.slots, state.shapes,
-            state.world_shapes, state.turned and state.code.turns, state.turned, state.axes,
-            state.table.stacks["collider.offset"],
-            scratch["offset"], scratch["size"], scratch["lower"], scratch["upper"], state.like,
+        box_motion = state.kernels.box_motion if len(state.levels) == 1 else box_kernel_with_levels(state.code)
+        box_motion(
+            start, stop, before, arrays["position"], state.levels, state.slots, state.shapes, state.world_shapes,
+            state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
+            state.level_offsets, scratch["size"], scratch["lower"], scratch["upper"], state.like,
         )  # fmt: skip
 
     @property

@@ -49,6 +49,7 @@ class ContactEvents(System):
         self._generation = state.table.generation
 
     def process(self, dt: float) -> None:
+        self._state.queries.forget()  # the response has moved bodies
         contacts = self._state.contacts
         now = self._state.contact_columns
         if not len(now["entity_a"]) and not len(self.touching["entity_a"]):

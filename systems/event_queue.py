@@ -10,17 +10,17 @@ from .impacts import LAST
 class EventQueue:
     """events (m, 3): pair and how often each body had been struck when the event was made; with times and order keys.
 
-    heap (m,): indices of events. log_pair (k,), log_value (k, 2 + 2 d): time, impulse, normal, point. counts (6,).
+    values (m, 2 + 3 d): time, change of the speed along the normal, normal, point, change along the surface. heap (m,):
+    indices of events. log_pair (k,), log_value (k, 2 + 2 d): time, impulse, normal, point. counts (6,).
     """
 
     def __init__(self, dimensions: int) -> None:
-        self._width = 2 + 2 * dimensions
         self.counts = np.zeros(6, np.int64)
         self.events = np.empty((0, 3), np.int64)
         self.times, self.keys = np.empty(0), np.empty(0, np.int64)
-        self.values = np.empty((0, self._width))
+        self.values = np.empty((0, 2 + 3 * dimensions))
         self.heap = np.empty(0, np.int64)
-        self.log_pair, self.log_value = np.empty(0, np.int64), np.empty((0, self._width))
+        self.log_pair, self.log_value = np.empty(0, np.int64), np.empty((0, 2 + 2 * dimensions))
         self.grow(64)
 
     @property

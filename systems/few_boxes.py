@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..framework.compilation import kernel
+from . import tree_build
 from .spatial_tree import SpatialTree
 
 FEW = 192  # boxes; testing their 18,000 pairs takes little longer than building a tree of them
-TESTS_AT_MOST = 1 << 17  # between two sets; beyond it a tree pays even for few boxes
+TESTS_AT_MOST = 1 << 17  # between two sets, or with queries; beyond it a tree pays even for few boxes
 
 
 @kernel
@@ -44,13 +45,27 @@ class FewBoxes:
         self.rows = np.empty(0, np.int32)
         self.boxes = np.empty((0, 2 * dimensions))
         self._tree: SpatialTree | None = None
+        self._layout: tuple[np.ndarray, ...] | None = None
 
     def build(self, lower: np.ndarray, upper: np.ndarray, start: int, stop: int) -> None:
         """Take the boxes of rows start..stop-1; NaN boxes overlap nothing."""
         self.boxes = np.concatenate((lower[start:stop], upper[start:stop]), axis=1)
         self.rows = np.arange(start, stop, dtype=np.int32)
         self.count = stop - start
-        self._tree = None
+        self._tree = self._layout = None
+
+    @property
+    def layout(self) -> tuple[np.ndarray, ...]:
+        """As that of a tree whose only level has one cell."""
+        if self._layout is None:
+            d = self.dimensions
+            valid = (self.boxes[:, :d] <= self.boxes[:, d:]).all(axis=1)
+            table = np.zeros((tree_build.MAX_LEVELS + 2, tree_build.TABLE_COLUMNS), np.int64)
+            table[0, tree_build.CELLS], table[0, tree_build.END] = 1, valid.sum()
+            directory = np.array((0, valid.sum()), np.int32)
+            frame = np.zeros(tree_build.FRAME_SIZE)
+            self._layout = table, frame, directory, self.rows[valid], self.boxes[valid]
+        return self._layout
 
     def pairs_within(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows (first, second) of overlapping pairs."""
@@ -64,6 +79,8 @@ class FewBoxes:
 
     def query(self, query_lower: np.ndarray, query_upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Overlaps of m boxes: box i overlaps rows[offsets[i]:offsets[i + 1]], ascending."""
+        if len(query_lower) * self.count > TESTS_AT_MOST:
+            return self._as_tree().query(query_lower, query_upper)
         lower, upper = self.boxes[:, : self.dimensions], self.boxes[:, self.dimensions :]
         meet = (query_lower[:, None] <= upper) & (lower <= query_upper[:, None])
         query, found = np.nonzero(meet.all(axis=2))

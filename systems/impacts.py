@@ -39,6 +39,16 @@ def mix(rule, a, b):
 
 
 @inlined
+def mix_friction(rule, a, b):
+    """The contact's friction; who has none of his own (NaN) takes the partner's."""
+    if a != a:
+        a = b
+    if b != b:
+        b = a
+    return mix(rule, a, b) if a == a else 0.0
+
+
+@inlined
 def along(t, x0, x1, x2, x3):
     """x0 + x1 t + x2 t^2 + x3 t^3."""
     return add_scaled(x0, add_scaled(x1, add_scaled(x2, x3, t), t), t)
@@ -97,15 +107,17 @@ def bounce(
     c = events[event, 0]
     a, b = pair_a[c], pair_b[c]
     now = event_values[event, 0]
-    impulse = event_values[event, 1] / (inverse_mass[a] + inverse_mass[b])
-    normal = like
+    mass = 1.0 / (inverse_mass[a] + inverse_mass[b])
+    impulse = event_values[event, 1] * mass
+    change = like  # of the bodies' relative velocity, with what friction adds to it
     for k in range(len(like)):
-        normal = replace(normal, k, event_values[event, 2 + k])
-        pair_normal[c, k] = event_values[event, 2 + k]
+        normal = event_values[event, 2 + k]
+        change = replace(change, k, event_values[event, 1] * normal + event_values[event, 2 + 2 * len(like) + k])
+        pair_normal[c, k] = normal
         pair_point[c, k] = event_values[event, 2 + len(like) + k]
     for side in range(2):
         i = a if side == 0 else b
-        dv = scale(normal, (-impulse if side == 0 else impulse) * inverse_mass[i])
+        dv = scale(change, (-mass if side == 0 else mass) * inverse_mass[i])
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             struck[i] += 1
             store(start_velocity, i, add(row(start_velocity, i, like), dv))
@@ -123,13 +135,13 @@ def bounce(
     counts[LOGGED] += 1
 
 
-def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
+def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
     """The event loop over the shapes of a scene."""
 
     @part
     def consider(
-        c, since, dt, looked_at, pair_a, pair_b, rank, shape_of, offset, shapes, velocity, start_velocity, motion,
-        restitution, slots, rule, fixed_threshold, cap, share, struck, pair_impulse, events, event_times, event_keys,
+        c, since, dt, pair_a, pair_b, rank, size, shape_of, offset, shapes, velocity, start_velocity, motion,
+        restitution, friction, rules, slots, limits, share, struck, pair_impulse, events, event_times, event_keys,
         event_values, heap, counts, like,
     ):  # fmt: skip
         """Put the pair's next impact into the queue, if it has one: e > 0, overlap at the end, a fast approach.
@@ -141,7 +153,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         origin, path, second, third, degree = motion
         a, b = pair_a[c], pair_b[c]
         shape_a, shape_b = shape_of[a], shape_of[b]
-        e = mix(rule, restitution[slots[shape_a], a], restitution[slots[shape_b], b])
+        e = mix(rules[0], restitution[slots[shape_a], a], restitution[slots[shape_b], b])
         if e <= 0.0:
             return
         low, high, guess = since, dt, dt
@@ -151,7 +163,9 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         x2, x3 = like, like
         if degree > 1:
             x2, x3 = sub(row(second, b, like), row(second, a, like)), sub(row(third, b, like), row(third, a, like))
-        t, normal, point, apart = dt, like, like, like
+        t, normal, point, apart, end_normal = dt, like, like, like, like
+        fixed_threshold, fixed_slop, cap = limits
+        slop = slop_of(a, b, size, fixed_slop)
         for look in range(TIME_ITERATIONS):  # one place that calls evaluate: it is what takes time to compile
             middle = dt if look == 0 else since
             if look > 1:
@@ -162,6 +176,10 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
             hit, depth, n, p = evaluate(shape_a, a, shape_b, b, d, shapes, like)
             near = look > 1 and abs(depth) <= ROUNDING * length(d)
             guess = middle + depth / dot(along_rate(middle, x1, x2, x3), n)
+            if look == 0 and hit:
+                end_normal = n
+                if corner(shape_a, a, shape_b, b, d, slop, shapes, like):
+                    return
             if hit or near:
                 t, normal, point, apart = middle, n, p, d
                 if near:
@@ -169,7 +187,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
                 high = middle
                 if look == 1:
                     break
-            elif look == 0 and not looked_at:
+            elif look == 0:
                 return
             else:
                 low = middle
@@ -178,6 +196,8 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
             if pair_impulse[c] > 0.0:  # it has parted already
                 return
             normal = divided(negative(w), length(w))  # no direction between the centres: they part the way they came
+        elif corner(shape_a, a, shape_b, b, apart, slop, shapes, like):
+            normal = end_normal  # it slides from one thing onto the next: the edges are in nobody's way
         speed = dot(w, normal)
         threshold = fixed_threshold
         if threshold < 0.0:
@@ -197,6 +217,13 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         if struck[a] >= cap or struck[b] >= cap:
             counts[CAPPED] += 1
             return
+        pull = scale(like, 0.0)
+        mu = mix_friction(rules[1], friction[slots[shape_a], a], friction[slots[shape_b], b])
+        if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
+            sliding = add_scaled(w, normal, -dot(w, normal))
+            fast = length(sliding)
+            if fast > 0.0:
+                pull = scale(sliding, -min(1.0, -mu * (1.0 + e) * speed / fast))
         centre = add(add_scaled(row(origin, a, like), row(path, a, like), t), row(offset, a, like))
         if degree > 1:
             centre = add_scaled(centre, add_scaled(row(second, a, like), row(third, a, like), t), t * t)
@@ -208,19 +235,22 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         for k in range(len(like)):
             event_values[event, 2 + k] = item(normal, k)
             event_values[event, 2 + len(like) + k] = item(point, k)
+            event_values[event, 2 + 2 * len(like) + k] = item(pull, k)
         counts[WAITING] = heap_push(heap, counts[WAITING], event, event_times, event_keys)
         counts[EVENTS] += 1
 
     @kernel
     def resolve_impacts(
-        dt, pair_a, pair_b, responds, offsets, neighbours, rank, shape_of, offset, shapes, position, velocity,
-        start_velocity, inverse_mass, motion, restitution, slots, rule, fixed_threshold, cap, share, struck,
+        dt, pair_a, pair_b, responds, offsets, neighbours, rank, size, shape_of, offset, shapes, position, velocity,
+        start_velocity, inverse_mass, motion, restitution, friction, rules, slots, limits, share, struck,
         pair_impulse, pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values,
         heap, log_pair, log_value, counts, like,
     ):  # fmt: skip
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
 
-        The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[-1] are the contacts found.
+        The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[bodies] are looked at first.
+        restitution, friction: per slot of the shapes and row; rules: how two become one. limits: the threshold and
+        the slop (below 0: from the bodies), the most impacts of a body.
         share (n,): see gravity_share. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
         the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see
         EVENTS.
@@ -228,7 +258,7 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
         """
         bodies = len(rank)
         while True:
-            # What is looked at: at first every contact, later the pairs of the two bodies just struck.
+            # What is looked at: at first what may have met, later the pairs of the two bodies just struck.
             c = counts[LAST]
             first, first_stop, second, second_stop = offsets[bodies], len(neighbours), 0, 0
             if c >= 0:
@@ -246,8 +276,8 @@ def make_impact_kernel(evaluate: Any) -> Callable[..., Any]:
                 if responds[p]:
                     since = event_times[counts[CURRENT]] if c >= 0 else 0.0
                     consider(
-                        p, since, dt, c < 0, pair_a, pair_b, rank, shape_of, offset, shapes, velocity, start_velocity,
-                        motion, restitution, slots, rule, fixed_threshold, cap, share, struck, pair_impulse, events,
+                        p, since, dt, pair_a, pair_b, rank, size, shape_of, offset, shapes, velocity, start_velocity,
+                        motion, restitution, friction, rules, slots, limits, share, struck, pair_impulse, events,
                         event_times, event_keys, event_values, heap, counts, like,
                     )  # fmt: skip
             chosen = -1
@@ -277,11 +307,38 @@ def gravity_share(i, share, velocity, start_velocity, like):
     return share[i]
 
 
-@kernel
-def pairs_of_bodies(pair_a, pair_b, pairs, hits, found, bodies, offsets, neighbours):
-    """The pairs of each body: those of row i are neighbours[offsets[i]:offsets[i + 1]], ascending; then the contacts.
+SLOP = 0.005  # of the size of the smaller body
+MARGIN_STEPS = 2.0
 
-    offsets (bodies + 2,), neighbours (2 * pairs + found,).
+
+@inlined
+def smaller(a, b, size):
+    """The size of the smaller body; a point takes that of the other."""
+    one, other = size[a], size[b]
+    return min(one, other) if one > 0.0 and other > 0.0 else max(one, other)
+
+
+@inlined
+def slop_of(a, b, size, fixed):
+    """Metres that are nothing to this pair: as the settings say, or from the sizes."""
+    return fixed if fixed >= 0.0 else SLOP * smaller(a, b, size)
+
+
+@inlined
+def reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like):
+    """How near a pair is held before it touches: the slop, and twice the way that forces make in a step from rest."""
+    gained = max(
+        gravity_share(a, share, velocity, start_velocity, like), gravity_share(b, share, velocity, start_velocity, like)
+    )
+    return slop_of(a, b, size, fixed_slop) + MARGIN_STEPS * gained * dt
+
+
+@kernel
+def pairs_of_bodies(pair_a, pair_b, pairs, hits, found, supported, bodies, offsets, neighbours):
+    """The pairs of each body: those of row i are neighbours[offsets[i]:offsets[i + 1]], ascending.
+
+    Behind them stand those that may have met: the contacts found, and of bodies that do not fly freely every pair.
+    offsets (bodies + 2,), neighbours (3 * pairs,); returns how much of it is used.
     """
     for i in range(bodies + 2):
         offsets[i] = 0
@@ -290,10 +347,17 @@ def pairs_of_bodies(pair_a, pair_b, pairs, hits, found, bodies, offsets, neighbo
         offsets[pair_b[c] + 2] += 1
     for i in range(2, bodies + 2):
         offsets[i] += offsets[i - 1]
+    used = 2 * pairs
     for c in range(pairs):
         neighbours[offsets[pair_a[c] + 1]] = c
         offsets[pair_a[c] + 1] += 1
         neighbours[offsets[pair_b[c] + 1]] = c
         offsets[pair_b[c] + 1] += 1
+        if supported[pair_a[c]] or supported[pair_b[c]]:
+            neighbours[used] = c
+            used += 1
     for h in range(found):
-        neighbours[2 * pairs + h] = hits[h]
+        if not (supported[pair_a[hits[h]]] or supported[pair_b[hits[h]]]):
+            neighbours[used] = hits[h]
+            used += 1
+    return used

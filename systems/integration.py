@@ -49,6 +49,7 @@ class Integration(System):
         arrays["step_force"][:dynamic] = 0.0
         table.forces_summed = False
         state.moved = True
+        state.queries.forget()
 
     def _motion(self, dynamic: int) -> Motion:
         state = self._state

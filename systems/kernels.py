@@ -8,7 +8,6 @@ from typing import Any
 from .broad_phase import make_box_kernel
 from .impacts import make_impact_kernel
 from .narrow_phase import make_narrow_kernel
-from .queries import make_query_kernel
 from .resting import make_resting_kernels
 from .shape_code import ShapeCode
 
@@ -19,12 +18,11 @@ class SceneKernels:
     def __init__(self, code: ShapeCode) -> None:
         self.box_motion: Any = make_box_kernel(code.shape_bounds, code.write_world)
         self.find_contacts: Any = make_narrow_kernel(code.evaluate)
-        self.resolve_impacts: Any = make_impact_kernel(code.evaluate)
+        self.resolve_impacts: Any = make_impact_kernel(code.evaluate, code.corner)
         self.find_resting: Any
-        self.solve_resting: Any
-        self.find_resting, self.solve_resting = make_resting_kernels(code.evaluate)
-        self.touching_sphere: Any = make_query_kernel(code.meets_sphere) if code.meets_sphere else None
-        self.touching_box: Any = make_query_kernel(code.meets_box) if code.meets_box else None
+        self.linearise: Any
+        self.find_touching: Any
+        self.find_resting, self.linearise, self.find_touching = make_resting_kernels(code.evaluate, code.corner)
 
 
 @lru_cache(maxsize=64)

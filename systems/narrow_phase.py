@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,42 +11,84 @@ import numpy as np
 from ..framework.compilation import kernel
 from ..framework.schedule import Phase, System
 from ..framework.vectors import add, row, store, sub
+from .impacts import reach
+from .levels import COUNTERS
 
 if TYPE_CHECKING:
+    from .shape_code import ShapeCode
     from .state import PhysicsState
 
 
-def make_narrow_kernel(evaluate: Any) -> Callable[..., tuple[int, int]]:
-    """The kernel that tests candidates, over the shapes of a scene."""
+def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tuple[int, int, int, int, int]]:
+    """The kernel that tests candidates, over the shapes of a scene; ``several``: some body has several levels.
+
+    Known when it is compiled: levels in the loop cost other scenes 1 to 6 ns per candidate.
+    """
 
     @kernel
     def find_contacts(
-        first, second, entity, position, offset, shape_of, slots, shapes, layers, masks, all_meet, sensors,
-        inverse_mass, pair_a, pair_b, responds, hits, depths, normals, points, like,
+        first, second, entity, position, levels, level_offsets, outgrown, material, shapes, layers, masks, all_meet,
+        sensors, inverse_mass, dt, velocity, start_velocity, share, size, fixed_slop, pair_a, pair_b, responds,
+        pair_depth, hits, depths, normals, points, like,
     ):  # fmt: skip
-        """Sort each pair by entity, drop pairs whose layers do not meet, test the rest; (pairs kept, hits).
+        """Sort each pair by entity, drop pairs whose layers do not meet, test the rest, level by level.
 
-        pair_a, pair_b, responds (m,): the pairs kept, and whether they push each other.
-        hits: their indices that touch, with depth, normal and point in the world.
+        levels (levels, n): each body's shapes, the last one repeated where it has fewer than others; a pair hits if
+        every level does, and the last one gives the contact. outgrown: whether a body's last level may reach out of
+        one around it. material: the slot of the collider that gives layer, mask and sensor.
+        pair_a, pair_b, responds, pair_depth (m,): the pairs kept, whether they push each other, and their overlap.
+        hits: their indices that touch, with depth, normal and point in the world; with dt above 0 also those so near
+        that the response may push them, with a negative depth. share (n,): see ``impacts.gravity_share``.
+        Returns (pairs kept, hits, pairs tested by cheaper levels first, those of them that their first levels let
+        pass, those of these that another level has kept apart).
         """
-        kept = 0
-        found = 0
+        kept, found = 0, 0
+        tested, passed, wrong = 0, 0, 0
+        last = len(levels) - 1 if several else 0
         for c in range(len(first)):
             a, b = first[c], second[c]
             if entity[a] > entity[b]:
                 a, b = b, a
-            shape_a, shape_b = shape_of[a], shape_of[b]
-            if not all_meet:
-                slot_a, slot_b = slots[shape_a], slots[shape_b]
-                if layers[slot_a, a] & masks[slot_b, b] == 0 or layers[slot_b, b] & masks[slot_a, a] == 0:
-                    continue
+            slot_a, slot_b = material[a], material[b]
+            if not all_meet and (
+                layers[slot_a, a] & masks[slot_b, b] == 0 or layers[slot_b, b] & masks[slot_a, a] == 0
+            ):
+                continue
             pair_a[kept] = a
             pair_b[kept] = b
-            passive = sensors[slots[shape_a], a] or sensors[slots[shape_b], b]
+            passive = sensors[slot_a, a] or sensors[slot_b, b]
             responds[kept] = not passive and inverse_mass[a] + inverse_mass[b] > 0.0
-            centre = add(row(position, a, like), row(offset, a, like))
-            d = sub(add(row(position, b, like), row(offset, b, like)), centre)
-            hit, depth, normal, point = evaluate(shape_a, a, shape_b, b, d, shapes, like)
+            hit, depth, normal, point, centre = False, 0.0, like, like, like
+            missed = 0.0  # depth of the level that keeps them apart
+            first_hit = False
+            margin = 0.0
+            if several and dt > 0.0 and responds[kept]:
+                margin = reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like)
+            for level in range(last + 1):
+                shape_a, shape_b = levels[level, a], levels[level, b]
+                centre = add(row(position, a, like), row(level_offsets[level], a, like))
+                d = sub(add(row(position, b, like), row(level_offsets[level], b, like)), centre)
+                hit, depth, normal, point = evaluate(shape_a, a, shape_b, b, d, shapes, like)
+                if level == last or (shape_a == levels[last, a] and shape_b == levels[last, b]):
+                    break
+                if level == 0:
+                    tested += 1
+                    first_hit = hit
+                    passed += 1 if hit else 0
+                if not hit:
+                    missed = min(missed, depth)
+                    if depth < -margin and not (outgrown[a] or outgrown[b]):
+                        break
+            if missed < 0.0:
+                hit = False
+                if depth > missed and (outgrown[a] or outgrown[b]):  # it sticks out: they are kept apart in this step
+                    wrong += 1 if first_hit else 0
+                    continue
+            if first_hit and not hit:
+                wrong += 1
+            pair_depth[kept] = depth
+            if dt > 0.0 and not hit and responds[kept]:
+                hit = depth >= -reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like)
             if hit:
                 hits[found] = kept
                 depths[found] = depth
@@ -53,13 +96,18 @@ def make_narrow_kernel(evaluate: Any) -> Callable[..., tuple[int, int]]:
                 store(points, found, add(centre, point))
                 found += 1
             kept += 1
-        return kept, found
+        return kept, found, tested, passed, wrong
 
     return find_contacts
 
 
+@lru_cache(maxsize=64)
+def narrow_kernel_with_levels(code: ShapeCode) -> Callable[..., tuple[int, int, int, int, int]]:
+    return make_narrow_kernel(code.evaluate, several=True)
+
+
 class NarrowPhase(System):
-    """Tests the candidates with the functions of their shapes and fills ``world.contacts``.
+    """Tests the candidates with the functions of their shapes, level by level, and fills ``world.contacts``.
 
     Reads position and the colliders; writes the contacts, with ``enabled`` set. Systems that run after it and before
     RESPONSE may clear ``enabled``.
@@ -75,31 +123,41 @@ class NarrowPhase(System):
         if not state.candidates_ready:
             state.broad_phase.process(dt)
         if state.collides:
-            self._test()
+            self._test(dt)
         else:
             state.set_pairs(0, 0)
-        state.publish_contacts()
+        state.publish_found()
 
-    def _test(self) -> None:
-        state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
+    def _test(self, dt: float) -> None:
+        state = self._state
         first, second = state.candidates
         state.reserve_pairs(len(first))
-        stacks = state.table.stacks
-        kept, found = state.kernels.find_contacts(
-            first, second, arrays["entity"], arrays["position"], scratch["offset"], scratch["shape"], state.slots,
-            state.world_shapes, stacks["collider.layer"], stacks["collider.mask"], state.all_layers_meet(),
-            stacks["collider.sensor"], arrays["inverse_mass"], state.pair_a, state.pair_b, state.responds, state.hits,
-            state.depths, state.normals, state.points, state.like,
+        kept, found, *counts = self._find(
+            dt, first, second, state.pair_a, state.pair_b, state.responds, state.pair_depth, state.hits,
+            state.depths, state.normals, state.points,
         )  # fmt: skip
+        for name, count in zip(COUNTERS, counts, strict=True):
+            state.pair_counters[name] += count
         state.set_pairs(kept, found)
+
+    def _find(self, dt: float, first: np.ndarray, second: np.ndarray, *out: np.ndarray) -> tuple[int, ...]:
+        """Call the kernel; ``out``: what it fills."""
+        state, arrays, stacks = self._state, self._state.table.arrays, self._state.table.stacks
+        scratch, slop = state.scratch, state.world.settings.slop
+        scratch["gravity_share"][: state.table.count] = -1.0
+        several = len(state.levels) > 1
+        find_contacts = narrow_kernel_with_levels(state.code) if several else state.kernels.find_contacts
+        return find_contacts(
+            first, second, arrays["entity"], arrays["position"], state.levels, state.level_offsets, state.outgrown,
+            scratch["material"], state.world_shapes, stacks["collider.layer"], stacks["collider.mask"],
+            state.all_layers_meet(), stacks["collider.sensor"], arrays["inverse_mass"], dt if state.moved else 0.0,
+            arrays["linear_velocity"], scratch["start_velocity"], scratch["gravity_share"], scratch["size"],
+            -1.0 if slop is None else slop, *out, state.like,
+        )  # fmt: skip
 
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
         names = ", ".join(shape.component.__name__ for shape in self._state.code.shapes)
-        return f"all pairs of {names}"
-
-
-def order_of_pairs(a: np.ndarray, b: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """The canonical order: by the smaller entity id, then by the larger; ``rank`` is the place of a row by id."""
-    return np.argsort(rank[a] * len(rank) + rank[b], kind="stable")
+        levels = "; bodies with several colliders: level by level, the cheap one first"
+        return f"all pairs of {names}" + (levels if len(self._state.levels) > 1 else "")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..framework.contacts import Contacts, empty_columns
 from .impacts import CAPPED, LOGGED
-from .narrow_phase import order_of_pairs
+from .pair_order import order_of_pairs
 
 if TYPE_CHECKING:
     from ..framework.table import Table
@@ -19,8 +19,8 @@ class PairBuffers:
 
     candidates: rows (first, second) from the broad phase. pair_a, pair_b, responds (m,): the pairs whose layers meet,
     a's entity id the smaller. hits (found,): indices of the pairs that touch at the end of their motion, with depths,
-    normals, points. pair_impulse, pair_normal, pair_point, pair_depth: per pair, what the response made
-    of it.
+    normals, points. pair_impulse, pair_normal, pair_point, pair_depth, pair_parts (see ``resting``): per pair, what
+    the response made of it.
     """
 
     table: Table
@@ -51,6 +51,7 @@ class PairBuffers:
         self.hits, self.depths = np.empty(size, np.int64), np.empty(size)
         self.normals, self.points = np.empty((size, d)), np.empty((size, d))
         self.pair_impulse, self.pair_depth = np.empty(size), np.empty(size)
+        self.pair_parts = np.empty(size, np.uint8)
         self.pair_normal, self.pair_point = np.empty((size, d)), np.empty((size, d))
 
     def reserve_pairs(self, count: int) -> None:
@@ -82,44 +83,40 @@ class PairBuffers:
         for array in (self.hits, self.depths, self.normals, self.points):
             array[:found] = array[:found][order]
 
-    def clear_pairs(self) -> None:
-        """Nothing has been done to the pairs yet; those in contact start with the geometry found."""
-        hits = self.hits[: self.found]
-        self.pair_impulse[: self.pairs] = 0.0
-        self.pair_depth[hits] = self.depths[: self.found]
-        self.pair_normal[hits] = self.normals[: self.found]
-        self.pair_point[hits] = self.points[: self.found]
-
-    def take_enabled(self) -> None:
-        """Pairs whose contact a system has disabled push no more in this step."""
+    def take_enabled(self) -> np.ndarray:
+        """Pairs whose contact a system has disabled push no more in this step; returns which they are."""
         enabled = self.contact_columns["enabled"]
-        if not enabled.all():
-            self.responds[self._contact_pairs[~enabled]] = False
+        if enabled.all():
+            return self.no_pairs
+        disabled = self._contact_pairs[~enabled]
+        self.responds[disabled] = False
+        return disabled
 
-    def publish_contacts(self, final: bool = False) -> None:
-        """Make the contacts' columns: after NARROW those found; ``final``: also those that impacts led to."""
+    def publish_found(self) -> None:
+        """The contacts' columns after NARROW: what overlaps where free flight leads."""
         if not self.found:
-            self._contact_pairs, self.contact_columns = self.no_pairs, self._no_contacts
-            self.contacts.set_current(self.contact_columns)
+            self._publish(self.no_pairs, self._no_contacts)
             return
-        pairs = self.hits[: self.found]
-        if not final:
-            depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))
-            impulse, enabled = np.zeros(self.found), np.ones(self.found, bool)
-        else:
-            was_enabled = self.contact_columns["enabled"]
-            pairs = self._with_new_pairs(pairs)
-            depth, normal, point = self.pair_depth[pairs], self.pair_normal[pairs], self.pair_point[pairs]
-            impulse = self.pair_impulse[pairs]
-            enabled = was_enabled
-            if len(pairs) != self.found:
-                enabled = np.ones(len(pairs), bool)
-                enabled[np.isin(pairs, self._contact_pairs[~was_enabled])] = False
-            self.pair_counters["contacts"] += len(pairs)
-            self.pair_counters["resting_contacts"] += len(self.resting)
+        depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))
+        impulse, enabled = np.zeros(self.found), np.ones(self.found, bool)
+        pairs = self.hits[: self.found].copy()
+        self._publish(pairs, self._columns(pairs, depth, normal, point, impulse, enabled))
+
+    def publish_final(self, touching: np.ndarray, disabled: np.ndarray) -> None:
+        """The contacts' columns after RESPONSE; touching: pairs; disabled: those that were not to push."""
+        pairs = touching[order_of_pairs(self.pair_a[touching], self.pair_b[touching], self.rank)]
+        self.pair_counters["contacts"] += len(pairs)
+        self.pair_counters["resting_contacts"] += len(self.resting)
+        enabled = ~np.isin(pairs, disabled) if len(disabled) else np.ones(len(pairs), bool)
+        depth, normal, point = self.pair_depth[pairs], self.pair_normal[pairs], self.pair_point[pairs]
+        self._publish(pairs, self._columns(pairs, depth, normal, point, self.pair_impulse[pairs], enabled))
+
+    def _columns(
+        self, pairs: np.ndarray, depth: np.ndarray, normal: np.ndarray, point: np.ndarray, impulse: np.ndarray,
+        enabled: np.ndarray,
+    ) -> dict[str, np.ndarray]:  # fmt: skip
         entity = self.table.arrays["entity"]
-        self._contact_pairs = pairs.copy()
-        self.contact_columns = {
+        return {
             "entity_a": entity[self.pair_a[pairs]],
             "entity_b": entity[self.pair_b[pairs]],
             "point": point,
@@ -129,19 +126,10 @@ class PairBuffers:
             "step": np.full(len(pairs), self.world.step_count),
             "enabled": enabled,
         }
-        self.contacts.set_current(self.contact_columns)
 
-    def _with_new_pairs(self, pairs: np.ndarray) -> np.ndarray:
-        """The contacts found and those that only the response brought about, in canonical order."""
-        known = np.zeros(self.pairs, bool)
-        known[self.resting] = True
-        known[self.impact_pairs] = True
-        known[pairs] = False
-        more = np.flatnonzero(known)
-        if not len(more):
-            return pairs
-        joined = np.concatenate((pairs, more))
-        return joined[order_of_pairs(self.pair_a[joined], self.pair_b[joined], self.rank)]
+    def _publish(self, pairs: np.ndarray, columns: dict[str, np.ndarray]) -> None:
+        self._contact_pairs, self.contact_columns = pairs, columns
+        self.contacts.set_current(columns)
 
     def log_impacts(self, pairs: np.ndarray, values: np.ndarray, counts: np.ndarray) -> None:
         """Record the impacts of the step, in the order of their times; values: time, impulse, normal, point."""

@@ -1,138 +1,213 @@
-"""Questions about where things are: which colliders touch a sphere or a box."""
+"""Questions about where things are: what touches a shape, what a ray or a moving shape meets, what is nearest."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import kernel
-from ..framework.hits import Hits
-from ..framework.vectors import add, row, sub
+from ..framework.hits import CastHits, Hits, NearestHits, Neighbours
+from ..framework.services import QueryServices
+from ..framework.vectors import divided, length, row, store
+from .casts import ENDLESS
+from .neighbours import NeighbourSearch
+from .query_code import QueryKernels, query_kernels
+from .tree_build import MAX_LEVELS
 
 if TYPE_CHECKING:
     from .state import PhysicsState
 
 Point = tuple[float, ...]
 
-
-def make_query_kernel(meets: Any) -> Callable[..., int]:
-    """The kernel that tests the candidates of many queries with one shape, over the shapes of a scene."""
-
-    @kernel
-    def touching(
-        offsets, rows, other_offsets, other_rows, centres, sizes, mask, entity, position, offset, shape_of, slots,
-        layers, shapes, found, bounds, like,
-    ):  # fmt: skip
-        """Ids of the candidates that each query touches and whose layer it asks for, ascending; returns how many.
-
-        Candidates of query q: rows[offsets[q]:offsets[q + 1]] and likewise among the others. bounds (m + 1,).
-        """
-        count = 0
-        for q in range(len(offsets) - 1):
-            centre, size = row(centres, q, like), row(sizes, q, like)
-            begin = count
-            for side in range(2):
-                start = offsets[q] if side == 0 else other_offsets[q]
-                stop = offsets[q + 1] if side == 0 else other_offsets[q + 1]
-                for c in range(start, stop):
-                    i = rows[c] if side == 0 else other_rows[c]
-                    shape = shape_of[i]
-                    if layers[slots[shape], i] & mask == 0:
-                        continue
-                    d = sub(add(row(position, i, like), row(offset, i, like)), centre)
-                    if not meets(size, shape, i, d, shapes, like):
-                        continue
-                    place = count  # rows come nearly in order of their ids: each kind of body is sorted
-                    while place > begin and found[place - 1] > entity[i]:
-                        found[place] = found[place - 1]
-                        place -= 1
-                    found[place] = entity[i]
-                    count += 1
-            bounds[q + 1] = count
-        return count
-
-    return touching
+SMALLEST = float(np.finfo(float).tiny)
 
 
-class Queries:
+@kernel
+def unit_vectors(vectors, lengths, units, like):
+    """Lengths and directions of vectors (m, d); zero stays zero."""
+    for i in range(len(vectors)):
+        vector = row(vectors, i, like)
+        lengths[i] = length(vector)
+        store(units, i, divided(vector, lengths[i]) if lengths[i] > 0.0 else vector)
+
+
+class Queries(QueryServices):
     """Answers from the broad phase's boxes, made anew when the bodies have moved since the last question."""
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
         self._stamp: Any = None
+        self._moves = 0  # times that something has moved besides what the state counts
+        self._neighbours = NeighbourSearch(state)
+        self._walk = np.empty((2, MAX_LEVELS + 2))
 
     def forget(self) -> None:
         """The next question looks at the bodies anew."""
-        self._stamp = None
+        self._moves += 1
+
+    # -- what touches a shape ---------------------------------------------------------------------
 
     def spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
-        """What touches each sphere."""
-        return self._many(centres, np.repeat(radii[:, None], centres.shape[1], axis=1), mask, "touching_sphere")
+        half = np.repeat(radii[:, None], centres.shape[1], axis=1)
+        return self._many(SphereCollider, (radii,), centres, half, mask)
 
     def boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
-        """What touches each box."""
-        return self._many((lower + upper) / 2, (upper - lower) / 2, mask, "touching_box")
+        half = (upper - lower) / 2
+        return self._many(AABBCollider, (half,), (lower + upper) / 2, half, mask)
 
     def sphere(self, centre: Point, radius: float, mask: int) -> list[int]:
-        """What touches one sphere; the quick way for a single one."""
-        return self._one(centre, (radius,) * len(centre), mask, "touching_sphere")
+        return self._one(SphereCollider, (np.array((radius,)),), centre, (radius,) * len(centre), mask)
 
     def box(self, lower: Point, upper: Point, mask: int) -> list[int]:
-        """What touches one box."""
         centre = tuple((low + high) / 2 for low, high in zip(lower, upper, strict=True))
-        size = tuple((high - low) / 2 for low, high in zip(lower, upper, strict=True))
-        return self._one(centre, size, mask, "touching_box")
+        half = tuple((high - low) / 2 for low, high in zip(lower, upper, strict=True))
+        return self._one(AABBCollider, (np.array((half,)),), centre, half, mask)
 
-    def _one(self, centre: Point, size: Point, mask: int, kernel_name: str) -> list[int]:
-        touching = self._kernel(kernel_name)
-        if touching is None:
+    def _one(self, component: Any, query: Any, centre: Point, half: Point, mask: int) -> list[int]:
+        kernels = self._kernels(component)
+        if kernels is None:
             return []
-        lower = tuple(c - s for c, s in zip(centre, size, strict=True))
-        upper = tuple(c + s for c, s in zip(centre, size, strict=True))
+        lower = tuple(c - s for c, s in zip(centre, half, strict=True))
+        upper = tuple(c + s for c, s in zip(centre, half, strict=True))
         moving, fixed = (boxes.query_one(lower, upper) for boxes in self._state.broad_phase.partitions)
         ends = np.array((0, len(moving))), np.array((0, len(fixed)))
-        hits = self._touching(
-            touching, ends[0], moving, ends[1], fixed, np.array((centre,)), np.array((size,)), mask
-        )
+        hits = self._touching(kernels, ends[0], moving, ends[1], fixed, query, np.array((centre,)), mask)
         return hits.entities.tolist()
 
-    def _many(self, centres: np.ndarray, sizes: np.ndarray, mask: int, kernel_name: str) -> Hits:
-        touching = self._kernel(kernel_name)
-        if touching is None:
-            return Hits(np.zeros(len(centres) + 1, np.int64), np.empty(0, np.int64))
-        lower, upper = centres - sizes, centres + sizes
+    def _many(self, component: Any, query: Any, centres: np.ndarray, half: np.ndarray, mask: int) -> Hits:
+        kernels = self._kernels(component)
+        if kernels is None:
+            nobody = np.empty(0, np.int64)
+            return Hits(np.zeros(len(centres) + 1, np.int64), nobody, nobody)
+        lower, upper = centres - half, centres + half
         moving, fixed = (boxes.query(lower, upper) for boxes in self._state.broad_phase.partitions)
-        return self._touching(touching, *moving, *fixed, centres, sizes, mask)
+        return self._touching(kernels, *moving, *fixed, query, centres, mask)
 
-    def _kernel(self, name: str) -> Any:
-        """The kernel of that name, with the boxes made ready for it; None if the world has no colliders."""
+    def _touching(
+        self, kernels: QueryKernels, offsets: Any, rows: Any, other_offsets: Any, other_rows: Any, query: Any,
+        centres: Any, mask: int,
+    ) -> Hits:  # fmt: skip
+        found = np.empty(len(rows) + len(other_rows), np.int64)
+        bounds = np.zeros(len(offsets), np.int64)
+        count = kernels.touching(
+            offsets, rows, other_offsets, other_rows, query, centres, mask, *self._columns(), found, bounds,
+            self._state.like,
+        )  # fmt: skip
+        return Hits(bounds, self._state.table.arrays["entity"][found[:count]], found[:count])
+
+    # -- what is near -----------------------------------------------------------------------------
+
+    def nearest(self, points: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray) -> NearestHits:
+        rows, distances, normals, surface = _unanswered(len(points), np.minimum(limits, ENDLESS), points.shape[1])
+        kernels = self._kernels(SphereCollider)
+        if kernels is not None:
+            for boxes in self._state.broad_phase.partitions:
+                if boxes.count:
+                    kernels.nearest(
+                        (np.zeros(len(points)),), points, mask, excluded, *boxes.layout, *self._columns(), rows,
+                        distances, normals, surface, self._state.like,
+                    )  # fmt: skip
+        distances[rows < 0] = np.inf
+        return NearestHits(self._entities(rows), rows, distances, surface, normals)
+
+    def neighbours(self, radius: float, mask: int, askers: np.ndarray | None) -> Neighbours:
+        self._state.refresh_structure()
+        return self._neighbours.find(radius, mask, askers, self._current())
+
+    # -- what is met on the way -------------------------------------------------------------------
+
+    def rays(
+        self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray,
+        only_nearest: bool,
+    ) -> CastHits:  # fmt: skip
+        lengths, units = np.empty(len(origins)), np.empty_like(directions)
+        unit_vectors(directions, lengths, units, self._state.like)
+        query = (np.zeros(len(origins)),)
+        hits = self._cast(SphereCollider, query, origins, units, limits, mask, excluded, only_nearest)
+        way = np.where(hits.found, hits.distance, np.nan)[:, None] * units  # one ray if it is not the nearest only
+        hits.point[...] = origins + way  # more exact than the middle of a contact
+        return hits
+
+    def shapes(
+        self, component: type[Any], columns: dict[str, np.ndarray], positions: np.ndarray, displacements: np.ndarray,
+        mask: int, excluded: np.ndarray, only_nearest: bool,
+    ) -> CastHits:  # fmt: skip
+        lengths, units = np.empty(len(positions)), np.empty_like(displacements)
+        unit_vectors(displacements, lengths, units, self._state.like)
+        query = tuple(column for name, column in columns.items() if name != "offset")
+        starts = positions + columns["offset"]
+        return self._cast(component, query, starts, units, lengths, mask, excluded, only_nearest)
+
+    def _cast(
+        self, component: type[Any], query: Any, starts: np.ndarray, units: np.ndarray, limits: np.ndarray, mask: int,
+        excluded: np.ndarray, only_nearest: bool,
+    ) -> CastHits:  # fmt: skip
+        kernels = self._kernels(component)
+        partitions = [boxes for boxes in self._state.broad_phase.partitions if boxes.count]
+        limits = np.minimum(limits, ENDLESS)
+        if only_nearest:
+            rows, distances, normals, points = _unanswered(len(starts), limits, starts.shape[1])
+        else:
+            room = 1 + sum(boxes.count for boxes in partitions)
+            rows, distances = np.empty(room, np.int64), np.empty(room)
+            normals, points = np.empty((room, starts.shape[1])), np.empty((room, starts.shape[1]))
+            distances[-1] = limits[0]
+        count = 0
+        for boxes in partitions if kernels is not None else ():
+            count = kernels.cast(
+                query, starts, units, mask, excluded, only_nearest, *boxes.layout, self._walk, *self._columns(),
+                count, rows, distances, normals, points, self._state.like,
+            )  # fmt: skip
+        if only_nearest:
+            entity = self._entities(rows)
+        else:
+            entity = self._entities(rows[:count])
+            order = np.lexsort((entity, distances[:count]))
+            entity, rows, distances = entity[order], rows[order], distances[order]
+            normals, points = normals[order], points[order]
+        missed = rows < 0
+        whole = np.maximum(limits, SMALLEST)  # at a length of zero the distance is zero too
+        fractions = np.where(limits < ENDLESS, distances / whole, 0.0)
+        fractions[missed], distances[missed] = 1.0, np.inf
+        return CastHits(entity, rows, distances, points, normals, fractions)
+
+    # -- what the kernels get ---------------------------------------------------------------------
+
+    def _current(self) -> Any:
+        """Changes whenever bodies may have moved."""
+        return self._state.motion_stamp, self._moves, self._state.structure, self._state.table.static_version
+
+    def _kernels(self, component: Any) -> QueryKernels | None:
+        """The kernels that ask with that shape, with the boxes made ready for them; None if nothing has a collider."""
         state = self._state
         state.refresh_structure()
         if state.code is None:
             return None
-        touching = getattr(state.kernels, name)
-        if touching is None:
-            raise ValueError(f"no plugin has registered the shape that {name} needs")
-        stamp = (state.motion_stamp, state.table.version, state.table.static_version)
+        stamp = self._current()
         if stamp != self._stamp:
             state.refresh_rotation()
             state.broad_phase.trees_now()
             self._stamp = stamp
-        return touching
+        return query_kernels(state.world.registry, state.code.shapes, component)
 
-    def _touching(
-        self, touching: Any, offsets: Any, rows: Any, other_offsets: Any, other_rows: Any, centres: Any, sizes: Any,
-        mask: int,
-    ) -> Hits:  # fmt: skip
-        state = self._state
-        found = np.empty(len(rows) + len(other_rows), np.int64)
-        bounds = np.zeros(len(offsets), np.int64)
-        arrays, scratch = state.table.arrays, state.scratch
-        count = touching(
-            offsets, rows, other_offsets, other_rows, centres, sizes, mask, arrays["entity"], arrays["position"],
-            scratch["offset"], scratch["shape"], state.slots, state.table.stacks["collider.layer"],
-            state.world_shapes, found, bounds, state.like,
+    def _columns(self) -> tuple[Any, ...]:
+        """Those of the bodies: entity, position, offset, shape, the collider that has the layers, layers, shapes."""
+        arrays, scratch = self._state.table.arrays, self._state.scratch
+        layers = self._state.table.stacks["collider.layer"]
+        return (
+            arrays["entity"], arrays["position"], scratch["offset"], scratch["shape"], scratch["material"], layers,
+            self._state.world_shapes,
         )  # fmt: skip
-        return Hits(bounds, found[:count])
+
+    def _entities(self, rows: np.ndarray) -> np.ndarray:
+        """The ids of rows, -1 where there is none."""
+        return np.where(rows < 0, -1, self._state.table.arrays["entity"][rows])
+
+
+def _unanswered(count: int, limits: np.ndarray, dimensions: int) -> tuple[np.ndarray, ...]:
+    """Rows, distances, normals and points before anything is found."""
+    nothing = np.full((count, dimensions), np.nan)
+    distances = np.array(np.broadcast_to(limits, count))
+    return np.full(count, -1), distances, nothing, nothing.copy()

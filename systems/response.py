@@ -8,9 +8,9 @@ import numpy as np
 
 from ..framework.schedule import Phase, System
 from ..framework.settings import MIXING_RULES
+from .contact_solver import ContactSolver
 from .event_queue import EventQueue
 from .impacts import pairs_of_bodies
-from .narrow_phase import order_of_pairs
 
 if TYPE_CHECKING:
     from .state import PhysicsState
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class Response(System):
     """Bounces pairs that approach, at the time they meet on their path, and holds those that rest.
 
-    Reads the contacts and their ``enabled``, the path of the step, restitution; writes position, linear_velocity and
-    the contacts' normal_impulse, and logs the impacts.
+    Reads the contacts and their ``enabled``, the path of the step, restitution, friction; writes position,
+    linear_velocity and the contacts' normal_impulse, and logs the impacts.
     """
 
     phase = Phase.RESPONSE
@@ -29,78 +29,106 @@ class Response(System):
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
         self._queue = EventQueue(state.dimensions)
+        state.contact_solver = self._solver = ContactSolver(state)
 
     def process(self, dt: float) -> None:
         state = self._state
         if not state.contacts_ready:
             state.narrow_phase.process(dt)
-        if not state.found:
+        if not state.pairs and not self._solver.memory.count:
             return
-        state.take_enabled()
+        disabled = state.take_enabled()
         self._start_paths()
+        self._solver.predict(dt, disabled)
         struck = self._impacts(dt)
-        self._resting(dt, struck)
-        state.publish_contacts(final=True)
+        resting = self._resting(dt, struck)
+        self._solver.solve(dt, resting)
+        self._publish(disabled)
 
     def _start_paths(self) -> None:
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         count = state.table.count
-        state.clear_pairs()
+        state.pair_impulse[: state.pairs] = 0.0
         start = "previous_position" if state.moved else "position"
         np.copyto(scratch["origin"][:count], arrays[start][:count])
+        state.start_positions = arrays["previous_position"]
         if not state.moved:  # the phase is run alone: the bodies stand where they overlap
+            np.copyto(arrays["previous_position"][:count], arrays["position"][:count])
             np.copyto(scratch["path_velocity"][:count], arrays["linear_velocity"][:count])
             np.copyto(scratch["start_velocity"][:count], arrays["linear_velocity"][:count])
             state.path_degree = 1
-        scratch["gravity_share"][:count] = -1.0
 
     def _impacts(self, dt: float) -> np.ndarray:
+        """Bounce what bounces; returns how often each row was struck."""
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
-        settings, count = self.world.settings, state.table.count
+        settings, count, stacks = self.world.settings, state.table.count, state.table.stacks
         struck = np.zeros(count, np.int64)
+        restitution = stacks["collider.restitution"]
+        if not state.pairs or not restitution[:, :count].any():
+            return struck
         offsets = np.empty(count + 2, np.int64)
-        neighbours = np.empty(2 * state.pairs + state.found, np.int64)
-        pairs_of_bodies(
-            state.pair_a, state.pair_b, state.pairs, state.hits, state.found, count, offsets, neighbours
-        )
+        neighbours = np.empty(3 * state.pairs, np.int64)
+        used = pairs_of_bodies(
+            state.pair_a, state.pair_b, state.pairs, state.hits, state.found, self._solver.supported, count, offsets,
+            neighbours,
+        )  # fmt: skip
+        if used == 2 * state.pairs:
+            return struck
         queue = self._queue
         queue.begin()
         curves = (scratch["path_second"], scratch["path_third"])
         motion = (scratch["origin"], scratch["path_velocity"], *curves, state.path_degree)
-        threshold = settings.restitution_threshold
+        rules = (MIXING_RULES.index(settings.restitution_mixing), MIXING_RULES.index(settings.friction_mixing))
+        threshold, slop = settings.restitution_threshold, settings.slop
+        limits = (
+            -1.0 if threshold is None else threshold, -1.0 if slop is None else slop, settings.max_impacts_per_step,
+        )  # fmt: skip
         while not state.kernels.resolve_impacts(
-            dt, state.pair_a, state.pair_b, state.responds, offsets, neighbours, state.rank, scratch["shape"],
-            scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
-            scratch["start_velocity"], arrays["inverse_mass"], motion, state.table.stacks["collider.restitution"],
-            state.slots, MIXING_RULES.index(settings.restitution_mixing), -1.0 if threshold is None else threshold,
-            settings.max_impacts_per_step, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
+            dt, state.pair_a, state.pair_b, state.responds, offsets, neighbours[:used], state.rank, scratch["size"],
+            scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
+            scratch["start_velocity"], arrays["inverse_mass"], motion, restitution, stacks["collider.friction"], rules,
+            state.slots, limits, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
             state.pair_point, state.pair_depth, *queue.arrays, state.like,
         ):  # fmt: skip
             queue.grow(state.found)
         state.log_impacts(queue.log_pair, queue.log_value, queue.counts)
         return struck
 
-    def _resting(self, dt: float, struck: np.ndarray) -> None:
+    def _resting(self, dt: float, struck: np.ndarray) -> np.ndarray:
+        """The pairs that neither bounce nor are apart."""
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         settings = self.world.settings
         threshold, slop = settings.restitution_threshold, settings.slop
-        resting = state.kernels.find_resting(
-            state.pair_a, state.pair_b, state.pairs, state.responds, state.hits, state.found, scratch["shape"],
+        result = np.empty(state.pairs, np.int64)
+        if not state.pairs:
+            return result
+        count = state.kernels.find_resting(
+            dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.pair_depth, scratch["shape"],
             scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
-            scratch["start_velocity"], state.table.stacks["collider.restitution"], state.slots,
-            MIXING_RULES.index(settings.restitution_mixing), -1.0 if threshold is None else threshold,
-            scratch["gravity_share"], struck, state.pair_impulse, state.like,
+            scratch["start_velocity"], state.start_positions, scratch["size"],
+            state.table.stacks["collider.restitution"], state.slots, MIXING_RULES.index(settings.restitution_mixing),
+            -1.0 if threshold is None else threshold, -1.0 if slop is None else slop, scratch["gravity_share"], struck,
+            self._solver.supported, self._solver.change, self._solver.travels * dt, state.pair_impulse,
+            state.pair_parts, result, state.like,
         )  # fmt: skip
-        state.resting = resting
-        if not len(resting):
+        return result[:count]
+
+    def _publish(self, disabled: np.ndarray) -> None:
+        """The contacts as they are now."""
+        state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
+        if not state.pairs:
+            state.publish_final(state.no_pairs, disabled)
             return
-        resting = resting[order_of_pairs(state.pair_a[resting], state.pair_b[resting], state.rank)]
-        state.kernels.solve_resting(
-            dt, resting, state.pair_a, state.pair_b, scratch["shape"], scratch["offset"], state.world_shapes,
-            arrays["position"], arrays["linear_velocity"], scratch["origin"], arrays["previous_position"],
-            arrays["inverse_mass"], scratch["size"], -1.0 if slop is None else slop, state.pair_impulse,
-            state.pair_normal, state.pair_point, state.pair_depth, state.like,
+        involved = np.zeros(state.pairs, bool)
+        for pairs in (state.hits[: state.found], state.resting, state.impact_pairs):
+            involved[pairs] = True
+        touching = np.empty(state.pairs, np.int64)
+        count = state.kernels.find_touching(
+            state.pair_a, state.pair_b, state.pairs, state.responds, involved, scratch["shape"], scratch["offset"],
+            state.world_shapes, arrays["position"], scratch["size"], state.pair_impulse, state.pair_depth,
+            state.pair_normal, state.pair_point, touching, state.like,
         )  # fmt: skip
+        state.publish_final(touching[:count], disabled)
 
     def reason(self) -> str:
         if not self._state.collides:

@@ -1,139 +1,176 @@
-"""Contacts at rest, in their plain form: bodies that overlap at the end of the step must not approach.
-
-Impulses are summed over the contacts of all bodies (projected Gauss-Seidel), every contact allowed to close the gap
-it had at the start; the bodies concerned take the step again with the velocities that result. Overlap that remains is
-pushed out in position alone, a part per step, so that repairing it never makes energy.
-"""
+"""Contacts at rest: which pairs they are, and their geometry at the start of the step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
+from ..framework.compilation import inlined, kernel, part
+from ..framework.vectors import add, add_scaled, dot, row, store, sub
+from .impacts import mix, mix_friction, reach, slop_of, smaller
 
-from ..framework.compilation import allocating_kernel, part
-from ..framework.vectors import add, add_scaled, dot, row, scale, store, sub
-from .impacts import gravity_share, mix
-
-ITERATIONS = 24
-SLOP = 0.005  # of the size of the smaller body: overlap left alone, so that contacts persist
-PUSH_RATE = 0.2  # of the overlap beyond the slop, per step
-PUSH_LIMIT = 0.05  # of the size, per step
+ENTRY_ITERATIONS = 24
+STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
+SAME_PLACE = 1e-9  # of the size: a gap of rounding errors is none
 
 
-@part
-def solve(resting, pair_a, pair_b, normals, room, impulse, velocity, inverse_mass, like):
-    """Impulses (added to ``impulse``) after which no contact closes faster than ``room`` allows."""
-    for _ in range(ITERATIONS):
-        for r in range(len(resting)):
-            c = resting[r]
-            a, b = pair_a[c], pair_b[c]
-            normal = row(normals, r, like)
-            speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
-            total = max(0.0, impulse[r] - (speed + room[r]) / (inverse_mass[a] + inverse_mass[b]))
-            change = total - impulse[r]
-            impulse[r] = total
-            if change != 0.0:
-                store(velocity, a, add_scaled(row(velocity, a, like), normal, -change * inverse_mass[a]))
-                store(velocity, b, add_scaled(row(velocity, b, like), normal, change * inverse_mass[b]))
+@inlined
+def between(a, b, position, offset, like):
+    """From the centre of a's shape to that of b's."""
+    at_a, at_b = add(row(position, a, like), row(offset, a, like)), add(row(position, b, like), row(offset, b, like))
+    return sub(at_b, at_a)
 
 
-def make_resting_kernels(evaluate: Any) -> tuple[Callable[..., Any], Callable[..., None]]:
-    """The kernels over the shapes of a scene: (find the contacts at rest, solve them)."""
+def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any], Callable[..., None], Any]:
+    """The kernels over the shapes of a scene: (find the contacts at rest, linearise them, measure what touches)."""
 
     @part
-    def geometry(a, b, position, offset, shape_of, shapes, like):
-        centre = add(row(position, a, like), row(offset, a, like))
-        d = sub(add(row(position, b, like), row(offset, b, like)), centre)
-        hit, depth, normal, point = evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
-        return hit, depth, normal, add(centre, point)
+    def touch(a, b, d, shape_of, shapes, like):
+        """The pair function and its answer."""
+        return evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
 
-    @allocating_kernel
+    @part
+    def entry(a, b, d, travel, at_end, slop, shape_of, shapes, like):
+        """Gap at the start, normal and point where the pair first touches on its way from d to d + travel.
+
+        That is the start if it touches there, and the end if it touches nowhere or that is asked for. A touch of
+        corners is none.
+        """
+        low, high, t = 0.0, 1.0, 1.0 if at_end else 0.0
+        normal, point, depth, chosen = like, like, 0.0, 0.0
+        for look in range(ENTRY_ITERATIONS):
+            at = add_scaled(d, travel, t)
+            _, depth_now, n, p = touch(a, b, at, shape_of, shapes, like)
+            if corner(shape_of[a], a, shape_of[b], b, at, slop, shapes, like):
+                depth_now = min(depth_now, -slop)  # so that the search goes on
+            if look == 1 or at_end or depth_now >= 0.0:  # the end, or a time in touch
+                normal, point, depth, chosen = n, p, depth_now, t
+                if look == 0 or depth_now < 0.0:
+                    break
+                high = t
+            else:
+                low = t
+            if abs(depth_now) <= slop and look > 1:
+                break
+            t = 1.0
+            if look > 0:
+                t = chosen + depth / dot(travel, normal)  # where its plane says, if that is between the two
+                if not low < t < high or look % 4 == 3:
+                    t = 0.5 * (low + high)
+        return -depth - chosen * dot(travel, normal), normal, point
+
+    @kernel
     def find_resting(
-        pair_a, pair_b, pairs, responds, hits, found, shape_of, offset, shapes, position, velocity, start_velocity,
-        restitution, slots, rule, fixed_threshold, share, struck, pair_impulse, like,
+        dt, pair_a, pair_b, pairs, responds, pair_depth, shape_of, offset, shapes, position, velocity, start_velocity,
+        start, size, restitution, slots, rule, fixed_threshold, fixed_slop, share, struck, supported, change, travelled,
+        pair_impulse, pair_parts, result, like,
     ):  # fmt: skip
-        """Indices of the pairs that overlap after the impacts and are not bouncing off each other."""
-        touching = np.zeros(pairs, np.bool_)
-        for h in range(found):
-            touching[hits[h]] = True
-        result = np.empty(pairs, np.int64)
+        """Pairs whose gap is below the margin after the impacts and that are not bouncing; returns how many.
+
+        pair_depth (m,) is that of the free flight, and still holds for bodies neither struck nor supported. supported
+        (n,), change (n, d): see ``support``; travelled: the displacement by the latter, over it.
+        """
         count = 0
         for c in range(pairs):
-            a, b = pair_a[c], pair_b[c]
             if not responds[c]:
                 continue
-            if struck[a] == 0 and struck[b] == 0 and not touching[c]:
+            a, b = pair_a[c], pair_b[c]
+            slop = slop_of(a, b, size, fixed_slop)
+            margin = reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like)
+            hit = struck[a] > 0 or struck[b] > 0
+            carried = supported[a] or supported[b]
+            near = pair_depth[c] >= -margin and not hit
+            if not near and not hit and not carried:
                 continue
-            hit, _, normal, _ = geometry(a, b, position, offset, shape_of, shapes, like)
-            if not hit:
-                continue
+            d = between(a, b, position, offset, like)
+            _, depth, normal, _ = touch(a, b, d, shape_of, shapes, like)
+            if depth < -margin:
+                if hit or not carried:
+                    continue
+                # Supports may push too much in the prediction; who meets in free flight is a contact all the same.
+                free = between(a, b, position, offset, like)
+                if supported[a]:
+                    free = add_scaled(free, row(change, a, like), travelled)
+                if supported[b]:
+                    free = add_scaled(free, row(change, b, like), -travelled)
+                _, depth, normal, _ = touch(a, b, free, shape_of, shapes, like)
+                if depth < -margin:
+                    continue
+            pair_parts[c] = STAYS
             e = mix(rule, restitution[slots[shape_of[a]], a], restitution[slots[shape_of[b]], b])
             if e > 0.0:
-                threshold = fixed_threshold
-                if threshold < 0.0:
-                    threshold = max(
-                        gravity_share(a, share, velocity, start_velocity, like),
-                        gravity_share(b, share, velocity, start_velocity, like),
-                    )
+                threshold = fixed_threshold if fixed_threshold >= 0.0 else (margin - slop) / dt
                 speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
-                if speed > (threshold if pair_impulse[c] > 0.0 else 0.0):
-                    continue  # on its way out
+                if depth < 0.0 and speed < -threshold:
+                    continue  # the next step's impact
+                if speed > 0.0:
+                    pair_parts[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY
+                if pair_impulse[c] > 0.0 and speed > threshold:
+                    _, before, _, _ = touch(a, b, between(a, b, start, offset, like), shape_of, shapes, like)
+                    if before < 0.0:
+                        continue  # on its way out
+            if corner(shape_of[a], a, shape_of[b], b, d, slop, shapes, like):
+                continue
             result[count] = c
             count += 1
-        return result[:count]
+        return count
 
-    @allocating_kernel
-    def solve_resting(
-        dt, resting, pair_a, pair_b, shape_of, offset, shapes, position, velocity, origin, start, inverse_mass, size,
-        fixed_slop, pair_impulse, pair_normal, pair_point, pair_depth, like,
+    @kernel
+    def linearise(
+        resting, slot, pair_a, pair_b, shape_of, offset, shapes, position, start, size, friction, slots, rule,
+        fixed_slop, inverse_mass, pair_impulse, pair_parts, pair_normal, pair_point, normals, gaps, masses, frictions,
+        extents, parting, like,
     ):  # fmt: skip
-        """Solve the contacts ``resting`` (canonical order) and move their bodies anew from ``origin``."""
-        count = len(resting)
-        impulse = np.zeros(count)
-        room = np.empty(count)
-        normals = np.empty((count, len(like)))
-        loaded = np.zeros(len(position), np.bool_)
-        for r in range(count):
-            c = resting[r]
+        """The contacts' columns: normal and gap where the step starts, and what the two bodies make of it together.
+
+        resting (m,): pairs; slot (m,): where each contact's columns are.
+        """
+        for r in range(len(resting)):
+            c, k = resting[r], slot[r]
             a, b = pair_a[c], pair_b[c]
-            _, depth, normal, point = geometry(a, b, position, offset, shape_of, shapes, like)
-            travel = sub(
-                sub(row(position, b, like), row(start, b, like)), sub(row(position, a, like), row(start, a, like))
-            )
-            room[r] = max(0.0, -depth - dot(travel, normal)) / dt
-            store(normals, r, normal)
+            slop = slop_of(a, b, size, fixed_slop)
+            d = between(a, b, start, offset, like)
+            travel = sub(between(a, b, position, offset, like), d)
+            gap, normal, point = entry(a, b, d, travel, pair_parts[c] != STAYS, slop, shape_of, shapes, like)
+            if pair_impulse[c] > 0.0 and dot(normal, row(pair_normal, c, like)) <= 0.0:
+                normal = row(pair_normal, c, like)  # coincident centres have parted: not back again
+            point = add(point, add(row(start, a, like), row(offset, a, like)))
+            store(normals, k, normal)
             store(pair_normal, c, normal)
             store(pair_point, c, point)
-            pair_depth[c] = depth
-        solve(resting, pair_a, pair_b, normals, room, impulse, velocity, inverse_mass, like)
-        for r in range(count):
-            if impulse[r] > 0.0:
-                loaded[pair_a[resting[r]]] = loaded[pair_b[resting[r]]] = True
-        for i in range(len(position)):
-            if loaded[i] and inverse_mass[i] > 0.0:
-                store(position, i, add_scaled(row(origin, i, like), row(velocity, i, like), dt))
-        closed = False
-        for r in range(count):
-            if impulse[r] > 0.0 and room[r] > 0.0:
-                room[r] = 0.0
-                closed = True
-        if closed:  # they have come as near as they may: none keeps the speed it came with, else it bounces off later
-            solve(resting, pair_a, pair_b, normals, room, impulse, velocity, inverse_mass, like)
-        for r in range(count):
-            pair_impulse[resting[r]] += impulse[r]
-        for r in range(count):
-            c = resting[r]
-            a, b = pair_a[c], pair_b[c]
-            extent = min(size[a], size[b])
-            if extent == 0.0:  # a point: the other body sets the scale
-                extent = max(size[a], size[b])
-            slop = fixed_slop if fixed_slop >= 0.0 else SLOP * extent
-            hit, depth, normal, _ = geometry(a, b, position, offset, shape_of, shapes, like)
-            if hit and depth > slop:
-                push = min(PUSH_RATE * (depth - slop), PUSH_LIMIT * extent) / (inverse_mass[a] + inverse_mass[b])
-                store(position, a, sub(row(position, a, like), scale(normal, push * inverse_mass[a])))
-                store(position, b, add(row(position, b, like), scale(normal, push * inverse_mass[b])))
+            gaps[k] = gap
+            masses[k] = 1.0 / (inverse_mass[a] + inverse_mass[b])
+            # After a blow at time t the body seems to come from dv t behind: no overlap to be pushed out.
+            parting[k] = pair_parts[c] == PARTS or (pair_impulse[c] > 0.0 and gap > 0.0)
+            extents[k] = smaller(a, b, size)
+            frictions[k] = mix_friction(rule, friction[slots[shape_of[a]], a], friction[slots[shape_of[b]], b])
 
-    return find_resting, solve_resting
+    @kernel
+    def find_touching(
+        pair_a, pair_b, pairs, responds, involved, shape_of, offset, shapes, position, size, pair_impulse, pair_depth,
+        pair_normal, pair_point, result, like,
+    ):  # fmt: skip
+        """Pairs that touch now that all is done, or pushed each other in the step; returns how many.
+
+        involved (m,): pairs that may; those that push nobody are looked at in any case.
+        """
+        count = 0
+        for c in range(pairs):
+            if responds[c] and not involved[c]:
+                continue
+            a, b = pair_a[c], pair_b[c]
+            hit, depth, normal, point = touch(a, b, between(a, b, position, offset, like), shape_of, shapes, like)
+            pushed = pair_impulse[c] > 0.0
+            if responds[c] and depth >= -SAME_PLACE * smaller(a, b, size):
+                hit = True
+            if not hit and not pushed:
+                continue
+            pair_depth[c] = max(0.0, depth)
+            if not pushed:
+                store(pair_normal, c, normal)
+            store(pair_point, c, add(point, add(row(position, a, like), row(offset, a, like))))
+            result[count] = c
+            count += 1
+        return count
+
+    return find_resting, linearise, find_touching

@@ -15,11 +15,10 @@ import types
 from dataclasses import dataclass
 from typing import Any
 
-from ..components import AABBCollider, SphereCollider
-from ..framework.compilation import deep_hash, inlined
+from ..framework.compilation import deep_hash, inlined, kernel
 from ..framework.component import Component
 from ..framework.registry import Registry, Shape
-from ..framework.vectors import negative, row, sub
+from ..framework.vectors import negative, row, store, sub
 
 
 @dataclass(frozen=True)
@@ -29,21 +28,21 @@ class ShapeCode:
     evaluate(shape_a, a, shape_b, b, d, shapes, like) -> (hit, depth, normal, point)
         rows a and b, d = centre of b - centre of a; normal from a to b, point relative to a's centre;
         depth is negative while the two are apart
+    corner(shape_a, a, shape_b, b, d, slop, shapes, like) -> whether the two touch at a corner only, which is no contact
     shape_bounds(shape, row, shapes, like) -> half extents
     write_world(shape, row, shapes, world, turn, axes, like); writes the parameters as turned into ``world``
-    meets_sphere, meets_box(size, shape, row, d, shapes, like) -> hit; for queries, None if no plugin has that shape
     """
 
     shapes: tuple[Shape, ...]
     evaluate: Any
+    corner: Any
     shape_bounds: Any
     write_world: Any
     turns: bool
-    meets_sphere: Any
-    meets_box: Any
 
 
 _made: dict[tuple[Any, ...], ShapeCode] = {}
+_half_extents: dict[tuple[int, Shape], Any] = {}
 
 
 def shape_code(registry: Registry, components: list[type[Component]], dimensions: int) -> ShapeCode:
@@ -65,24 +64,42 @@ def _make(registry: Registry, shapes: tuple[Shape, ...], dimensions: int) -> Sha
         scope[f"bounds{index}"] = shape.bounds
         scope[f"turned{index}"] = shape.turned
     source += _evaluate_source(registry, shapes, scope)
+    source += _corner_source(registry, shapes, scope)
     source += _bounds_source(shapes)
     source += _world_source(shapes)
-    queries = {"meets_sphere": (SphereCollider, "Query(size[0])"), "meets_box": (AABBCollider, "Query(size)")}
-    for name, (component, parameters) in queries.items():
-        if component in registry.shapes:
-            source += _query_source(registry, shapes, scope, name, component, parameters)
-    module = _module("\n".join(source) + "\n", scope)
+    module = source_module("\n".join(source) + "\n", scope)
     return ShapeCode(
         shapes,
         inlined(module.evaluate),
+        inlined(module.corner),
         inlined(module.shape_bounds),
         inlined(module.write_world),
         any(shape.turned is not None for shape in shapes),
-        *(inlined(getattr(module, name)) if hasattr(module, name) else None for name in queries),
     )
 
 
-def _parameters(shapes: tuple[Shape, ...], index: int, at: str) -> str:
+def half_extents_kernel(shape: Shape, dimensions: int) -> Any:
+    """A kernel (shapes, half, like) that writes the half extents (n, d) of the boxes around n shapes of one kind.
+
+    shapes: a tuple with one tuple of the shape's parameters, each an array of n.
+    """
+    key = (dimensions, shape)
+    if key not in _half_extents:
+        scope: dict[str, Any] = {"row": row, "bounds0": shape.bounds}
+        scope["Shape0"] = collections.namedtuple("Shape0", shape.parameters)
+        source = [f'"""Bounds of {shape.component.__name__}, {dimensions}D."""', "", *_bounds_source((shape,))]
+        bounds = inlined(source_module("\n".join(source) + "\n", scope).shape_bounds)
+
+        @kernel
+        def half_extents(shapes, half, like):
+            for i in range(len(half)):
+                store(half, i, bounds(0, i, shapes, like))
+
+        _half_extents[key] = half_extents
+    return _half_extents[key]
+
+
+def parameters_source(shapes: tuple[Shape, ...], index: int, at: str) -> str:
     """Source of the parameter tuple of shape ``index`` at row ``at``."""
     shape = shapes[index]
     parts = []
@@ -112,7 +129,7 @@ def _evaluate_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[
             assert pair is not None
             scope[f"pair{i}_{j}"] = pair.function
             in_order = pair.first is first.component
-            one, two = _parameters(shapes, i, "a"), _parameters(shapes, j, "b")
+            one, two = parameters_source(shapes, i, "a"), parameters_source(shapes, j, "b")
             indent = "    "
             if many:
                 last = i == j == len(shapes) - 1
@@ -133,30 +150,32 @@ def _evaluate_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[
     return [*lines, "    return hit, depth, normal, point", ""]
 
 
+def _corner_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[str, Any]) -> list[str]:
+    """Only of the pairs that know corners; nearly all do not."""
+    lines = ["def corner(shape_a, a, shape_b, b, d, slop, shapes, like):"]
+    for i, first in enumerate(shapes):
+        for j, second in enumerate(shapes):
+            pair = registry.pair(first.component, second.component)
+            if pair is None or pair.corner is None or pair.first is not first.component:
+                continue
+            scope[f"corner{i}_{j}"] = pair.corner
+            one, two = parameters_source(shapes, i, "a"), parameters_source(shapes, j, "b")
+            lines += [f"    if shape_a == {i} and shape_b == {j}:"]
+            lines += [f"        return corner{i}_{j}({one}, {two}, d, slop)"]
+            if i != j:
+                one, two = parameters_source(shapes, i, "b"), parameters_source(shapes, j, "a")
+                lines += [f"    if shape_a == {j} and shape_b == {i}:"]
+                lines += [f"        return corner{i}_{j}({one}, {two}, negative(d), slop)"]
+    return [*lines, "    return False", ""]
+
+
 def _bounds_source(shapes: tuple[Shape, ...]) -> list[str]:
     lines = ["def shape_bounds(shape, at, shapes, like):"]
     for index in range(len(shapes) - 1):
         lines.append(f"    if shape == {index}:")
-        lines.append(f"        return bounds{index}({_parameters(shapes, index, 'at')}, like)")
+        lines.append(f"        return bounds{index}({parameters_source(shapes, index, 'at')}, like)")
     last = len(shapes) - 1
-    return [*lines, f"    return bounds{last}({_parameters(shapes, last, 'at')}, like)", ""]
-
-
-def _query_source(
-    registry: Registry, shapes: tuple[Shape, ...], scope: dict[str, Any], name: str, component: Any, parameters: str
-) -> list[str]:
-    """A query's own shape against each of the scene's; a shape that has no pair with it is never hit."""
-    scope[f"Query_{name}"] = collections.namedtuple(f"Query_{name}", registry.shapes[component].parameters)
-    lines = [f"def {name}(size, shape, at, d, shapes, like):"]
-    for index, shape in enumerate(shapes):
-        pair = registry.pair(component, shape.component)
-        if pair is None:
-            continue
-        scope[f"{name}{index}"] = pair.function
-        query, other = parameters.replace("Query", f"Query_{name}"), _parameters(shapes, index, "at")
-        arguments = f"{query}, {other}, d" if pair.first is component else f"{other}, {query}, negative(d)"
-        lines += [f"    if shape == {index}:", f"        return {name}{index}({arguments})[0]"]
-    return [*lines, "    return False", ""]
+    return [*lines, f"    return bounds{last}({parameters_source(shapes, last, 'at')}, like)", ""]
 
 
 def _world_source(shapes: tuple[Shape, ...]) -> list[str]:
@@ -166,7 +185,7 @@ def _world_source(shapes: tuple[Shape, ...]) -> list[str]:
         if shape.turned is None:
             continue
         lines += [f"    if shape == {index}:", "        if turn:"]
-        lines.append(f"            new = turned{index}({_parameters(shapes, index, 'at')}, axes[at])")
+        lines.append(f"            new = turned{index}({parameters_source(shapes, index, 'at')}, axes[at])")
         for place, name in enumerate(shape.parameters):
             lines.append(_assign(shape, index, place, name, f"new[{place}]", 12))
         lines.append("        else:")
@@ -185,7 +204,7 @@ def _assign(shape: Shape, index: int, place: int, name: str, value: str, indent:
     return f"{space}value = {value}\n{space}for k in range(len(like)):\n{space}    {target}[at, k] = value[k]"
 
 
-def _module(source: str, scope: dict[str, Any]) -> types.ModuleType:
+def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:
     """A module of that source, findable by name (numba looks functions up there) and by tracebacks."""
     functions = [value for value in scope.values() if hasattr(value, "py_func")]
     digest = hashlib.sha256((source + "".join(deep_hash(f) for f in functions)).encode()).hexdigest()[:24]

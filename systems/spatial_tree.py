@@ -8,7 +8,7 @@ an infinite box overlaps all it covers. Same input, same output in the same orde
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,11 @@ class SpatialTree:
             lower, upper, start, stop, directory, keys, self._order, self._cells, self._boxes, self._codes, frame, like
         )
         self.count = int(table[int(frame[tree_build.LEVELS]), tree_build.END])
+
+    @property
+    def layout(self) -> tuple[NDArray[Any], ...]:
+        """(table, frame, directory, order, boxes) as the kernels take them that walk through the tree."""
+        return self._table, self._frame, self._directory, self._order, self._boxes
 
     @property
     def boxes(self) -> Corners:

@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..components import Collider, RigidBody, Transform
+from ..components import AABBCollider, Collider, RigidBody, Transform
 from ..framework.adoption import Adoption
 from ..framework.bodies import Bodies
 from ..framework.component import Component
 from ..framework.contacts import Contacts, EntityLookup
-from ..framework.hits import Hits
 from ..framework.services import PhysicsServices
 from ..framework.table import Table
+from . import preparation
 from .energy import kinetic_energy, momentum, potential_energy
 from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
+from .levels import COUNTERS, LevelCheck, arrange, check_sensors, in_order
 from .pair_buffers import PairBuffers
 from .queries import Queries
 from .rotation import axes_of
@@ -31,8 +32,8 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     SCRATCH = (
         ("start_velocity", "vector", float), ("path_velocity", "vector", float), ("origin", "vector", float),
-        ("offset", "vector", float), ("size", "scalar", float), ("shape", "scalar", np.int8),
-        ("gravity_share", "scalar", float), ("lower", "vector", float), ("upper", "vector", float),
+        ("size", "scalar", float), ("material", "scalar", np.int64), ("gravity_share", "scalar", float),
+        ("lower", "vector", float), ("upper", "vector", float),
     )  # fmt: skip
     CURVES = (("path_second", "vector", float), ("path_third", "vector", float))
 
@@ -51,19 +52,22 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.table.add_array("inverse_mass")
         self.scratch: dict[str, np.ndarray] = {}  # per row, made anew within a step or when rows have moved
         self._allocate_scratch()
-        self.adoption = Adoption(self.table, Transform, _makes_body)
+        self.adoption = Adoption(self.table, Transform, _makes_body, LevelCheck(self.table, world.registry))
         self.bodies = Bodies(self.table)
         self.lookup = EntityLookup(self._living_with)
         self.contacts = Contacts(dimensions, self.lookup, self._running_step)
         self.queries = Queries(self)
         PairBuffers.__init__(self, dimensions)
+        self.pair_counters.update(dict.fromkeys(COUNTERS, 0))
         self._integrators: dict[str, Integrator] = {}
-        self._structure: Any = None
+        self.prepared: set[type[Any]] = set()  # colliders whose kernels are kept ready
+        self.structure: Any = None  # changes whenever what refresh_structure makes does
         self.code: ShapeCode | None = None
         self.kernels: SceneKernels | None = None
         self.shapes: tuple[Any, ...] = ()
         self.world_shapes: tuple[Any, ...] = ()
         self.slots = np.empty(0, np.int64)
+        self._set_levels(np.empty((1, 0), np.int8))
         self.rank = np.empty(0, np.int64)
         self.axes = np.empty((0, dimensions, dimensions))
         self.turned = False
@@ -79,26 +83,45 @@ class PhysicsState(PairBuffers, PhysicsServices):
         """What follows from which bodies and colliders there are."""
         table = self.table
         structure = (table.version, table.members_version, tuple(table.component_types), self.world.settings.geometry)
-        if structure == self._structure:
+        if structure == self.structure:
             return
-        self._structure = structure
+        self.structure = structure
         self._allocate_scratch()
-        count, arrays, scratch = table.count, table.arrays, self.scratch
+        count, arrays = table.count, table.arrays
         arrays["linear_velocity"][table.stops[1] : count] = 0.0
-        present = [c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[:count].any()]
-        present.sort(key=lambda c: (self.world.registry.shapes[c].cost, c.__name__))
-        shape_of = scratch["shape"]
-        shape_of[:count] = -1
-        precise = self.world.settings.geometry == "precise"
-        for index in range(len(present)) if precise else reversed(range(len(present))):
-            shape_of[:count][table.has_mask(present[index])[:count]] = index  # the last one written decides
-        self.collides = bool((shape_of[: table.stops[1]] >= 0).any())
-        self.slots = np.array([table.slot_of(component) for component in present], np.int64)
+        known = table.stacked_types(Collider.stack)
+        present = [c for c in known if c in self.prepared or table.has_mask(c)[:count].any()]
+        present = in_order(self.world.registry, present)
+        masks = [table.has_mask(component)[:count] for component in present]
+        levels = arrange(np.array(masks).reshape(len(present), count))
+        slots = np.array([table.slot_of(component) for component in present], np.int64)
+        if present:
+            self.scratch["material"][:count] = slots[levels[-1]]
+        if self.world.settings.geometry == "bounds" and len(levels) > 1:  # shapes that are never tested cost nothing
+            levels = levels[:1]
+            used = [index for index, c in enumerate(present) if c in self.prepared or (levels == index).any()]
+            levels = np.where(levels < 0, -1, np.searchsorted(used, levels)).astype(np.int8)
+            present, slots = [present[index] for index in used], slots[used]
+        self._set_levels(levels)
+        boxes = present.index(AABBCollider) if AABBCollider in present else len(present)
+        self._stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
+        self.collides = bool((levels[0, : table.stops[1]] >= 0).any())
+        self.slots = slots
         self.rank = np.empty(count, np.int64)
         self.rank[np.argsort(arrays["entity"][:count], kind="stable")] = np.arange(count)
         self.code = shape_code(self.world.registry, present, self.dimensions) if present else None
         self.kernels = kernels_for(self.code) if self.code else None
         self._bind_shapes()
+
+    def _set_levels(self, levels: np.ndarray) -> None:
+        """Room for what follows from the levels (levels, n); the last one decides, and others know it as the shape."""
+        count, capacity = len(levels), self.table.capacity
+        self.levels = np.full((count, capacity), -1, np.int8)
+        self.levels[:, : levels.shape[1]] = levels
+        self.level_offsets = np.zeros((count, capacity, self.dimensions))
+        self.scratch["shape"], self.scratch["offset"] = self.levels[-1], self.level_offsets[-1]
+        self._stretches = np.zeros(levels.shape[1], bool)
+        self.outgrown = np.zeros(capacity if count > 1 else 0, bool)
 
     def _bind_shapes(self) -> None:
         """The parameter columns of each shape: as given, and as they are in the world."""
@@ -124,6 +147,9 @@ class PhysicsState(PairBuffers, PhysicsServices):
         rotation = self.table.column("rotation")
         self.turned = bool((rotation if self.dimensions == 2 else rotation[:, 1:]).any())
         self.axes = axes_of(rotation, self.dimensions) if self.turned else self.axes[:0]
+        if len(self.levels) > 1:  # a box that is stretched may reach out of the level around it
+            turned = rotation != 0.0 if self.dimensions == 2 else rotation[:, 1:].any(axis=1)
+            self.outgrown[: self.table.count] = self._stretches & turned
         self._bind_shapes()
 
     def _allocate_scratch(self) -> None:
@@ -174,6 +200,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         dynamic = table.stops[0]
         np.divide(1.0, arrays["mass"][:dynamic], out=arrays["inverse_mass"][:dynamic])
         arrays["inverse_mass"][dynamic : table.count] = 0.0
+        check_sensors(self)
         self.limits_speed = not bool(np.isnan(arrays["max_linear_speed"][:dynamic]).all())
         self.refresh_rotation()
         self.moved = False
@@ -206,10 +233,11 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.table.arrays["applied_frame"][: self.table.stops[0]] = -1  # else state_hash would tell frame rates apart
 
     def tracking_state(self) -> Any:
-        return self.contact_events.touching
+        return self.contact_events.touching, self.contact_solver.memory
 
     def restore_tracking(self, state: Any) -> None:
-        self.contact_events.touching = state
+        self.contact_events.touching, memory = state
+        self.contact_solver.restore(memory)
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -229,40 +257,14 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.forces.evaluations = 0
         self.pair_counters = dict.fromkeys(self.pair_counters, 0)
 
-    def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
-        return self.queries.spheres(centres, radii, mask)
-
-    def query_sphere(self, centre: tuple[float, ...], radius: float, mask: int) -> list[int]:
-        return self.queries.sphere(centre, radius, mask)
-
-    def query_box(self, lower: tuple[float, ...], upper: tuple[float, ...], mask: int) -> list[int]:
-        return self.queries.box(lower, upper, mask)
-
-    def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
-        return self.queries.boxes(lower, upper, mask)
-
     def prepare(self, components: tuple[type[Any], ...]) -> None:
-        """Step a small world of such bodies, so that all they need is compiled."""
-        for component in components:
-            if not (isinstance(component, type) and issubclass(component, Component)):
-                raise TypeError(f"prepare takes component types, got {component!r}")
-        colliders = [c for c in components if issubclass(c, Collider)]
-        if not colliders:
-            colliders = [c for c in self.table.stacked_types(Collider.stack) if self.table.has_mask(c).any()]
-        with type(self.world)(*self.world.plugins, settings=self.world.settings) as small:
-            for restitution in (0.0, 1.0):
-                for collider in colliders:
-                    for x in (0.0, 0.1, 50.0, 50.5):
-                        place = Transform([x, *(0.0,) * (self.dimensions - 1)])
-                        body = RigidBody(linear_velocity=[-x, *(0.0,) * (self.dimensions - 1)])
-                        small.create_entity(place, body, collider.sample(restitution=restitution))
-                    small.create_entity(Transform([0.0] * self.dimensions), collider.sample(restitution=restitution))
-            for _ in range(3):
-                small.step()
-        small.close()
+        """See :mod:`preparation`."""
+        preparation.prepare(self, components)
 
-    def refresh_queries(self) -> None:
-        self.queries.forget()
+    def keep_ready(self, colliders: set[type[Any]]) -> None:
+        """From now on the kernels are those for these shapes and others, whether there are bodies of them or not."""
+        self.prepared |= colliders
+        self.structure = None
 
     def _running_step(self) -> int | None:
         return self.world.step_count if self.table.in_step else None
@@ -275,6 +277,8 @@ class PhysicsState(PairBuffers, PhysicsServices):
     broad_phase: Any
     narrow_phase: Any
     contact_events: Any
+    contact_solver: Any
+    start_positions: np.ndarray  # where the bodies were at the start of the step
 
 
 def _makes_body(component: type[Component]) -> bool:

@@ -3,11 +3,49 @@
 from __future__ import annotations
 
 from ..framework.compilation import inlined, kernel
-from ..framework.vectors import item, row
-from .tree_build import BASE, BEGIN, CELLS, END, LEVELS, STRIDE
+from ..framework.vectors import item, replace, row
+from .tree_build import BASE, BEGIN, CELLS, END, FINE, HIGHEST, LEVELS, LOWEST, ORIGIN, REACH, STRIDE
 from .tree_pairs import cover
 
 SORTED_HERE = 64  # results up to this many are sorted by insertion; longer ones by numpy, from Python
+
+
+@inlined
+def parts_of(first, n0, n1, n2, table, level):
+    """How many parts the runs of cells have that :func:`tree_pairs.cover` has found, and whether any wraps round.
+
+    If one does, each run has two parts, of which the first is what lies beyond the level's end.
+    """
+    last = first + (n1 - 1) * table[level, STRIDE + 1] + (n2 - 1) * table[level, STRIDE + 2]
+    wraps = 1 if first < 0 or last + n0 > table[level, CELLS] else 0
+    return (n1 * n2) << wraps, wraps
+
+
+@inlined
+def cells_of(part, wraps, first, n0, n1, n2, table, directory, level):
+    """The sorted objects begin..end-1 in one part."""
+    base, size = table[level, BASE], table[level, CELLS]
+    run = part >> wraps
+    layer = 0 if n2 == 1 else run // n1  # a division takes longer than all the rest
+    number = first + (run - layer * n1) * table[level, STRIDE + 1] + layer * table[level, STRIDE + 2]
+    if wraps == 0:
+        return directory[base + number], directory[base + number + n0]
+    number %= size
+    beyond = max(number + n0 - size, 0)
+    if part & 1 == 0:
+        return directory[base], directory[base + beyond]
+    return directory[base + number], directory[base + number + n0 - beyond]
+
+
+@inlined
+def uncertainty(point, frame):
+    """Per axis more than all rounding errors of distances between the point and the boxes that are in cells."""
+    result = point
+    for k in range(len(point)):
+        lowest = abs(frame[ORIGIN + k] + frame[LOWEST + k] * frame[FINE])
+        highest = abs(frame[ORIGIN + k] + frame[HIGHEST + k] * frame[FINE])
+        result = replace(result, k, REACH * (abs(item(point, k)) + max(lowest, highest) + frame[FINE]))
+    return result
 
 
 @inlined
@@ -38,16 +76,9 @@ def query_box(low, high, table, frame, directory, order, boxes, rows, found):
     for level in range(int(frame[LEVELS]) + 1):
         if table[level, END] > table[level, BEGIN]:
             first, n0, n1, n2 = cover(low, high, table, frame, level)
-            base, size = table[level, BASE], table[level, CELLS]
-            for k in range(n1 * n2):
-                number = first + (k % n1) * table[level, STRIDE + 1] + (k // n1) * table[level, STRIDE + 2]
-                beyond = 0
-                if number < 0 or number + n0 > size:
-                    number %= size
-                    beyond = max(number + n0 - size, 0)
-                    begin, end = directory[base], directory[base + beyond]
-                    found = _scan(low, high, begin, end, boxes, order, rows, found)
-                begin, end = directory[base + number], directory[base + number + n0 - beyond]
+            parts, wraps = parts_of(first, n0, n1, n2, table, level)
+            for part in range(parts):
+                begin, end = cells_of(part, wraps, first, n0, n1, n2, table, directory, level)
                 found = _scan(low, high, begin, end, boxes, order, rows, found)
     if found - start <= SORTED_HERE:
         for i in range(start + 1, found):

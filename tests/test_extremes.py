@@ -62,31 +62,33 @@ def test_c2_coincident_with_relative_velocity(d, w, e):
 @makers
 @pytest.mark.parametrize("e", [0.0, 1.0])
 def test_c21_overlapping_with_equal_velocities(maker, e):
-    """Nothing to divide by: the overlap is repaired in position, both keep their velocity to the bit."""
+    """Nothing to divide by: the overlap is repaired, both keep their velocity."""
     world = make_world()
     a, b = maker(world, 0.0, (3.0, 1.0), restitution=e), maker(world, 0.7, (3.0, 1.0), restitution=e)
     kept = Conserved(world)
     run(world, 240)
     for entity in (a, b):
-        assert velocity(world, entity).tolist() == [3.0, 1.0]
+        np.testing.assert_allclose(velocity(world, entity), [3.0, 1.0], rtol=4 * EPS)
     assert position(world, b)[0] - position(world, a)[0] > 0.99
     assert not len(world.contacts.impacts)
     kept.check()
 
 
-def test_a_heap_of_overlapping_bodies_spreads_without_speed():
-    """500 discs thrown into 10 x 10: pushed apart in position, so there is no energy at the end as there was none."""
+def test_a_heap_of_overlapping_bodies_spreads_slowly():
+    """500 discs thrown into 10 x 10: deep overlap is pushed out in position, so hardly any speed comes of it.
+
+    RESPONSE's limit for this heap: 1.5 sizes a second.
+    """
     world = make_world()
     for place in np.random.default_rng(1).uniform(0, 10, (500, 2)):
         ball(world, place)
     total = []
-    kept = Conserved(world)
     for _ in range(60):
         world.step()
         total.append(world.contacts.depth.sum())
-    assert (world.bodies.linear_velocity == 0).all()
+        assert np.linalg.norm(world.bodies.linear_velocity, axis=1).max() < 1.5
     assert total[-1] < 0.5 * total[0]
-    kept.check()
+    np.testing.assert_allclose(world.momentum(), 0, atol=1e-12)  # of 500 bodies at up to 1.5 m/s
 
 
 # -- mass and restitution ------------------------------------------------------------------------

@@ -1,0 +1,146 @@
+"""Compiling ahead: a small world of the same plugins and settings goes through all that a step and the queries do.
+
+Kernels compile when they are called first, and which ones a world calls depends on what happens in it. So things
+happen here: bodies strike and rest, move fast and slowly, alone and by the hundreds, and are asked about.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..components import Collider, RigidBody, SphereCollider, Transform
+from ..framework.bodies import SelectedBodies
+from ..framework.component import Component
+from ..framework.schedule import ForceSystem
+from ..framework.world import World
+from .few_boxes import FEW
+from .levels import in_order
+
+if TYPE_CHECKING:
+    from .state import PhysicsState
+
+STEPS = 3  # contacts begin, stay and end
+LANE = 8.0  # m between things that are not to meet; samples of shapes are about one metre wide
+
+
+def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
+    """Compile what bodies of these types will need beside those there are; TypeError for what is no component type.
+
+    The world keeps to the kernels for all these shapes from now on, whether bodies of each exist or not.
+    """
+    for component in components:
+        if not (isinstance(component, type) and issubclass(component, Component)):
+            raise TypeError(f"prepare takes component types, got {component!r}")
+    table, registry = state.table, state.world.registry
+    wanted = {c for c in components if issubclass(c, Collider)}
+    wanted.update(c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[: table.count].any())
+    registry.require_pairs(sorted(wanted | state.prepared, key=lambda c: c.__name__))
+    for component in sorted(wanted, key=lambda c: c.__name__):
+        table.check_component_type(component)
+        table.add_component_type(component)
+    state.keep_ready(wanted)
+    colliders = sorted(state.prepared, key=lambda c: c.__name__)
+    fine = [c for c in colliders if c is not SphereCollider and in_order(registry, (c, SphereCollider))[1] is c]
+    with_levels = SphereCollider in colliders and bool(fine)
+    for crowd, layered in ((0, False), (FEW + 8, False), (0, True))[: 3 if with_levels else 2]:
+        small = World(*state.world.plugins, settings=state.world.settings)
+        try:
+            if crowd:
+                small.add_system(_NoForce())
+            _strike_and_rest(small, colliders)
+            if colliders:
+                _crowd(small, colliders[0], crowd)
+            for collider in fine if layered else ():
+                small.create_entity(Transform(np.zeros(state.dimensions)), SphereCollider(LANE), collider.sample())
+            for _ in range(STEPS):
+                small.step()
+            _ask(small, colliders)
+        finally:
+            small.close()
+    _evaluate_forces(state)
+
+
+class _NoForce(ForceSystem):
+    """With a force system of the game, integrators evaluate forces at every stage."""
+
+    def add_forces(self, bodies: Any, time: float) -> None:
+        pass
+
+
+def _strike_and_rest(world: World, colliders: list[type[Collider]]) -> None:
+    """Pairs of all shapes that meet within a step or overlap from the start: struck and bouncing, or pressed and held
+    by friction; against all kinds of body."""
+    d, speed = world.dimensions, 0.25 / world.settings.dt
+    lane = 0
+    for collider in colliders or [None]:
+        for restitution in (0.0, 1.0):
+            for kind in ("static", "kinematic", "dynamic"):
+                for distance in (0.25, 0.5, 0.75, 1.0, 1.25):
+                    lane += 1
+                    here, there = np.zeros(d), np.zeros(d)
+                    here[1] = there[1] = LANE * lane
+                    there[0] = distance
+                    towards = -np.eye(d)[0]
+                    body = RigidBody(
+                        linear_velocity=restitution * speed * towards, constant_force=10.0 * towards,
+                        linear_damping=0.1, max_linear_speed=2.0 * speed,
+                    )  # fmt: skip
+                    for transform, mover in ((Transform(here), RigidBody(kind=kind)), (Transform(there), body)):
+                        shape = [collider.sample(restitution=restitution, friction=0.5)] if collider else []
+                        world.create_entity(transform, mover, *shape)
+
+
+def _crowd(world: World, collider: type[Collider], count: int) -> None:
+    """So many moving and so many static bodies: enough for trees, of several levels because speeds differ."""
+    places = np.zeros((count, world.dimensions))
+    places[:, 0] = 2.0 * LANE + LANE * np.arange(count)
+    for index, place in enumerate(places):
+        velocity = np.zeros(world.dimensions)
+        velocity[1] = 4.0 ** (index % 6) / world.settings.dt
+        world.create_entity(Transform(place), RigidBody(linear_velocity=velocity), collider.sample())
+        world.create_entity(Transform(place), collider.sample())
+
+
+def _ask(world: World, colliders: list[type[Collider]]) -> None:
+    """One question of each kind, of one and of many."""
+    d = world.dimensions
+    origin, ahead = np.zeros(d), np.eye(d)[0]
+    points, ways = np.zeros((2, d)), np.ones((2, d))
+    world.query_point(origin)
+    world.query_sphere(origin, 1.0)
+    world.query_aabb(origin, ahead + 1.0)
+    world.query_spheres(points, 1.0)
+    world.query_aabbs(points, points + 1.0)
+    world.query_nearest(origin)
+    world.query_nearests(points)
+    world.neighbours(1.0)
+    world.ray_cast(origin, ahead)
+    world.ray_cast(origin, ahead, only_nearest=True)
+    world.ray_casts(points, ways)
+    for collider in colliders:
+        shape = collider.sample()
+        world.shape_cast(shape, origin, ahead)
+        world.shape_cast(shape, origin, ahead, only_nearest=True)
+        world.shape_casts(shape, points, ways)
+
+
+def _evaluate_forces(state: PhysicsState) -> None:
+    """Force systems of the game are pure: asked about the bodies there are, they compile what they call.
+
+    They get columns in place if all bodies have what they require, else copies that cannot be written: to numba two
+    types.
+    """
+    dynamic, force = state.bodies.dynamic, state.table.arrays["force"].copy()
+    try:
+        for system in state.world.force_systems:
+            has = np.ones(len(dynamic), bool)
+            for component in system.requires:
+                has &= dynamic.has(component)
+            if has.any() and has.all():
+                system.add_forces(dynamic, state.world.time)
+            if has.any():
+                system.add_forces(SelectedBodies(state.table, np.flatnonzero(has)), state.world.time)
+    finally:
+        state.table.arrays["force"][...] = force
