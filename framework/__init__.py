@@ -12,7 +12,7 @@ from .errors import (
     StepError,
     UnhandledPairError,
 )
-from .hits import Hits
+from .hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
 from .plan import Plan
 from .registry import Plugin
 from .schedule import ForceSystem, Phase, System
@@ -23,6 +23,8 @@ from .world import World
 __all__ = [
     "Bodies",
     "CaromError",
+    "CastHit",
+    "CastHits",
     "Column",
     "Component",
     "Contact",
@@ -30,6 +32,9 @@ __all__ = [
     "ForceSystem",
     "Hits",
     "MissingComponentError",
+    "NearestHit",
+    "NearestHits",
+    "Neighbours",
     "NoPhysicsError",
     "Phase",
     "Plan",

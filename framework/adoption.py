@@ -22,11 +22,22 @@ Handles = dict[int, Component]
 
 
 class Adoption:
-    """Adopts the components of entities that form a body: those with ``anchor`` and any of ``partners``."""
+    """Adopts the components of entities that form a body: those with ``anchor`` and any of ``partners``.
 
-    def __init__(self, table: Table, anchor: type[Component], is_partner: Callable[[type[Any]], bool]) -> None:
+    ``check_together(fresh, members, gone)`` may refuse what does not go together on one entity: the handles to adopt
+    and those adopted, by type and entity, and who loses which.
+    """
+
+    def __init__(
+        self,
+        table: Table,
+        anchor: type[Component],
+        is_partner: Callable[[type[Any]], bool],
+        check_together: Callable[[Any, Any, Any], None] = lambda *_: None,
+    ) -> None:
         self.table = table
         self.anchor = anchor
+        self._check_together = check_together
         self._is_partner = is_partner  # component type -> whether it makes a body together with the anchor
         self._members: dict[type[Component], Handles] = {}
         self._log: esper_bridge.ChangeLog | None = None  # of this world's context
@@ -51,6 +62,7 @@ class Adoption:
         come, left = self._bodies(touched)
         gone, fresh = self._differences(types, touched, come, left)
         self._check(fresh)
+        self._check_together(fresh, self._members, gone)
         self._pending = {}
         return self._apply(gone, come, left, fresh)
 

@@ -1,40 +1,32 @@
-"""Compiled kernels: numba dispatchers with a disk cache of our own.
+"""Compiled kernels: numba dispatchers that keep their machine code on disk, say when they compile, and can be timed.
 
-numba's own cache has three properties a framework cannot live with: it does not notice an edit in a function that
-lives in another file, it misses for functions made by factories (closures over other kernels), and the import of a
-module fails where it finds no folder to write to. The cache here stores one file per kernel and signature, named by a
-hash of everything the machine code depends on: byte code, constants, options, captured values and, recursively, every
-function called.
+The cache is ours (:mod:`kernel_cache`). What compiling and loading costs a process stands in :data:`log`; a program
+that shows it itself joins ``log.listeners``, for all others there is the logger ``carom``: a line of level WARNING when
+the first kernel compiles, because seconds without a word look like a hang, one of level INFO for each, and one of level
+DEBUG for each that is loaded.
 """
 
 from __future__ import annotations
 
-import contextlib
-import getpass
-import hashlib
-import operator
-import os
-import pickle
-import tempfile
+import gc
+import logging
 import time
-import types
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numba
-import numpy as np
-from numba.core import compiler
-from numba.core.caching import _Cache
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
-from numba.core.serialize import dumps
+from numba.core.registry import CPUDispatcher
+
+from .deep_hash import deep_hash as deep_hash
+from .kernel_cache import CACHE_FOLDER_VARIABLE, KernelCache, cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-machine_code = operator.attrgetter("library")  # of numba's compile result
-
-CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
+logger = logging.getLogger("carom")
 
 
 @dataclass
@@ -43,15 +35,17 @@ class CompilationLog:
 
     compiled: list[tuple[str, float]] = field(default_factory=list)  # (kernel, seconds)
     loaded: int = 0
-    listeners: list[Callable[[str], None]] = field(default_factory=list)
+    waited: float = 0.0  # s, for kernels to be compiled or loaded
+    listeners: list[Callable[[str], None]] = field(default_factory=list)  # told the kernel that begins to compile
+    announced: bool = False
 
     @property
     def seconds(self) -> float:
+        """Spent compiling."""
         return sum(seconds for _, seconds in self.compiled)
 
 
 log = CompilationLog()
-
 
 # A wrapper for C callers costs compile time and serves none of our kernels.
 _OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
@@ -64,12 +58,12 @@ def kernel(function: Function) -> Function:
     cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
     passed in tuples. Use :func:`allocating_kernel` for those that must.
     """
-    return _cached(numba.njit(**_OPTIONS, _nrt=False)(function))
+    return _kept(numba.njit(**_OPTIONS, _nrt=False)(function))
 
 
 def allocating_kernel(function: Function) -> Function:
     """Like :func:`kernel`, for functions that make arrays; keep hot loops out of them."""
-    return _cached(numba.njit(**_OPTIONS)(function))
+    return _kept(numba.njit(**_OPTIONS)(function))
 
 
 def part(function: Function) -> Function:
@@ -83,173 +77,124 @@ def inlined(function: Function) -> Function:
     return numba.njit(**options)(function)  # type: ignore[return-value]
 
 
-def _cached(dispatcher: Any) -> Any:
+class Wait:
+    """A context manager around compiling and loading: notes the time, and keeps other threads out.
+
+    own: seconds without those of waits inside it, once it is over.
+    """
+
+    _running: ClassVar[list[Wait]] = []
+
+    def __enter__(self) -> Wait:
+        global_compiler_lock.acquire()
+        self.own = 0.0
+        self._collecting = gc.isenabled()
+        gc.disable()  # the compiler makes millions of objects that live on; looking through them takes a twentieth
+        self._running.append(self)
+        self._started = time.perf_counter()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running.pop()
+        if self._collecting:
+            gc.collect(0)  # once now, instead of at some moment soon, which would be taken for run time
+            gc.enable()
+        seconds = time.perf_counter() - self._started
+        self.own += seconds
+        if self._running:
+            self._running[-1].own -= seconds
+        else:
+            log.waited += seconds
+        global_compiler_lock.release()
+
+
+class Kernel(CPUDispatcher):
+    """numba's dispatcher, with the cost of compiling and loading noted."""
+
+    def compile(self, sig: Any) -> Any:
+        with Wait() as wait:
+            known, loaded = len(self.overloads), self._cache_hits[sig]
+            entry_point = super().compile(sig)
+            was_loaded = self._cache_hits[sig] > loaded
+            was_compiled = len(self.overloads) > known and not was_loaded
+        if was_loaded:
+            log.loaded += 1
+            logger.debug("loaded %s for %s", self.py_func.__name__, sig)
+        elif was_compiled:
+            log.compiled.append((self.py_func.__qualname__, wait.own))
+        return entry_point
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
+        """What numba calls for arguments of new types: looks at them, then compiles."""
+        with Wait():
+            return super()._compile_for_args(*args, **kws)
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Called once per new type of argument; the first time loads a good part of numba."""
+        with Wait():
+            return super().typeof_pyval(val)
+
+    def _reduce_class(self) -> type[CPUDispatcher]:
+        return Kernel  # in cached files, even while the kernel is timed
+
+
+class TimedKernel(Kernel):
+    """What all kernels are while :func:`time_calls` is on: calls from Python are timed."""
+
+    def __call__(self, *args: Any) -> Any:
+        waited = log.waited
+        started = time.perf_counter_ns()
+        result = Kernel.__call__(self, *args)
+        elapsed = time.perf_counter_ns() - started
+        if _timing is not None:
+            _timing(self.py_func.__name__, elapsed, log.waited != waited)
+        return result
+
+
+_kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()  # all there are
+_timing: Callable[[str, int, bool], None] | None = None
+
+
+def time_calls(record: Callable[[str, int, bool], None] | None) -> None:
+    """From now on call ``record(kernel, nanoseconds, compiled)`` after each call of a kernel; None: no more.
+
+    compiled: whether that call had to compile or load it first. Kernels change their class for it, so that nothing at
+    all is added to a call that is not timed; one that is costs about 0.3 microseconds more.
+    """
+    global _timing
+    _timing = record
+    for dispatcher in list(_kernels):
+        dispatcher.__class__ = Kernel if record is None else TimedKernel
+
+
+def timing() -> bool:
+    """Whether calls are timed at the moment."""
+    return _timing is not None
+
+
+def _kept(dispatcher: Any) -> Any:
     if isinstance(dispatcher, Dispatcher):  # a plain function when NUMBA_DISABLE_JIT is set
-        dispatcher._cache = KernelCache(dispatcher)  # type: ignore[attr-defined]
+        dispatcher.__class__ = Kernel if _timing is None else TimedKernel
+        dispatcher._cache = KernelCache(dispatcher, _announce)  # type: ignore[attr-defined]
+        _kernels.add(dispatcher)  # type: ignore[arg-type]
     return dispatcher
 
 
-def cache_folder() -> Path | None:
-    """The first folder that can be written: the environment's choice, the user's cache, a temporary one; else None."""
-    chosen = os.environ.get(CACHE_FOLDER_VARIABLE)
-    candidates = [Path(chosen)] if chosen else []
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    with contextlib.suppress(RuntimeError):  # no home folder
-        candidates.append((Path(base) if base else Path.home() / ".cache") / "carom")
-    with contextlib.suppress(OSError, KeyError, ImportError):  # no user name
-        candidates.append(Path(tempfile.gettempdir()) / f"carom-{getpass.getuser()}")
-    for folder in candidates:
-        if _usable(folder):
-            return folder
-    return None
-
-
-def _usable(folder: Path) -> bool:
-    """Whether ``folder`` exists or can be made, is writable and is ours: machine code is loaded from it."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        owner = getattr(os, "getuid", None)
-        return os.access(folder, os.W_OK) and (owner is None or folder.stat().st_uid == owner())
-    except OSError:
-        return False
-
-
-class KernelCache(_Cache):
-    """numba's cache interface over one file per (deep hash, signature, processor)."""
-
-    def __init__(self, dispatcher: Any) -> None:
-        self._dispatcher = dispatcher
-        self._enabled = True
-        self._started: dict[Any, float] = {}
-        self._hash: str | None = None
-
-    @property
-    def cache_path(self) -> str:
-        return str(cache_folder() or "")
-
-    def enable(self) -> None:
-        self._enabled = True
-
-    def disable(self) -> None:
-        self._enabled = False
-
-    def flush(self) -> None:
+def _announce(dispatcher: Any) -> None:
+    """Say that a kernel is about to compile."""
+    for listener in log.listeners:
+        listener(dispatcher.py_func.__qualname__)
+    if not log.announced and not log.listeners:
+        log.announced = True
         folder = cache_folder()
-        for path in folder.glob(f"{self._stem()}-*") if folder else ():
-            path.unlink(missing_ok=True)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        target_context.refresh()
-        path = self._path(sig, target_context.codegen())
-        if self._enabled and path is not None and path.exists():
-            # A damaged or half-readable file is a miss: the kernel is compiled again and the file replaced.
-            with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):
-                payload = pickle.loads(path.read_bytes())
-                result = compiler.CompileResult._rebuild(target_context, *payload)
-                log.loaded += 1
-                return result
-        self._started[sig] = time.perf_counter()
-        for listener in log.listeners:
-            listener(self._dispatcher.py_func.__qualname__)
-        return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        started = self._started.pop(sig, None)
-        if started is not None:
-            name = self._dispatcher.py_func.__qualname__
-            log.compiled.append((name, time.perf_counter() - started))
-        path = self._path(sig, data.codegen)
-        if not self._enabled or path is None or machine_code(data).has_dynamic_globals or data.lifted:
-            return
-        with contextlib.suppress(OSError):  # a full or vanished disk costs speed, never the run
-            handle, temporary = tempfile.mkstemp(dir=path.parent)
-            with os.fdopen(handle, "wb") as file:
-                file.write(dumps(data._reduce()))
-            os.replace(temporary, path)
-
-    def _stem(self) -> str:
-        if self._hash is None:
-            self._hash = deep_hash(self._dispatcher)
-        return f"{self._dispatcher.py_func.__name__}-{self._hash[:32]}"
-
-    def _path(self, sig: Any, codegen: Any) -> Path | None:
-        folder = cache_folder()
-        if folder is None:
-            return None
-        key = hashlib.sha256(repr((sig, codegen.magic_tuple())).encode()).hexdigest()
-        return folder / f"{self._stem()}-{key[:24]}.kernel"
-
-
-def deep_hash(function: Any) -> str:
-    """A hash of ``function`` and of everything its machine code depends on, stable between processes."""
-    digest = hashlib.sha256(repr((numba.__version__, np.__version__)).encode())
-    _feed(function, digest, set())
-    return digest.hexdigest()
-
-
-def _feed(value: Any, digest: Any, seen: set[int]) -> None:
-    """Add ``value`` to ``digest``; functions are followed into what they call, each once."""
-    if isinstance(value, Dispatcher):
-        digest.update(repr(sorted(value.targetoptions.items())).encode())
-        value = value.py_func
-    if hasattr(value, "carom_depends_on"):  # code written by hand, see vectors
-        value = value.carom_depends_on
-    if isinstance(value, types.FunctionType):
-        if id(value) in seen:
-            digest.update(b"again")
-            return
-        seen.add(id(value))
-        _feed_code(value.__code__, digest)
-        captured = [cell.cell_contents for cell in value.__closure__ or ()]
-        for item in [*captured, *(value.__defaults__ or ())]:
-            _feed(item, digest, seen)
-        for name, item in _referenced_globals(value):
-            digest.update(name.encode())
-            _feed(item, digest, seen)
-    elif isinstance(value, (tuple, list)):
-        digest.update(f"{type(value).__name__}{len(value)}".encode())
-        for item in value:
-            _feed(item, digest, seen)
-    elif isinstance(value, type):
-        digest.update(f"{value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}".encode())
-    elif isinstance(value, np.ndarray):
-        digest.update(repr((value.dtype.str, value.shape)).encode() + value.tobytes())
-    elif isinstance(value, types.ModuleType):
-        digest.update(value.__name__.encode())
-    else:
-        digest.update(f"{type(value).__qualname__}{value!r}".encode() if _is_plain(value) else b"")
-        digest.update(type(value).__qualname__.encode())
-
-
-def _is_plain(value: Any) -> bool:
-    """Values whose repr is the same in every process (no addresses)."""
-    return isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic))
-
-
-def _feed_code(code: types.CodeType, digest: Any) -> None:
-    digest.update(code.co_code)
-    digest.update(repr((code.co_names, code.co_varnames, code.co_freevars)).encode())
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            _feed_code(constant, digest)
+        if folder is not None:
+            logger.warning(
+                "carom: compiling kernels that are not in %s yet; this takes some seconds, once: later runs load them "
+                "(carom warm-up compiles ahead)", folder
+            )  # fmt: skip
         else:
-            digest.update(repr(constant).encode())
-
-
-def _referenced_globals(function: types.FunctionType) -> list[tuple[str, Any]]:
-    """The globals the function names; through a module, the attributes that its code names too."""
-    names = set(_all_names(function.__code__))
-    found: list[tuple[str, Any]] = []
-    for name in sorted(names & function.__globals__.keys()):
-        item = function.__globals__[name]
-        found.append((name, item))
-        if isinstance(item, types.ModuleType):
-            attributes = sorted(names & vars(item).keys())
-            members = ((attribute, getattr(item, attribute)) for attribute in attributes)
-            found += [(f"{name}.{a}", m) for a, m in members if isinstance(m, (Dispatcher, int, float, tuple))]
-    return found
-
-
-def _all_names(code: types.CodeType) -> list[str]:
-    nested = [c for c in code.co_consts if isinstance(c, types.CodeType)]
-    return [*code.co_names, *(name for inner in nested for name in _all_names(inner))]
+            logger.warning(
+                "carom: compiling kernels, which takes some seconds in every run: there is no folder that can be "
+                "written to keep them (%s names one)", CACHE_FOLDER_VARIABLE
+            )  # fmt: skip
+    logger.info("compiling %s (%d so far, %.1f s)", dispatcher.py_func.__name__, len(log.compiled), log.seconds)

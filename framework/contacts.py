@@ -79,21 +79,28 @@ class ContactRows:
         """(a, b, contact) for contacts of an entity that has ``first`` with one that has ``second``.
 
         The contact is oriented from a to b. Entities that have been deleted meanwhile are skipped, also those deleted
-        while iterating.
+        while iterating; so are contacts that are not enabled.
         """
         entities = zip(self._columns["entity_a"].tolist(), self._columns["entity_b"].tolist(), strict=True)
         for index, (a, b) in enumerate(entities):
+            if not self._counts(index):
+                continue
             if self._lookup.has(a, first) and self._lookup.has(b, second):
                 yield a, b, self.row(index)
             elif self._lookup.has(b, first) and self._lookup.has(a, second):
                 yield b, a, self.row(index).flipped()
 
     def of(self, entity: int) -> list[Contact]:
-        """The contacts of one entity, each seen from it (the normal points away from it)."""
+        """The enabled contacts of one entity, each seen from it (the normal points away from it)."""
         c = self._columns
-        rows = np.flatnonzero((c["entity_a"] == entity) | (c["entity_b"] == entity))
-        found = (self.row(int(index)) for index in rows)
+        rows = np.flatnonzero((c["entity_a"] == entity) | (c["entity_b"] == entity)).tolist()
+        found = (self.row(index) for index in rows if self._counts(index))
         return [contact if contact.entity_a == entity else contact.flipped() for contact in found]
+
+    def _counts(self, index: int) -> bool:
+        """Whether that row is a contact for those who ask pair by pair: a disabled one counts as not touching."""
+        enabled = self._columns.get("enabled")
+        return enabled is None or bool(enabled[index])
 
 
 class EntityLookup:

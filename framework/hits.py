@@ -1,19 +1,28 @@
-"""Answers to many queries at once."""
+"""Answers to queries: lists of ids for many questions at once, and hits with a place.
+
+Columns named ``row`` and ``rows`` are places in the columns of ``world.bodies``; they hold until the next structural
+change, as views do.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
 
 
 class Hits(Sequence[np.ndarray]):
-    """``hits[i]`` are the ids that query i found, ascending; as columns: ``entities[offsets[i]:offsets[i + 1]]``."""
+    """``hits[i]`` are the ids that query i found, ascending; as columns: ``entities[offsets[i]:offsets[i + 1]]``.
 
-    def __init__(self, offsets: np.ndarray, entities: np.ndarray) -> None:
+    ``rows`` are the places of ``entities`` in the columns of ``world.bodies``.
+    """
+
+    def __init__(self, offsets: np.ndarray, entities: np.ndarray, rows: np.ndarray) -> None:
         self.offsets = offsets
         self.entities = entities
+        self.rows = rows
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -37,3 +46,87 @@ class Hits(Sequence[np.ndarray]):
     def counts(self) -> np.ndarray:
         """(m,) how many each query found."""
         return np.diff(self.offsets)
+
+
+class Neighbours(Hits):
+    """Who is near whom: ``hits[i]`` are the neighbours of ``askers[i]``, whose row is ``asker_rows[i]``."""
+
+    def __init__(
+        self, askers: np.ndarray, asker_rows: np.ndarray, offsets: np.ndarray, entities: np.ndarray, rows: np.ndarray
+    ) -> None:
+        super().__init__(offsets, entities, rows)
+        self.askers = askers
+        self.asker_rows = asker_rows
+
+    def of(self, entity: int) -> np.ndarray:
+        """The neighbours of that asker; KeyError if it is none."""
+        found = np.flatnonzero(self.askers == entity)
+        if not len(found):
+            raise KeyError(entity)
+        return self[int(found[0])]
+
+    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (asker, neighbour), one for each neighbour found: for sums over all pairs at once."""
+        return np.repeat(self.asker_rows, self.counts), self.rows
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NearestHit:
+    """The surface nearest to a point.
+
+    distance
+        m, from the point to the surface; negative inside: how deep
+    point, normal
+        (d,) the place on the surface, and the unit vector that points out of the collider there
+    """
+
+    entity: int
+    distance: float
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CastHit:
+    """What a ray or a moving shape meets.
+
+    distance
+        m, travelled until it touches; 0 if it does at the start
+    fraction
+        the same as a part of the whole way: ``position + fraction * displacement`` is where a shape stops (of a ray
+        without end 0)
+    point, normal
+        (d,) where they touch, and the unit vector that points out of the collider that was hit
+    """
+
+    entity: int
+    distance: float
+    fraction: float
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class NearestHits:
+    """Per query the nearest, as columns; where there is none: entity and row -1, distance inf, the others nan."""
+
+    entity: np.ndarray
+    row: np.ndarray
+    distance: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+
+    @property
+    def found(self) -> np.ndarray:
+        """(m,) mask of the queries that found something."""
+        return self.row >= 0
+
+    def __len__(self) -> int:
+        return len(self.entity)
+
+
+@dataclass(frozen=True, eq=False)
+class CastHits(NearestHits):
+    """Per cast the first hit, as columns; where there is none, the fraction is 1: all of the way is free."""
+
+    fraction: np.ndarray

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import esper
 
 from . import esper_bridge
+from .compilation import log
 from .errors import NoPhysicsError, ScheduleError
 from .schedule import ForceSystem, Phase, System, in_order, means
 
@@ -32,8 +33,9 @@ class Guard:
         if pipeline is None:
             self._process(*args, **kwargs)
             return
-        started = time.perf_counter()
-        pipeline.running += 1
+        measurements = pipeline.measurements
+        outer, measurements.at = measurements.at, self.name
+        waited, started = log.waited, time.perf_counter()
         try:
             self._process(*args, **kwargs)
             if pipeline.world.settings.debug and pipeline.world.physics is not None:
@@ -42,9 +44,13 @@ class Guard:
             pipeline.fail(self.name, error)
             raise
         finally:
-            pipeline.running -= 1
-        seconds = pipeline.seconds
-        seconds[self.name] = seconds.get(self.name, 0.0) + time.perf_counter() - started
+            measurements.at = outer
+        taken = time.perf_counter() - started
+        if log.waited != waited:  # kernels were compiled or loaded
+            measurements.wait(log.waited - waited)
+            taken -= log.waited - waited
+        seconds = measurements.seconds
+        seconds[self.name] = seconds.get(self.name, 0.0) + taken
 
 
 class Lineup:

@@ -10,8 +10,8 @@ from . import esper_bridge, snapshots
 from .clock import Clock
 from .errors import CaromError, StepError
 from .lineup import Lineup
+from .measurements import Measurements
 from .schedule import FIRST_PRIORITY, LAST_PRIORITY, Phase
-from .statistics import Stats
 
 if TYPE_CHECKING:
     from .world import World
@@ -47,12 +47,10 @@ class Pipeline:
         self.clock = Clock(world.settings.dt)
         self.lineup = Lineup(self)
         self.in_step = False
-        self.running = 0  # processors at work, one inside the other
-        self.seconds: dict[str, float] = {}
+        self.measurements = Measurements(self)
         self.faults: list[str] = []
         self._in_window = False
         self._unfinished: snapshots.StepState | None = None
-        self._steps_measured = 0
 
     def attach(self) -> None:
         esper.add_processor(_Opening(self), FIRST_PRIORITY)
@@ -101,7 +99,7 @@ class Pipeline:
         self._close_window()
 
     def open_step(self, *args: Any) -> None:
-        if self.in_step and self.running:
+        if self.in_step and self.measurements.at is not None:
             raise CaromError("a step cannot be taken inside a step")
         self.roll_back()  # what a step has left behind that broke off under plain esper without anybody noticing
         dt = self.world.settings.dt
@@ -138,7 +136,7 @@ class Pipeline:
         self._set_in_step(False)
         self._unfinished = None
         self.clock.step_count += 1
-        self._steps_measured += 1
+        self.measurements.step_taken()
         if not self._in_window:
             self._close_window()
         if self.lineup.changed:
@@ -207,19 +205,3 @@ class Pipeline:
             physics.table.in_step = False
         self.lineup.apply()
         return True
-
-    # -- statistics -------------------------------------------------------------------------------
-
-    def stats(self) -> Stats:
-        steps = self._steps_measured
-        names = dict.fromkeys([*(s.name for s in self.lineup.systems), *self.seconds])
-        milliseconds = {name: 1e3 * self.seconds.get(name, 0.0) / max(steps, 1) for name in names}
-        counters = dict(self.world.physics.counters()) if self.world.physics is not None else {}
-        counters["dropped_steps"] = self.clock.dropped_steps
-        return Stats(steps, milliseconds, counters)
-
-    def reset_stats(self) -> None:
-        self.seconds.clear()
-        self._steps_measured = 0
-        if self.world.physics is not None:
-            self.world.physics.reset_counters()

@@ -3,78 +3,107 @@
 from __future__ import annotations
 
 import math
-import numbers
 from typing import Any
 
 import numpy as np
 
-from .hits import Hits
-from .services import PhysicsServices
+from . import query_arguments as check
+from .cast_verbs import CastVerbs
+from .hits import Hits, NearestHit, NearestHits, Neighbours
 
 
-class QueryVerbs:
-    """``world.query_...``: arguments checked, answers from the plugin that provides physics; mixed into World."""
+class QueryVerbs(CastVerbs):
+    """``world.query_...``: arguments checked, answers from the plugin that provides physics; mixed into World.
 
-    def _synchronized(self) -> PhysicsServices:
-        """The physics, up to date with what was created and deleted."""
-        raise NotImplementedError
+    All of them find static bodies and sensors too; ``mask`` has a bit for each layer that is asked for.
+    """
 
     def query_point(self, point: Any, mask: int = -1) -> list[int]:
         """Entities whose collider contains the point, by id."""
         services = self._synchronized()
-        return services.query_sphere(_point(point, "query_point: point", services.dimensions), 0.0, mask)
+        centre = check.point(point, "query_point: point", services.dimensions)
+        return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"))
 
     def query_aabb(self, lower: Any, upper: Any, mask: int = -1) -> list[int]:
         """Entities whose collider touches the box, by id."""
         services = self._synchronized()
-        low = _point(lower, "query_aabb: lower", services.dimensions)
-        high = _point(upper, "query_aabb: upper", services.dimensions)
+        low = check.point(lower, "query_aabb: lower", services.dimensions)
+        high = check.point(upper, "query_aabb: upper", services.dimensions)
         if any(a > b for a, b in zip(low, high, strict=True)):
             raise ValueError(f"query_aabb: lower {list(low)} exceeds upper {list(high)}")
-        return services.query_box(low, high, mask)
+        return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"))
 
     def query_sphere(self, centre: Any, radius: float, mask: int = -1) -> list[int]:
         """Entities whose collider touches the sphere, by id."""
         services = self._synchronized()
-        point = _point(centre, "query_sphere: centre", services.dimensions)
-        if not isinstance(radius, numbers.Real) or not math.isfinite(radius) or radius < 0:
-            raise ValueError(f"query_sphere: radius must be finite and not negative, got {radius!r}")
-        return services.query_sphere(point, float(radius), mask)
+        place = check.point(centre, "query_sphere: centre", services.dimensions)
+        size = check.distance(radius, "query_sphere: radius")
+        return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"))
 
     def query_spheres(self, centres: Any, radii: Any, mask: int = -1) -> Hits:
         """For each of m spheres (centres (m, d), radii one or (m,)) the ids of the entities it touches, ascending."""
         services = self._synchronized()
-        centres = np.ascontiguousarray(centres, float)
-        if centres.ndim != 2 or centres.shape[1] != services.dimensions:
-            raise ValueError(f"query_spheres: centres must have shape (m, {services.dimensions}), got {centres.shape}")
-        radii = np.ascontiguousarray(np.broadcast_to(np.asarray(radii, float), len(centres)))
-        if not np.isfinite(centres).all() or not np.isfinite(radii).all() or (radii < 0).any():
-            raise ValueError("query_spheres: centres and radii must be finite, radii not negative")
-        return services.query_spheres(centres, radii, mask)
+        places = check.points(centres, "query_spheres: centres", services.dimensions)
+        sizes = check.distances(radii, "query_spheres: radii", len(places))
+        return services.queries.spheres(places, sizes, check.mask(mask, "query_spheres: mask"))
 
     def query_aabbs(self, lower: Any, upper: Any, mask: int = -1) -> Hits:
         """For each of m boxes (corners (m, d)) the ids of the entities it touches, ascending."""
         services = self._synchronized()
-        low, high = np.ascontiguousarray(lower, float), np.ascontiguousarray(upper, float)
-        if low.ndim != 2 or low.shape[1] != services.dimensions or low.shape != high.shape:
-            raise ValueError(
-                f"query_aabbs: corners must have shape (m, {services.dimensions}), got {low.shape} and {high.shape}"
-            )
-        if not np.isfinite(low).all() or not np.isfinite(high).all() or (low > high).any():
-            raise ValueError("query_aabbs: corners must be finite, lower not above upper")
-        return services.query_boxes(low, high, mask)
+        low = check.points(lower, "query_aabbs: lower", services.dimensions)
+        high = check.points(upper, "query_aabbs: upper", services.dimensions, len(low))
+        if (low > high).any():
+            row = int(np.argmax((low > high).any(axis=1)))
+            raise ValueError(f"query_aabbs: lower {low[row].tolist()} exceeds upper {high[row].tolist()} in row {row}")
+        return services.queries.boxes(low, high, check.mask(mask, "query_aabbs: mask"))
+
+    def query_nearest(
+        self, point: Any, mask: int = -1, *, max_distance: float = math.inf, exclude: int | None = None
+    ) -> NearestHit | None:
+        """The collider whose surface is nearest to the point, at most ``max_distance`` away; None if there is none.
+
+        Inside a collider the distance is negative, and the deepest is the nearest. Ties go to the smaller id.
+        ``exclude``: an entity to leave out.
+        """
+        services = self._synchronized()
+        place = check.point(point, "query_nearest: point", services.dimensions)
+        limit = check.distance(max_distance, "query_nearest: max_distance", endless=True)
+        bits = check.mask(mask, "query_nearest: mask")
+        others = check.excluded(exclude, "query_nearest: exclude", 1)
+        hits = services.queries.nearest(np.array((place,)), np.array((limit,)), bits, others)
+        if hits.row[0] < 0:
+            return None
+        return NearestHit(int(hits.entity[0]), float(hits.distance[0]), hits.point[0], hits.normal[0])
+
+    def query_nearests(
+        self, points: Any, mask: int = -1, *, max_distances: Any = math.inf, exclude: Any = None
+    ) -> NearestHits:
+        """:meth:`query_nearest` for m points (m, d), as columns. max_distances, exclude: one for all or (m,)."""
+        services = self._synchronized()
+        places = check.points(points, "query_nearests: points", services.dimensions)
+        limits = check.distances(max_distances, "query_nearests: max_distances", len(places), endless=True)
+        bits = check.mask(mask, "query_nearests: mask")
+        others = check.excluded(exclude, "query_nearests: exclude", len(places))
+        return services.queries.nearest(places, limits, bits, others)
+
+    def neighbours(self, radius: float, mask: int = -1, *, of: Any = None) -> Neighbours:
+        """For every body the others whose position is within ``radius`` of its own, by id.
+
+        Distances are between the positions of the Transforms, so it needs no collider, and whoever is a neighbour has
+        its asker as a neighbour too. ``mask`` chooses layers; bodies without a collider are in none and found only with
+        the mask -1. ``of``: the ids of those who ask, each once, in this order; all bodies by default, ascending.
+        KeyError if one of them is no body.
+        """
+        services = self._synchronized()
+        size = check.distance(radius, "neighbours: radius")
+        askers = None
+        if of is not None:
+            askers = np.asarray(of)
+            if askers.ndim != 1 or (askers.size and askers.dtype.kind not in "iu"):
+                raise ValueError(f"neighbours: of must be entities, a list of their ids, got {of!r}")
+            askers = askers.astype(np.int64)
+        return services.queries.neighbours(size, check.mask(mask, "neighbours: mask"), askers)
 
     def refresh_queries(self) -> None:
         """Make the next query see positions that were written since the last step."""
-        self._synchronized().refresh_queries()
-
-
-def _point(value: Any, name: str, dimensions: int) -> tuple[float, ...]:
-    """The point as plain floats: for one point quicker than an array."""
-    try:
-        point = tuple(map(float, value))
-    except (TypeError, ValueError):
-        point = ()
-    if len(point) != dimensions or not all(map(math.isfinite, point)):
-        raise ValueError(f"{name} must be {dimensions} finite numbers, got {value!r}")
-    return point
+        self._synchronized().queries.forget()

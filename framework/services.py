@@ -10,12 +10,58 @@ import numpy as np
 from .adoption import Adoption
 from .bodies import Bodies
 from .contacts import Contacts
-from .hits import Hits
+from .hits import CastHits, Hits, NearestHits, Neighbours
 from .table import Table
 
 
+class QueryServices(ABC):
+    """Answers to the questions of ``world``, which has checked the arguments: arrays are contiguous, of right shape."""
+
+    @abstractmethod
+    def sphere(self, centre: tuple[float, ...], radius: float, mask: int) -> list[int]:
+        """What touches one sphere, by id."""
+
+    @abstractmethod
+    def box(self, lower: tuple[float, ...], upper: tuple[float, ...], mask: int) -> list[int]:
+        """What touches one box, by id."""
+
+    @abstractmethod
+    def spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
+        """What touches each sphere."""
+
+    @abstractmethod
+    def boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
+        """What touches each box."""
+
+    @abstractmethod
+    def nearest(self, points: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray) -> NearestHits:
+        """The surface nearest to each point."""
+
+    @abstractmethod
+    def neighbours(self, radius: float, mask: int, askers: np.ndarray | None) -> Neighbours:
+        """Which bodies are within the radius of each asker; of all bodies if None."""
+
+    @abstractmethod
+    def rays(
+        self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray,
+        only_nearest: bool,
+    ) -> CastHits:  # fmt: skip
+        """What rays meet: the nearest, a row for each ray; or everything on one ray, in order."""
+
+    @abstractmethod
+    def shapes(
+        self, component: type[Any], columns: dict[str, np.ndarray], positions: np.ndarray, displacements: np.ndarray,
+        mask: int, excluded: np.ndarray, only_nearest: bool,
+    ) -> CastHits:  # fmt: skip
+        """What moving shapes meet: the nearest, a row for each shape; or everything that one shape meets, in order."""
+
+    @abstractmethod
+    def forget(self) -> None:
+        """The next question looks at the bodies anew."""
+
+
 class PhysicsServices(ABC):
-    """The state and the questions behind ``world.bodies``, ``world.contacts``, energies and queries."""
+    """The state behind ``world.bodies``, ``world.contacts``, energies and queries."""
 
     dimensions: int
     table: Table
@@ -23,6 +69,7 @@ class PhysicsServices(ABC):
     bodies: Bodies
     contacts: Contacts
     gravity: np.ndarray
+    queries: QueryServices
 
     @abstractmethod
     def set_gravity(self, gravity: Any) -> None: ...
@@ -61,22 +108,6 @@ class PhysicsServices(ABC):
 
     @abstractmethod
     def counters(self) -> dict[str, int]: ...
-
-    @abstractmethod
-    def query_sphere(self, centre: tuple[float, ...], radius: float, mask: int) -> list[int]: ...
-
-    @abstractmethod
-    def query_box(self, lower: tuple[float, ...], upper: tuple[float, ...], mask: int) -> list[int]: ...
-
-    @abstractmethod
-    def query_boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits: ...
-
-    @abstractmethod
-    def query_spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits: ...
-
-    @abstractmethod
-    def refresh_queries(self) -> None:
-        """The next query looks at the bodies anew."""
 
     @abstractmethod
     def prepare(self, components: tuple[type[Any], ...]) -> None:

@@ -77,7 +77,7 @@ def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
     clock.set_dt(dt)
     physics.contacts.restore_state(copy.deepcopy(state.contacts))
     physics.restore_tracking(copy.deepcopy(state.tracking))
-    physics.refresh_queries()
+    physics.queries.forget()
 
 
 def state_hash(physics: PhysicsServices) -> str:

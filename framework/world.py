@@ -289,8 +289,13 @@ class World(EntityVerbs, QueryVerbs):
         self._pipeline.run(Phase(phase))
 
     def prepare(self, *component_types: type[Any]) -> None:
-        """Compile ahead what bodies of these component types will need, so that nothing stalls in mid-game."""
-        self._services.prepare(component_types)
+        """Compile ahead what bodies of these component types, and those there are, will need; between two steps.
+
+        All of it: impacts and rest, trees for hundreds of bodies, queries, what force systems call. Whatever of these
+        types comes and goes later, nothing compiles in mid-game.
+        """
+        self._pipeline.must_be_between_steps("a world can be prepared")
+        self._synchronized().prepare(component_types)
 
     # -- events -----------------------------------------------------------------------------------
 
@@ -314,11 +319,19 @@ class World(EntityVerbs, QueryVerbs):
     # -- looking inside ---------------------------------------------------------------------------
 
     def stats(self) -> Stats:
-        """Time per system and counters since the world began (or ``reset_stats``)."""
-        return self._pipeline.stats()
+        """Time per system and counters since the world began (or ``reset_stats``); ``print`` shows a table."""
+        return self._pipeline.measurements.stats()
 
     def reset_stats(self) -> None:
-        self._pipeline.reset_stats()
+        """Begin to measure anew."""
+        self._pipeline.measurements.reset()
+
+    def profile(self) -> AbstractContextManager[None]:
+        """``with world.profile():`` times each call of a kernel; ``stats().kernels`` has the result.
+
+        Kernels are timed for one world at a time: CaromError inside another profile.
+        """
+        return self._pipeline.measurements.profile()
 
     @property
     def faults(self) -> list[str]:

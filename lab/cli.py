@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,43 +13,17 @@ from rich.console import Console
 from rich.table import Table
 
 from .. import __version__, scenes
-from .bench import bench_gas
+from .bench_command import bench_command
 from .choices import parse_assignments, preset
+from .commands import Commands
 from .loading import Loaded, load, stdout_kept_clean
-from .problems import Problem, did_you_mean
+from .problems import Problem
 from .progress import StepProgress
 from .report import print_report
 from .run import Run, run
+from .warm_up import warm_up_command
 
 DEFAULT_SECONDS = 10.0  # of a file that does not say
-STOPPED = 130  # the exit code of what Ctrl-C stopped
-
-
-class Commands(click.Group):
-    """A click group whose errors are one line on stderr, with suggestions, and exit code 2."""
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        name = args[0] if args else ""
-        if name and not name.startswith("-") and self.get_command(ctx, name) is None:
-            raise Problem(f"no command {name!r}{did_you_mean(name, self.list_commands(ctx))}")
-        return super().resolve_command(ctx, args)
-
-    def main(self, *args: Any, **options: Any) -> Any:
-        options["standalone_mode"] = False
-        traceback_wanted = "--traceback" in (options.get("args") or sys.argv[1:])
-        try:
-            result = super().main(*args, **options)
-        except click.exceptions.Abort:
-            click.echo("carom: stopped", err=True)
-            sys.exit(STOPPED)
-        except click.ClickException as error:
-            if traceback_wanted:
-                raise
-            click.echo(f"carom: {' '.join(error.format_message().split())}", err=True)
-            sys.exit(2)
-        sys.exit(result if isinstance(result, int) else 0)
 
 
 @click.group(
@@ -92,6 +65,7 @@ def cli(context: click.Context) -> None:
     "--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."
 )
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
+@click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
 @click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
 def run_command(
     target: str,
@@ -103,6 +77,7 @@ def run_command(
     out: Path,
     as_json: bool,
     no_pictures: bool,
+    profile: bool,
     traceback: bool,
 ) -> None:
     """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
@@ -123,7 +98,7 @@ def run_command(
         raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
         steps = _steps_for(loaded, seconds, world.settings.dt)
-    finished = _run_with_progress(loaded, world, steps, number, screen)
+    finished = _run_with_progress(loaded, world, steps, number, screen, profile)
     if draw is not None:
         with screen.status("drawing ..."):
             finished.report.pictures = _pictures(draw, finished, out, loaded)
@@ -151,30 +126,8 @@ def scenes_command() -> None:
     Console().print(table)
 
 
-@cli.command("bench", short_help="Time an elastic gas on this machine.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@click.option(
-    "--repeats", type=click.IntRange(min=1), default=5, show_default=True, help="Runs; the median counts."
-)
-def bench_command(as_json: bool, repeats: int) -> None:
-    """Time an elastic gas of 1,000 and of 10,000 bodies: nanoseconds per body per step."""
-    rows = bench_gas((1000, 10_000), repeats)
-    if as_json:
-        click.echo(json.dumps([row.as_dict() for row in rows], indent=2))
-        return
-    table = Table(box=None, pad_edge=False)
-    for heading in ("scene", "bodies", "ns per body per step", "ms per step", "spread", "compiling"):
-        table.add_column(heading, justify="left" if heading == "scene" else "right")
-    for row in rows:
-        table.add_row(
-            row.scene,
-            f"{row.bodies:,}",
-            f"{row.nanoseconds:.1f}",
-            f"{row.milliseconds:.4f}",
-            f"{row.fastest:.1f} to {row.slowest:.1f}",
-            f"{row.compile_seconds:.2f} s",
-        )
-    Console().print(table)
+cli.add_command(bench_command)
+cli.add_command(warm_up_command)
 
 
 def _drawing(no_pictures: bool, out: Path) -> Any:
@@ -216,9 +169,11 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
     return max(0, round(wanted / dt))
 
 
-def _run_with_progress(loaded: Loaded, world: Any, steps: int, seed: int, screen: Console) -> Run:
+def _run_with_progress(
+    loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool
+) -> Run:
     with StepProgress(screen, loaded.name, steps) as progress, loaded.blame(), stdout_kept_clean():
-        return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done)
+        return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done, profile=profile)
 
 
 def main() -> None:

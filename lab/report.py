@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from .profiling import milliseconds, profile_table
 from .run import Drift, RunReport
 
 GOOD, WARNING = "green", "bold yellow"
@@ -18,7 +19,11 @@ def print_report(report: RunReport, console: Console) -> None:
     """The tables: what ran, what it cost by system, and how true it stayed."""
     console.print()
     console.print(summary(report))
-    console.print(cost(report))
+    if report.profile is None:
+        console.print(cost(report))
+    else:
+        console.print(profile_table(report.profile, report.step_milliseconds_mean))
+        console.print(f"not in it: {report.compile_seconds:.3g} s for the steps that compiled or loaded kernels\n")
     console.print(quality(report))
     for fault in report.faults[:FAULTS_SHOWN]:
         console.print(f"! {fault}", style=WARNING, highlight=False)
@@ -59,17 +64,12 @@ def cost(report: RunReport) -> Table:
     table.add_column("share", justify="right")
     total = report.step_milliseconds_mean
     rest = total - sum(report.system_milliseconds.values())
-    for name, milliseconds in {**report.system_milliseconds, "everything else": rest}.items():
-        share = f"{100 * milliseconds / total:.0f} %" if total > 0 else ""
-        table.add_row(name, _milliseconds(milliseconds), share)
+    for name, mean in {**report.system_milliseconds, "everything else": rest}.items():
+        share = f"{100 * mean / total:.0f} %" if total > 0 else ""
+        table.add_row(name, milliseconds(mean), share)
     table.add_section()
-    table.add_row("whole step (mean)", _milliseconds(total), "", style="bold")
+    table.add_row("whole step (mean)", milliseconds(total), "", style="bold")
     return table
-
-
-def _milliseconds(value: float) -> str:
-    """A dash for what was not measured: every step compiled or loaded kernels."""
-    return f"{max(value, 0.0):.4f}" if math.isfinite(value) else "-"
 
 
 def quality(report: RunReport) -> Table:

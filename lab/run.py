@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from ..components import AABBCollider, SphereCollider
 from ..framework import World
 from ..framework.compilation import log
+from ..framework.statistics import Stats, Totals
 from .escape import Enclosure
+from .profiling import profile_of
 from .shapes import dimensions_of, sensor_entities
 
 TRACED_BODIES = 200  # in a picture
@@ -62,6 +65,7 @@ class RunReport:
     step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
     step_milliseconds_mean: float = math.nan
     system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, compiling left out
+    profile: dict[str, Any] | None = None  # see profile_of; None unless asked for
     energy: Drift | None = None
     energy_changes: list[str] = field(default_factory=list)  # why the scene does not keep its energy
     momentum: Drift | None = None
@@ -172,7 +176,7 @@ class Meter:
         self.kinetic_most = 0.0
         self.momenta: list[NDArray[np.float64]] = []
         self.momentum_scale = 0.0
-        self.system_totals: dict[str, float] = {}  # milliseconds, of the steps in step_seconds
+        self.measured = Totals()  # of the steps in step_seconds
         self._kernels_seen = _kernels()
         started = time.perf_counter()
         self.recorder.record()
@@ -196,7 +200,7 @@ class Meter:
     def step(self) -> None:
         """One step, timed; then what must be seen after every step."""
         world = self.world
-        before = _totals(world)
+        before = world.stats().totals
         started = time.perf_counter()
         world.step()
         seconds = time.perf_counter() - started
@@ -205,8 +209,7 @@ class Meter:
             self.compile_seconds += seconds
         else:
             self.step_seconds.append(seconds)
-            for name, total in _totals(world).items():
-                self.system_totals[name] = self.system_totals.get(name, 0.0) + total - before.get(name, 0.0)
+            self.measured += world.stats().totals - before
         depth = np.asarray(world.contacts.depth)
         self.contact_counts.append(len(depth))
         self.impacts += len(world.contacts.impacts)
@@ -242,9 +245,9 @@ class Meter:
         if self.step_seconds:
             report.step_milliseconds = 1e3 * float(np.median(self.step_seconds))
             report.step_milliseconds_mean = 1e3 * float(np.mean(self.step_seconds))
-        measured = len(self.step_seconds)
+        stats = self.stats()
         report.system_milliseconds = {
-            name: self.system_totals.get(name, 0.0) / measured if measured else math.nan for name in _totals(world)
+            name: mean if self.step_seconds else math.nan for name, mean in stats.milliseconds.items()
         }
         report.energy = self._energy_drift()
         report.energy_changes = self._energy_changes()
@@ -260,6 +263,10 @@ class Meter:
         report.counters = dict(world.stats().counters)
         report.faults = list(world.faults)
         report.state_hash = world.state_hash()
+
+    def stats(self) -> Stats:
+        """Of the steps that neither compiled nor loaded kernels."""
+        return Stats(self.measured, self.measured, self.world.stats().units)
 
     def _deepest_of_solids(self, depth: NDArray[np.float64]) -> float:
         """Sensors are there to be overlapped."""
@@ -317,18 +324,23 @@ def run(
     scene: str = "",
     seed: int = 0,
     after_step: Callable[[int], None] | None = None,
+    profile: bool = False,
 ) -> Run:
-    """Take ``steps`` steps of ``world`` and measure them; ``after_step`` is told how many are done."""
+    """Take ``steps`` steps of ``world`` and measure them; ``after_step`` is told how many are done.
+
+    ``profile``: kernels too, one by one, which makes each call of one a little slower.
+    """
     report = RunReport(scene, seed, dimensions_of(world), plain_settings(world))
     compiled, loaded = _kernels()
     started = time.perf_counter()
     every = max(1, math.ceil(steps / SAMPLES))
     moving = len(world.bodies.dynamic) + len(world.bodies.kinematic)
     meter = Meter(world, every, max(1, min(every, math.ceil(steps * max(moving, 1) / PATH_POINTS))))
-    for done in range(1, steps + 1):
-        meter.step()
-        if after_step is not None:
-            after_step(done)
+    with world.profile() if profile else contextlib.nullcontext():
+        for done in range(1, steps + 1):
+            meter.step()
+            if after_step is not None:
+                after_step(done)
     if world.step_count % meter.every:
         meter.sample()
     if world.step_count % meter.path_every:
@@ -336,6 +348,8 @@ def run(
     report.wall_seconds = time.perf_counter() - started
     report.kernels_compiled, report.kernels_loaded = _kernels()[0] - compiled, _kernels()[1] - loaded
     meter.fill(report)
+    if profile:
+        report.profile = profile_of(meter.stats(), report.step_milliseconds_mean, meter.compile_seconds)
     return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world)
 
 
@@ -344,12 +358,6 @@ def plain_settings(world: World) -> dict[str, Any]:
     plain = (bool, int, float, str, type(None))
     values = {f.name: getattr(world.settings, f.name) for f in dataclasses.fields(world.settings)}
     return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
-
-
-def _totals(world: World) -> dict[str, float]:
-    """Milliseconds by system, since the world began."""
-    stats = world.stats()
-    return {name: mean * stats.steps for name, mean in stats.milliseconds.items()}
 
 
 def _restitutions(bodies: Any) -> list[NDArray[np.float64]]:

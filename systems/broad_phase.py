@@ -115,7 +115,7 @@ class BroadPhase(System):
         position, before = table.arrays["position"], table.arrays["previous_position"]
         self._box(0, moving, before if state.moved else position)
         fixed = position[moving:count]
-        seen = (table.static_version, state.structure, state.turned)
+        seen = (table.static_version, state.structures, state.turned)
         if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
             before[moving:count] = fixed
             self._box(moving, count, position)

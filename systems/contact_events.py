@@ -85,5 +85,8 @@ class ContactEvents(System):
 
 
 def _select(columns: Columns, mask: np.ndarray) -> Columns:
+    """Those rows, without ``enabled``; columns of which all are taken are not copied."""
     rows = np.flatnonzero(mask)
+    if len(rows) == len(mask):
+        return {key: column for key, column in columns.items() if key != "enabled"}
     return {key: column.take(rows, axis=0) for key, column in columns.items() if key != "enabled"}

@@ -9,7 +9,6 @@ import numpy as np
 from ..framework.settings import MIXING_RULES
 from .contact_bodies import COLOURS, gather, put_back, squeeze
 from .contact_memory import ContactMemory, recall, remember
-from .pair_order import order_of_pairs
 from .soft_step import solve_contacts
 from .support import drop_support, predict_support
 
@@ -45,14 +44,13 @@ class ContactSolver:
 
     def _allocate_contacts(self, count: int) -> None:
         d = self._state.dimensions
-        self._first, self._second, self._slot, self._colours, self._light, self._before = (
-            np.empty(count, np.int64) for _ in range(6)
-        )
+        self._first, self._second = np.empty(count, np.uint32), np.empty(count, np.uint32)  # no negative indices
+        self._slot, self._colours, self._light, self._before = (np.empty(count, np.int64) for _ in range(4))
         self._normal, self._tangent = np.empty((count, d)), np.empty((count, d))
-        self._gap, self._mass, self._friction, self._extent, self._impulse, self._total = (
-            np.empty(count) for _ in range(6)
+        self._gap, self._mass, self._friction, self._extent, self._impulse, self._total, self._opening, self._pushing = (
+            np.empty(count) for _ in range(8)
         )
-        self._in_block, self._worked, self._parting, self._active = (np.empty(count, bool) for _ in range(4))
+        self._in_block, self._worked, self._parting, self._active, self._soft = (np.empty(count, bool) for _ in range(5))
         self._blocks = np.empty((count, 2), np.int64)
 
     # -- before the impacts -----------------------------------------------------------------------
@@ -106,10 +104,9 @@ class ContactSolver:
     # -- after the impacts ------------------------------------------------------------------------
 
     def solve(self, dt: float, resting: np.ndarray) -> None:
-        """Hold the contacts ``resting`` (pairs) and advance their bodies again from the start of the step."""
+        """Hold the contacts ``resting`` (pairs, canonical order) and advance their bodies again from the start of the step."""
         state, arrays = self._state, self._state.table.arrays
         self._held = np.zeros(state.table.count, bool)
-        resting = resting[order_of_pairs(state.pair_a[resting], state.pair_b[resting], state.rank)]
         state.resting = resting
         self._solve(dt, resting)
         if self._any_support:
@@ -141,7 +138,7 @@ class ContactSolver:
         stacks, slop = state.table.stacks, settings.slop
         state.kernels.linearise(
             resting, slot, state.pair_a, state.pair_b, scratch["shape"], scratch["offset"], state.world_shapes,
-            position, start, scratch["size"], stacks["collider.friction"], state.slots,
+            position, start, scratch["size"], stacks["collider.friction"], scratch["material"],
             MIXING_RULES.index(settings.friction_mixing), -1.0 if slop is None else slop, inverse_mass,
             state.pair_impulse, state.pair_parts, state.pair_normal, state.pair_point, normal, gap, mass, friction, extent,
             parting, state.like,
@@ -160,8 +157,9 @@ class ContactSolver:
         )
         substeps = settings.substeps
         solve_contacts(
-            substeps, dt / substeps, any_loose, loose, self._active, first, second, normal, gap, mass, friction, extent, parting,
-            in_block, self._blocks[:blocks], impulse, tangent, total, worked, body_velocity, shift, self._acceleration, body_mass,
+            substeps, dt / substeps, any_loose, loose, self._active, first, second, normal, gap, mass,
+            bool(friction.any()), friction, extent, parting, in_block, self._blocks[:blocks], impulse, tangent, total,
+            worked, self._opening, self._pushing, self._soft, body_velocity, shift, self._acceleration, body_mass,
             state.like,
         )  # fmt: skip
         put_back(

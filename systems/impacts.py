@@ -98,7 +98,7 @@ def heap_pop(heap, size, times, keys):
         parent = child
 
 
-@part
+@inlined
 def bounce(
     event, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, origin, path, struck, pair_impulse,
     pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
@@ -138,10 +138,10 @@ def bounce(
 def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
     """The event loop over the shapes of a scene."""
 
-    @part
+    @inlined
     def consider(
         c, since, dt, pair_a, pair_b, rank, size, shape_of, offset, shapes, velocity, start_velocity, motion,
-        restitution, friction, rules, slots, limits, share, struck, pair_impulse, events, event_times, event_keys,
+        restitution, friction, rules, material, limits, share, struck, pair_impulse, events, event_times, event_keys,
         event_values, heap, counts, like,
     ):  # fmt: skip
         """Put the pair's next impact into the queue, if it has one: e > 0, overlap at the end, a fast approach.
@@ -153,7 +153,7 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
         origin, path, second, third, degree = motion
         a, b = pair_a[c], pair_b[c]
         shape_a, shape_b = shape_of[a], shape_of[b]
-        e = mix(rules[0], restitution[slots[shape_a], a], restitution[slots[shape_b], b])
+        e = mix(rules[0], restitution[material[a], a], restitution[material[b], b])
         if e <= 0.0:
             return
         low, high, guess = since, dt, dt
@@ -218,7 +218,7 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
             counts[CAPPED] += 1
             return
         pull = scale(like, 0.0)
-        mu = mix_friction(rules[1], friction[slots[shape_a], a], friction[slots[shape_b], b])
+        mu = mix_friction(rules[1], friction[material[a], a], friction[material[b], b])
         if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast = length(sliding)
@@ -242,14 +242,14 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
     @kernel
     def resolve_impacts(
         dt, pair_a, pair_b, responds, offsets, neighbours, rank, size, shape_of, offset, shapes, position, velocity,
-        start_velocity, inverse_mass, motion, restitution, friction, rules, slots, limits, share, struck,
+        start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits, share, struck,
         pair_impulse, pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values,
         heap, log_pair, log_value, counts, like,
     ):  # fmt: skip
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
 
         The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[bodies] are looked at first.
-        restitution, friction: per slot of the shapes and row; rules: how two become one. limits: the threshold and
+        restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the threshold and
         the slop (below 0: from the bodies), the most impacts of a body.
         share (n,): see gravity_share. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
         the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see
@@ -277,7 +277,7 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
                     since = event_times[counts[CURRENT]] if c >= 0 else 0.0
                     consider(
                         p, since, dt, pair_a, pair_b, rank, size, shape_of, offset, shapes, velocity, start_velocity,
-                        motion, restitution, friction, rules, slots, limits, share, struck, pair_impulse, events,
+                        motion, restitution, friction, rules, material, limits, share, struck, pair_impulse, events,
                         event_times, event_keys, event_values, heap, counts, like,
                     )  # fmt: skip
             chosen = -1

@@ -27,11 +27,11 @@ def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tu
 
     @kernel
     def find_contacts(
-        first, second, entity, position, levels, level_offsets, outgrown, material, shapes, layers, masks, all_meet,
+        first, second, position, levels, level_offsets, outgrown, material, shapes, layers, masks, all_meet,
         sensors, inverse_mass, dt, velocity, start_velocity, share, size, fixed_slop, pair_a, pair_b, responds,
         pair_depth, hits, depths, normals, points, like,
     ):  # fmt: skip
-        """Sort each pair by entity, drop pairs whose layers do not meet, test the rest, level by level.
+        """Drop pairs whose layers do not meet, test the rest, level by level.
 
         levels (levels, n): each body's shapes, the last one repeated where it has fewer than others; a pair hits if
         every level does, and the last one gives the contact. outgrown: whether a body's last level may reach out of
@@ -47,8 +47,6 @@ def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tu
         last = len(levels) - 1 if several else 0
         for c in range(len(first)):
             a, b = first[c], second[c]
-            if entity[a] > entity[b]:
-                a, b = b, a
             slot_a, slot_b = material[a], material[b]
             if not all_meet and (
                 layers[slot_a, a] & masks[slot_b, b] == 0 or layers[slot_b, b] & masks[slot_a, a] == 0
@@ -130,11 +128,10 @@ class NarrowPhase(System):
 
     def _test(self, dt: float) -> None:
         state = self._state
-        first, second = state.candidates
-        state.reserve_pairs(len(first))
+        first, second = state.sort_candidates()
         kept, found, *counts = self._find(
-            dt, first, second, state.pair_a, state.pair_b, state.responds, state.pair_depth, state.hits,
-            state.depths, state.normals, state.points,
+            dt, first, second, state.pair_a, state.pair_b, state.responds, state.pair_depth, state.hits, state.depths,
+            state.normals, state.points,
         )  # fmt: skip
         for name, count in zip(COUNTERS, counts, strict=True):
             state.pair_counters[name] += count
@@ -148,7 +145,7 @@ class NarrowPhase(System):
         several = len(state.levels) > 1
         find_contacts = narrow_kernel_with_levels(state.code) if several else state.kernels.find_contacts
         return find_contacts(
-            first, second, arrays["entity"], arrays["position"], state.levels, state.level_offsets, state.outgrown,
+            first, second, arrays["position"], state.levels, state.level_offsets, state.outgrown,
             scratch["material"], state.world_shapes, stacks["collider.layer"], stacks["collider.mask"],
             state.all_layers_meet(), stacks["collider.sensor"], arrays["inverse_mass"], dt if state.moved else 0.0,
             arrays["linear_velocity"], scratch["start_velocity"], scratch["gravity_share"], scratch["size"],

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..framework.contacts import Contacts, empty_columns
 from .impacts import CAPPED, LOGGED
-from .pair_order import order_of_pairs
+from .pair_order import collect_contacts, sort_pairs
 
 if TYPE_CHECKING:
     from ..framework.table import Table
@@ -34,6 +34,7 @@ class PairBuffers:
         self.candidates = (self.no_pairs, self.no_pairs)
         self.candidates_ready = self.contacts_ready = False
         self.pairs = self.found = 0
+        self._starts = np.empty(0, np.int64)
         self.resting = np.empty(0, np.int64)
         self.impact_pairs = np.empty(0, np.int64)
         self.step_impacts: dict[str, np.ndarray] | None = None
@@ -47,16 +48,13 @@ class PairBuffers:
     def _allocate(self, size: int) -> None:
         d = self.dimensions
         self.pair_a, self.pair_b = np.empty(size, np.int64), np.empty(size, np.int64)
+        self._half_a, self._half_b = np.empty(size, np.int64), np.empty(size, np.int64)
         self.responds = np.empty(size, bool)
         self.hits, self.depths = np.empty(size, np.int64), np.empty(size)
         self.normals, self.points = np.empty((size, d)), np.empty((size, d))
         self.pair_impulse, self.pair_depth = np.empty(size), np.empty(size)
         self.pair_parts = np.empty(size, np.uint8)
         self.pair_normal, self.pair_point = np.empty((size, d)), np.empty((size, d))
-
-    def reserve_pairs(self, count: int) -> None:
-        if count > len(self.pair_a):
-            self._allocate(max(count, 2 * len(self.pair_a)))
 
     def begin_pairs(self) -> None:
         """A new step: nothing is known yet."""
@@ -71,17 +69,22 @@ class PairBuffers:
         self.contacts_ready = False
         self.pair_counters["candidates"] += len(first)
 
+    def sort_candidates(self) -> tuple[np.ndarray, np.ndarray]:
+        """The candidates in canonical order, at the start of pair_a and pair_b; there is room for all of them as pairs."""
+        first, second = self.candidates
+        count = len(first)
+        if count > len(self.pair_a):
+            self._allocate(max(count, 2 * len(self.pair_a)))
+        if len(self._starts) != len(self.rank) + 1:
+            self._starts = np.empty(len(self.rank) + 1, np.int64)
+        sort_pairs(first, second, self.rank, self._starts, self._half_a, self._half_b, self.pair_a, self.pair_b)
+        return self.pair_a[:count], self.pair_b[:count]
+
     def set_pairs(self, pairs: int, found: int) -> None:
-        """The narrow phase is done; puts the contacts into canonical order."""
+        """The narrow phase is done."""
         self.pairs, self.found = pairs, found
         self.contacts_ready = True
         self.pair_counters["pairs"] += pairs
-        if not found:
-            return
-        hits = self.hits[:found]
-        order = order_of_pairs(self.pair_a[hits], self.pair_b[hits], self.rank)
-        for array in (self.hits, self.depths, self.normals, self.points):
-            array[:found] = array[:found][order]
 
     def take_enabled(self) -> np.ndarray:
         """Pairs whose contact a system has disabled push no more in this step; returns which they are."""
@@ -93,28 +96,34 @@ class PairBuffers:
         return disabled
 
     def publish_found(self) -> None:
-        """The contacts' columns after NARROW: what overlaps where free flight leads."""
+        """The contacts' columns after NARROW: what overlaps where free flight leads, or is near."""
         if not self.found:
             self._publish(self.no_pairs, self._no_contacts)
             return
-        depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))
-        impulse, enabled = np.zeros(self.found), np.ones(self.found, bool)
         pairs = self.hits[: self.found].copy()
-        self._publish(pairs, self._columns(pairs, depth, normal, point, impulse, enabled))
+        depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))
+        self._publish(pairs, self._columns(pairs, depth, normal, point, np.zeros(self.found)))
 
-    def publish_final(self, touching: np.ndarray, disabled: np.ndarray) -> None:
-        """The contacts' columns after RESPONSE; touching: pairs; disabled: those that were not to push."""
-        pairs = touching[order_of_pairs(self.pair_a[touching], self.pair_b[touching], self.rank)]
+    def publish_final(self, pairs: np.ndarray, disabled: np.ndarray) -> None:
+        """The contacts' columns after RESPONSE; disabled: the pairs that were not to push."""
         self.pair_counters["contacts"] += len(pairs)
         self.pair_counters["resting_contacts"] += len(self.resting)
-        enabled = ~np.isin(pairs, disabled) if len(disabled) else np.ones(len(pairs), bool)
-        depth, normal, point = self.pair_depth[pairs], self.pair_normal[pairs], self.pair_point[pairs]
-        self._publish(pairs, self._columns(pairs, depth, normal, point, self.pair_impulse[pairs], enabled))
+        if not len(pairs):
+            self._publish(self.no_pairs, self._no_contacts)
+            return
+        d, count = self.dimensions, len(pairs)
+        depth, normal, point, impulse = np.empty(count), np.empty((count, d)), np.empty((count, d)), np.empty(count)
+        columns = self._columns(pairs, depth, normal, point, impulse)
+        collect_contacts(
+            pairs, self.pair_depth, self.pair_normal, self.pair_point, self.pair_impulse, depth, normal, point, impulse
+        )
+        if len(disabled):
+            columns["enabled"][np.isin(pairs, disabled)] = False
+        self._publish(pairs, columns)
 
     def _columns(
-        self, pairs: np.ndarray, depth: np.ndarray, normal: np.ndarray, point: np.ndarray, impulse: np.ndarray,
-        enabled: np.ndarray,
-    ) -> dict[str, np.ndarray]:  # fmt: skip
+        self, pairs: np.ndarray, depth: np.ndarray, normal: np.ndarray, point: np.ndarray, impulse: np.ndarray
+    ) -> dict[str, np.ndarray]:
         entity = self.table.arrays["entity"]
         return {
             "entity_a": entity[self.pair_a[pairs]],
@@ -124,7 +133,7 @@ class PairBuffers:
             "depth": depth,
             "normal_impulse": impulse,
             "step": np.full(len(pairs), self.world.step_count),
-            "enabled": enabled,
+            "enabled": np.ones(len(pairs), bool),
         }
 
     def _publish(self, pairs: np.ndarray, columns: dict[str, np.ndarray]) -> None:

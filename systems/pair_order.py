@@ -1,33 +1,49 @@
-"""The canonical order of pairs: by the smaller entity id, then by the larger."""
+"""Pairs in canonical order, by the smaller entity id, then by the larger; and the columns of those that touch."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from ..framework.compilation import kernel
 
 
 @kernel
-def sort_by_counting(key, order, count, starts, result):
-    """Stable counting sort of order[:count] by ``key[order]``; keys are below len(starts) - 1."""
+def sort_pairs(first, second, rank, starts, half_a, half_b, sorted_a, sorted_b):
+    """Write the pairs (first, second) (m,) of rows in canonical order, the row of the smaller id first.
+
+    rank (n,): the place of a row by its entity's id; starts (n + 1,), half_a, half_b (m,): room. Two stable counting
+    sorts, by the larger id and by the smaller.
+    """
     for i in range(len(starts)):
         starts[i] = 0
-    for i in range(count):
-        starts[key[order[i]] + 1] += 1
+    for c in range(len(first)):
+        starts[max(rank[first[c]], rank[second[c]]) + 1] += 1
     for i in range(1, len(starts)):
         starts[i] += starts[i - 1]
-    for i in range(count):
-        k = key[order[i]]
-        result[starts[k]] = order[i]
-        starts[k] += 1
+    for c in range(len(first)):
+        a, b = first[c], second[c]
+        if rank[a] > rank[b]:
+            a, b = b, a
+        k = starts[rank[b]]
+        starts[rank[b]] += 1
+        half_a[k], half_b[k] = a, b
+    for i in range(len(starts)):
+        starts[i] = 0
+    for c in range(len(first)):
+        starts[rank[half_a[c]] + 1] += 1
+    for i in range(1, len(starts)):
+        starts[i] += starts[i - 1]
+    for c in range(len(first)):
+        k = starts[rank[half_a[c]]]
+        starts[rank[half_a[c]]] += 1
+        sorted_a[k], sorted_b[k] = half_a[c], half_b[c]
 
 
-def order_of_pairs(a: np.ndarray, b: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """Indices that sort pairs of rows (a, b); ``rank`` is the place of a row by its entity's id."""
-    first, second = rank[a], rank[b]
-    if 8 * len(a) < len(rank):  # counting would spend its time on bodies that touch nothing
-        return np.argsort(first * len(rank) + second, kind="stable")
-    starts, half, order = np.empty(len(rank) + 1, np.int64), np.empty(len(a), np.int64), np.arange(len(a))
-    sort_by_counting(second, order, len(a), starts, half)
-    sort_by_counting(first, half, len(a), starts, order)
-    return order
+@kernel
+def collect_contacts(
+    pairs, pair_depth, pair_normal, pair_point, pair_impulse, depth, normal, point, impulse,
+):  # fmt: skip
+    """Copy what is known of some pairs (k,) into columns of their own."""
+    for r in range(len(pairs)):
+        c = pairs[r]
+        depth[r], impulse[r] = pair_depth[c], pair_impulse[c]
+        for axis in range(normal.shape[1]):
+            normal[r, axis], point[r, axis] = pair_normal[c, axis], pair_point[c, axis]

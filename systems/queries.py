@@ -40,6 +40,8 @@ class Queries(QueryServices):
         self._state = state
         self._stamp: Any = None
         self._moves = 0  # times that something has moved besides what the state counts
+        self._asked: dict[type[Any], QueryKernels] = {}  # kernels by the shape that asks
+        self._asked_of: Any = None  # the code of the shapes that they ask for
         self._neighbours = NeighbourSearch(state)
         self._walk = np.empty((2, MAX_LEVELS + 2))
 
@@ -100,7 +102,7 @@ class Queries(QueryServices):
     # -- what is near -----------------------------------------------------------------------------
 
     def nearest(self, points: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray) -> NearestHits:
-        rows, distances, normals, surface = _unanswered(len(points), np.minimum(limits, ENDLESS), points.shape[1])
+        rows, distances, normals, surface = _unanswered(np.minimum(limits, ENDLESS), points.shape[1])
         kernels = self._kernels(SphereCollider)
         if kernels is not None:
             for boxes in self._state.broad_phase.partitions:
@@ -148,7 +150,7 @@ class Queries(QueryServices):
         partitions = [boxes for boxes in self._state.broad_phase.partitions if boxes.count]
         limits = np.minimum(limits, ENDLESS)
         if only_nearest:
-            rows, distances, normals, points = _unanswered(len(starts), limits, starts.shape[1])
+            rows, distances, normals, points = _unanswered(limits, starts.shape[1])
         else:
             room = 1 + sum(boxes.count for boxes in partitions)
             rows, distances = np.empty(room, np.int64), np.empty(room)
@@ -177,7 +179,7 @@ class Queries(QueryServices):
 
     def _current(self) -> Any:
         """Changes whenever bodies may have moved."""
-        return self._state.motion_stamp, self._moves, self._state.structure, self._state.table.static_version
+        return self._state.motion_stamp, self._moves, self._state.structures, self._state.table.static_version
 
     def _kernels(self, component: Any) -> QueryKernels | None:
         """The kernels that ask with that shape, with the boxes made ready for them; None if nothing has a collider."""
@@ -190,7 +192,11 @@ class Queries(QueryServices):
             state.refresh_rotation()
             state.broad_phase.trees_now()
             self._stamp = stamp
-        return query_kernels(state.world.registry, state.code.shapes, component)
+        if self._asked_of is not state.code:
+            self._asked_of, self._asked = state.code, {}
+        if component not in self._asked:
+            self._asked[component] = query_kernels(state.world.registry, state.code.shapes, component)
+        return self._asked[component]
 
     def _columns(self) -> tuple[Any, ...]:
         """Those of the bodies: entity, position, offset, shape, the collider that has the layers, layers, shapes."""
@@ -206,8 +212,7 @@ class Queries(QueryServices):
         return np.where(rows < 0, -1, self._state.table.arrays["entity"][rows])
 
 
-def _unanswered(count: int, limits: np.ndarray, dimensions: int) -> tuple[np.ndarray, ...]:
+def _unanswered(limits: np.ndarray, dimensions: int) -> tuple[np.ndarray, ...]:
     """Rows, distances, normals and points before anything is found."""
-    nothing = np.full((count, dimensions), np.nan)
-    distances = np.array(np.broadcast_to(limits, count))
-    return np.full(count, -1), distances, nothing, nothing.copy()
+    nothing = np.full((len(limits), dimensions), np.nan)
+    return np.full(len(limits), -1), limits.copy(), nothing, nothing.copy()

@@ -87,7 +87,7 @@ class Response(System):
             dt, state.pair_a, state.pair_b, state.responds, offsets, neighbours[:used], state.rank, scratch["size"],
             scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
             scratch["start_velocity"], arrays["inverse_mass"], motion, restitution, stacks["collider.friction"], rules,
-            state.slots, limits, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
+            scratch["material"], limits, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
             state.pair_point, state.pair_depth, *queue.arrays, state.like,
         ):  # fmt: skip
             queue.grow(state.found)
@@ -106,7 +106,7 @@ class Response(System):
             dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.pair_depth, scratch["shape"],
             scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
             scratch["start_velocity"], state.start_positions, scratch["size"],
-            state.table.stacks["collider.restitution"], state.slots, MIXING_RULES.index(settings.restitution_mixing),
+            state.table.stacks["collider.restitution"], scratch["material"], MIXING_RULES.index(settings.restitution_mixing),
             -1.0 if threshold is None else threshold, -1.0 if slop is None else slop, scratch["gravity_share"], struck,
             self._solver.supported, self._solver.change, self._solver.travels * dt, state.pair_impulse,
             state.pair_parts, result, state.like,

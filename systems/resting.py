@@ -24,45 +24,47 @@ def between(a, b, position, offset, like):
 def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any], Callable[..., None], Any]:
     """The kernels over the shapes of a scene: (find the contacts at rest, linearise them, measure what touches)."""
 
-    @part
+    @inlined
     def touch(a, b, d, shape_of, shapes, like):
         """The pair function and its answer."""
+        return evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
+
+    @part
+    def touch_seldom(a, b, d, shape_of, shapes, like):
+        """The same where speed is nothing, and code to compile is."""
         return evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
 
     @part
     def entry(a, b, d, travel, at_end, slop, shape_of, shapes, like):
         """Gap at the start, normal and point where the pair first touches on its way from d to d + travel.
 
-        That is the start if it touches there, and the end if it touches nowhere or that is asked for. A touch of
-        corners is none.
+        That is the end if it touches nowhere or that is asked for. A touch of corners is none.
         """
-        low, high, t = 0.0, 1.0, 1.0 if at_end else 0.0
+        low, high, t = 0.0, 1.0, 1.0
         normal, point, depth, chosen = like, like, 0.0, 0.0
         for look in range(ENTRY_ITERATIONS):
             at = add_scaled(d, travel, t)
-            _, depth_now, n, p = touch(a, b, at, shape_of, shapes, like)
+            _, depth_now, n, p = touch_seldom(a, b, at, shape_of, shapes, like)
             if corner(shape_of[a], a, shape_of[b], b, at, slop, shapes, like):
                 depth_now = min(depth_now, -slop)  # so that the search goes on
-            if look == 1 or at_end or depth_now >= 0.0:  # the end, or a time in touch
+            if look == 0 or depth_now >= 0.0:  # the end, or a time in touch
                 normal, point, depth, chosen = n, p, depth_now, t
-                if look == 0 or depth_now < 0.0:
+                if at_end or depth_now < 0.0:
                     break
                 high = t
             else:
                 low = t
-            if abs(depth_now) <= slop and look > 1:
+            if abs(depth_now) <= slop and look > 0:
                 break
-            t = 1.0
-            if look > 0:
-                t = chosen + depth / dot(travel, normal)  # where its plane says, if that is between the two
-                if not low < t < high or look % 4 == 3:
-                    t = 0.5 * (low + high)
+            t = chosen + depth / dot(travel, normal)  # where its plane says, if that is between the two
+            if not low < t < high or look % 4 == 3:
+                t = 0.5 * (low + high)
         return -depth - chosen * dot(travel, normal), normal, point
 
     @kernel
     def find_resting(
         dt, pair_a, pair_b, pairs, responds, pair_depth, shape_of, offset, shapes, position, velocity, start_velocity,
-        start, size, restitution, slots, rule, fixed_threshold, fixed_slop, share, struck, supported, change, travelled,
+        start, size, restitution, material, rule, fixed_threshold, fixed_slop, share, struck, supported, change, travelled,
         pair_impulse, pair_parts, result, like,
     ):  # fmt: skip
         """Pairs whose gap is below the margin after the impacts and that are not bouncing; returns how many.
@@ -93,11 +95,11 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
                     free = add_scaled(free, row(change, a, like), travelled)
                 if supported[b]:
                     free = add_scaled(free, row(change, b, like), -travelled)
-                _, depth, normal, _ = touch(a, b, free, shape_of, shapes, like)
+                _, depth, normal, _ = touch_seldom(a, b, free, shape_of, shapes, like)
                 if depth < -margin:
                     continue
             pair_parts[c] = STAYS
-            e = mix(rule, restitution[slots[shape_of[a]], a], restitution[slots[shape_of[b]], b])
+            e = mix(rule, restitution[material[a], a], restitution[material[b], b])
             if e > 0.0:
                 threshold = fixed_threshold if fixed_threshold >= 0.0 else (margin - slop) / dt
                 speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
@@ -106,7 +108,7 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
                 if speed > 0.0:
                     pair_parts[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY
                 if pair_impulse[c] > 0.0 and speed > threshold:
-                    _, before, _, _ = touch(a, b, between(a, b, start, offset, like), shape_of, shapes, like)
+                    _, before, _, _ = touch_seldom(a, b, between(a, b, start, offset, like), shape_of, shapes, like)
                     if before < 0.0:
                         continue  # on its way out
             if corner(shape_of[a], a, shape_of[b], b, d, slop, shapes, like):
@@ -117,7 +119,7 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
 
     @kernel
     def linearise(
-        resting, slot, pair_a, pair_b, shape_of, offset, shapes, position, start, size, friction, slots, rule,
+        resting, slot, pair_a, pair_b, shape_of, offset, shapes, position, start, size, friction, material, rule,
         fixed_slop, inverse_mass, pair_impulse, pair_parts, pair_normal, pair_point, normals, gaps, masses, frictions,
         extents, parting, like,
     ):  # fmt: skip
@@ -130,8 +132,11 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
             a, b = pair_a[c], pair_b[c]
             slop = slop_of(a, b, size, fixed_slop)
             d = between(a, b, start, offset, like)
-            travel = sub(between(a, b, position, offset, like), d)
-            gap, normal, point = entry(a, b, d, travel, pair_parts[c] != STAYS, slop, shape_of, shapes, like)
+            _, depth, normal, point = touch(a, b, d, shape_of, shapes, like)
+            gap = -depth
+            if depth < 0.0 or pair_parts[c] != STAYS or corner(shape_of[a], a, shape_of[b], b, d, slop, shapes, like):
+                travel = sub(between(a, b, position, offset, like), d)
+                gap, normal, point = entry(a, b, d, travel, pair_parts[c] != STAYS, slop, shape_of, shapes, like)
             if pair_impulse[c] > 0.0 and dot(normal, row(pair_normal, c, like)) <= 0.0:
                 normal = row(pair_normal, c, like)  # coincident centres have parted: not back again
             point = add(point, add(row(start, a, like), row(offset, a, like)))
@@ -143,7 +148,7 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
             # After a blow at time t the body seems to come from dv t behind: no overlap to be pushed out.
             parting[k] = pair_parts[c] == PARTS or (pair_impulse[c] > 0.0 and gap > 0.0)
             extents[k] = smaller(a, b, size)
-            frictions[k] = mix_friction(rule, friction[slots[shape_of[a]], a], friction[slots[shape_of[b]], b])
+            frictions[k] = mix_friction(rule, friction[material[a], a], friction[material[b], b])
 
     @kernel
     def find_touching(

@@ -27,66 +27,18 @@ PUSH_RATE = 0.2  # of the deep overlap, per step
 PUSH_LIMIT = 0.05  # of the size, per step
 
 
-@part
-def sweep(
-    biased, chosen, active, h, bias_rate, mass_scale, impulse_scale, first, second, normal, gap, mass, friction, extent, parting,
-    in_block, impulse, tangent, velocity, shift, inverse_mass, like,
-):  # fmt: skip
-    """One pass over all contacts: each gets the impulse that stops its approach; with friction after it.
-
-    A contact still open may close within the substep. ``biased``: overlap gives an approach to be stopped too.
-    chosen: only the contacts that are ``active`` (m,).
-    """
-    for k in range(len(first)):
-        if chosen and not active[k]:
-            continue
-        a, b = first[k], second[k]
-        n = row(normal, k, like)
-        w_a, w_b = inverse_mass[a], inverse_mass[b]
-        v_a, v_b = row(velocity, a, like), row(velocity, b, like)
-        if not in_block[k]:
-            room = gap[k] + dot(sub(row(shift, b, like), row(shift, a, like)), n)
-            speed = dot(sub(v_b, v_a), n)
-            old = impulse[k]
-            if room > 0.0:
-                new = old - mass[k] * (speed + room / h)
-            elif biased and not parting[k] and room > -DEEP * extent[k]:
-                new = old - mass_scale * mass[k] * (speed + bias_rate * room) - impulse_scale * old
-            else:
-                new = old - mass[k] * speed
-            new = max(0.0, new)
-            impulse[k] = new
-            v_a = add_scaled(v_a, n, (old - new) * w_a)
-            v_b = add_scaled(v_b, n, (new - old) * w_b)
-        if friction[k] > 0.0:
-            w = sub(v_b, v_a)
-            along = add_scaled(w, n, -dot(w, n))
-            old_pull = row(tangent, k, like)
-            pull = add_scaled(old_pull, along, -mass[k])
-            strength = math.sqrt(dot(pull, pull))
-            limit = friction[k] * impulse[k]
-            if strength > limit:
-                pull = scale(pull, limit / strength)
-            store(tangent, k, pull)
-            change = sub(pull, old_pull)
-            v_a = add_scaled(v_a, change, -w_a)
-            v_b = add_scaled(v_b, change, w_b)
-        store(velocity, a, v_a)
-        store(velocity, b, v_b)
-
-
 @kernel
 def solve_contacts(
-    substeps, h, any_loose, loose, active, first, second, normal, gap, mass, friction, extent, parting, in_block, blocks, impulse,
-    tangent, total, worked, velocity, shift, acceleration, inverse_mass, like,
+    substeps, h, any_loose, loose, active, first, second, normal, gap, mass, rubs, friction, extent, parting, in_block,
+    blocks, impulse, tangent, total, worked, opening, pushing, soft, velocity, shift, acceleration, inverse_mass, like,
 ):  # fmt: skip
     """Advance the bodies by ``substeps`` of ``h`` seconds under ``acceleration`` and their contacts.
 
     Of contact k: first, second (m,) bodies; normal (m, d) from first to second; gap (m,) at the start (overlap is
-    negative); mass (m,) 1 / (1/m_a + 1/m_b); friction (m,); extent (m,) size of the smaller body; parting (m,) its
-    overlap needs no push; in_block (m,) and blocks (b, 2), see ``squeezed``. impulse (m,) and tangent (m, d) start with
-    those of the last step's last substep and end with those of this one's; total (m,) sums the former over the step;
-    worked (m,): it pushed at some time; active (m,): room.
+    negative); mass (m,) 1 / (1/m_a + 1/m_b); friction (m,), rubs: any is above 0; extent (m,) size of the smaller body;
+    parting (m,) its overlap needs no push; in_block (m,) and blocks (b, 2), see ``squeezed``. impulse (m,) and tangent
+    (m, d) start with those of the last step's last substep and end with those of this one's; total (m,) sums the former
+    over the step; worked (m,): it pushed at some time; active, opening, pushing, soft (m,): room.
     Of bodies: velocity, shift (n, d), the displacement since the start; acceleration (n, d); inverse_mass (n,); loose
     (n,): a contact that pushed in the last step has gone, so that the others push too much: before anything else
     these let go, and their neighbours.
@@ -98,12 +50,15 @@ def solve_contacts(
     for k in range(len(first)):
         total[k] = 0.0
         worked[k] = False
+    measure(h, bias_rate, first, second, normal, gap, extent, parting, shift, opening, pushing, soft, like)
     for step in range(substeps):
         for i in range(len(velocity)):
             store(velocity, i, add_scaled(row(velocity, i, like), row(acceleration, i, like), h))
         for k in range(len(first)):
             if impulse[k] > 0.0:
-                push = add_scaled(row(tangent, k, like), row(normal, k, like), impulse[k])
+                push = scale(row(normal, k, like), impulse[k])
+                if rubs:
+                    push = add_scaled(push, row(tangent, k, like), 1.0)
                 a, b = first[k], second[k]
                 store(velocity, a, add_scaled(row(velocity, a, like), push, -inverse_mass[a]))
                 store(velocity, b, add_scaled(row(velocity, b, like), push, inverse_mass[b]))
@@ -111,25 +66,85 @@ def solve_contacts(
         for turn in range(-LET_GO_PASSES if any_loose and step == 0 else 0, 1 + last):
             if turn < 0:
                 spread(loose, first, second, inverse_mass, active)
-            sweep(
-                turn == 0, turn < 0, active, h, bias_rate, mass_scale, impulse_scale, first, second, normal, gap, mass, friction, extent,
-                parting, in_block, impulse, tangent, velocity, shift, inverse_mass, like,
-            )  # fmt: skip
-            solve_squeezed(
-                turn == 0, turn < 0, active, h, bias_rate, blocks, first, second, normal, gap, impulse, velocity, shift, inverse_mass,
-                like,
-            )  # fmt: skip
+            bias = pushing if turn == 0 else opening
+            for k in range(len(first)):
+                if in_block[k] or (turn < 0 and not active[k]):
+                    continue
+                a, b = first[k], second[k]
+                n = row(normal, k, like)
+                v_a, v_b = row(velocity, a, like), row(velocity, b, like)
+                old = impulse[k]
+                wanted = mass[k] * (dot(sub(v_b, v_a), n) + bias[k])
+                if turn == 0 and soft[k]:
+                    wanted = mass_scale * wanted + impulse_scale * old
+                new = max(0.0, old - wanted)
+                impulse[k] = new
+                store(velocity, a, add_scaled(v_a, n, (old - new) * inverse_mass[a]))
+                store(velocity, b, add_scaled(v_b, n, (new - old) * inverse_mass[b]))
+            solve_squeezed(turn < 0, active, blocks, first, second, normal, bias, impulse, velocity, inverse_mass, like)
+            if rubs:
+                rub(turn < 0, active, first, second, normal, mass, friction, impulse, tangent, velocity, inverse_mass, like)
             if turn == 0:
                 for k in range(len(first)):
-                    worked[k] = worked[k] or impulse[k] > 0.0
+                    worked[k] |= impulse[k] > 0.0
                 for i in range(len(velocity)):
                     store(shift, i, add_scaled(row(shift, i, like), row(velocity, i, like), h))
-                push_deep(
-                    substeps, first, second, normal, gap, mass, extent, parting, worked, shift, inverse_mass, like
-                )
+                if measure(
+                    h, bias_rate, first, second, normal, gap, extent, parting, shift, opening, pushing, soft, like
+                ):
+                    push_deep(
+                        substeps, first, second, normal, gap, mass, extent, parting, worked, shift, inverse_mass, like
+                    )
+                    measure(
+                        h, bias_rate, first, second, normal, gap, extent, parting, shift, opening, pushing, soft, like
+                    )
         for k in range(len(first)):
             total[k] += impulse[k]
-            worked[k] = worked[k] or impulse[k] > 0.0
+            worked[k] |= impulse[k] > 0.0
+
+
+@part
+def measure(h, bias_rate, first, second, normal, gap, extent, parting, shift, opening, pushing, soft, like):
+    """What each contact asks of the speed along its normal, from where the bodies are now.
+
+    opening (m,): at most closing what is open within a substep; pushing (m,): in the pass that pushes, overlap is to
+    open as well, softly where ``soft`` (m,) says so. Returns whether some overlap is too deep for that.
+    """
+    any_deep = False
+    for k in range(len(first)):
+        room = gap[k] + dot(sub(row(shift, second[k], like), row(shift, first[k], like)), row(normal, k, like))
+        opening[k] = pushing[k] = max(0.0, room) / h
+        soft[k] = False
+        if room <= 0.0 and not parting[k]:
+            if room >= -DEEP * extent[k]:
+                soft[k] = True
+                pushing[k] = bias_rate * room
+            else:
+                any_deep = True
+    return any_deep
+
+
+@part
+def rub(chosen, active, first, second, normal, mass, friction, impulse, tangent, velocity, inverse_mass, like):
+    """Friction: stop what slides, with at most ``friction`` times the normal impulse (Coulomb's cone).
+
+    chosen: only the contacts that are ``active`` (m,).
+    """
+    for k in range(len(first)):
+        if friction[k] == 0.0 or (chosen and not active[k]):
+            continue
+        a, b = first[k], second[k]
+        n = row(normal, k, like)
+        w = sub(row(velocity, b, like), row(velocity, a, like))
+        old = row(tangent, k, like)
+        pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass[k])
+        strength, limit = math.sqrt(dot(pull, pull)), friction[k] * impulse[k]
+        if strength > limit:
+            pull = scale(pull, limit / strength)
+        store(tangent, k, pull)
+        change = sub(pull, old)
+        store(velocity, a, add_scaled(row(velocity, a, like), change, -inverse_mass[a]))
+        store(velocity, b, add_scaled(row(velocity, b, like), change, inverse_mass[b]))
 
 
 @part

@@ -55,9 +55,12 @@ def find_squeezed(first, second, normal, inverse_mass, light_of, last, before, i
 
 @part
 def solve_squeezed(
-    biased, chosen, active, h, bias_rate, blocks, first, second, normal, gap, impulse, velocity, shift, inverse_mass, like
+    chosen, active, blocks, first, second, normal, bias, impulse, velocity, inverse_mass, like
 ):  # fmt: skip
-    """Solve the two contacts of each block exactly; see ``soft_step.sweep``."""
+    """Solve the two contacts of each block exactly; bias (m,): what they ask, see ``soft_step.measure``.
+
+    chosen: only blocks of which a contact is ``active`` (m,).
+    """
     for q in range(len(blocks)):
         j, k = blocks[q, 0], blocks[q, 1]
         if chosen and not (active[j] or active[k]):
@@ -70,19 +73,9 @@ def solve_squeezed(
         if first[k] != light:
             two, r = negative(two), first[k]
         w, w_p, w_r = inverse_mass[light], inverse_mass[p], inverse_mass[r]
-        v, x = row(velocity, light, like), row(shift, light, like)
-        wrong_j = dot(sub(row(velocity, p, like), v), one)
-        wrong_k = dot(sub(row(velocity, r, like), v), two)
-        room_j = gap[j] + dot(sub(row(shift, p, like), x), one)
-        room_k = gap[k] + dot(sub(row(shift, r, like), x), two)
-        if room_j > 0.0:
-            wrong_j += room_j / h
-        elif biased:
-            wrong_j += bias_rate * room_j
-        if room_k > 0.0:
-            wrong_k += room_k / h
-        elif biased:
-            wrong_k += bias_rate * room_k
+        v = row(velocity, light, like)
+        wrong_j = dot(sub(row(velocity, p, like), v), one) + bias[j]
+        wrong_k = dot(sub(row(velocity, r, like), v), two) + bias[k]
         cosine = dot(one, two)
         # changes of the two impulses: both contacts held; then one of them, the other let go; then none
         determinant = (1.0 - cosine * cosine) * w * w + w * (w_p + w_r) + w_p * w_r

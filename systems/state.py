@@ -61,7 +61,8 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.pair_counters.update(dict.fromkeys(COUNTERS, 0))
         self._integrators: dict[str, Integrator] = {}
         self.prepared: set[type[Any]] = set()  # colliders whose kernels are kept ready
-        self.structure: Any = None  # changes whenever what refresh_structure makes does
+        self.structure: Any = None
+        self.structures = 0  # how often refresh_structure has made everything anew
         self.code: ShapeCode | None = None
         self.kernels: SceneKernels | None = None
         self.shapes: tuple[Any, ...] = ()
@@ -86,6 +87,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         if structure == self.structure:
             return
         self.structure = structure
+        self.structures += 1
         self._allocate_scratch()
         count, arrays = table.count, table.arrays
         arrays["linear_velocity"][table.stops[1] : count] = 0.0

@@ -422,7 +422,7 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
     make = {
         Transform: lambda: Transform(rng.normal(size=2) * 100),
         RigidBody: lambda: RigidBody(rng.random() + 0.1, kind=("dynamic", "kinematic", "static")[rng.integers(3)]),
-        SphereCollider: lambda: SphereCollider(rng.random()),
+        SphereCollider: lambda: SphereCollider(2 + rng.random()),  # holds the box, if one has both
         AABBCollider: lambda: AABBCollider(rng.random(2), layer=2),
         Charge: lambda: Charge(rng.normal()),
     }

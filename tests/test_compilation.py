@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import logging
 import os
 import subprocess
 import sys
@@ -9,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
-from carom.framework import compilation
+from carom.framework import compilation, kernel_cache
 from carom.framework.compilation import deep_hash, inlined, kernel, part
+from carom.framework.kernel_cache import cache_contents, clear_cache
 
 HELPERS = """
 from carom.framework.compilation import part
@@ -54,20 +58,28 @@ class Program:
         self.folder = folder
         self.cache = folder / "cache"
         self.helpers = HELPERS
+        self.stderr = ""  # of the last run
         self.main = MAIN.format(folder=str(folder))
 
-    def run(self, seed="0", **environment) -> tuple[float, float, int, int, str]:
-        """What both kernels return, how many were compiled and how many loaded, and the hash of the first."""
+    def start(self, seed="0", **environment) -> subprocess.Popen:
         (self.folder / "helpers.py").write_text(self.helpers)
         everything = {
             **os.environ, "CAROM_CACHE_DIR": str(self.cache), "PYTHONHASHSEED": seed, "PYTHONDONTWRITEBYTECODE": "1",
             **environment,
         }  # fmt: skip
-        result = subprocess.run(
-            [sys.executable, "-c", self.main], env=everything, capture_output=True, text=True, cwd=self.folder
-        )
-        assert result.returncode == 0, result.stderr
-        first, second, compiled, loaded, digest = result.stdout.split()
+        return subprocess.Popen(
+            [sys.executable, "-c", self.main], env=everything, cwd=self.folder, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+
+    def run(self, seed="0", **environment) -> tuple[float, float, int, int, str]:
+        """What both kernels return, how many were compiled and how many loaded, and the hash of the first."""
+        return self.result(self.start(seed, **environment))
+
+    def result(self, process: subprocess.Popen) -> tuple[float, float, int, int, str]:
+        output, self.stderr = process.communicate()
+        assert process.returncode == 0, self.stderr
+        first, second, compiled, loaded, digest = output.split()
         return float(first), float(second), int(compiled), int(loaded), digest
 
     def files(self) -> list[Path]:
@@ -111,11 +123,21 @@ def test_an_edit_of_a_comment_compiles_nothing(program):
     assert program.run()[2] == 0
 
 
-@pytest.mark.parametrize("damage", [b"", b"garbage", None], ids=["empty", "garbage", "cut short"])
+def flipped(content: bytes) -> bytes:
+    """One bit in the middle, where the machine code is."""
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [lambda _: b"", lambda _: b"garbage" * 20, lambda content: content[: len(content) // 2], flipped],
+    ids=["empty", "garbage", "cut short", "one bit"],
+)
 def test_a_damaged_file_is_compiled_anew_and_replaced(program, damage):
     program.run()
     for path in program.files():
-        path.write_bytes(path.read_bytes()[: path.stat().st_size // 2] if damage is None else damage)
+        path.write_bytes(damage(path.read_bytes()))
     assert program.run()[:4] == (9.0, 109.0, 2, 0)
     assert program.run()[2:4] == (0, 2)
 
@@ -131,7 +153,20 @@ def test_without_any_folder_to_write_to_everything_works_and_nothing_is_kept(pro
     program.main = code + program.main
     for _ in range(2):
         assert program.run(**environment)[:4] == (9.0, 109.0, 2, 0)
+        assert program.stderr.count("no folder that can be written") == 1
+        assert "CAROM_CACHE_DIR" in program.stderr
+        assert len(program.stderr.splitlines()) == 1
     assert not list(program.folder.rglob("*.kernel"))
+
+
+def test_processes_that_compile_at_once_share_the_folder(program):
+    """Each finds whole files or none; both write the same ones."""
+    processes = [program.start() for _ in range(2)]
+    for process in processes:
+        assert program.result(process)[:2] == (9.0, 109.0)
+    assert len(program.files()) == 2
+    assert not list(program.cache.glob("*.unfinished"))
+    assert program.run()[:4] == (9.0, 109.0, 0, 2)
 
 
 def test_a_folder_that_cannot_be_written_is_passed_over(monkeypatch, tmp_path):
@@ -145,20 +180,117 @@ def test_a_folder_that_cannot_be_written_is_passed_over(monkeypatch, tmp_path):
     assert (tmp_path / "chosen").is_dir()
 
 
-def test_a_disk_that_fills_up_costs_speed_and_not_the_run(monkeypatch, tmp_path):
+def test_a_disk_that_fills_up_costs_speed_and_not_the_run(monkeypatch, tmp_path, caplog):
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
 
     def full(*args, **kwargs):
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(compilation.tempfile, "mkstemp", full)
+    monkeypatch.setattr(kernel_cache.tempfile, "mkstemp", full)
 
     @kernel
     def twice(x):
         return 2.0 * x
 
     assert twice(4.0) == 8.0
+    assert twice(4) == 8.0
     assert not list(tmp_path.iterdir())
+    assert [r.getMessage() for r in caplog.records if "cannot be kept" in r.getMessage()] == [
+        f"carom: kernels cannot be kept in {tmp_path}, the next run compiles again: no space left on device"
+    ]
+
+
+def test_a_write_that_breaks_off_leaves_nothing_behind(monkeypatch, tmp_path):
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
+
+    def broken(*args):
+        raise OSError("connection to the disk lost")
+
+    monkeypatch.setattr(kernel_cache.os, "replace", broken)
+
+    @kernel
+    def halved(x):
+        return 0.5 * x
+
+    assert halved(4.0) == 2.0
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_folder_can_be_counted_and_emptied(monkeypatch, tmp_path):
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
+    (tmp_path / "other.txt").write_text("not a kernel")
+    (tmp_path / "old.kernel").write_bytes(b"12345")  # of another version
+    (tmp_path / "broken.unfinished").write_bytes(b"1")  # of a process that was killed
+    assert cache_contents() == (1, 5)
+    assert clear_cache() == (1, 5)
+    assert cache_contents() == (0, 0)
+    assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
+
+
+# -- saying so -------------------------------------------------------------------------------------------------------
+
+
+def test_the_first_wait_says_in_one_line_what_is_happening_and_later_ones_nothing(program):
+    program.run()
+    (line,) = program.stderr.splitlines()  # two kernels were compiled
+    assert line.startswith("carom: compiling kernels")
+    assert str(program.cache) in line
+    assert "carom warm-up" in line
+    program.run()
+    assert program.stderr == ""
+
+
+def test_logging_silences_the_line_or_shows_every_kernel(program):
+    quiet = "import logging; logging.getLogger('carom').setLevel(logging.ERROR)\n"
+    talkative = "import logging; logging.basicConfig(level=logging.INFO)\n"
+    main = program.main
+    program.main = quiet + main
+    program.run()
+    assert program.stderr == ""
+    clear_folder(program)
+    program.main = talkative + main
+    program.run()
+    assert program.stderr.count("INFO:carom:compiling total (") == 2
+    assert program.stderr.count("WARNING:carom:") == 1
+
+
+def clear_folder(program):
+    for path in program.files():
+        path.unlink()
+
+
+def test_who_listens_shows_it_himself(monkeypatch, tmp_path, caplog):
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compilation.log, "announced", False)
+    monkeypatch.setattr(compilation.log, "listeners", [lambda name: None])
+
+    @kernel
+    def quietly(x):
+        return x + 17.0
+
+    with caplog.at_level(logging.DEBUG, "carom"):
+        quietly(1.0)
+    assert [r.levelname for r in caplog.records if r.name == "carom"] == ["INFO"]
+
+
+def test_the_garbage_collector_is_as_it_was_after_compiling_and_after_failing(monkeypatch, tmp_path):
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
+
+    @kernel
+    def five_more(x):
+        return x + 5.0
+
+    five_more(1.0)
+    assert gc.isenabled()
+    with pytest.raises(TypingError):
+        five_more("text")
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        five_more(1)
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
 
 
 # -- the hash --------------------------------------------------------------------------------------------------------

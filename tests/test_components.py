@@ -424,7 +424,7 @@ def test_wrong_values_are_refused_by_the_setter_which_names_the_entity(make, fie
     owner, name = field.split(".")
     world = make_world()
     e = world.create_entity(
-        Transform((1, 2)), RigidBody(), SphereCollider(1.0), AABBCollider((1, 1)), Everything(1)
+        Transform((1, 2)), RigidBody(), SphereCollider(2.0), AABBCollider((1, 1)), Everything(1)
     )  # fmt: skip
     world.bodies  # noqa: B018
     before = world.state_hash()

@@ -1,0 +1,154 @@
+"""The disk cache of compiled kernels: one file per kernel, signature and processor.
+
+numba's own cache has three properties a framework cannot live with: it does not notice an edit in a function that
+lives in another file, it misses for functions made by factories (closures over other kernels), and the import of a
+module fails where it finds no folder to write to. Here a file is named by a hash of everything the machine code depends
+on (:mod:`deep_hash`), and ends with a checksum of what it holds: whatever happened to it, a damaged file is compiled
+anew. Files are written whole or not at all, so any number of processes share a folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import getpass
+import hashlib
+import logging
+import operator
+import os
+import pickle
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba.core import compiler
+from numba.core.caching import _Cache
+from numba.core.serialize import dumps
+
+from .deep_hash import deep_hash
+
+CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
+KERNELS, UNFINISHED = "*.kernel", "*.unfinished"
+
+logger = logging.getLogger("carom")
+machine_code = operator.attrgetter("library")  # of numba's compile result
+_checksum = hashlib.sha256
+_reported: set[Path] = set()  # folders that could not be written, told once
+
+
+def cache_folder() -> Path | None:
+    """The first folder that can be written: the environment's choice, the user's cache, a temporary one; else None."""
+    chosen = os.environ.get(CACHE_FOLDER_VARIABLE)
+    candidates = [Path(chosen)] if chosen else []
+    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    with contextlib.suppress(RuntimeError):  # no home folder
+        candidates.append((Path(base) if base else Path.home() / ".cache") / "carom")
+    with contextlib.suppress(OSError, KeyError, ImportError):  # no user name
+        candidates.append(Path(tempfile.gettempdir()) / f"carom-{getpass.getuser()}")
+    for folder in candidates:
+        if _usable(folder):
+            return folder
+    return None
+
+
+def cache_contents() -> tuple[int, int]:
+    """How many kernels the cache folder holds, and their bytes; (0, 0) without a folder."""
+    sizes = []
+    for path in _files(KERNELS):
+        with contextlib.suppress(FileNotFoundError):  # another process empties the folder
+            sizes.append(path.stat().st_size)
+    return len(sizes), sum(sizes)
+
+
+def clear_cache() -> tuple[int, int]:
+    """Delete all kernels from the cache folder, those of older versions too; how many there were, and their bytes."""
+    contents = cache_contents()
+    for path in [*_files(KERNELS), *_files(UNFINISHED)]:
+        path.unlink(missing_ok=True)
+    return contents
+
+
+def _files(pattern: str) -> list[Path]:
+    folder = cache_folder()
+    return list(folder.glob(pattern)) if folder is not None else []
+
+
+def _usable(folder: Path) -> bool:
+    """Whether ``folder`` exists or can be made, is writable and is ours: machine code is loaded from it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        owner = getattr(os, "getuid", None)
+        return os.access(folder, os.W_OK) and (owner is None or folder.stat().st_uid == owner())
+    except OSError:
+        return False
+
+
+class KernelCache(_Cache):
+    """numba's cache interface over those files. ``missing`` is called before a kernel compiles that was not found."""
+
+    def __init__(self, dispatcher: Any, missing: Callable[[Any], None]) -> None:
+        self._dispatcher = dispatcher
+        self._missing = missing
+        self._enabled = True
+        self._hash: str | None = None
+
+    @property
+    def cache_path(self) -> str:
+        return str(cache_folder() or "")
+
+    def enable(self) -> None:
+        self._enabled = True
+
+    def disable(self) -> None:
+        self._enabled = False
+
+    def flush(self) -> None:
+        for path in _files(f"{self._stem()}-*"):
+            path.unlink(missing_ok=True)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        if self._enabled and path is not None and path.exists():
+            # A damaged or unreadable file is a miss: the kernel is compiled again and the file replaced.
+            with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):
+                data = path.read_bytes()
+                size = _checksum().digest_size
+                if _checksum(data[:-size]).digest() == data[-size:]:
+                    return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+        self._missing(self._dispatcher)
+        return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        path = self._path(sig, data.codegen)
+        if not self._enabled or path is None or machine_code(data).has_dynamic_globals or data.lifted:
+            return
+        content = dumps(data._reduce())
+        temporary = None
+        try:
+            handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=UNFINISHED[1:])
+            with os.fdopen(handle, "wb") as file:
+                file.write(content + _checksum(content).digest())
+            os.replace(temporary, path)
+        except OSError as error:  # a full or vanished disk costs speed, never the run
+            if temporary is not None:
+                with contextlib.suppress(OSError):
+                    os.unlink(temporary)
+            if path.parent not in _reported:
+                _reported.add(path.parent)
+                logger.warning(
+                    "carom: kernels cannot be kept in %s, the next run compiles again: %s",
+                    path.parent, error.strerror or error,
+                )  # fmt: skip
+
+    def _stem(self) -> str:
+        if self._hash is None:
+            self._hash = deep_hash(self._dispatcher)
+        return f"{self._dispatcher.py_func.__name__}-{self._hash[:32]}"
+
+    def _path(self, sig: Any, codegen: Any) -> Path | None:
+        folder = cache_folder()
+        if folder is None:
+            return None
+        key = hashlib.sha256(repr((sig, codegen.magic_tuple())).encode()).hexdigest()
+        return folder / f"{self._stem()}-{key[:24]}.kernel"

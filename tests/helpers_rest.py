@@ -1,0 +1,54 @@
+"""Bodies at rest: towers of boxes and balls, and how well they stand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from worlds import ball, box
+
+G = 9.81
+SLOP = 0.005  # of a size: the overlap that is left alone
+
+
+def tower(world, count, *, x=0.0, bottom=0.5, pitch=1.0, maker=box, masses=None, **collider):
+    """``count`` bodies above each other, the lowest centre at height ``bottom``; returns their entities."""
+    masses = np.ones(count) if masses is None else masses
+    rest = (0.0,) * (world.dimensions - 2)
+    return [maker(world, (x, bottom + pitch * k, *rest), mass=masses[k], **collider) for k in range(count)]
+
+
+def rows_of(world, entities):
+    return [world.bodies.row_of(e) for e in entities]
+
+
+def heights(world, entities):
+    return world.bodies.position[rows_of(world, entities), 1].copy()
+
+
+def overlaps(world, entities):
+    """Of a tower of unit bodies, from the floor upwards: floor to first, first to second and so on, metres."""
+    return 1.0 - np.diff(heights(world, entities), prepend=-0.5)
+
+
+def speed(world):
+    """The greatest of any moving body's velocity components."""
+    return float(np.abs(world.bodies.dynamic.linear_velocity).max())
+
+
+def energy(world):
+    return world.kinetic_energy() + world.potential_energy()
+
+
+def depths(world):
+    return np.maximum(np.asarray(world.contacts.depth), 0.0)
+
+
+def soft_overlap(load, effective_mass, settings, g=G):
+    """What a contact at rest gives way under a load, metres: load g / (effective_mass w^2).
+
+    w, the frequency of the soft contact, is a quarter of the substeps' rate; effective_mass: of the two bodies, 1 /
+    (1/m_a + 1/m_b).
+    """
+    frequency = 2 * math.pi * 0.25 * settings.substeps / settings.dt
+    return np.asarray(load) * g / (np.asarray(effective_mass) * frequency**2)

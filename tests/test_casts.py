@@ -1,0 +1,373 @@
+"""Rays and moving shapes against brute force over all bodies, and against closed forms (B13, B14, C15)."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from helpers_queries import GRAZE, Bodies, directions, scene
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import ball, box, make_world
+
+from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
+from carom.framework import Plugin, Settings, World, column
+from carom.plugins import Physics
+
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+
+
+def check_cast(hits, one, bodies, way, least, tolerance):
+    """All hits of one cast and the nearest of it, against the oracle's."""
+    clear = np.abs(least) > GRAZE
+    expected = set(bodies.entity[(way < np.inf) & clear].tolist())
+    unsure = set(bodies.entity[~clear].tolist())
+    found = [hit.entity for hit in hits]
+    assert len(set(found)) == len(found)
+    assert expected - unsure <= set(found) <= expected | unsure
+    assert [(hit.distance, hit.entity) for hit in hits] == sorted((hit.distance, hit.entity) for hit in hits)
+    for hit in hits:
+        index = int(np.flatnonzero(bodies.entity == hit.entity)[0])
+        if clear[index]:
+            # a way is as uncertain as the gap, divided by the slope with which it closes
+            slack = tolerance * (1.0 + 1.0 / math.sqrt(abs(least[index])))
+            assert hit.distance == pytest.approx(way[index], abs=slack)
+    if hits:
+        assert (one["entity"], one["distance"]) == (hits[0].entity, hits[0].distance)
+        np.testing.assert_array_equal(one["normal"], hits[0].normal)
+        np.testing.assert_array_equal(one["point"], hits[0].point)
+        assert one["fraction"] == hits[0].fraction
+    else:
+        assert one["entity"] == -1
+        assert one["distance"] == math.inf
+        assert one["fraction"] == 1.0
+
+
+def row_of(hits, i):
+    return {name: getattr(hits, name)[i] for name in ("entity", "distance", "fraction", "point", "normal")}
+
+
+@both_dimensions
+@pytest.mark.parametrize("sizes", ["even", "power", "clusters"])
+@pytest.mark.parametrize("n", [60, 2500])
+def test_casts_through_many_bodies(d, n, sizes):
+    world, bodies, side = scene(d, n, seed=n + d, sizes=sizes)
+    rng = np.random.default_rng(7)
+    m = 16
+    starts = (rng.random((m, d)) * 1.4 - 0.2) * side
+    ways = directions(rng, m, d)
+    lengths = rng.random(m) * 1.5 * side
+    radii, halves = rng.random(m) * 0.5, rng.random((m, d)) * 0.5
+    rays = world.ray_casts(starts, ways, lengths)
+    spheres = world.shape_casts(SphereCollider.many(radius=radii), starts, lengths[:, None] * ways)
+    boxes = world.shape_casts(AABBCollider.many(half_extents=halves), starts, lengths[:, None] * ways)
+    scale = 1e6 if sizes == "clusters" else side
+    tolerance = 1e-13 * scale
+    for i in range(m):
+        zero, radius = np.zeros(d), np.full(d, radii[i])
+        hits = world.ray_cast(starts[i], ways[i], lengths[i])
+        check_cast(hits, row_of(rays, i), bodies, *bodies.cast(starts[i], ways[i], lengths[i], zero, True), tolerance)
+        hits = world.shape_cast(SphereCollider(radii[i]), starts[i], lengths[i] * ways[i])
+        expected = bodies.cast(starts[i], ways[i], lengths[i], radius, True)
+        check_cast(hits, row_of(spheres, i), bodies, *expected, tolerance)
+        hits = world.shape_cast(AABBCollider(halves[i]), starts[i], lengths[i] * ways[i])
+        expected = bodies.cast(starts[i], ways[i], lengths[i], halves[i], False)
+        check_cast(hits, row_of(boxes, i), bodies, *expected, tolerance)
+    world.close()
+
+
+# -- closed forms ---------------------------------------------------------------------------------
+
+
+def swept_sphere(y, z=0.0, radius=1.0):
+    """B13: a sphere that flies from x = -5 with (2, 0, 0) at the box [-1, 1]^3; its cast, in units of time."""
+    world = make_world(3)
+    box(world, (0, 0, 0), half=1.0, kind="static")
+    hits = world.shape_cast(SphereCollider(radius), (-5.0, y, z), (20.0, 0.0, 0.0))
+    many = world.shape_casts(SphereCollider(radius), [(-5.0, y, z)], (20.0, 0.0, 0.0))
+    assert (many.entity[0] >= 0) == bool(hits)
+    world.close()
+    return hits
+
+
+@pytest.mark.parametrize(
+    ("y", "z", "time", "normal"),
+    [
+        (0.0, 0.0, 1.5, (-1.0, 0.0, 0.0)),
+        (1.6, 0.0, 1.6, (-0.8, 0.6, 0.0)),
+        (1 + 3 / 7, 1 + 6 / 7, 13 / 7, (-2 / 7, 3 / 7, 6 / 7)),
+    ],
+)
+def test_b13_face_edge_corner(y, z, time, normal):
+    (hit,) = swept_sphere(y, z)
+    assert hit.distance / 2 == pytest.approx(time, rel=1e-12)
+    assert hit.fraction * 10 == pytest.approx(time, rel=1e-12)
+    np.testing.assert_allclose(hit.normal, normal, atol=1e-12)
+    if z == 0.0 and y > 0.0:
+        np.testing.assert_allclose(hit.point, (-1.0, 1.0, 0.0), atol=1e-12)
+
+
+def exact_time(y):
+    """Of the sphere that meets the edge at (-1, 1): (4 - sqrt(1 - (y - 1)^2)) / 2, from the rounded y, in fractions."""
+    rest = 1 - (Fraction(y) - 1) ** 2
+    root = Fraction(math.isqrt(rest.numerator * rest.denominator * 4**200), rest.denominator * 2**200)
+    return float((4 - root) / 2)
+
+
+@pytest.mark.parametrize("below", [1e-3, 1e-6, 1e-9])
+def test_b13_nearly_a_graze(below):
+    (hit,) = swept_sphere(2.0 - below)
+    scale = math.hypot(5.0, 2.0)  # |p|
+    assert hit.distance / 2 == pytest.approx(exact_time(2.0 - below), abs=1e-12 * scale / 2)
+    if below == 1e-9:
+        assert hit.distance / 2 == pytest.approx(1.99997764, abs=5e-9)
+        assert hit.normal[0] == pytest.approx(-4.47e-5, rel=1e-3)
+
+
+def test_b13_tangent_and_beyond():
+    for hit in swept_sphere(2.0):  # either answer is right, the place must be
+        nearest = np.clip((-5.0 + hit.distance, 2.0, 0.0), -1.0, 1.0)
+        assert np.linalg.norm((-5.0 + hit.distance, 2.0, 0.0) - nearest) == pytest.approx(1.0, abs=1e-9)
+    assert swept_sphere(2.0 + 1e-9) == []
+
+
+@pytest.mark.parametrize("by", [1e-12, 1e-16])
+def test_c15_grazing_spheres(by):
+    world = make_world()
+    ball(world, (0, 0), radius=0.5)
+    for sign in (-1, 1):
+        y = 1.0 * (1 + sign * by)
+        for hit in world.shape_cast(SphereCollider(0.5), (-10, y), (20, 0)):
+            assert math.hypot(-10 + hit.distance, y) == pytest.approx(1.0, abs=1e-9)
+    world.close()
+
+
+def test_b13_radius_zero_is_a_ray():
+    world = make_world(3)
+    box(world, (0, 0, 0), half=1.0, kind="static")
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        start, way = 4 * rng.standard_normal(3), rng.standard_normal(3)
+        ray = world.ray_cast(start, way, 10.0)
+        sphere = world.shape_cast(SphereCollider(0.0), start, 10.0 * way / np.linalg.norm(way))
+        assert [hit.entity for hit in ray] == [hit.entity for hit in sphere]
+        for one, two in zip(ray, sphere, strict=True):
+            assert one.distance == pytest.approx(two.distance, rel=1e-14)
+            np.testing.assert_allclose(one.point, start + one.distance * way / np.linalg.norm(way), atol=1e-14)
+    world.close()
+
+
+@both_dimensions
+@pytest.mark.parametrize("gap", [1e-15, 1e-12, 1e-6])
+def test_b14_nearly_touching_spheres(d, gap):
+    """The way is the gap, to the rounding of the start itself."""
+    world = make_world(d)
+    ball(world, 0, radius=1.0)
+    start = np.zeros(d)
+    start[0] = -(2.0 + gap)
+    (hit,) = world.shape_cast(SphereCollider(1.0), start, -start)
+    assert hit.distance == pytest.approx(-start[0] - 2.0, abs=4e-16 * 2)
+    world.close()
+
+
+def test_b14_far_start():
+    world = make_world()
+    ball(world, (0, 0), radius=1.0)
+    for origin in (1e7, 1e9, 1e12):
+        (hit,) = world.ray_cast((-origin, 0.0), (1, 0))
+        assert hit.distance == pytest.approx(origin - 1.0, abs=4e-16 * origin)
+    world.close()
+
+
+@pytest.mark.parametrize("scale", [1e-150, 1e-9, 1e9, 1e150])
+@both_dimensions
+def test_casts_at_extreme_sizes(d, scale):
+    """Powers of ten, so the answers differ from those at size 1 by rounding alone."""
+    world = make_world(d)
+    ball(world, (3 * scale, 0.25 * scale, 0)[:d], radius=scale)
+    box(world, (6 * scale, 0.0, 0)[:d], half=scale, kind="static")
+    start, way = np.zeros(d), np.eye(d)[0]
+    first, second = world.ray_cast(start, way)
+    assert first.distance == pytest.approx(scale * (3 - math.sqrt(1 - 0.0625)), rel=1e-14)
+    assert second.distance == pytest.approx(5 * scale, rel=1e-14)
+    (hit,) = world.shape_cast(AABBCollider(np.full(d, scale)), start, 4 * scale * way, only_nearest=True)
+    assert hit.distance == pytest.approx(scale, rel=1e-14)
+    assert world.query_nearest(start).distance == pytest.approx(scale * (math.hypot(3, 0.25) - 1), rel=1e-14)
+    world.close()
+
+
+@both_dimensions
+def test_starts_inside(d):
+    """At distance 0, with the normal of the nearest way out."""
+    world = make_world(d)
+    inside = box(world, 0, half=1.0, kind="static")
+    start = np.zeros(d)
+    start[0] = 0.9
+    way = np.eye(d)[1]
+    (hit,) = world.ray_cast(start, way)
+    assert (hit.entity, hit.distance, hit.fraction) == (inside, 0.0, 0.0)
+    np.testing.assert_array_equal(hit.normal, np.eye(d)[0])
+    np.testing.assert_array_equal(hit.point, start)
+    (hit,) = world.shape_cast(SphereCollider(0.5), start + 0.3 * np.eye(d)[0], np.zeros(d))
+    assert (hit.distance, hit.fraction) == (0.0, 0.0)
+    np.testing.assert_array_equal(hit.normal, np.eye(d)[0])
+    assert world.shape_cast(SphereCollider(0.1), start + 0.3 * np.eye(d)[0], np.zeros(d)) == []
+    assert world.query_nearest(start).distance == pytest.approx(-0.1, abs=1e-15)
+    world.close()
+
+
+@both_dimensions
+def test_shape_offset_and_adopted_shapes(d):
+    world = make_world(d)
+    wall = box(world, 10, half=1.0, kind="static")
+    ahead = 2 * np.eye(d)[0]
+    for shape in (SphereCollider(0.5, offset=ahead), AABBCollider(np.full(d, 0.5), offset=ahead), AABBCollider(0.5)):
+        (hit,) = world.shape_cast(shape, np.zeros(d), 20 * np.eye(d)[0])
+        expected = 8.5 if np.any(shape.offset == 0) and np.ndim(shape.offset) == 0 else 6.5
+        assert (hit.entity, hit.distance) == (wall, expected)
+    player = ball(world, 0, radius=0.25)
+    own = world.component_for_entity(player, SphereCollider)
+    (hit,) = world.shape_cast(own, np.zeros(d), 20 * np.eye(d)[0], exclude=player)
+    assert (hit.entity, hit.distance) == (wall, 8.75)
+    offsets = SphereCollider.many(radius=[0.5, 0.5], offset=[ahead, 0 * ahead])
+    hits = world.shape_casts(offsets, np.zeros((2, d)), 20 * np.eye(d)[0], exclude=player)
+    np.testing.assert_array_equal(hits.distance, [6.5, 8.5])
+    world.close()
+
+
+def test_turned_boxes_are_met_as_they_stand():
+    world = make_world()
+    box(world, (5, 0), half=1.0, rotation=math.pi / 4, kind="static", offset=(1.0, 0.0))
+    (hit,) = world.ray_cast((0, 0), (1, 0))
+    assert hit.distance == pytest.approx(5 + math.sqrt(0.5) - math.sqrt(2), rel=1e-14)  # the offset turns as well
+    world.close()
+
+
+def test_the_shape_of_a_plugin_is_met_and_casts():
+    """One registered pair with spheres serves queries, rays, casts of spheres and casts of the shape itself."""
+    plugin = Plugin("rhombus")
+
+    @plugin.shape(cost=2)
+    class RhombusCollider(Collider):
+        reach = column(positive=True)
+
+        @staticmethod
+        def bounds(shape, like):
+            return (shape.reach, shape.reach)
+
+    @plugin.pair(RhombusCollider, SphereCollider)
+    def rhombus_sphere(a, b, d):
+        """Separating planes along the faces only: a bound of the distance, as plugins may give."""
+        x, y = (1.0 if d[0] >= 0.0 else -1.0), (1.0 if d[1] >= 0.0 else -1.0)
+        normal = (x * 0.7071067811865476, y * 0.7071067811865476)
+        depth = 0.7071067811865476 * (a.reach - abs(d[0]) - abs(d[1])) + b.radius
+        return depth >= 0.0, depth, normal, (d[0] - normal[0] * b.radius, d[1] - normal[1] * b.radius)
+
+    @plugin.pair(RhombusCollider, RhombusCollider)
+    def rhombus_rhombus(a, b, d):
+        x, y = (1.0 if d[0] >= 0.0 else -1.0), (1.0 if d[1] >= 0.0 else -1.0)
+        depth = 0.7071067811865476 * (a.reach + b.reach - abs(d[0]) - abs(d[1]))
+        return depth >= 0.0, depth, (x * 0.7071067811865476, y * 0.7071067811865476), (0.5 * d[0], 0.5 * d[1])
+
+    world = World(Physics(), plugin)
+    gem = world.create_entity(Transform((5, 0)), RhombusCollider(1.0))
+    (hit,) = world.ray_cast((0, 0.5), (1, 0))
+    assert hit.entity == gem
+    assert hit.distance == pytest.approx(4.5, rel=1e-15)
+    np.testing.assert_allclose(hit.normal, (-math.sqrt(0.5), math.sqrt(0.5)))
+    (hit,) = world.shape_cast(RhombusCollider(1.0), (0, 0.5), (10, 0))
+    assert hit.distance == pytest.approx(3.5, rel=1e-15)
+    assert world.query_point((5.4, 0.5)) == [gem]
+    assert world.query_point((5.6, 0.5)) == []
+    assert world.query_aabb((4, -1), (6, 1)) == []  # no plugin has said how boxes meet it
+    world.close()
+
+
+def test_geometry_setting_counts():
+    """Questions are answered by the level that contacts come from."""
+    world = World(Physics(), settings=Settings())
+    world.create_entity(Transform((5, 0)), SphereCollider(1.5), AABBCollider((1.0, 1.0)))
+    assert world.ray_cast((0, 0), (1, 0))[0].distance == 4.0
+    world.settings = world.settings.replace(geometry="bounds")
+    assert world.ray_cast((0, 0), (1, 0))[0].distance == 3.5
+    world.close()
+
+
+# -- geometry at random ---------------------------------------------------------------------------
+
+numbers = st.floats(-3, 3, allow_subnormal=False)
+vectors = st.tuples(numbers, numbers, numbers)
+sizes = st.tuples(*(st.floats(0, 2, allow_subnormal=False),) * 3)
+
+
+@both_dimensions
+@settings(deadline=None, max_examples=80)
+@given(
+    body=st.tuples(st.booleans(), vectors, sizes),
+    mover=st.tuples(st.booleans(), vectors, sizes),
+    way=vectors.filter(lambda v: max(map(abs, v[:2])) > 1e-3),
+)
+def test_any_pair_meets_where_the_oracle_says(d, body, mover, way):
+    (sphere, place, size), (round_one, start, half) = body, mover
+    half = (half[0],) * 3 if round_one else half
+    world = make_world(d)
+    target = SphereCollider(size[0]) if sphere else AABBCollider(size[:d])
+    entity = world.create_entity(Transform(place[:d]), target)
+    bodies = Bodies([entity], [place[:d]], [(size[0],) * d if sphere else size[:d]], [sphere])
+    shape = SphereCollider(half[0]) if round_one else AABBCollider(half[:d])
+    way = np.array(way[:d])
+    length = float(np.linalg.norm(way))
+    ways, least = bodies.cast(np.array(start[:d]), way / length, length, np.array(half[:d]), round_one)
+    hits = world.shape_cast(shape, start[:d], way)
+    world.close()
+    if abs(least[0]) < GRAZE:
+        return
+    assert bool(hits) == (ways[0] < np.inf)
+    if hits:
+        assert hits[0].distance == pytest.approx(ways[0], abs=1e-12 / math.sqrt(abs(least[0])) + 1e-13)
+        assert np.linalg.norm(hits[0].normal) == pytest.approx(1.0, abs=1e-12)
+        if hits[0].distance > 0.0:
+            assert hits[0].normal @ way < 0.0
+
+
+# -- errors ---------------------------------------------------------------------------------------
+
+WRONG = {
+    "ray_cast: origin": lambda w: w.ray_cast("here", (1, 0)),
+    "ray_cast: direction must not be zero": lambda w: w.ray_cast((0, 0), (0, 0)),
+    "ray_cast: direction must be 2": lambda w: w.ray_cast((0, 0), (1, 0, 0)),
+    "ray_cast: max_distance": lambda w: w.ray_cast((0, 0), (1, 0), math.nan),
+    "ray_cast: mask": lambda w: w.ray_cast((0, 0), (1, 0), mask=1 << 70),
+    "ray_cast: exclude": lambda w: w.ray_cast((0, 0), (1, 0), exclude="me"),
+    "ray_casts: directions must not be zero, as row 1": lambda w: w.ray_casts([(0, 0)] * 2, [(1, 0), (0, 0)]),
+    "ray_casts: directions must have shape": lambda w: w.ray_casts([(0, 0)] * 2, [(1, 0)] * 3),
+    "ray_casts: max_distances": lambda w: w.ray_casts([(0, 0)], (1, 0), -1.0),
+    "shape_cast: displacement": lambda w: w.shape_cast(SphereCollider(1), (0, 0), (math.inf, 0)),
+    "shape_cast: position": lambda w: w.shape_cast(SphereCollider(1), (0,), (1, 0)),
+    "shape_casts: positions": lambda w: w.shape_casts(SphereCollider(1), [(math.nan, 0)], (1, 0)),
+    "AABBCollider.half_extents": lambda w: w.shape_cast(AABBCollider((1, 1, 1)), (0, 0), (1, 0)),
+    "SphereCollider.radius": lambda w: w.shape_casts(SphereCollider.many(radius=[1, 2]), [(0, 0)], (1, 0)),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+@pytest.mark.parametrize("empty", [True, False])
+def test_wrong_arguments(message, empty):
+    world = make_world()
+    if not empty:
+        ball(world, (0, 0))
+    with pytest.raises(ValueError, match=message):
+        WRONG[message](world)
+    world.close()
+
+
+def test_wrong_shapes():
+    world = make_world()
+    for shape in (RigidBody(), 0.5, SphereCollider, SphereCollider.many(radius=1.0)):
+        with pytest.raises(TypeError, match=r"shape_cast: shape must be a collider of this world \(AABBCollider, Sph"):
+            world.shape_cast(shape, (0, 0), (1, 0))
+    with pytest.raises(TypeError, match="shape_casts: shape"):
+        world.shape_casts(Transform.many(position=(0, 0)), [(0, 0)], (1, 0))
+    world.close()

@@ -1,0 +1,514 @@
+"""Levels of geometry: several colliders on one body, cheap first; against the definition, pair by pair."""
+
+from __future__ import annotations
+
+import math
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles import narrow_naive
+from worlds import EPS, ball, box, floor, make_world, position, run, velocity
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components.colliders import Collider
+from carom.framework import Phase, Settings, System, World, column
+from carom.framework.errors import UnhandledPairError
+from carom.framework.registry import Plugin
+from carom.plugins import Physics
+
+ROOT = Path(__file__).resolve().parent.parent
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
+
+
+def levelled(world, place, velocity=0.0, *, half=0.5, radius=None, rotation=0.0, sphere=None, kind="dynamic", **last):
+    """A box with a sphere around it; the sphere touches the corners unless a radius is given."""
+    half = np.broadcast_to(half, world.dimensions)
+    radius = float(np.linalg.norm(half)) if radius is None else radius
+    place = place if np.ndim(place) else (place, *(0.0,) * (world.dimensions - 1))
+    speed = velocity if np.ndim(velocity) else (velocity, *(0.0,) * (world.dimensions - 1))
+    return world.create_entity(
+        Transform(place, rotation), RigidBody(linear_velocity=speed, kind=kind),
+        SphereCollider(radius, **(sphere or {})), AABBCollider(half, **last),
+    )  # fmt: skip
+
+
+def pairs(world):
+    contacts = world.contacts
+    return list(zip(contacts.entity_a.tolist(), contacts.entity_b.tolist(), strict=True))
+
+
+# -- a pair hits if every level hits -------------------------------------------------------------
+
+
+def depth_of(shape_a, shape_b):
+    """Of two shapes (kind, centre, size), by the oracle."""
+    if (shape_a[0], shape_b[0]) == ("box", "sphere"):
+        shape_a, shape_b = shape_b, shape_a
+    return getattr(narrow_naive, f"{shape_a[0]}_{shape_b[0]}")(*shape_a[1:], *shape_b[1:])[0]
+
+
+def crowd(d, turned, seed):
+    """150 bodies: spheres, boxes, and boxes in spheres that more than hold them; and their shapes in the world."""
+    rng = np.random.default_rng(seed)
+    world, shapes = make_world(d), {}
+    for k in range(150):
+        rotation = 0.0 if not turned or k % 4 == 3 else (rng.uniform(-3, 3) if d == 2 else rng.normal(size=4))
+        place, offset, half = rng.uniform(-3.5, 3.5, d), rng.uniform(-0.3, 0.3, d), rng.uniform(0.05, 0.5, d)
+        gap = rng.uniform(-0.1, 0.1, d)
+        radius = np.linalg.norm(np.abs(gap) + half) * rng.uniform(1.0, 1.2)
+        colliders, levels = [], []
+        turn = narrow_naive.rotation_matrix(rotation, d)
+        if k % 3 != 1:
+            colliders.append(SphereCollider(radius, offset=offset + gap))
+            levels.append(("sphere", place + turn @ (offset + gap), radius))
+        if k % 3 != 2:
+            colliders.append(AABBCollider(half, offset=offset))
+            levels.append(("box", place + turn @ offset, narrow_naive.stretched(half, rotation)))
+        body = () if k % 5 == 0 else (RigidBody(),)
+        entity = world.create_entity(Transform(place, rotation), *body, *colliders)
+        shapes[entity] = levels, not body
+    return world, shapes
+
+
+@both_dimensions
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_pair_hits_if_every_level_hits(d, turned):
+    """Contacts, their depth and the counters, by the definition: level k of one against level k of the other, the last
+    one standing in where a body has fewer. Turned boxes stick out of their spheres in places."""
+    world, shapes = crowd(d, turned, 5 + d)
+    world.run(Phase.NARROW)
+    expected, first_hits, wrong, stuck_out = {}, 0, 0, 0
+    entities = sorted(shapes)
+    for i, a in enumerate(entities):
+        for b in entities[i + 1 :]:
+            (levels_a, fixed_a), (levels_b, fixed_b) = shapes[a], shapes[b]
+            if fixed_a and fixed_b:
+                continue
+            count = max(len(levels_a), len(levels_b))
+            depths = [
+                depth_of(levels_a[min(k, len(levels_a) - 1)], levels_b[min(k, len(levels_b) - 1)])
+                for k in range(count)
+            ]
+            hit = min(depths) >= 0
+            if hit:
+                expected[a, b] = depths[-1]
+            stuck_out += depths[0] < 0 <= depths[-1]
+            if count > 1:
+                first_hits += depths[0] >= 0
+                wrong += depths[0] >= 0 and not hit
+    assert pairs(world) == list(expected)
+    np.testing.assert_allclose(world.contacts.depth, list(expected.values()), atol=100 * EPS)
+    counters = world.stats().counters
+    assert (counters["first_level_hits"], counters["false_positives"]) == (first_hits, wrong)
+    assert first_hits <= counters["first_level_tests"] <= counters["candidates"]
+    assert len(expected) > 50
+    assert wrong > 30
+    assert (stuck_out > 0) == turned
+
+
+class Found(System):
+    """What NARROW has found, step by step."""
+
+    phase = Phase.NARROW
+
+    def __init__(self):
+        self.steps = []
+
+    def process(self, dt):
+        contacts = self.world.contacts
+        names = ("entity_a", "entity_b", "depth", "normal", "point")
+        self.steps.append({name: getattr(contacts, name).copy() for name in names})
+
+
+@both_dimensions
+def test_levels_change_the_cost_and_not_what_is_found(d):
+    """A heap of boxes, bouncing ones among them, falls together. From the same state every step finds the same bits
+    with spheres around the boxes: contacts and what is near, depth, normal and point."""
+
+    def heap(with_spheres):
+        rng = np.random.default_rng(3)
+        world = make_world(d, gravity=9.81)
+        floor(world)
+        for k in range(24):
+            place = rng.uniform(-0.8, 0.8, d)
+            place[1] = 0.5 + 0.9 * k
+            half = rng.uniform(0.25, 0.5, d)
+            colliders = [SphereCollider(np.linalg.norm(half))] if with_spheres else []
+            collider = AABBCollider(half, restitution=0.4 * (k % 2))
+            world.create_entity(Transform(place), RigidBody(1.0 + k % 3), *colliders, collider)
+        found = Found()
+        world.add_system(found)
+        return world, found.steps
+
+    (plain, expected), (several, found) = heap(False), heap(True)
+    near = 0
+    for _ in range(120):
+        several.bodies.position[:] = plain.bodies.position
+        several.bodies.linear_velocity[:] = plain.bodies.linear_velocity
+        plain.step()
+        several.step()
+        for name, column_of in expected[-1].items():
+            np.testing.assert_array_equal(found[-1][name], column_of)
+        near += int((expected[-1]["depth"] < 0).sum())
+    assert near > 20
+    assert several.stats().counters["false_positives"] > 100
+    assert [plain.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
+
+
+def test_what_the_first_level_hits_is_counted():
+    """Two squares corner to corner: their circles overlap, they do not. Then nearer, then far apart."""
+    world = make_world()
+    a = levelled(world, 0.0, kind="kinematic")
+    b = levelled(world, (1.2, 0.5), kind="kinematic")
+    world.step()
+    assert not len(world.contacts)
+    assert [world.stats().counters[name] for name in COUNTERS] == [1, 1, 1]
+    world.component_for_entity(b, Transform).position = (0.9, 0.5)
+    world.step()
+    assert pairs(world) == [(a, b)]
+    assert [world.stats().counters[name] for name in COUNTERS] == [2, 2, 1]
+    world.component_for_entity(b, Transform).position = (9.0, 0.5)
+    world.step()
+    assert [world.stats().counters[name] for name in COUNTERS] == [2, 2, 1]
+    world.reset_stats()
+    assert [world.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
+
+
+def test_bodies_with_one_level_are_tested_once():
+    """A sphere meets a box without levels directly, also in a world where others have several."""
+    world = make_world()
+    levelled(world, 20.0)
+    ball(world, 0.0)
+    box(world, 0.9)
+    world.step()
+    assert len(world.contacts) == 1
+    assert world.stats().counters["first_level_tests"] == 0
+
+
+@both_dimensions
+def test_the_last_level_gives_contact_and_material(d):
+    """Restitution, normal and time of impact are the box's: the sphere around it is there for nothing else."""
+    world = make_world(d)
+    a = levelled(world, -1.0, 1.0, sphere={"restitution": 0.2, "friction": 3.0}, restitution=1.0)
+    b = levelled(world, 1.0, -1.0)
+    run(world, 20)
+    assert not len(world.contacts)
+    assert velocity(world, a)[0] == 1.0
+    run(world, 20)  # they meet after 0.5 s with the speeds exchanged
+    assert velocity(world, a)[0] == -1.0
+    assert position(world, a)[0] == pytest.approx(-0.5 - (40 / 60 - 0.5), abs=1e-12)
+    assert velocity(world, b)[0] == 1.0
+
+
+def test_layer_and_mask_are_those_of_the_last_level():
+    world = make_world()
+    levelled(world, 0.0, sphere={"layer": 2, "mask": 2}, layer=4, mask=4)
+    levelled(world, 0.5, sphere={"layer": 1, "mask": 1}, layer=4, mask=4)
+    levelled(world, 0.25, sphere={"layer": 4, "mask": 4})
+    world.step()
+    assert len(world.contacts) == 1
+
+
+@both_dimensions
+def test_a_level_off_the_centre_turns_with_the_body(d):
+    """The box at (1, 0) is at (0, 1) after a quarter turn, and its sphere with it."""
+    world = make_world(d)
+    rotation = math.pi / 2 if d == 2 else (math.sqrt(0.5), 0, 0, math.sqrt(0.5))
+    turned = world.create_entity(
+        Transform((0.0,) * d, rotation), RigidBody(),
+        SphereCollider(1.0, offset=np.eye(d)[0]), AABBCollider((0.4,) * d, offset=np.eye(d)[0]),
+    )  # fmt: skip
+    near, far = ball(world, np.eye(d)[1], radius=0.1), ball(world, np.eye(d)[0], radius=0.1)
+    world.step()
+    assert pairs(world) == [(turned, near)]
+    assert far not in world.contacts.entity_b
+
+
+@pytest.mark.parametrize("restitution", [0.0, 1.0])
+def test_a_level_that_is_outgrown_keeps_them_apart(restitution):
+    """A square turned by 45 degrees stretches to twice its area; its circle leaves the corners out. A ball on a line
+    through such a corner, 0.8 from the centre, flies on, whether it would rest or bounce; else it cannot."""
+    for spheres in ([SphereCollider(math.sqrt(0.5))], []):
+        world = make_world()
+        world.create_entity(Transform((0, 0), math.pi / 4), *spheres, AABBCollider((0.5, 0.5), restitution=restitution))
+        nearest = 0.8 * math.sqrt(0.5)
+        flying = ball(world, (nearest - 1.0, nearest + 1.0), (1.0, -1.0), radius=0.01)
+        run(world, 120)
+        assert (velocity(world, flying).tolist() == [1.0, -1.0]) == bool(spheres)
+
+
+# -- bounds: the first level alone ---------------------------------------------------------------
+
+
+def test_bounds_stops_at_the_first_level():
+    """Corner to corner two squares hit by their circles; the contact is that of the circles, nothing else is tested."""
+    world = make_world(geometry="bounds")
+    levelled(world, 0.0, layer=2, mask=2, sensor=True, sphere={"sensor": True})
+    levelled(world, (1.2, 0.5), layer=2, mask=2, sensor=True, sphere={"sensor": True})
+    levelled(world, (0.5, 0.5), layer=4, mask=4)
+    world.step()
+    assert world.contacts.depth[0] == pytest.approx(2 * math.sqrt(0.5) - 1.3, abs=4 * EPS)
+    np.testing.assert_allclose(world.contacts.normal, [(12 / 13, 5 / 13)], atol=4 * EPS)
+    assert len(world.contacts) == 1  # layer, mask and sensor are those of the last level all the same
+    assert velocity(world, 1).tolist() == [0, 0]
+    assert [world.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
+    (line,) = [line for line in str(world.plan()).splitlines() if "NarrowPhase" in line]
+    assert "all pairs of SphereCollider" in line
+    assert "AABBCollider" not in line
+
+
+def test_geometry_can_be_changed_between_steps():
+    world = make_world()
+    levelled(world, 0.0, kind="static")
+    levelled(world, (1.2, 0.5), kind="kinematic")
+    for geometry, hits in (("precise", 0), ("bounds", 1), ("precise", 0), ("bounds", 1)):
+        world.settings = world.settings.replace(geometry=geometry)
+        world.step()
+        assert len(world.contacts) == hits
+        assert bool(world.query_point((0.0, 0.6))) == hits
+
+
+def test_what_stands_still_keeps_its_offset_when_the_kernels_change():
+    """Preparing for other shapes in the middle of a run makes the levels anew: static bodies are boxed again."""
+    world = make_world(gravity=10.0)
+    ground = world.create_entity(Transform((0, 5)), AABBCollider((5, 0.5), offset=(0, -5.5)))
+    body = box(world, (0.0, 0.5))
+    run(world, 10)
+    world.prepare(SphereCollider)
+    run(world, 60)
+    assert position(world, body)[1] == pytest.approx(0.5, abs=0.01)
+    assert world.query_point((0.0, -0.9)) == [ground]
+
+
+def test_a_query_asks_the_last_level():
+    world = make_world()
+    entity = levelled(world, 0.0)
+    world.step()
+    assert world.query_point((0.49, 0.49)) == [entity]
+    assert world.query_point((0.0, 0.6)) == []  # in the circle, not in the square
+
+
+def test_the_plan_tells_of_levels():
+    world = make_world()
+    levelled(world, 0.0)
+    world.step()
+    assert "level by level" in str(world.plan())
+    world = make_world()
+    ball(world, 0.0)
+    box(world, 5.0)
+    world.step()
+    assert "level by level" not in str(world.plan())
+
+
+# -- what must enclose what ----------------------------------------------------------------------
+
+
+@both_dimensions
+@pytest.mark.parametrize("scale", [1.0, 1e-9, 1e9])
+def test_a_sphere_must_hold_the_corners_of_the_box(d, scale):
+    """To a millionth of its radius, wherever the two are; 1e-5 short is an error that says by how much."""
+    half, gap = np.array([0.3, 0.4, 1.2])[:d] * scale, np.array([0.1, -0.2, 0.3])[:d] * scale
+    for offset in (np.zeros(d), gap):
+        reach = np.linalg.norm(half + np.abs(offset))
+        for factor, fits in ((1.0, True), (1 - 0.5e-6, True), (1 - 1e-5, False), (0.5, False)):
+            world = make_world(d)
+            entity = world.create_entity(
+                Transform((0.0,) * d), SphereCollider(factor * reach, offset=-offset), AABBCollider(half)
+            )
+            if fits:
+                world.step()
+                continue
+            with pytest.raises(ValueError, match=rf"entity {entity}: its SphereCollider is the cheaper level") as error:
+                world.step()
+            assert f"AABBCollider, which sticks out by {(1 - factor) * reach:.4g}:" in str(error.value)
+
+
+def test_what_does_not_fit_is_told_again_until_it_does():
+    """Nothing is taken in before; a larger sphere, or none, mends it."""
+    world = make_world()
+    ball(world, 9.0)
+    first = levelled(world, 0.0, radius=0.7)
+    second = levelled(world, 3.0, radius=0.6)
+    for _ in range(2):
+        with pytest.raises(ValueError, match=rf"entity {first}: .*\(1 more entities likewise\)"):
+            world.step()
+        with pytest.raises(ValueError, match=r"sticks out by 0\.007107"):
+            len(world.bodies)
+    assert world.step_count == 0
+    world.remove_component(first, SphereCollider)
+    with pytest.raises(ValueError, match=rf"entity {second}: .*second entity for a shape of its own$"):
+        world.step()
+    world.component_for_entity(second, SphereCollider).radius = 0.8
+    world.step()
+    assert len(world.bodies) == 3
+
+
+def test_a_collider_that_comes_later_is_checked_against_those_that_are_there():
+    world = make_world()
+    entity = box(world, 0.0)
+    world.step()
+    world.add_component(entity, SphereCollider(0.6))
+    with pytest.raises(ValueError, match=rf"entity {entity}: .*sticks out by 0.1071"):
+        world.step()
+    world.add_component(entity, SphereCollider(0.75))
+    world.step()
+    world.add_component(entity, AABBCollider((0.7, 0.7)))
+    with pytest.raises(ValueError, match=rf"entity {entity}: .*sticks out by 0.2399"):
+        world.step()
+    world.remove_component(entity, SphereCollider)
+    world.step()
+
+
+def test_it_is_checked_once():
+    """What the game changes afterwards is its own affair, as the turns of bodies are."""
+    world = make_world()
+    entity = levelled(world, 0.0, rotation=0.6)
+    world.step()
+    world.component_for_entity(entity, SphereCollider).radius = 0.1
+    run(world, 3)
+    ball(world, 9.0)
+    run(world, 3)
+
+
+@both_dimensions
+def test_many_at_once_are_checked_at_once(d):
+    """10,000 entities in bulk; of two that do not fit, the first is named."""
+    n = 10_000
+    world = make_world(d)
+    places = np.arange(n * d, dtype=float).reshape(n, d)
+    radii = np.full(n, 1.01 * math.sqrt(d))
+    radii[[777, 4000]] = 1.0
+    ids = world.create_entities(
+        n, Transform.many(places), SphereCollider.many(radius=radii), AABBCollider.many(half_extents=1.0)
+    )
+    sticks_out = f"{math.sqrt(d) - 1:.4g}"
+    with pytest.raises(ValueError, match=rf"entity {ids[777]}: .*sticks out by {sticks_out}: .*\(1 more entities"):
+        world.step()
+    for k in (777, 4000):
+        world.component_for_entity(ids[k], SphereCollider).radius = 2.0
+    world.step()
+
+
+def test_sensor_and_solid_do_not_mix():
+    world = make_world()
+    entity = levelled(world, 0.0, sphere={"sensor": True})
+    message = f"entity {entity}: its SphereCollider is a sensor and its AABBCollider is solid.*use a second entity"
+    with pytest.raises(ValueError, match=message):
+        world.step()
+    world.component_for_entity(entity, SphereCollider).sensor = False
+    world.step()
+    world.component_for_entity(entity, AABBCollider).sensor = True
+    message = f"entity {entity}: its AABBCollider is a sensor and its SphereCollider is solid"
+    for _ in range(2):
+        with pytest.raises(ValueError, match=message):
+            world.step()
+    assert world.step_count == 1
+    world.component_for_entity(entity, SphereCollider).sensor = True
+    world.step()
+    assert world.step_count == 2
+
+
+# -- shapes of others ----------------------------------------------------------------------------
+
+
+class DiscCollider(Collider):
+    """A sphere by another name, which costs more."""
+
+    reach = column(minimum=0.0)
+
+    @staticmethod
+    def bounds(shape, like):
+        return (shape.reach, shape.reach) if len(like) == 2 else (shape.reach, shape.reach, shape.reach)
+
+
+def disc_disc(a, b, d):
+    gap = math.sqrt(d[0] * d[0] + d[1] * d[1])
+    return gap <= a.reach + b.reach, a.reach + b.reach - gap, (d[0] / gap, d[1] / gap), d
+
+
+def sphere_disc(a, b, d):
+    gap = math.sqrt(d[0] * d[0] + d[1] * d[1])
+    return gap <= a.radius + b.reach, a.radius + b.reach - gap, (d[0] / gap, d[1] / gap), d
+
+
+def box_disc(a, b, d):
+    x = max(abs(d[0]) - a.half_extents[0], 0.0)
+    y = max(abs(d[1]) - a.half_extents[1], 0.0)
+    gap = math.sqrt(x * x + y * y)
+    return gap <= b.reach, b.reach - gap, (1.0, 0.0), d
+
+
+def disc_world(cost=5.0):
+    plugin = Plugin("discs")
+    plugin.shape(cost=cost)(DiscCollider)
+    plugin.pair(DiscCollider, DiscCollider)(disc_disc)
+    plugin.pair(SphereCollider, DiscCollider)(sphere_disc)
+    plugin.pair(AABBCollider, DiscCollider)(box_disc)
+    return World(Physics(dimensions=2), plugin, settings=Settings())
+
+
+def nested(world, place, *, radius=1.5, half=1.0, reach=0.9):
+    """A disc in a box in a sphere."""
+    return world.create_entity(
+        Transform(place), RigidBody(kind="kinematic"), AABBCollider((half, half)), DiscCollider(reach),
+        SphereCollider(radius),
+    )  # fmt: skip
+
+
+def test_three_levels_of_which_one_is_a_plugins():
+    """Where each of them decides; the middle level of three stands against the last of two."""
+    world = disc_world()
+    a, b = nested(world, (0, 0)), nested(world, (9, 9))
+    two = world.create_entity(Transform((-9, 9)), RigidBody(), AABBCollider((1, 1)), SphereCollider(1.5))
+    for other, place, hits, counts in (
+        (b, (2.3, 2.0), 0, (1, 0, 0)),  # beyond the spheres, 3.05 apart
+        (b, (2.1, 2.0), 0, (1, 1, 1)),  # within the spheres, beyond the boxes
+        (b, (1.9, 1.9), 0, (1, 1, 1)),  # the boxes overlap, the discs are 2.7 apart
+        (b, (1.2, 1.2), 1, (1, 1, 0)),
+        (two, (1.0, 2.1), 0, (1, 1, 1)),  # the boxes are apart
+        (two, (1.8, 1.8), 0, (1, 1, 1)),  # the boxes overlap; from the box to the disc's centre 1.13
+        (two, (1.2, 1.2), 1, (1, 1, 0)),
+    ):
+        world.component_for_entity(other, Transform).position = place
+        world.reset_stats()
+        world.step()
+        assert pairs(world) == [(a, other)][:hits], place
+        assert tuple(world.stats().counters[name] for name in COUNTERS) == counts, place
+        world.component_for_entity(other, Transform).position = (9, 9) if other == b else (-9, 9)
+
+
+def test_shapes_of_others_are_checked_by_the_boxes_around_them():
+    for sizes, out in (
+        ({"reach": 1.1}, "AABBCollider is the cheaper level and must enclose its DiscCollider.*out by 0.1:"),
+        ({"radius": 1.4}, "SphereCollider is the cheaper level and must enclose its AABBCollider"),
+    ):
+        world = disc_world()
+        nested(world, (0, 0), **sizes)
+        with pytest.raises(ValueError, match=out):
+            world.step()
+    world = disc_world(cost=1.0)  # as cheap as a sphere, and first by its name
+    world.create_entity(Transform((0, 0)), DiscCollider(1.0), SphereCollider(1.1))
+    with pytest.raises(ValueError, match=r"DiscCollider is the cheaper level .* SphereCollider, .* out by 0\.1:"):
+        world.step()
+
+
+def test_a_collider_that_nobody_has_registered_is_named():
+    world = make_world()
+    world.create_entity(Transform((0, 0)), DiscCollider(1.0))
+    with pytest.raises(UnhandledPairError, match="DiscCollider is a collider that no plugin"):
+        world.step()
+
+
+def test_the_example_runs(capsys):
+    """Levels find the same contacts as the last one alone; bounds finds the first level's hits."""
+    runpy.run_path(str(ROOT / "examples" / "levels.py"))["main"](300)
+    lines = capsys.readouterr().out.splitlines()[1:]
+    rows = {line[:32].strip(): [int(number) for number in line[32:77].split()] for line in lines}
+    for name in ("2D, boxes 1:1", "3D, boxes 1:4", "2D, rocks"):
+        plain, several = rows[name], rows[f"{name} in spheres"]
+        assert several[4] == plain[4] > 0
+        assert several[2] >= several[3] > 0
+    assert rows["2D, boxes 1:2 in spheres, bounds"][4] == rows["2D, boxes 1:2 in spheres"][2]

@@ -1,0 +1,126 @@
+"""Heaps: they come to rest and stay, nobody gets out, overlap is small; and bodies thrown into each other."""
+
+from __future__ import annotations
+
+import importlib
+
+import numpy as np
+import pytest
+from helpers_rest import G, depths
+from worlds import make_world
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework.errors import StepError
+from carom.scenes import pile
+
+
+def fall(dimensions, n, e, seconds):
+    """A pile after ``seconds``: (kinetic energy per body in units of m g d, depths, escaped)."""
+    with importlib.import_module(f"carom.scenes.pile{dimensions}d").build(n=n) as world:
+        world.bodies.dynamic.sphere_collider.restitution[:] = e
+        for _ in range(round(seconds * 60)):
+            world.step()
+        dynamic = world.bodies.dynamic
+        outside = (dynamic.position < 0) | (dynamic.position > pile.width(n, dimensions))
+        outside[:, pile.UP] = dynamic.position[:, pile.UP] < 0
+        return world.kinetic_energy() / n / (dynamic.mass[0] * G), depths(world), int(outside.any(axis=1).sum())
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
+def test_a_pile_of_a_thousand(e):
+    """At 15 s all stands but for what single discs may still do: mean overlap 0.2 %, greatest 2 % of a diameter."""
+    energy, overlap, escaped = fall(2, 1000, e, 15)
+    assert energy < 1e-6
+    assert overlap.mean() < 0.002
+    assert overlap.max() < 0.02
+    assert escaped == 0
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
+def test_a_pile_of_a_thousand_spheres(e):
+    """Without friction layers of spheres go on slipping now and then; the demand on big piles holds at 20 s."""
+    energy, overlap, escaped = fall(3, 1000, e, 20)
+    assert energy < 1e-4
+    assert overlap.mean() < 0.002
+    assert overlap.max() < 0.02
+    assert escaped == 0
+
+
+@pytest.mark.slow
+def test_a_pile_of_ten_thousand_comes_to_rest():
+    """Kinetic energy per body below 1e-4 m g d, mean overlap below 2 % of a diameter, none escaped."""
+    energy, overlap, escaped = fall(2, 10_000, 0.0, 25)
+    assert energy < 1e-4
+    assert overlap.mean() < 0.02
+    assert escaped == 0
+
+
+@pytest.mark.parametrize(
+    ("dt", "published"), [(1e-2, 0.0161), pytest.param(1e-3, 1.55e-4, marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize(("shape", "pitch"), [((7, 7, 1), 2.0), ((6, 6, 6), 0.201), ((6, 6, 6), 2.0)])
+def test_published_lattice_666(shape, pitch, dt, published):
+    """A3: spheres R = 0.1, 10 kg, e = 0 fall for 10 s, lowest centre at 0.101: mean squared overlap, m^2, below ODE's."""
+    world = make_world(3, gravity=(0.0, 0.0, -G), dt=dt)
+    world.create_entity(Transform((0, 0, -1)), AABBCollider((100, 100, 1)))
+    centres = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 3) * pitch + (0, 0, 0.101)
+    world.create_entities(
+        len(centres), Transform.many(centres), RigidBody.many(mass=10.0), SphereCollider.many(radius=0.1)
+    )
+    squares = []
+    for _ in range(round(10 / dt)):
+        world.step()
+        squares.append((depths(world) ** 2).sum())
+    assert np.mean(squares) < published
+    assert world.kinetic_energy() < 1e-9
+
+
+# -- no room -------------------------------------------------------------------------------------
+
+
+def throw(count, dimensions, e=0.0, side=10.0):
+    world = make_world(dimensions)
+    places = np.random.default_rng(1).uniform(0, side, (count, dimensions)) if side else np.zeros((count, dimensions))
+    world.create_entities(
+        count, Transform.many(places), RigidBody.many(), SphereCollider.many(radius=0.5, restitution=e)
+    )
+    return world
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize(("count", "dimensions"), [(2000, 2), (5000, 3)])
+def test_bodies_spawned_in_each_other(count, dimensions, e):
+    """C19: finite, slow (pushed out in position, so 1.5 sizes a second at most), the overlap falls all the time."""
+    world = throw(count, dimensions, e)
+    before = np.inf
+    for _ in range(15):
+        world.step()
+        assert np.linalg.norm(world.bodies.linear_velocity, axis=1).max() < 1.5
+        total = depths(world).sum()
+        assert total < before
+        before = total
+    assert np.isfinite(world.bodies.position).all()
+    np.testing.assert_allclose(world.momentum(), 0.0, rtol=0, atol=1e-9)  # of thousands of bodies
+
+
+@pytest.mark.parametrize("count", [100, 1000])
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_bodies_at_one_point(count, dimensions):
+    """C3: they part, slowly, and nothing is lost."""
+    world = throw(count, dimensions, side=0.0)
+    for _ in range(10):
+        world.step()
+        assert np.linalg.norm(world.bodies.linear_velocity, axis=1).max() < 1.5
+    assert np.isfinite(world.bodies.position).all()
+    assert np.ptp(world.bodies.position[:, 0]) > 0.05
+    np.testing.assert_allclose(world.momentum(), 0.0, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [0.0, 10.0])
+def test_more_pairs_than_memory_are_refused(side):
+    """C3, C19 with 1e5 bodies: 5e9 and 1.5e8 candidate pairs are not stored; the error says how many, nothing moves."""
+    world = throw(100_000, 3, side=side)
+    before = world.bodies.position.copy()
+    with pytest.raises(StepError, match="candidate pairs exceed the limit"):
+        world.step()
+    assert (world.bodies.position == before).all()

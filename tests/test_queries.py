@@ -1,0 +1,283 @@
+"""What touches, what is nearest, who is near: against brute force over all bodies; and what all questions share."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_queries import directions, scene
+from worlds import ball, make_world
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import Phase, System
+
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+
+
+@both_dimensions
+@pytest.mark.parametrize("sizes", ["even", "power", "clusters"])
+@pytest.mark.parametrize("n", [60, 2500])
+def test_nearest_of_many_bodies(d, n, sizes):
+    world, bodies, side = scene(d, n, seed=n, sizes=sizes)
+    rng = np.random.default_rng(3)
+    points = (rng.random((100, d)) * 2 - 0.5) * side
+    points[:5] += 1e3 * side
+    limits = np.where(np.arange(100) % 3, math.inf, rng.random(100))
+    hits = world.query_nearests(points, max_distances=limits)
+    for i in range(len(points)):
+        distance = -bodies.depth_of_point(points[i])
+        nearest = int(np.argmin(distance))
+        single = world.query_nearest(points[i], max_distance=limits[i])
+        if distance[nearest] > limits[i]:
+            assert single is None
+            assert hits.entity[i] == -1
+            assert hits.distance[i] == math.inf
+            continue
+        tolerance = 1e-14 * np.abs(points[i]).max() + 1e-14 * side
+        assert hits.distance[i] == pytest.approx(distance[nearest], abs=tolerance)
+        assert distance[bodies.entity == hits.entity[i]][0] == pytest.approx(distance[nearest], abs=2 * tolerance)
+        assert (single.entity, single.distance) == (hits.entity[i], hits.distance[i])
+        # the point lies on the surface, and the normal leads from it to where the question was asked
+        np.testing.assert_allclose(single.point + single.distance * single.normal, points[i], atol=10 * tolerance)
+        on_surface = bodies.depth_of_point(single.point)[bodies.entity == single.entity][0]
+        assert abs(on_surface) < 10 * tolerance
+    world.close()
+
+
+@both_dimensions
+@pytest.mark.parametrize("n", [60, 2500])
+def test_touching_many_bodies(d, n):
+    world, bodies, side = scene(d, n, seed=5)
+    rng = np.random.default_rng(5)
+    centres = rng.random((50, d)) * side
+    radii, halves = 2 * rng.random(50), 2 * rng.random((50, d))
+    spheres, boxes = world.query_spheres(centres, radii), world.query_aabbs(centres - halves, centres + halves)
+    for i in range(50):
+        expected = bodies.entity[bodies.gap(centres[i], radii[i : i + 1], True) <= 0]
+        np.testing.assert_array_equal(spheres[i], expected)
+        assert world.query_sphere(centres[i], radii[i]) == expected.tolist()
+        expected = bodies.entity[bodies.gap(centres[i], halves[i], False) <= 0]
+        np.testing.assert_array_equal(boxes[i], expected)
+        assert world.query_aabb(centres[i] - halves[i], centres[i] + halves[i]) == expected.tolist()
+        inside = bodies.entity[bodies.depth_of_point(centres[i]) >= 0]
+        assert world.query_point(centres[i]) == inside.tolist()
+    np.testing.assert_array_equal(world.bodies.entity[spheres.rows], spheres.entities)
+    world.close()
+
+
+@both_dimensions
+def test_many_questions_to_few_bodies(d):
+    """More tests than are worth while go through a tree; the answers are those to single questions."""
+    world, _, side = scene(d, 180, seed=2, kinds=("dynamic",))
+    centres = np.random.default_rng(2).random((1000, d)) * side
+    spheres, nearest = world.query_spheres(centres, 1.0), world.query_nearests(centres)
+    for i in range(0, 1000, 10):
+        assert spheres[i].tolist() == world.query_sphere(centres[i], 1.0)
+        assert nearest.entity[i] == world.query_nearest(centres[i]).entity
+    world.close()
+
+
+@both_dimensions
+@pytest.mark.parametrize("n", [60, 1500])
+def test_neighbours_of_many_bodies(d, n):
+    world, bodies, side = scene(d, n, seed=9, sizes="clusters")
+    radius = 0.1 * side
+    near = world.neighbours(radius)
+    np.testing.assert_array_equal(near.askers, np.sort(bodies.entity))
+    distance = np.linalg.norm(bodies.centre[:, None] - bodies.centre[None], axis=2)
+    within = (distance <= radius) & ~np.eye(n, dtype=bool)
+    for i in range(n):
+        np.testing.assert_array_equal(near[i], bodies.entity[within[i]])
+    asker, other = near.pairs()
+    pairs = set(zip(asker.tolist(), other.tolist(), strict=True))
+    assert pairs == {(j, i) for i, j in pairs}
+    np.testing.assert_array_equal(world.bodies.entity[asker], np.repeat(near.askers, near.counts))
+    np.testing.assert_array_equal(world.bodies.entity[other], near.entities)
+
+    of = bodies.entity[::-7]
+    some = world.neighbours(radius, mask=0b0101, of=of)
+    np.testing.assert_array_equal(some.askers, of)
+    wanted = np.arange(n) % 4 % 2 == 0  # layers 1 and 4
+    for i, entity in enumerate(of):
+        expected = bodies.entity[within[bodies.entity == entity][0] & wanted]
+        np.testing.assert_array_equal(some[i], expected)
+        np.testing.assert_array_equal(some.of(entity), expected)
+    world.close()
+
+
+# -- what all questions share ---------------------------------------------------------------------
+
+
+@both_dimensions
+def test_ties_go_to_the_smaller_id(d):
+    world = make_world(d)
+    kinds = ("static", "dynamic", "kinematic", "dynamic", "static")
+    entities = [ball(world, 5, kind=kind) for kind in kinds]
+    away = np.zeros(d)
+    assert [hit.entity for hit in world.ray_cast(away, np.eye(d)[0])] == entities
+    assert world.ray_casts([away], np.eye(d)[0]).entity.tolist() == [entities[0]]
+    assert world.query_nearest(away).entity == entities[0]
+    assert world.query_nearest(away, exclude=entities[0]).entity == entities[1]
+    world.close()
+
+
+@both_dimensions
+def test_the_order_of_rows_does_not_matter(d):
+    """The kinds of bodies decide on rows and trees; ids and places are the same, and so are the bits."""
+    answers = []
+    for kinds in (("dynamic",), ("static",), ("static", "dynamic", "kinematic")):
+        world, _, side = scene(d, 400, seed=11, kinds=kinds)
+        rng = np.random.default_rng(1)
+        starts, ways = rng.random((200, d)) * side, directions(rng, 200, d)
+        casts = world.shape_casts(SphereCollider(0.2), starts, side * ways)
+        nearest = world.query_nearests(starts)
+        columns = [getattr(casts, name) for name in ("entity", "distance", "fraction", "normal", "point")]
+        columns += [getattr(nearest, name) for name in ("entity", "distance", "normal", "point")]
+        answers.append([*columns, world.neighbours(3.0).entities])
+        world.close()
+    for other in answers[1:]:
+        for one, two in zip(answers[0], other, strict=True):
+            np.testing.assert_array_equal(one, two)
+
+
+@both_dimensions
+def test_masks_and_exclusion(d):
+    world = make_world(d)
+    first = ball(world, 3, layer=1, sensor=True)
+    second = ball(world, 6, layer=2, kind="static")
+    third = ball(world, 9, layer=4, mask=0)  # who it meets does not matter to questions
+    origin, way = np.zeros(d), np.eye(d)[0]
+
+    def along(**arguments):
+        return [hit.entity for hit in world.ray_cast(origin, way, **arguments)]
+
+    assert along() == [first, second, third]
+    assert along(mask=2 | 4) == [second, third]
+    assert along(exclude=second) == [first, third]
+    assert along(max_distance=5.6) == [first, second]
+    assert along(only_nearest=True, exclude=first) == [second]
+    assert along(mask=8) == []
+    assert world.ray_cast(origin, way, only_nearest=True)[0].entity == first
+    many = world.ray_casts([origin] * 4, way, exclude=[-1, first, second, 77], mask=1 | 2)
+    assert many.entity.tolist() == [first, second, first, first]
+    assert world.bodies.entity[many.row].tolist() == many.entity.tolist()
+    assert many.found.all()
+    moved = world.shape_casts(SphereCollider(0.5), [origin] * 2, [100 * way, way], exclude=first)
+    assert moved.entity.tolist() == [second, -1]
+    assert world.query_nearest(origin, mask=4).entity == third
+    assert world.query_nearest(origin, mask=8) is None
+    assert world.query_nearests([origin, 6 * way], exclude=[first, second]).entity.tolist() == [second, first]
+    world.close()
+
+
+@both_dimensions
+def test_what_is_deleted_and_what_is_written(d):
+    world = make_world(d)
+    gone, stays = ball(world, 3), ball(world, 6)
+    origin, way = np.zeros(d), np.eye(d)[0]
+    assert world.ray_cast(origin, way, only_nearest=True)[0].entity == gone
+    world.delete_entity(gone, immediate=True)
+    assert world.ray_cast(origin, way, only_nearest=True)[0].entity == stays
+    assert world.query_nearest(origin).entity == stays
+    assert world.neighbours(100.0).askers.tolist() == [stays]
+    world.component_for_entity(stays, Transform).position = 50 * way
+    world.refresh_queries()
+    assert world.ray_cast(origin, way)[0].distance == 49.5
+    assert world.query_nearest(origin).distance == 49.5
+    new = ball(world, 20)
+    assert [hit.entity for hit in world.ray_cast(origin, way)] == [new, stays]
+    np.testing.assert_array_equal(world.neighbours(30.0)[0], [new])
+    world.delete_entity(new, immediate=True)
+    world.delete_entity(stays, immediate=True)
+    assert world.ray_cast(origin, way) == []
+    assert world.query_nearest(origin) is None
+    assert len(world.neighbours(1.0)) == 0
+    assert world.ray_casts(np.empty((0, d)), way).entity.shape == (0,)
+    world.close()
+
+
+def test_systems_see_bodies_where_they_are():
+    """In every phase of a step, whatever has been asked before in it."""
+    world = make_world(restitution_threshold=0.0)
+    mover = ball(world, (0, 0), (60.0, 0.0), restitution=1.0)
+    ball(world, (1.5, 0), kind="static", restitution=1.0)
+    seen = []
+
+    class Look(System):
+        def process(self, dt):
+            place = self.world.bodies.position[self.world.bodies.row_of(mover)]
+            hit = self.world.ray_cast((-50, 0), (1, 0), only_nearest=True)[0]
+            nearest = self.world.query_nearest((-50, 0))
+            near = self.world.neighbours(1e-9 + abs(1.5 - place[0])).counts.sum()
+            seen.append((self.phase, hit.distance - (place[0] + 49.5), nearest.distance - (place[0] + 49.5), near))
+
+    for phase in (Phase.START, Phase.INTEGRATION, Phase.BROAD, Phase.NARROW, Phase.RESPONSE, Phase.END):
+        world.add_system(type(f"Look{phase.name}", (Look,), {"phase": phase})())
+    world.step()
+    assert len(seen) == 6
+    for _, *errors, near in seen:
+        np.testing.assert_allclose(errors, 0.0, atol=1e-13)
+        assert near == 2
+    world.close()
+
+
+@both_dimensions
+@pytest.mark.parametrize("n", [3, 300])
+@pytest.mark.filterwarnings("error")
+def test_bodies_that_are_nowhere_disturb_no_answer(d, n):
+    world = make_world(d)
+    there = [ball(world, 3 * (k + 1)) for k in range(n)]
+    world.bodies.position[0] = math.nan
+    world.bodies.position[1] = math.inf
+    origin, way = np.zeros(d), np.eye(d)[0]
+    world.refresh_queries()
+    assert [hit.entity for hit in world.ray_cast(origin, way)] == there[2:]
+    assert world.query_nearest(origin).entity == there[2]
+    assert world.query_sphere(origin, 8.5) == there[2:3]
+    assert world.neighbours(3.5).counts.tolist() == [0, 0] + [min(1, n - 3)] + [2] * (n - 4) + [1] * (n > 3)
+    world.close()
+
+
+def test_neighbours_without_colliders():
+    world = make_world()
+    birds = [world.create_entity(Transform((x, 0)), RigidBody()) for x in (0.0, 1.0, 3.0)]
+    assert [found.tolist() for found in world.neighbours(1.0)] == [[birds[1]], [birds[0]], []]
+    assert [found.tolist() for found in world.neighbours(1.0, mask=1)] == [[], [], []]
+    hawk = ball(world, (2, 0), layer=2)
+    assert world.neighbours(1.0).of(hawk).tolist() == birds[1:]
+    assert [found.tolist() for found in world.neighbours(1.0, mask=2)] == [[], [hawk], [hawk], []]
+    with pytest.raises(KeyError, match="no body"):
+        world.neighbours(1.0, of=[birds[0], 99])
+    world.close()
+
+
+# -- errors ---------------------------------------------------------------------------------------
+
+WRONG = {
+    "query_point: point": lambda w: w.query_point((0, math.nan)),
+    "query_sphere: radius": lambda w: w.query_sphere((0, 0), -1.0),
+    "query_sphere: mask": lambda w: w.query_sphere((0, 0), 1.0, mask=1.5),
+    "query_spheres: radii": lambda w: w.query_spheres([(0, 0)], [-1.0]),
+    "query_spheres: centres": lambda w: w.query_spheres([(0, 0, 0)], 1.0),
+    "query_aabbs: lower": lambda w: w.query_aabbs([(0, 0)], [(-1, 0)]),
+    "query_aabbs: upper": lambda w: w.query_aabbs([(0, 0)], [(math.inf, 0)]),
+    "query_nearest: point": lambda w: w.query_nearest((0, 0, 0)),
+    "query_nearest: max_distance": lambda w: w.query_nearest((0, 0), max_distance=-1),
+    "query_nearests: points": lambda w: w.query_nearests([(0, math.inf)]),
+    "query_nearests: max_distances": lambda w: w.query_nearests([(0, 0)], max_distances=[1, 2]),
+    "query_nearests: exclude": lambda w: w.query_nearests([(0, 0)], exclude=[1, 2]),
+    "neighbours: radius": lambda w: w.neighbours(math.inf),
+    "neighbours: of": lambda w: w.neighbours(1.0, of=3),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+@pytest.mark.parametrize("empty", [True, False])
+def test_wrong_arguments(message, empty):
+    world = make_world()
+    if not empty:
+        ball(world, (0, 0))
+    with pytest.raises(ValueError, match=message):
+        WRONG[message](world)
+    world.close()

@@ -1,0 +1,133 @@
+"""What the contacts at rest remember from step to step: snapshots, errors, other steps, other units."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers_rest import G, heights, overlaps, soft_overlap, speed, tower
+from worlds import ball, box, floor, make_world, run
+
+from carom.framework import Phase, System
+from carom.framework.errors import StepError
+
+ROWS = 6
+
+
+def heap():
+    """Balls and boxes that have fallen onto each other, still moving."""
+    world = make_world(gravity=G)
+    floor(world, friction=0.4)
+    box(world, (-2.0, 4.0), half=(0.5, 5.0), kind="static")
+    box(world, (7.0, 4.0), half=(0.5, 5.0), kind="static")
+    rng = np.random.default_rng(7)
+    places = [(1.05 * (k % ROWS) - 0.8 + 0.1 * rng.uniform(), 0.6 + 1.1 * (k // ROWS)) for k in range(5 * ROWS)]
+    for k, place in enumerate(places):
+        (ball if k % 3 else box)(world, place, friction=0.4, restitution=0.3 * (k % 2))
+    return world
+
+
+def bits(world):
+    dynamic = world.bodies.dynamic
+    contacts = world.contacts
+    columns = (dynamic.position, dynamic.linear_velocity, contacts.normal_impulse, contacts.depth, contacts.normal)
+    return [np.array(column).tobytes() for column in columns]
+
+
+def test_a_snapshot_in_the_midst_of_a_pile_holds_the_impulses():
+    """Restored, also into a world that has gone on: the same bits as without."""
+    world = heap()
+    run(world, 90)
+    snapshot = world.snapshot()
+    expected = [bits(world) for _ in range(60) if world.step() is None]
+    for _ in range(2):
+        world.restore(snapshot)
+        assert [bits(world) for _ in range(60) if world.step() is None] == expected
+        run(world, 37)
+
+
+class Fails(System):
+    phase = Phase.END
+    armed = False
+
+    def process(self, dt):
+        if self.armed:
+            self.armed = False
+            raise RuntimeError("on purpose")
+
+
+def test_a_step_that_fails_leaves_no_trace_in_the_impulses():
+    """An error after the response takes the memory of contacts back too: what follows has the bits of a world without."""
+    calm, hurt = heap(), heap()
+    saboteur = Fails()
+    hurt.add_system(saboteur)
+    for step in range(120):
+        if step in (40, 41, 90):
+            saboteur.armed = True
+            with pytest.raises(StepError, match="on purpose"):
+                hurt.step()
+        calm.step()
+        hurt.step()
+        assert bits(calm) == bits(hurt)
+
+
+@pytest.mark.parametrize("change", [{"dt": 1 / 120}, {"dt": 1 / 30}, {"substeps": 8}, {"substeps": 2}])
+def test_another_step_in_mid_run_makes_nobody_jump(change):
+    """The impulses in store are those of the old step; they are rescaled. The overlap goes to that of the new springs.
+
+    A jump would be g dt of the change, 0.1 m/s and more. What there is comes from the springs' new length, d: five
+    contacts on top of each other that close or open by up to d within one of the old steps.
+    """
+    world = make_world(gravity=G)
+    floor(world)
+    ids = tower(world, 5)
+    run(world, 300)
+    before = heights(world, ids)
+    world.settings = world.settings.replace(**change)
+    load, mass = [5, 4, 3, 2, 1], [1.0, 0.5, 0.5, 0.5, 0.5]
+    expected = soft_overlap(load, mass, world.settings)
+    fastest = 0.0
+    for _ in range(600):
+        world.step()
+        fastest = max(fastest, speed(world))
+    assert fastest < 0.08
+    np.testing.assert_allclose(overlaps(world, ids), expected, rtol=0.01, atol=1e-7)
+    assert np.abs(heights(world, ids) - before).max() < 0.02
+
+
+def test_what_rests_stays_at_rest_for_a_minute():
+    world = heap()
+    run(world, 1200)
+    before = world.bodies.dynamic.position.copy()
+    run(world, 3600)
+    assert np.abs(world.bodies.dynamic.position - before).max() < 0.005
+    assert speed(world) < 0.01
+
+
+def test_slop_and_threshold_are_relative_to_size():
+    """The same heap in millimetres: lengths, so also g, by 2^-10: every length is 2^-10 of it, bit for bit."""
+    answers = []
+    for scale in (1.0, 2.0**-10):
+        world = make_world(gravity=G * scale)
+        floor_half = 0.5 * scale
+        box(world, (0, -floor_half), half=(50 * scale, floor_half), kind="static", friction=0.4)
+        for k in range(18):
+            place = (1.05 * (k % 3) * scale, (0.6 + 1.1 * (k // 3)) * scale)
+            if k % 2:
+                ball(world, place, radius=0.5 * scale, friction=0.4, restitution=0.3)
+            else:
+                box(world, place, half=0.5 * scale, friction=0.4)
+        run(world, 200)
+        answers.append(world.bodies.dynamic.position / scale)
+    np.testing.assert_array_equal(answers[0], answers[1])
+
+
+def test_a_slop_of_ones_own_reaches_the_contacts():
+    """With 0.05 m bodies are held from further away: two boxes 0.04 above each other are a contact at once."""
+    found = []
+    for slop in (None, 0.05):
+        world = make_world(slop=slop)
+        box(world, (0, 0))
+        box(world, (0, 1.04))
+        world.step()
+        found.append(world.stats().counters["resting_contacts"])
+    assert found == [0, 1]

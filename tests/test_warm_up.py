@@ -1,0 +1,340 @@
+"""Compiling ahead: what ``world.prepare`` promises, and what ``carom warm-up`` says and leaves behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+
+import esper
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from carom import scenes
+from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
+from carom.framework import CaromError, ForceSystem, System, UnhandledPairError, column
+from carom.framework.kernel_cache import cache_folder
+from carom.lab import warm_up
+from carom.lab.cli import cli
+
+from .worlds import ball, floor, make_world, run
+
+# A whole game, in a process of its own: kernels that were there before would hide what prepare has missed.
+GAME = '''
+import logging
+import sys
+import numpy as np
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Component, ForceSystem, Phase, Settings, World, column
+from carom.framework.compilation import kernel, log
+from carom.plugins import Physics
+
+logging.basicConfig()
+logging.getLogger("carom").setLevel(logging.DEBUG)  # who failed says what it loaded last
+d = int(sys.argv[1])
+
+
+class Charge(Component):
+    value = column(default=0.0)
+
+
+@kernel
+def push(force, charge):
+    for i in range(len(force)):
+        force[i, 0] += charge[i]
+
+
+class Field(ForceSystem):
+    requires = (RigidBody, Charge)
+
+    def add_forces(self, bodies, time):
+        push(bodies.force, bodies.charge.value)
+
+
+def at(x, y=0.0):
+    return (x, y, 0.0)[:d]
+
+
+def play(integrator):
+    world = World(Physics(dimensions=d, gravity=at(0.0, -9.81)), settings=Settings(integrator=integrator))
+    world.add_system(Field())
+    world.create_entity(Transform(at(-500)), RigidBody(), Charge(1.0))
+    world.prepare(SphereCollider, AABBCollider)
+    ready = len(log.compiled), log.loaded
+
+    def check(after):
+        assert (len(log.compiled), log.loaded) == ready, (integrator, after, log.compiled[ready[0]:], log.loaded)
+
+    world.step()
+    check("no colliders")
+    floor = world.create_entity(Transform(at(0, -0.5)), AABBCollider(tuple(0.5 if k == 1 else 1e3 for k in range(d))))
+    world.step()
+    check("boxes only")
+    half, turn = (0.5,) * d, 0.3 if d == 2 else (0.9, 0.1, 0.1, 0.1)
+    balls = [
+        world.create_entity(Transform(at(2 * k, 0.4)), RigidBody(), SphereCollider(0.5, restitution=0.8 * (k % 2)))
+        for k in range(5)
+    ]
+    for k in range(4):
+        world.create_entity(Transform(at(20, 0.5 + k)), RigidBody(), AABBCollider(half, friction=0.3))
+    world.create_entity(Transform(at(20, 8), turn), RigidBody(), AABBCollider(half))
+    lift = RigidBody(kind="kinematic", linear_velocity=at(0, -1.0))
+    world.create_entity(Transform(at(30, 3)), lift, AABBCollider(half))
+    world.create_entity(Transform(at(30, 1)), RigidBody(), SphereCollider(0.5, sensor=True))
+    limited = RigidBody(max_linear_speed=2.0, linear_damping=0.1, linear_velocity=at(3))
+    world.create_entity(Transform(at(40, 3)), limited, SphereCollider(1.0), AABBCollider(half))  # two levels
+    told = []
+    for event in ("contact_begin", "contact_stay", "contact_end", "impact"):
+        world.on(event, told.append)
+    for _ in range(20):
+        world.step()
+        check("a few bodies")
+    world.restore(world.snapshot())
+    n = 300
+    places, velocities = np.zeros((n, d)), np.zeros((n, d))
+    places[:, 0], places[:, 1] = 3.0 * np.arange(n), 30.0 + np.arange(n) % 3
+    velocities[:, 1] = -np.geomspace(0.01, 1000.0, n)
+    radii, halves = np.geomspace(0.05, 5, n), np.full((n, d), 0.4)
+    world.create_entities(
+        n, Transform.many(places), RigidBody.many(linear_velocity=velocities), SphereCollider.many(radius=radii)
+    )
+    world.create_entities(n, Transform.many(places - 20.0), AABBCollider.many(half_extents=halves))
+    for _ in range(20):
+        world.step()
+        check("hundreds of bodies")
+    origin, ahead = np.array(at(0, 2)), np.array(at(1))
+    points = np.array([origin, ahead])
+    world.query_point(origin), world.query_sphere(origin, 3), world.query_aabb(origin, origin + 3)
+    check("a question")
+    world.query_spheres(points, 3), world.query_aabbs(points, points + 3)
+    check("many questions")
+    world.neighbours(2.0), world.neighbours(2.0, of=balls)
+    check("neighbours")
+    world.query_nearest(origin), world.query_nearest(origin, max_distance=3, exclude=floor)
+    world.query_nearests(points)
+    check("nearest")
+    world.ray_cast(origin, ahead), world.ray_cast(origin, ahead, 10, only_nearest=True)
+    world.ray_casts(points, ahead), world.ray_casts(points, points - 9, np.array([3.0, 4.0]), exclude=[floor, -1])
+    check("rays")
+    for shape in (SphereCollider(1.0), AABBCollider(half)):
+        world.shape_cast(shape, origin, ahead), world.shape_cast(shape, origin, ahead, only_nearest=True)
+        world.shape_casts(shape, points, ahead)
+    world.shape_casts(AABBCollider.many(half_extents=halves[:2]), points, points)
+    check("moving shapes")
+    world.settings = world.settings.replace(geometry="bounds", substeps=2, debug=True)
+    world.advance(0.1)
+    check("other settings")
+    for entity in world.bodies.entity[world.bodies.has(SphereCollider)].tolist():
+        world.delete_entity(entity)
+    for phase in Phase:
+        world.run(phase)
+    world.advance(0.1)
+    check("no more balls")
+    assert told
+    world.close()
+
+
+for integrator in ("semi_implicit_euler", "yoshida4", "rk4", "velocity_verlet", "explicit_euler"):
+    play(integrator)
+'''
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_after_prepare_nothing_compiles_and_nothing_loads(d):
+    """Every integrator; few bodies and hundreds, impacts and rest, levels, sensors, platforms, all queries, a game's
+    own force system; the last body of a shape goes, too."""
+    result = subprocess.run([sys.executable, "-c", GAME, str(d)], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr[-3000:]
+
+
+# -- what else prepare must keep --------------------------------------------------------------------------------------
+
+
+def test_prepare_changes_nothing_that_can_be_seen():
+    worlds = make_world(gravity=9.81), make_world(gravity=9.81)
+    for world in worlds:
+        floor(world)
+        ball(world, (0, 2), restitution=0.5)
+        run(world, 3)
+    before, force = worlds[0].state_hash(), worlds[0].bodies.force.copy()
+    context, kept = esper.current_world, set(esper.list_worlds())
+    worlds[0].prepare(AABBCollider)
+    assert worlds[0].state_hash() == before
+    np.testing.assert_array_equal(worlds[0].bodies.force, force)
+    assert (worlds[0].step_count, len(worlds[0].bodies), worlds[0].faults) == (3, 2, [])
+    assert (esper.current_world, set(esper.list_worlds())) == (context, kept)
+    for world in worlds:
+        run(world, 60)
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+    assert worlds[0].stats().counters == worlds[1].stats().counters
+
+
+def test_one_may_prepare_more_and_more():
+    world = make_world()
+    world.prepare()
+    ball(world, 0)
+    world.step()
+    world.prepare(AABBCollider)
+    world.prepare(AABBCollider)
+    world.step()
+    assert {shape.component for shape in world.physics.code.shapes} == {SphereCollider, AABBCollider}
+
+
+def test_force_systems_are_asked_about_the_bodies_there_are():
+    seen = []
+
+    class Watch(ForceSystem):
+        requires = (RigidBody, SphereCollider)
+
+        def add_forces(self, bodies, time):
+            seen.append(len(bodies))
+            bodies.force[:] += 1e6
+
+    world = make_world()
+    world.add_system(Watch())
+    world.prepare()
+    assert seen == []  # no bodies, nothing to ask about
+    ball(world, 0)
+    world.create_entity(Transform((9, 9)), RigidBody())
+    world.prepare()
+    assert set(seen) == {1}
+    assert not world.bodies.force.any()
+    assert world.stats().counters["force_evaluations"] == 0
+
+
+def test_what_cannot_be_prepared():
+    world = make_world()
+    for wrong in (SphereCollider(1.0), int, "SphereCollider"):
+        with pytest.raises(TypeError, match="prepare takes component types"):
+            world.prepare(wrong)
+
+    class StrangeCollider(Collider):
+        radius = column(positive=True)
+
+    with pytest.raises(UnhandledPairError, match="StrangeCollider"):
+        world.prepare(StrangeCollider)
+    world.step()  # and nothing of it is left
+
+    class InMidStep(System):
+        def process(self, dt):
+            self.world.prepare()
+
+    world.add_system(InMidStep())
+    with pytest.raises(CaromError, match="between steps"):
+        world.step()
+
+
+# -- carom warm-up ---------------------------------------------------------------------------------------------------
+
+FALLING = """
+from carom.components import RigidBody, Transform
+from carom.framework import World
+from carom.plugins import Physics
+
+def build(settings=None, seed=0):
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=settings)
+    world.create_entity(Transform((0, 10)), RigidBody())
+    print("falling")
+    return world
+"""
+
+
+@pytest.fixture
+def carom(tmp_path):
+    """The command, in processes of its own and with an empty cache of its own."""
+    (tmp_path / "falling.py").write_text(FALLING)
+    environment = {**os.environ, "CAROM_CACHE_DIR": str(tmp_path / "kernels")}
+
+    def run_it(*arguments):
+        command = [sys.executable, "-m", "carom", "warm-up", *arguments]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+
+    return run_it
+
+
+def test_the_second_time_everything_is_there_already(carom, tmp_path):
+    first = carom("falling.py", "--json")
+    assert first.returncode == 0, first.stderr
+    report = json.loads(first.stdout)
+    (row,) = report["targets"]
+    assert row["target"] == "falling.py"
+    assert row["found"] == 0
+    assert {"euler", "sum_constant_forces"} <= {kernel for kernel, _ in row["compiled"]}
+    assert all(0 < seconds <= row["seconds"] for _, seconds in row["compiled"])
+    files = list((tmp_path / "kernels").glob("*.kernel"))
+    size = sum(path.stat().st_size for path in files)
+    assert report["cache"] == {
+        "folder": str(tmp_path / "kernels"), "kernels_before": 0, "kernels": len(row["compiled"]), "bytes": size,
+    }  # fmt: skip
+    assert "kept in" in first.stderr
+    assert str(tmp_path / "kernels") in first.stderr
+
+    second = carom("falling.py")
+    assert second.returncode == 0, second.stderr
+    assert second.stdout.splitlines()[1].split()[:3] == ["falling.py", "0", str(len(files))]
+    assert f"{len(files)} kernels" in second.stdout.splitlines()[-1]
+    assert "compiled, with seconds" not in second.stdout
+    assert "first use" not in second.stderr
+
+    cleared = carom("--clear")
+    assert cleared.returncode == 0, cleared.stderr
+    assert cleared.stdout.startswith(f"{len(files)} kernels deleted from {tmp_path / 'kernels'} (")
+    assert not list((tmp_path / "kernels").iterdir())
+    assert json.loads(carom("--clear", "--json").stdout)["cache"]["kernels_before"] == 0
+
+
+def names_of_work(monkeypatch, *arguments):
+    """What the command would do, and the order."""
+    done = []
+    monkeypatch.setattr(warm_up, "prepare_built_in", lambda d: done.append(d))
+    monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: done.append(loaded.name))
+    result = CliRunner().invoke(cli, ["warm-up", *arguments])
+    assert result.exit_code == 0, result.stderr
+    return done
+
+
+def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
+    assert names_of_work(monkeypatch) == [2, 3]
+    assert names_of_work(monkeypatch, "--dimensions", "3") == [3]
+    assert names_of_work(monkeypatch, "jump", "gas2d") == ["jump", "gas2d"]
+    flat = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
+    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [2, *flat]
+    assert names_of_work(monkeypatch, "--all") == [2, 3, *scenes.names()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["jumpp"], "did you mean 'jump'?"),
+        (["jump", "jumpp"], "did you mean 'jump'?"),
+        (["--clear", "jump"], "--clear goes alone"),
+        (["--clear", "--all"], "--clear goes alone"),
+        (["jump", "--all"], "--all and scenes exclude each other"),
+        (["jump", "--dimensions", "2"], "--dimensions and scenes exclude each other"),
+        (["--dimensions", "4"], "'4' is not one of"),
+    ],
+)
+def test_refusals_come_before_anything_compiles(monkeypatch, arguments, words):
+    monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: pytest.fail("compiled"))
+    result = CliRunner().invoke(cli, ["warm-up", *arguments])
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert words in result.stderr.splitlines()[-1]
+
+
+def test_a_scene_that_fails_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.py").write_text("def build(settings=None, seed=0):\n    raise ValueError('no such level')\n")
+    result = CliRunner().invoke(cli, ["warm-up", "bad.py"])
+    assert result.exit_code == 2
+    assert "bad.py, line 2: no such level" in result.stderr
+
+
+def test_without_a_folder_there_is_nothing_to_warm(monkeypatch):
+    monkeypatch.setattr(warm_up, "cache_folder", lambda: None)
+    result = CliRunner().invoke(cli, ["warm-up"])
+    assert result.exit_code == 2
+    assert "CAROM_CACHE_DIR" in result.stderr
+    assert cache_folder() is not None
