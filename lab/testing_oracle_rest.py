@@ -13,6 +13,7 @@ from .shapes import Floats
 from .testing_oracle_bodies import Body, Pair, only_corners, touch
 
 SEARCHES = 24  # for the place where a pair first touches
+ROUNDING = 1e-12  # of what was subtracted: a number this small may as well be zero
 LIGHT = 10.0  # a body between two that have this many times its mass is squeezed
 DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap pushed out in position, part of it, and limit per step
 
@@ -41,6 +42,7 @@ class Resting:
     total: float = 0.0
     pushed: bool = False
     in_block: bool = False
+    doubtful: bool = False  # a number of rounding's size has decided what happens
 
 
 class Moving:
@@ -327,6 +329,7 @@ class Sweep:
         a, b = (self.bodies[body] for body in contact.pair.bodies)
         speed = float((b.velocity - a.velocity) @ contact.normal)
         room = contact.gap + float((b.shift - a.shift) @ contact.normal)
+        contact.doubtful |= abs(room) <= ROUNDING * contact.pair.size
         if room > 0.0:  # it may close within the substep
             return speed + room / self.h, False
         if biased and not contact.parting and room >= -DEEP * contact.pair.size:
@@ -339,6 +342,7 @@ class Sweep:
         if softly:
             wanted = self.soft[1] * wanted + self.soft[2] * old
         contact.impulse = max(0.0, old - wanted)
+        contact.doubtful |= 0.0 < old and abs(old - wanted) <= ROUNDING * old
         self.push(contact, (contact.impulse - old) * contact.normal)
 
     def _rub(self, contact: Resting) -> None:

@@ -94,7 +94,9 @@ def recall(
 
 
 @kernel
-def remember(a, b, slot, normal, impulse, total, tangent, new_a, new_b, new_normal, new_impulse, new_total, new_tangent):
+def remember(
+    a, b, slot, normal, impulse, total, tangent, new_a, new_b, new_normal, new_impulse, new_total, new_tangent
+):  # fmt: skip
     """Keep the contacts that pushed; returns how many."""
     count = 0
     for r in range(len(a)):

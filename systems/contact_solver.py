@@ -47,10 +47,10 @@ class ContactSolver:
         self._first, self._second = np.empty(count, np.uint32), np.empty(count, np.uint32)  # no negative indices
         self._slot, self._colours, self._light, self._before = (np.empty(count, np.int64) for _ in range(4))
         self._normal, self._tangent = np.empty((count, d)), np.empty((count, d))
-        self._gap, self._mass, self._friction, self._extent, self._impulse, self._total, self._opening, self._pushing = (
-            np.empty(count) for _ in range(8)
-        )
-        self._in_block, self._worked, self._parting, self._active, self._soft = (np.empty(count, bool) for _ in range(5))
+        self._gap, self._mass, self._friction, self._extent = (np.empty(count) for _ in range(4))
+        self._impulse, self._total, self._opening, self._pushing = (np.empty(count) for _ in range(4))
+        self._in_block, self._worked, self._parting = (np.empty(count, bool) for _ in range(3))
+        self._active, self._soft = np.empty(count, bool), np.empty(count, bool)
         self._blocks = np.empty((count, 2), np.int64)
 
     # -- before the impacts -----------------------------------------------------------------------
@@ -104,7 +104,7 @@ class ContactSolver:
     # -- after the impacts ------------------------------------------------------------------------
 
     def solve(self, dt: float, resting: np.ndarray) -> None:
-        """Hold the contacts ``resting`` (pairs, canonical order) and advance their bodies again from the start of the step."""
+        """Hold the contacts ``resting`` (pairs, canonical order) and advance their bodies again from the start."""
         state, arrays = self._state, self._state.table.arrays
         self._held = np.zeros(state.table.count, bool)
         state.resting = resting
@@ -120,11 +120,13 @@ class ContactSolver:
         if not count:
             self._swap(0, NONE, NONE, dt)
             return
-        arrays, scratch, settings, start = state.table.arrays, state.scratch, state.world.settings, state.start_positions
+        arrays, scratch, settings = state.table.arrays, state.scratch, state.world.settings
+        start = state.start_positions
         if len(self._first) < count:
             self._allocate_contacts(2 * count)
         first, second, slot = self._first[:count], self._second[:count], self._slot[:count]
-        normal, gap, mass, friction = self._normal[:count], self._gap[:count], self._mass[:count], self._friction[:count]
+        normal, gap, mass = self._normal[:count], self._gap[:count], self._mass[:count]
+        friction = self._friction[:count]
         impulse, tangent, total = self._impulse[:count], self._tangent[:count], self._total[:count]
         extent, worked, in_block = self._extent[:count], self._worked[:count], self._in_block[:count]
         parting = self._parting[:count]
@@ -140,8 +142,8 @@ class ContactSolver:
             resting, slot, state.pair_a, state.pair_b, scratch["shape"], scratch["offset"], state.world_shapes,
             position, start, scratch["size"], stacks["collider.friction"], scratch["material"],
             MIXING_RULES.index(settings.friction_mixing), -1.0 if slop is None else slop, inverse_mass,
-            state.pair_impulse, state.pair_parts, state.pair_normal, state.pair_point, normal, gap, mass, friction, extent,
-            parting, state.like,
+            state.pair_impulse, state.pair_parts, state.pair_normal, state.pair_point, normal, gap, mass, friction,
+            extent, parting, state.like,
         )  # fmt: skip
         entity = arrays["entity"]
         rows_a, rows_b = state.pair_a[resting], state.pair_b[resting]

@@ -249,8 +249,8 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
 
         The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[bodies] are looked at first.
-        restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the threshold and
-        the slop (below 0: from the bodies), the most impacts of a body.
+        restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the
+        threshold and the slop (below 0: from the bodies), the most impacts of a body.
         share (n,): see gravity_share. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
         the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see
         EVENTS.

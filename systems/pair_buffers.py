@@ -70,7 +70,7 @@ class PairBuffers:
         self.pair_counters["candidates"] += len(first)
 
     def sort_candidates(self) -> tuple[np.ndarray, np.ndarray]:
-        """The candidates in canonical order, at the start of pair_a and pair_b; there is room for all of them as pairs."""
+        """The candidates in canonical order, at the start of pair_a and pair_b, where all have room."""
         first, second = self.candidates
         count = len(first)
         if count > len(self.pair_a):

@@ -64,8 +64,8 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
     @kernel
     def find_resting(
         dt, pair_a, pair_b, pairs, responds, pair_depth, shape_of, offset, shapes, position, velocity, start_velocity,
-        start, size, restitution, material, rule, fixed_threshold, fixed_slop, share, struck, supported, change, travelled,
-        pair_impulse, pair_parts, result, like,
+        start, size, restitution, material, rule, fixed_threshold, fixed_slop, share, struck, supported, change,
+        travelled, pair_impulse, pair_parts, result, like,
     ):  # fmt: skip
         """Pairs whose gap is below the margin after the impacts and that are not bouncing; returns how many.
 

@@ -83,7 +83,10 @@ def solve_contacts(
                 store(velocity, b, add_scaled(v_b, n, (new - old) * inverse_mass[b]))
             solve_squeezed(turn < 0, active, blocks, first, second, normal, bias, impulse, velocity, inverse_mass, like)
             if rubs:
-                rub(turn < 0, active, first, second, normal, mass, friction, impulse, tangent, velocity, inverse_mass, like)
+                rub(
+                    turn < 0, active, first, second, normal, mass, friction, impulse, tangent, velocity, inverse_mass,
+                    like,
+                )  # fmt: skip
             if turn == 0:
                 for k in range(len(first)):
                     worked[k] |= impulse[k] > 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from worlds import ball, box
+from worlds import box
 
 G = 9.81
 SLOP = 0.005  # of a size: the overlap that is left alone

@@ -5,11 +5,12 @@ Overlap at rest is known: each contact gives way like its spring does under the 
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from helpers_rest import G, SLOP, depths, energy, heights, overlaps, rows_of, soft_overlap, speed, tower
+from helpers_rest import SLOP, G, depths, energy, heights, overlaps, rows_of, soft_overlap, speed, tower
 from worlds import ball, box, floor, make_world, run
 
 from carom.components import AABBCollider, Transform
@@ -53,7 +54,7 @@ def test_towers_stand(d, maker):
         np.testing.assert_allclose(overlaps(world, ids), expected, rtol=0, atol=1e-8)
         np.testing.assert_allclose(heights(world, ids), before, rtol=0, atol=1e-6)
         assert peak < (1.001 if n <= 10 else 1.3) * expected.max()
-        pairs = [(ground, ids[0]), *zip(ids[:-1], ids[1:], strict=True)]
+        pairs = [(ground, ids[0]), *itertools.pairwise(ids)]
         impulses = [contact.get(pair) or contact[pair[::-1]] for pair in pairs]
         np.testing.assert_allclose(impulses, G * world.settings.dt * load, rtol=0, atol=1e-9)
 
