@@ -126,6 +126,11 @@ def test_asteroids_is_a_game_in_60_lines():
     assert 40 < sum(lines_of_code(block.text) for block in game) <= 60
 
 
+def test_the_jump_and_run_has_60_lines():
+    game = [block for block in python_blocks(ROOT / "docs" / "platformer.md") if "game" in block.info]
+    assert 40 < sum(lines_of_code(block.text) for block in game) <= 60
+
+
 def test_the_game_of_the_readme_prints_what_the_page_says(namespace, capsys):
     page = ROOT / "README.md"
     run(python_blocks(page), page, namespace)
