@@ -61,7 +61,7 @@ class Oracle:
         self.step_count = world.step_count
         self.contacts: dict[tuple[int, int], OracleContact] = {}
         self.impacts: list[Impact] = []
-        self.doubts: list[tuple[int, int]] = []  # pairs about which rounding decided in the last step: see docs/testing.md
+        self.doubts: list[tuple[int, int]] = []  # pairs about which rounding decided in the last step
         self._by_entity = {body.entity: body for body in self.bodies}
         self._memory = _memory_of(world, set(self._by_entity))
 
@@ -131,7 +131,8 @@ class Oracle:
     def _hold_what_rests(self, pairs: Sequence[Pair], travels: float) -> None:
         """Solve the contacts at rest; who was pushed goes where the solver says, the others fly on freely."""
         contacts = find_resting(pairs, travels, self.settings)
-        self.doubts = [two.pair.key for one, two in pairwise(self.impacts) if two.time - one.time <= ROUNDING * two.time]
+        in_order = pairwise(self.impacts)
+        self.doubts = [two.pair.key for one, two in in_order if two.time - one.time <= ROUNDING * two.time]
         solved = solve(contacts, self._memory, self.settings) if contacts else {}
         self.doubts += [contact.pair.key for contact in contacts if contact.doubtful]
         held = {body for body, moving in solved.items() if moving.held and body.inverse_mass > 0.0}

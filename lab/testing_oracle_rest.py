@@ -130,7 +130,7 @@ def entry(pair: Pair, at_end: bool, slop: float) -> tuple[float, Floats]:
     low, high = 0.0, 1.0
     if depth < 0.0:
         return at_start(1.0, depth, normal)
-    for search in range(2, SEARCHES):
+    for search in range(1, SEARCHES):
         rate = float(travel @ normal)
         t = high + depth / rate if rate else math.nan  # where the plane of contact says, now and then the middle
         if not low < t < high or search % 4 == 0:
@@ -342,7 +342,7 @@ class Sweep:
         if softly:
             wanted = self.soft[1] * wanted + self.soft[2] * old
         contact.impulse = max(0.0, old - wanted)
-        contact.doubtful |= 0.0 < old and abs(old - wanted) <= ROUNDING * old
+        contact.doubtful |= old > 0.0 and abs(old - wanted) <= ROUNDING * old
         self.push(contact, (contact.impulse - old) * contact.normal)
 
     def _rub(self, contact: Resting) -> None:

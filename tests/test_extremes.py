@@ -77,7 +77,7 @@ def test_c21_overlapping_with_equal_velocities(maker, e):
 def test_a_heap_of_overlapping_bodies_spreads_slowly():
     """500 discs thrown into 10 x 10: deep overlap is pushed out in position, so hardly any speed comes of it.
 
-    RESPONSE's limit for this heap: 1.5 sizes a second.
+    The limit on the speed is that of a reference implementation on this heap: 1.5 sizes a second.
     """
     world = make_world()
     for place in np.random.default_rng(1).uniform(0, 10, (500, 2)):

@@ -66,7 +66,7 @@ def test_rebound_and_rest_for_every_restitution(d, maker):
 @pytest.mark.parametrize("substeps", [4, 32])
 @pytest.mark.parametrize("rate", [60, 240])
 def test_substeps_change_nothing_for_what_only_bounces(rate, substeps):
-    """B12: at e = 1 the energy of a ball is the same after 100 s (40 s at 240 Hz), with the same bits for any substeps."""
+    """B12: at e = 1 a ball keeps its energy, 100 s (40 s at 240 Hz), with the same bits for any substeps."""
     world = make_world(gravity=G, dt=1 / rate, substeps=substeps)
     reference = make_world(gravity=G, dt=1 / rate)
     entity = 0

@@ -55,12 +55,10 @@ def test_a_pile_of_ten_thousand_comes_to_rest():
     assert escaped == 0
 
 
-@pytest.mark.parametrize(
-    ("dt", "published"), [(1e-2, 0.0161), pytest.param(1e-3, 1.55e-4, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("dt", "published"), [(1e-2, 0.0161), pytest.param(1e-3, 1.55e-4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("shape", "pitch"), [((7, 7, 1), 2.0), ((6, 6, 6), 0.201), ((6, 6, 6), 2.0)])
 def test_published_lattice_666(shape, pitch, dt, published):
-    """A3: spheres R = 0.1, 10 kg, e = 0 fall for 10 s, lowest centre at 0.101: mean squared overlap, m^2, below ODE's."""
+    """A3: spheres R = 0.1, 10 kg, e = 0, 10 s, lowest centre at 0.101: mean squared overlap, m^2, below ODE's."""
     world = make_world(3, gravity=(0.0, 0.0, -G), dt=dt)
     world.create_entity(Transform((0, 0, -1)), AABBCollider((100, 100, 1)))
     centres = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 3) * pitch + (0, 0, 0.101)

@@ -56,7 +56,7 @@ class Fails(System):
 
 
 def test_a_step_that_fails_leaves_no_trace_in_the_impulses():
-    """An error after the response takes the memory of contacts back too: what follows has the bits of a world without."""
+    """An error after the response takes the impulses back too: what follows has the bits of a world without."""
     calm, hurt = heap(), heap()
     saboteur = Fails()
     hurt.add_system(saboteur)
@@ -74,8 +74,7 @@ def test_a_step_that_fails_leaves_no_trace_in_the_impulses():
 def test_another_step_in_mid_run_makes_nobody_jump(change):
     """The impulses in store are those of the old step; they are rescaled. The overlap goes to that of the new springs.
 
-    A jump would be g dt of the change, 0.1 m/s and more. What there is comes from the springs' new length, d: five
-    contacts on top of each other that close or open by up to d within one of the old steps.
+    Impulses of another step would send them off at 0.03 to 0.05 m/s; the springs' own change of length makes 0.014.
     """
     world = make_world(gravity=G)
     floor(world)
@@ -89,7 +88,7 @@ def test_another_step_in_mid_run_makes_nobody_jump(change):
     for _ in range(600):
         world.step()
         fastest = max(fastest, speed(world))
-    assert fastest < 0.08
+    assert fastest < 0.02
     np.testing.assert_allclose(overlaps(world, ids), expected, rtol=0.01, atol=1e-7)
     assert np.abs(heights(world, ids) - before).max() < 0.02
 

@@ -219,7 +219,6 @@ def test_boxes_in_each_other_part_gently(friction):
         assert speed(world) < 1e-9  # without, the rows slide on, apart
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.6, 0.0])
 def test_a_pyramid_of_fifty_rows_stands_without_drift(friction):
     """10 s. The boxes of a row touch with nothing between them: no push to the side, so no friction is needed."""

@@ -1,0 +1,109 @@
+"""What must come out, in closed form: flight, falls, bounces, collisions, sliding, springs, orbits.
+
+Numbers or arrays (d,) alike where a vector makes sense; metres, seconds, kilograms.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+# Half steps by which a method's parabola lags (-) or leads (+): x = x0 + n dt v0 + a dt^2 n (n + lag) / 2.
+LAGS = {"explicit_euler": -1, "semi_implicit_euler": 1, "velocity_verlet": 0, "rk4": 0, "yoshida4": 0}
+
+
+def free_flight(seconds: float, position: Any, velocity: Any, acceleration: Any) -> tuple[Any, Any]:
+    """(position, velocity) on the exact parabola."""
+    x, v, a = (np.asarray(value, float) for value in (position, velocity, acceleration))
+    return x + v * seconds + 0.5 * a * seconds**2, v + a * seconds
+
+
+def flight_after(
+    steps: int, dt: float, position: Any, velocity: Any, acceleration: Any, integrator: str = "semi_implicit_euler"
+) -> tuple[Any, Any]:
+    """(position, velocity) that the integrator gives after so many steps of constant acceleration, to rounding.
+
+    Both Euler methods miss the parabola by a dt t / 2, explicit Euler behind it, semi-implicit Euler ahead. ValueError
+    for an integrator that is not built in.
+    """
+    if integrator not in LAGS:
+        raise ValueError(f"integrator must be one of {', '.join(LAGS)}, got {integrator!r}")
+    x, v, a = (np.asarray(value, float) for value in (position, velocity, acceleration))
+    return x + steps * dt * v + 0.5 * steps * (steps + LAGS[integrator]) * dt**2 * a, v + steps * dt * a
+
+
+def fall_time(height: float, gravity: float) -> float:
+    """From rest, s: sqrt(2 h / g)."""
+    return math.sqrt(2 * height / gravity)
+
+
+def fall_speed(height: float, gravity: float) -> float:
+    """At the end of a fall from rest, and the speed that jumps so high, m/s: sqrt(2 g h)."""
+    return math.sqrt(2 * gravity * height)
+
+
+def bounce_heights(height: float, restitution: float, count: int) -> Any:
+    """(count,) m: the highest points after the first bounces, h e^(2k)."""
+    return height * float(restitution) ** (2 * np.arange(1, count + 1))
+
+
+def bounce_times(height: float, gravity: float, restitution: float, count: int) -> Any:
+    """(count,) s: when a ball dropped from rest strikes the floor. For e < 1 they gather at t1 (1 + e) / (1 - e)."""
+    flights = 2 * float(restitution) ** np.arange(count)
+    flights[:1] = 1.0
+    return fall_time(height, gravity) * np.cumsum(flights)
+
+
+def collide(
+    mass_a: float, velocity_a: Any, mass_b: float, velocity_b: Any, restitution: float = 1.0, normal: Any = 1.0
+) -> tuple[Any, Any]:
+    """Velocities after two bodies have struck each other without friction.
+
+    normal: the unit vector from a to b; 1 on a line. mass_b may be infinite: a wall.
+    """
+    va, vb, n = (np.asarray(value, float) for value in (velocity_a, velocity_b, normal))
+    share_a = 1.0 if math.isinf(mass_b) else mass_b / (mass_a + mass_b)
+    change = -(1 + restitution) * np.sum((vb - va) * n) * n
+    return va - share_a * change, vb + (1.0 - share_a) * change
+
+
+def impact_time(position_a: Any, velocity_a: Any, position_b: Any, velocity_b: Any, distance: float) -> float:
+    """When two spheres in straight flight come within ``distance`` of centres, the sum of radii, s; inf for never."""
+    d = np.atleast_1d(np.subtract(position_b, position_a).astype(float))
+    w = np.atleast_1d(np.subtract(velocity_b, velocity_a).astype(float))
+    closing, fast, room = -float(d @ w), float(w @ w), float(d @ d) - distance**2
+    if room <= 0:
+        return 0.0
+    under = closing**2 - fast * room
+    return room / (closing + math.sqrt(under)) if closing > 0 and under >= 0 else math.inf
+
+
+def sliding_distance(speed: float, friction: float, gravity: float) -> float:
+    """Until a body that slides on level ground stops, m: v^2 / (2 mu g)."""
+    return speed**2 / (2 * friction * gravity)
+
+
+def sliding_time(speed: float, friction: float, gravity: float) -> float:
+    """Until it stops, s: v / (mu g)."""
+    return speed / (friction * gravity)
+
+
+def spring(seconds: float, stiffness: float, mass: float, position: Any, velocity: Any = 0.0) -> tuple[Any, Any]:
+    """(position, velocity) relative to the resting place, without drag; the period is 2 pi sqrt(m / k)."""
+    rate = math.sqrt(stiffness / mass)
+    x, v = np.asarray(position, float), np.asarray(velocity, float)
+    c, s = math.cos(rate * seconds), math.sin(rate * seconds)
+    return x * c + v / rate * s, v * c - x * rate * s
+
+
+def orbit_speed(strength: float, radius: float) -> float:
+    """On a circle under the attraction strength / r^2, m/s: sqrt(strength / r); the period is 2 pi r over it."""
+    return math.sqrt(strength / radius)
+
+
+def damped_velocity(seconds: float, velocity: Any, acceleration: Any, damping: float) -> Any:
+    """v e^(-c t) + a (1 - e^(-c t)) / c; exact for every integrator of carom."""
+    v, a = np.asarray(velocity, float), np.asarray(acceleration, float)
+    return v * math.exp(-damping * seconds) - a * math.expm1(-damping * seconds) / damping
