@@ -27,7 +27,7 @@ from .testing_oracle_impacts import Impact, bounce_all
 from .testing_oracle_rest import ROUNDING, Kept, find_resting, solve
 
 INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet")
-TRAVELS = dict(zip(INTEGRATORS, (0.0, 1.0, 0.5), strict=True))  # way by a constant force in a step, over dt dv
+TRAVELS: dict[str, float] = dict(zip(INTEGRATORS, (0.0, 1.0, 0.5), strict=True))  # by a constant force, over dt dv
 NEIGHBOURS = 0.1  # of the smallest half extent: how much wider the boxes around the motion are
 SAME_PLACE = 1e-9  # of the size: a gap that is none
 

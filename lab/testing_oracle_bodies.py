@@ -144,10 +144,8 @@ class Pair:
 
     def friction(self, settings: Settings) -> float:
         """Who has none of his own takes the partner's."""
-        one, other = self.a.friction, self.b.friction
-        if one is None and other is None:
-            return 0.0
-        return mixed(settings.friction_mixing, other if one is None else one, one if other is None else other)
+        values = [body.friction for body in self.bodies if body.friction is not None]
+        return mixed(settings.friction_mixing, values[0], values[-1]) if values else 0.0
 
     def between(self, at_a: Floats, at_b: Floats) -> Floats:
         """From the centre of a's shape to that of b's, if the bodies are at these places."""
@@ -236,8 +234,8 @@ def _body(world: World, entity: int) -> Body:
     if len(colliders) != 1:
         raise ValueError(f"entity {entity}: the oracle takes one collider on each body, got {len(colliders)}")
     collider = colliders[0]
-    rigid = components.get(RigidBody)
-    if rigid is not None and rigid.max_linear_speed is not None:
+    rigid = components.get(RigidBody, RigidBody(kind="static"))
+    if rigid.max_linear_speed is not None:
         raise ValueError(f"entity {entity}: the oracle knows no max_linear_speed, got {rigid.max_linear_speed}")
 
     def vector(value: object) -> Floats:
@@ -250,12 +248,10 @@ def _body(world: World, entity: int) -> Body:
         radius, half = 0.0, np.abs(turned) @ vector(collider.half_extents)
     else:
         raise ValueError(f"entity {entity}: the oracle knows spheres and boxes, got {type(collider).__name__}")
-    kind = "static" if rigid is None else rigid.kind
+    velocity = vector(0.0 if rigid.kind == "static" else rigid.linear_velocity)
     return Body(
-        entity, kind, vector(transform.position), vector(0.0 if kind == "static" else rigid.linear_velocity),
-        1.0 if rigid is None else float(rigid.mass), 1.0 if rigid is None else float(rigid.gravity_scale),
-        vector(0.0 if rigid is None else rigid.constant_force), 0.0 if rigid is None else float(rigid.linear_damping),
-        radius, half, isinstance(collider, SphereCollider), turned @ vector(collider.offset),
-        float(collider.restitution), collider.friction, bool(collider.sensor), int(collider.layer),
-        int(collider.mask),
+        entity, rigid.kind, vector(transform.position), velocity, float(rigid.mass), float(rigid.gravity_scale),
+        vector(rigid.constant_force), float(rigid.linear_damping), radius, half, isinstance(collider, SphereCollider),
+        turned @ vector(collider.offset), float(collider.restitution), collider.friction, bool(collider.sensor),
+        int(collider.layer), int(collider.mask),
     )  # fmt: skip

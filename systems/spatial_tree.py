@@ -20,8 +20,8 @@ Rows: TypeAlias = NDArray[np.int32]
 Corners: TypeAlias = NDArray[np.float64]
 Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
 
-# 64 million candidates: as pairs half a gigabyte, and about 0.1 s to test. A game has 1 to 50 per object.
-CANDIDATE_LIMIT = 1 << 26
+# 8 million candidates: with all that is kept of a pair about 4 gigabytes. A game has 1 to 50 per object.
+CANDIDATE_LIMIT = 1 << 23
 
 
 class CandidateLimitError(RuntimeError):
