@@ -1,6 +1,6 @@
 """A pyramid of unit boxes: each row of one box less stands on the row below, half a box to the side.
 
-Restitution 0, mass 1, gravity 9.81. It must stand, with friction 0.6 and, as nothing pushes sideways, without. A spacing
+Restitution 0, mass 1, gravity 9.81. It must stand, with friction 0.6 and without. A spacing
 of 1.1 leaves gaps between the boxes of a row.
 """
 
