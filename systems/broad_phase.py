@@ -11,6 +11,7 @@ import numpy as np
 from ..framework.compilation import kernel
 from ..framework.schedule import Phase, System
 from ..framework.vectors import add, item, replace, row, store
+from .even_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
 from .few_boxes import FEW, FewBoxes, pairs_between
 from .spatial_tree import SpatialTree
 
@@ -28,13 +29,17 @@ def make_box_kernel(shape_bounds: Any, write_world: Any, several: bool = False) 
     @kernel
     def box_motion(
         start, stop, before, after, levels, slots, shapes, world, turns, turned, axes, offsets, level_offsets, size,
-        lower, upper, like,
+        lower, upper, frame, like,
     ):  # fmt: skip
         """Offsets as they are in the world, sizes, and the boxes around the motion of rows start..stop-1.
 
         turns: whether any shape changes when turned; turned: whether any body is. A row without shape gets NaN. A box
         holds every level of its body, so that what the first one meets is looked at; the size is that of the last.
+        frame: the lowest and the highest coordinate of all these boxes, and their longest edge; see ``even_grid``.
         """
+        lowest, highest, largest = like, like, 0.0
+        for k in range(len(like)):
+            lowest, highest = replace(lowest, k, np.inf), replace(highest, k, -np.inf)
         for i in range(start, stop):
             for level in range(len(levels) if several else 1):
                 shape = levels[level, i]
@@ -67,6 +72,14 @@ def make_box_kernel(shape_bounds: Any, write_world: Any, several: bool = False) 
                         lower[i, k] = low
                     if level == 0 or high > upper[i, k]:
                         upper[i, k] = high
+            for k in range(len(like)):  # comparisons with NaN are false
+                low, high = lower[i, k], upper[i, k]
+                lowest = replace(lowest, k, low if low < item(lowest, k) else item(lowest, k))
+                highest = replace(highest, k, high if high > item(highest, k) else item(highest, k))
+                largest = high - low if high - low > largest else largest
+        for k in range(len(like)):
+            frame[LOWEST + k], frame[HIGHEST + k] = item(lowest, k), item(highest, k)
+        frame[LARGEST] = largest
 
     return box_motion
 
@@ -77,7 +90,8 @@ def box_kernel_with_levels(code: ShapeCode) -> Callable[..., None]:
 
 
 class BroadPhase(System):
-    """Finds candidate pairs with one quadtree (octree) of what moves and one, built once, of what does not.
+    """Finds candidate pairs with a uniform grid of what moves, where that suits, see :mod:`even_grid`; else with one
+    quadtree (octree) of what moves and one, built once, of what does not.
 
     Reads previous_position, position, rotation and the colliders; writes the candidate pairs. Pairs of static bodies
     are never made.
@@ -90,6 +104,8 @@ class BroadPhase(System):
         self._moving_tree, self._static_tree = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
         self._moving: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
         self._static: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
+        self._grid, self._frame = EvenGrid(state.dimensions), np.zeros(FRAME_SIZE)
+        self._even = False
         self._static_seen: Any = None
         self._static_positions = np.empty((0, state.dimensions))
 
@@ -99,21 +115,31 @@ class BroadPhase(System):
         if state.collides:
             state.queries.forget()  # these boxes hold whole motions
             self.box_all()
-            moving = table.stops[1]
-            self._moving = self._partition(self._moving_tree, 0, moving)
-            first, second = self._moving.pairs_within()
-            if self._static.count:
-                fixed, mover = pairs_between(self._static, self._moving)
-                if len(fixed):
-                    first, second = np.concatenate((first, mover)), np.concatenate((second, fixed))
+            first, second = self._pairs(table.stops[1], table.count)
         state.set_candidates(first, second)
+
+    def _pairs(self, moving: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of overlapping boxes, at least one of each pair below ``moving``."""
+        self._even = False
+        if moving > FEW and count - moving <= moving:  # else what moves had better look at what does not
+            lower, upper = self._state.scratch["lower"], self._state.scratch["upper"]
+            pairs = self._grid.pairs(lower, upper, self._frame, moving, count)
+            self._even = pairs is not None
+            if pairs is not None:
+                return pairs
+        self._moving = self._partition(self._moving_tree, 0, moving)
+        first, second = self._moving.pairs_within()
+        if self._static.count:
+            fixed, mover = pairs_between(self._static, self._moving)
+            if len(fixed):
+                first, second = np.concatenate((first, mover)), np.concatenate((second, fixed))
+        return first, second
 
     def box_all(self) -> None:
         """Boxes around the motion of what moves; of what does not only if it has changed."""
         state, table = self._state, self._state.table
         moving, count = table.stops[1], table.count
         position, before = table.arrays["position"], table.arrays["previous_position"]
-        self._box(0, moving, before if state.moved else position)
         fixed = position[moving:count]
         seen = (table.static_version, state.structures, state.turned)
         if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
@@ -122,6 +148,7 @@ class BroadPhase(System):
             self._static = self._partition(self._static_tree, moving, count)
             self._static_seen = seen
             self._static_positions = fixed.copy()
+        self._box(0, moving, before if state.moved else position)
 
     def _box(self, start: int, stop: int, before: np.ndarray) -> None:
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
@@ -129,7 +156,7 @@ class BroadPhase(System):
         box_motion(
             start, stop, before, arrays["position"], state.levels, state.slots, state.shapes, state.world_shapes,
             state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
-            state.level_offsets, scratch["size"], scratch["lower"], scratch["upper"], state.like,
+            state.level_offsets, scratch["size"], scratch["lower"], scratch["upper"], self._frame, state.like,
         )  # fmt: skip
 
     @property
@@ -156,6 +183,8 @@ class BroadPhase(System):
         if not self._state.collides:
             return "no colliders: nothing to do"
         moving, count = self._state.table.stops[1], self._state.table.count
+        if self._even:
+            return f"uniform grid of {moving} moving bodies, and {count - moving} static ones that look into it"
         tree = "quadtree" if self._state.dimensions == 2 else "octree"
         if max(moving, count - moving) <= FEW:
             return f"every pair of {moving} moving and {count - moving} static bodies; a {tree} above {FEW}"

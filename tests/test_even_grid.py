@@ -1,0 +1,112 @@
+"""The uniform grid against brute force: the same exact sets as the tree, or no answer where it does not suit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from carom.systems.even_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
+
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+
+
+def frame_of(lower, upper):
+    frame, d = np.zeros(FRAME_SIZE), lower.shape[1]
+    frame[LOWEST : LOWEST + d] = np.nanmin(lower, axis=0)
+    frame[HIGHEST : HIGHEST + d] = np.nanmax(upper, axis=0)
+    frame[LARGEST] = np.nanmax(upper - lower)
+    return frame
+
+
+def brute_force(lower, upper, inside):
+    meet = ((lower[:, None] <= upper) & (lower <= upper[:, None])).all(axis=2)
+    first, second = np.nonzero(np.triu(meet, 1))
+    return {(i, j) for i, j in zip(first.tolist(), second.tolist(), strict=True) if i < inside}
+
+
+def check(lower, upper, inside, grid=None):
+    """None if the grid does not suit, else the number of pairs, after comparing them with brute force."""
+    grid = grid or EvenGrid(lower.shape[1])
+    found = grid.pairs(lower, upper, frame_of(lower[:inside], upper[:inside]), inside, len(lower))
+    if found is None:
+        return None
+    pairs = [(min(p), max(p)) for p in zip(found[0].tolist(), found[1].tolist(), strict=True)]
+    assert len(set(pairs)) == len(pairs)
+    assert set(pairs) == brute_force(lower, upper, inside)
+    return len(pairs)
+
+
+@both_dimensions
+@pytest.mark.parametrize("filling", [0.01, 0.3, 1.0, 2.5])
+@pytest.mark.parametrize("offset", [0.0, -1e7])
+def test_even_boxes_and_some_of_any_size(d, filling, offset):
+    rng = np.random.default_rng(1)
+    centre = rng.random((900, d)) * (900 / filling) ** (1 / d) + offset
+    half = rng.uniform(0.35, 0.5, (900, 1))
+    half[800:] = 10.0 ** rng.uniform(-3, 3, (100, 1))
+    lower, upper = centre - half, centre + half
+    lower[:5] = np.nan
+    lower[800:810, 0] = np.nan
+    lower[810:820, 0], upper[815:825] = -np.inf, np.inf
+    lower[830:835], upper[830:835] = np.inf, np.inf
+    assert check(lower, upper, 800) > 0
+    grid = EvenGrid(d)
+    for inside in (800, 300, 700):  # buffers are reused
+        assert check(lower[:inside], upper[:inside], inside, grid) is not None
+
+
+@both_dimensions
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_lattices_lines_and_touching(d, data):
+    """Edges on multiples of the cell, extents of zero, touching and one ulp apart."""
+    rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    n = data.draw(st.integers(1, 120))
+    shape = np.array(data.draw(st.lists(st.integers(1, 9), min_size=d, max_size=d)))
+    spacing = data.draw(st.sampled_from([1.0, 0.5, np.nextafter(1.0, 2.0), np.nextafter(1.0, 0.0), 0.1]))
+    unit = 10.0 ** data.draw(st.integers(-100, 100))
+    centre = rng.integers(0, shape, (n, d)) * spacing + data.draw(st.sampled_from([0.0, 0.5, 1e6]))
+    lower, upper = (centre - 0.5) * unit, (centre + 0.5) * unit
+    check(lower, upper, data.draw(st.integers(1, n)))
+
+
+@both_dimensions
+def test_full_cells(d):
+    """More objects in a row of cells than are looked at together, up to the limit of a cell, and beyond it none."""
+    rng = np.random.default_rng(2)
+    spread = rng.random((2000, d)) * 2000 ** (1 / d) * 2
+    for crowd in (12, 30, 60):
+        spread[:crowd] = 10.0
+        assert check(spread - 0.1, spread + 0.1, 2000) is not None
+        spread[:crowd] = 10.0 + 0.3 * rng.random((crowd, d))
+        assert check(spread - 0.1, spread + 0.1, 2000) is not None
+    spread[:70] = 10.0
+    assert check(spread - 0.1, spread + 0.1, 2000) is None
+
+
+@both_dimensions
+def test_what_does_not_suit(d):
+    """Very different sizes, one place, points, an infinite box, no box at all: left to the tree."""
+    rng = np.random.default_rng(3)
+    centre = rng.random((1000, d)) * 40
+    half = np.full((1000, 1), 0.01)
+    half[0] = 15.0
+    assert check(centre - half, centre + half, 1000) is None
+    assert check(0 * centre - 0.5, 0 * centre + 0.5, 1000) is None
+    assert check(centre, centre, 1000) is None
+    half[0] = np.inf
+    assert check(centre - half, centre + half, 1000) is None
+    nothing, frame = np.full((10, d), np.nan), np.zeros(FRAME_SIZE)
+    frame[LOWEST : LOWEST + d], frame[HIGHEST : HIGHEST + d] = np.inf, -np.inf
+    assert EvenGrid(d).pairs(nothing, nothing, frame, 10, 10) is None
+
+
+@both_dimensions
+def test_output_grows(d):
+    """Each of 1,000 boxes meets 40 that are not in the grid: ten times the room there is at first."""
+    centre = np.random.default_rng(4).random((1040, d)) * 2 * 1000 ** (1 / d)
+    lower, upper = centre - 0.1, centre + 0.1
+    lower[1000:], upper[1000:] = -1.0, 1e3
+    assert check(lower, upper, 1000) > 40_000
