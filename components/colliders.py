@@ -8,7 +8,7 @@ import numpy as np
 
 from ..framework.columns import REQUIRED, Column, column
 from ..framework.component import Component
-from ..framework.vectors import item, replace
+from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
 # Arguments, checked as fields are.
@@ -43,9 +43,15 @@ class Collider(Component, abstract=True):
     layer = column(1, dtype=int)
     mask = column(ALL_LAYERS, dtype=int)
 
+    rotates: ClassVar[bool] = False  # whether its functions need the body's axes in the world, as ``shape.axes``
+    dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # of the worlds it can be in
+
     @classmethod
     def sample(cls, **common: Any) -> Self:
-        """Some collider of this type, half a unit in every measure it demands; for compiling ahead and checks."""
+        """Some collider of this type, half a unit in every measure it demands; for compiling ahead and checks.
+
+        A shape that cannot be made of halves has a ``sample`` of its own.
+        """
         demanded = {name: 0.5 for name, field in cls.columns.items() if field.default is REQUIRED}
         return cls(**demanded, **common)
 
@@ -72,11 +78,19 @@ class SphereCollider(Collider):
         self._fill({"radius": radius, **common, "sensor": sensor, "layer": layer, "mask": mask})
 
     @staticmethod
-    def bounds(shape, like):
-        half = like
-        for k in range(len(like)):
-            half = replace(half, k, shape.radius)
-        return half
+    def bounds(shape, dimensions):
+        if dimensions == 2:
+            return shape.radius, shape.radius
+        return shape.radius, shape.radius, shape.radius
+
+    @staticmethod
+    def support(shape, direction):
+        """The core of a sphere is its centre."""
+        return scale(direction, 0.0)
+
+    @staticmethod
+    def rounding(shape):
+        return shape.radius
 
 
 class AABBCollider(Collider):
@@ -116,8 +130,16 @@ class AABBCollider(Collider):
         return cls((high - low) / 2, offset=(low + high) / 2, **common)
 
     @staticmethod
-    def bounds(shape, like):
+    def bounds(shape, dimensions):
         return shape.half_extents
+
+    @staticmethod
+    def support(shape, direction):
+        corner = shape.half_extents
+        for k in range(len(direction)):
+            if item(direction, k) < 0.0:
+                corner = replace(corner, k, -item(corner, k))
+        return corner
 
     @staticmethod
     def turned(shape, axes):

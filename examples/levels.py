@@ -13,8 +13,7 @@ import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
-from carom.framework import Settings, World, column
-from carom.framework.registry import Plugin
+from carom.framework import Plugin, Settings, World, column
 from carom.plugins import Physics
 
 STEPS = 20
@@ -25,11 +24,12 @@ rocks = Plugin("rocks")
 class RockCollider(Collider):
     """Twelve circles on a ring, within a circle of that radius."""
 
+    dimensions = (2,)
     radius = column(positive=True)
 
     @staticmethod
-    def bounds(shape, like):
-        return (shape.radius, shape.radius)
+    def bounds(shape, dimensions):
+        return shape.radius, shape.radius
 
 
 @rocks.pair(RockCollider, RockCollider)
@@ -45,12 +45,6 @@ def rock_rock(a, b, d):
     gap = math.sqrt(x * x + y * y)
     normal = (x / gap, y / gap) if gap > 0.0 else (1.0, 0.0)
     return deepest >= 0.0, deepest, normal, (0.5 * d[0], 0.5 * d[1])
-
-
-@rocks.pair(SphereCollider, RockCollider)
-def sphere_rock(a, b, d):
-    """Never called: all rocks here have a sphere, or none has. Every pair of shapes in a world must be handled."""
-    return False, -1.0, (1.0, 0.0), d
 
 
 def crowd(d, seed, n, room):

@@ -1,5 +1,6 @@
 """World, settings, tables, schedule, registry: what everything else stands on; knows no physics itself."""
 
+from .array_columns import array_column
 from .bodies import Bodies
 from .columns import Column, column
 from .component import Component
@@ -8,13 +9,14 @@ from .errors import (
     CaromError,
     MissingComponentError,
     NoPhysicsError,
+    PluginError,
     ScheduleError,
     StepError,
     UnhandledPairError,
 )
 from .hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
 from .plan import Plan
-from .registry import Plugin
+from .plugin import Convex, Plugin
 from .schedule import ForceSystem, Phase, System
 from .settings import Settings
 from .statistics import Stats
@@ -29,6 +31,7 @@ __all__ = [
     "Component",
     "Contact",
     "Contacts",
+    "Convex",
     "ForceSystem",
     "Hits",
     "MissingComponentError",
@@ -39,6 +42,7 @@ __all__ = [
     "Phase",
     "Plan",
     "Plugin",
+    "PluginError",
     "ScheduleError",
     "Settings",
     "Stats",
@@ -46,5 +50,6 @@ __all__ = [
     "System",
     "UnhandledPairError",
     "World",
+    "array_column",
     "column",
 ]

@@ -122,7 +122,7 @@ class CastVerbs:
         if registered is None:
             known = ", ".join(sorted(known.__name__ for known in self.registry.shapes))
             raise TypeError(f"{verb}: shape must be a collider of this world ({known}), got {shape!r}")
-        names = (*registered.parameters, "offset")
+        names = (*registered.columns, "offset")
         count = 1 if many is None else many
         if isinstance(shape, Many):
             arrays = shape.arrays(count, dimensions)
@@ -131,7 +131,7 @@ class CastVerbs:
         made = {}
         for name in names:
             field = component.columns[name]
-            value = np.asarray(getattr(shape, name), field.dtype)
+            value = np.asarray(field.unshared(getattr(shape, name)), field.dtype)
             made[name] = np.array(np.broadcast_to(value, (count, *field.item_shape(dimensions))), order="C")
         return made
 

@@ -227,6 +227,10 @@ class Column:
         """A value read from a handle, as an unbound handle stores it."""
         return value.copy() if isinstance(value, np.ndarray) else self.checked(value)
 
+    def hashable(self, values: np.ndarray) -> np.ndarray:
+        """Stored values as a hash may take them: the same in every process."""
+        return values
+
     def shown(self, value: Any) -> Any:
         """The stored value as users see it."""
         if self.choices:

@@ -67,14 +67,19 @@ def allocating_kernel(function: Function) -> Function:
 
 
 def part(function: Function) -> Function:
-    """For functions that only kernels call: no entry from Python, nothing on disk of their own."""
-    return numba.njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=False)(function)  # type: ignore[return-value]
+    """For functions that only kernels call: nothing on disk of their own; called from Python they stay Python."""
+    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=False)(function))
 
 
 def inlined(function: Function) -> Function:
     """Like :func:`part`, for small helpers that must disappear into the kernels which call them."""
     options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True, "_nrt": False}
-    return numba.njit(**options)(function)  # type: ignore[return-value]
+    return _as_part(numba.njit(**options)(function))
+
+
+def pasted(function: Function) -> Function:
+    """Like :func:`inlined`, but before types are known: branches on arguments that are constants at the call vanish."""
+    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, inline="always", _nrt=False)(function))
 
 
 class Wait:
@@ -136,6 +141,19 @@ class Kernel(CPUDispatcher):
 
     def _reduce_class(self) -> type[CPUDispatcher]:
         return Kernel  # in cached files, even while the kernel is timed
+
+
+class Part(CPUDispatcher):
+    """A function that kernels call. Python runs it as written, so that it can be tried before anything compiles."""
+
+    def __call__(self, *args: Any) -> Any:
+        return self.py_func(*args)
+
+
+def _as_part(dispatcher: Any) -> Any:
+    if isinstance(dispatcher, Dispatcher):  # a plain function when NUMBA_DISABLE_JIT is set
+        dispatcher.__class__ = Part
+    return dispatcher
 
 
 class TimedKernel(Kernel):

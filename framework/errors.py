@@ -21,5 +21,9 @@ class UnhandledPairError(CaromError):
     """Two shapes can meet in this world and no plugin says how."""
 
 
+class PluginError(CaromError, ValueError):
+    """A plugin is not what it should be; the message names plugin, shape, function and the cure."""
+
+
 class ScheduleError(CaromError):
     """Systems cannot be put in order: a cycle, or two writers of one column without an order."""

@@ -1,18 +1,19 @@
-"""The registry of a world: shapes, and how each pair of them meets."""
+"""The registry of a world: what its plugins have brought, and how each pair of shapes meets."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from .compilation import inlined
 from .component import Component
-from .errors import UnhandledPairError
+from .errors import PluginError, UnhandledPairError
 
 if TYPE_CHECKING:
-    from .world import World
+    from .plugin import Plugin
+
+
+class Convex:
+    """In a pair, any shape that has a support function: ``@plugin.pair(PlaneCollider, Convex)``."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +23,12 @@ class Shape:
     cost
         of testing it, relative to the sphere's 1; orders the levels of a body that has several
     bounds
-        compiled; (parameters, like) -> half extents of the box around the shape, a tuple of d
+        compiled; (shape, dimensions) -> half extents of the box around the shape, a tuple of d
     turned
-        compiled, or None if rotation changes nothing; (parameters, rotation matrix (d, d)) -> tuple of parameters
+        compiled, or None if rotation changes nothing; (shape, rotation matrix (d, d)) -> tuple of parameters
+    support, rounding
+        compiled, or None; (shape, direction) -> the core's farthest point that way; (shape) -> how far the shape
+        reaches beyond its core
     """
 
     component: type[Component]
@@ -32,117 +36,147 @@ class Shape:
     bounds: Any
     turned: Any | None
     plugin: str
+    support: Any | None = None
+    rounding: Any | None = None
+
+    @property
+    def rotates(self) -> bool:
+        """Whether its functions see ``shape.axes``, the body's axes in the world."""
+        return bool(getattr(self.component, "rotates", False))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns the pair functions see: the shape's own, without those every collider has."""
+        shared = getattr(self.component, "stacked_columns", ())
+        return tuple(name for name in self.component.columns if name not in shared)
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """The columns the pair functions see: the shape's own, without those every collider has."""
-        shared = self.component.stacked_columns  # type: ignore[attr-defined]
-        return tuple(name for name in self.component.columns if name not in shared)
+        """Fields of the tuple that pair functions get."""
+        return (*self.columns, "axes") if self.rotates else self.columns
 
 
 @dataclass(frozen=True)
 class Pair:
-    """How two shapes meet: (a, b, d) -> (hit, depth, normal, point), d from a's centre to b's, compiled.
+    """How two shapes meet: (a, b, d, *helpers) -> (hit, depth, normal, point), d from a's centre to b's, compiled.
 
+    helpers
+        the support functions of those of the two that are registered as :class:`Convex`, then their roundings
     corner
         compiled, or None; (a, b, d, slop) -> whether they touch by less than the slop, and only at a corner or an edge
+    sweep
+        compiled, or None; (a, b, d, v) -> (hit, time, normal, point) of b moving by v relative to a from d on, the time
+        as a part of v
     """
 
-    first: type[Component]
-    second: type[Component]
+    first: type[Any]
+    second: type[Any]
     function: Any
     plugin: str
     corner: Any | None = None
+    sweep: Any | None = None
+    helpers: tuple[Any, ...] = ()
+
+    @property
+    def names(self) -> str:
+        return f"{self.first.__name__} and {self.second.__name__}"
 
 
-class Plugin:
-    """Something a world can do: shapes, pairs, systems. ``install`` is called once per world."""
-
-    def __init__(self, name: str) -> None:
-        if not isinstance(name, str) or not name:
-            raise ValueError(f"a plugin needs a name, got {name!r}")
-        self.name = name
-        self.shapes: list[Shape] = []
-        self.pairs: list[Pair] = []
-        self.integrators: dict[str, Any] = {}
-
-    def shape(self, *, cost: float) -> Callable[[type[Component]], type[Component]]:
-        """Register a collider class as a shape. It defines ``bounds(shape, like)`` and may define ``turned``."""
-
-        def register(component: type[Component]) -> type[Component]:
-            if not hasattr(component, "bounds"):
-                raise TypeError(f"plugin {self.name}: {component.__name__} needs bounds(shape, like)")
-            bounds = inlined(inspect.getattr_static(component, "bounds").__func__)
-            turned = inspect.getattr_static(component, "turned", None)
-            compiled = None if turned is None else inlined(turned.__func__)
-            self.shapes.append(Shape(component, cost, bounds, compiled, self.name))
-            return component
-
-        return register
-
-    def pair(
-        self, first: type[Component], second: type[Component], *, corner: Any | None = None
-    ) -> Callable[[Any], Any]:
-        """Register the function for two shapes; the registry swaps order and flips the normal itself.
-
-        ``corner(a, b, d, slop)`` may tell a touch of two corners, which pushes nobody: what slides over a row of such
-        shapes would catch there.
-        """
-
-        def register(function: Any) -> Any:
-            compiled = None if corner is None else inlined(corner)
-            self.pairs.append(Pair(first, second, inlined(function), self.name, compiled))
-            return function
-
-        return register
-
-    def integrator(self, name: str) -> Callable[[Any], Any]:
-        """Register an integrator under the name that ``Settings.integrator`` uses."""
-
-        def register(integrator: Any) -> Any:
-            self.integrators[name] = integrator
-            return integrator
-
-        return register
-
-    def install(self, world: World) -> None:
-        """Called by the world after all its plugins are registered."""
-
-
-@dataclass
+@dataclass(eq=False)
 class Registry:
-    """Everything the plugins of one world have registered."""
+    """Everything the plugins of one world have registered; ``version`` changes whenever they register more."""
 
+    plugins: list[Plugin] = field(default_factory=list)
+    version: int = 0
     shapes: dict[type[Component], Shape] = field(default_factory=dict)
-    pairs: dict[tuple[type[Component], type[Component]], Pair] = field(default_factory=dict)
+    pairs: dict[tuple[type[Any], type[Any]], Pair] = field(default_factory=dict)
     integrators: dict[str, Any] = field(default_factory=dict)
+    broad_phases: dict[str, Any] = field(default_factory=dict)
+    mixing_rules: dict[str, Any] = field(default_factory=dict)
+    pair_filters: list[Any] = field(default_factory=list)
 
     def add(self, plugin: Plugin) -> None:
-        """ValueError if a shape, pair or integrator is registered already."""
-        for shape in plugin.shapes:
-            if shape.component in self.shapes:
-                raise ValueError(f"plugin {plugin.name}: shape {shape.component.__name__} is registered already")
-        for name in plugin.integrators:
-            if name in self.integrators:
-                raise ValueError(f"plugin {plugin.name}: integrator {name!r} is registered already")
-        for pair in plugin.pairs:
-            if self.pair(pair.first, pair.second) is not None:
-                names = f"{pair.first.__name__} and {pair.second.__name__}"
-                raise ValueError(f"plugin {plugin.name}: the pair of {names} is registered already")
-        self.shapes.update({shape.component: shape for shape in plugin.shapes})
-        self.pairs.update({(pair.first, pair.second): pair for pair in plugin.pairs})
-        self.integrators.update(plugin.integrators)
+        """PluginError if something of it is registered already; what it registers later is seen too."""
+        self.plugins.append(plugin)
+        try:
+            self.refresh()
+        except PluginError:
+            self.plugins.remove(plugin)
+            raise
+        plugin.registries.add(self)
 
-    def pair(self, first: type[Component], second: type[Component]) -> Pair | None:
-        """The pair of two shapes in whichever order it was registered."""
-        return self.pairs.get((first, second)) or self.pairs.get((second, first))
+    def refresh(self) -> None:
+        """Gather everything anew; PluginError if two plugins want the same, and then nothing changes."""
+        shapes: dict[Any, Any] = {}
+        pairs: dict[Any, Any] = {}
+        integrators: dict[str, Any] = {}
+        broad_phases: dict[str, Any] = {}
+        mixing_rules: dict[str, Any] = {}
+        owners: dict[Any, str] = {}
+        for plugin in self.plugins:
+            kinds = (
+                ("shape", shapes, plugin.shapes), ("integrator", integrators, plugin.integrators),
+                ("broad phase", broad_phases, plugin.broad_phases), ("mixing rule", mixing_rules, plugin.mixing_rules),
+            )  # fmt: skip
+            for kind, known, fresh in kinds:
+                for key in fresh:
+                    name = key if isinstance(key, str) else key.__name__
+                    if key in known:
+                        raise PluginError(
+                            f"plugin {plugin.name}: {kind} {name} is registered already, by plugin {owners[kind, key]}"
+                        )
+                    owners[kind, key] = plugin.name
+                known.update(fresh)
+            for (first, second), pair in plugin.pairs.items():
+                other = pairs.get((first, second)) or pairs.get((second, first))
+                if other is not None:
+                    raise PluginError(
+                        f"plugin {plugin.name}: the pair of {pair.names} is registered already, by plugin "
+                        f"{other.plugin}"
+                    )
+                pairs[first, second] = pair
+        self.shapes, self.pairs, self.integrators = shapes, pairs, integrators
+        self.broad_phases, self.mixing_rules = broad_phases, mixing_rules
+        self.pair_filters = [filter_ for plugin in self.plugins for filter_ in plugin.pair_filters]
+        self.version += 1
+
+    def pair(self, first: type[Any], second: type[Any]) -> Pair | None:
+        """How two shapes meet: the pair registered for both, in whichever order; else for one and anything convex; else
+        for any two convex shapes; else None."""
+        exact = self.pairs.get((first, second)) or self.pairs.get((second, first))
+        if exact is not None:
+            return exact
+        for one, other in ((first, second), (second, first)):
+            general = self._with_convex(one, Convex, other) or self._with_convex(Convex, one, other)
+            if general is not None:
+                return general
+        general = self.pairs.get((Convex, Convex))
+        one, other = self.shapes.get(first), self.shapes.get(second)
+        if general is None or one is None or other is None or one.support is None or other.support is None:
+            return None
+        helpers = (one.support, other.support, one.rounding, other.rounding)
+        return replace(general, first=first, second=second, helpers=helpers)
+
+    def _with_convex(self, first: type[Any], second: type[Any], convex: type[Any]) -> Pair | None:
+        """The pair registered for one shape and Convex, made for a particular convex shape."""
+        pair, shape = self.pairs.get((first, second)), self.shapes.get(convex)
+        if pair is None or shape is None or shape.support is None or (first is Convex and second is Convex):
+            return None
+        sides = {"first": convex} if first is Convex else {"second": convex}
+        return replace(pair, **sides, helpers=(shape.support, shape.rounding))
 
     def require_pairs(self, components: list[type[Component]]) -> None:
         """UnhandledPairError if two of these shapes can meet and no plugin says how."""
         for index, first in enumerate(components):
             for second in components[index:]:
                 if self.pair(first, second) is None:
-                    raise UnhandledPairError(
-                        f"{first.__name__} and {second.__name__} can meet in this world, but no plugin has registered "
-                        f"the pair: register it with @plugin.pair, or keep them apart with layer and mask"
-                    )
+                    raise UnhandledPairError(self.unhandled(first, second))
+
+    def unhandled(self, first: type[Component], second: type[Component], where: str = "") -> str:
+        """What to say of a pair that no plugin handles."""
+        plain = [c.__name__ for c in (first, second) if c in self.shapes and self.shapes[c].support is None]
+        convex = f", give {' and '.join(dict.fromkeys(plain))} a support function" if plain else ""
+        return (
+            f"{first.__name__} and {second.__name__} can meet in this world{where}, but no plugin has registered the "
+            f"pair: register it with @plugin.pair{convex}, or keep them apart with layer and mask"
+        )

@@ -87,7 +87,9 @@ def state_hash(physics: PhysicsServices) -> str:
     digest = hashlib.sha256(table.column("entity")[order].tobytes())
     present = [c for c in table.component_types if table.has_mask(c)[: table.count].any()]
     for component in sorted(present, key=table.mask_name):
-        for key in (table.mask_name(component), *(column.key for column in component.columns.values())):
+        mask = table.mask_name(component)
+        columns = {column.key: column.hashable(table.column(column.key)) for column in component.columns.values()}
+        for key, values in {mask: table.column(mask), **columns}.items():
             digest.update(key.encode())
-            digest.update(np.ascontiguousarray(table.column(key)[order] + 0).tobytes())
+            digest.update(np.ascontiguousarray(values[order] + 0).tobytes())
     return digest.hexdigest()

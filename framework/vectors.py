@@ -16,11 +16,20 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import _Intrinsic, intrinsic
 
 from .compilation import inlined
 
 _INDEX = ir.IntType(32)
+
+
+class _Emitted(_Intrinsic):
+    """Python runs the plain function."""
+
+    plain: Callable[..., Any]
+
+    def __call__(self, *args: Any) -> Any:
+        return self.plain(*args)
 
 
 def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callable[[Any], Any]:
@@ -45,6 +54,8 @@ def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callabl
         scope = {"typing": typing}
         exec(f"def {function.__name__}(context, {names}): return typing(context, {names})", scope)
         made = intrinsic(scope[function.__name__])
+        made.__class__ = _Emitted
+        made.plain = function
         made.__doc__ = function.__doc__
         made.carom_depends_on = (function, emit, signature)
         return made
@@ -223,6 +234,35 @@ def store(column, index, vector):
     """Set row ``index`` (not negative) of an (n, d) column."""
     for k, value in enumerate(vector):
         column[index, k] = value
+
+
+def _emit_axes(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    count = arguments[2].count
+    made = context.make_array(arguments[0])(context, builder, values[0])
+    places = [context.get_constant(types.intp, k) for k in range(count)]
+    kind = types.UniTuple(arguments[2], count)
+    result = cgutils.get_null_value(context.get_value_type(kind))
+    for j in range(count):
+        axis = values[2]
+        for k in range(count):
+            place = cgutils.get_item_pointer(context, builder, arguments[0], made, [values[1], places[k], places[j]])
+            axis = builder.insert_value(axis, builder.load(place), k)
+        result = builder.insert_value(result, axis, j)
+    return result
+
+
+def _sign_axes(axes: Any, index: Any, like: Any) -> Any:
+    kind = _vector(like)
+    if kind is None or not isinstance(axes, types.Array) or axes.ndim != 3 or axes.dtype != types.float64:
+        return None
+    return types.UniTuple(kind, kind.count)(axes, types.intp, kind)
+
+
+@_emitted(_emit_axes, _sign_axes)
+def axes_at(axes, index, like):
+    """The axes of body ``index``, a tuple of vectors: columns of its rotation matrix."""
+    d = len(like)
+    return tuple(tuple(axes[index, k, j] for k in range(d)) for j in range(d))
 
 
 @inlined

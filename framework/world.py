@@ -18,12 +18,13 @@ from .clock import Clock
 from .component import Component
 from .contacts import Contacts
 from .entities import EntityVerbs
-from .errors import CaromError, NoPhysicsError
+from .errors import CaromError, NoPhysicsError, PluginError
 from .events import Events
 from .pipeline import Pipeline
 from .plan import Plan
+from .plugin import Plugin
 from .query_verbs import QueryVerbs
-from .registry import Plugin, Registry
+from .registry import Registry
 from .schedule import ForceSystem, Phase, System
 from .services import PhysicsServices
 from .settings import Settings
@@ -53,7 +54,7 @@ class World(EntityVerbs, QueryVerbs):
                 raise TypeError(f"World takes plugins, got {plugin!r}; settings go by name: World(..., settings=...)")
         names = [plugin.name for plugin in plugins]
         for twice in (n for n in names if names.count(n) > 1):
-            raise ValueError(f"a world takes one plugin named {twice!r}, got {names.count(twice)}")
+            raise PluginError(f"a world takes one plugin named {twice!r}, got {names.count(twice)}")
         if name is None:
             name = next(n for n in (f"carom-{i}" for i in _numbers) if not esper_bridge.context_exists(n))
         elif name != "default" and esper_bridge.context_exists(name):
@@ -126,6 +127,23 @@ class World(EntityVerbs, QueryVerbs):
     def _open(self) -> None:
         if self.closed:
             raise CaromError(f"world {self.name!r} is closed")
+
+    # -- plugins ----------------------------------------------------------------------------------
+
+    def add_plugin(self, plugin: Plugin) -> None:
+        """Take another plugin, between two steps; the next step knows what it brings.
+
+        PluginError if it registers what another one has registered, or if one of its name is here already.
+        """
+        self._open()
+        self._pipeline.must_be_between_steps("a plugin can be added")
+        if not isinstance(plugin, Plugin):
+            raise TypeError(f"add_plugin takes a plugin, got {plugin!r}")
+        if any(plugin.name == other.name for other in self.plugins):
+            raise PluginError(f"a plugin named {plugin.name!r} is in this world already")
+        self.registry.add(plugin)
+        self.plugins = (*self.plugins, plugin)
+        plugin.install(self)
 
     # -- settings and physics ---------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..framework.registry import Plugin
+from ..framework.plugin import Plugin
 from ..systems import (
     BroadPhase,
     ContactEvents,
@@ -36,7 +36,7 @@ class Physics(Plugin):
             raise ValueError(f"Physics: dimensions must be 2 or 3, got {dimensions!r}")
         self.dimensions = dimensions
         self.gravity = gravity
-        self.shapes, self.pairs = list(standard_shapes.shapes), list(standard_shapes.pairs)
+        self.shapes, self.pairs = dict(standard_shapes.shapes), dict(standard_shapes.pairs)
         for name, integrator in STANDARD_INTEGRATORS.items():
             self.integrator(name)(integrator)
 

@@ -11,7 +11,7 @@ import math
 
 from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import inlined
-from ..framework.registry import Plugin
+from ..framework.plugin import Plugin
 from ..framework.vectors import divided, item, length, replace, scale
 
 standard_shapes = Plugin("standard shapes")

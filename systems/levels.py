@@ -18,7 +18,7 @@ from ..framework.errors import UnhandledPairError
 from ..framework.handles import Sources
 from ..framework.registry import Registry
 from ..framework.table import Table
-from .shape_code import half_extents_kernel
+from .shape_code import half_extents_kernel, parameter_columns
 
 if TYPE_CHECKING:
     from .state import PhysicsState
@@ -74,6 +74,13 @@ class LevelCheck:
     ) -> None:
         """fresh, members: the handles to adopt and those adopted, by type and entity; gone: who loses them."""
         types = [c for c in dict.fromkeys((*fresh, *members)) if issubclass(c, Collider)]
+        for collider in types:
+            if fresh.get(collider) and self._table.dimensions not in collider.dimensions:
+                worlds = " and ".join(f"{d}D" for d in collider.dimensions)
+                raise ValueError(
+                    f"entity {min(fresh[collider])}: {collider.__name__} is a shape of {worlds} worlds, this world is "
+                    f"{self._table.dimensions}D"
+                )
         holders = {c: (fresh.get(c, {}).keys(), members.get(c, {}).keys(), gone.get(c, set())) for c in types}
         several: set[int] = set()  # entities that get a collider and have another
         for collider, other in itertools.permutations(types, 2):
@@ -152,7 +159,8 @@ class LevelCheck:
             return np.repeat(values["radius"][:, None], dimensions, axis=1)
         shape = self._registry.shapes[collider]
         result = np.empty((count, dimensions))
-        parameters = (tuple(values[name] for name in shape.parameters),)
+        unturned = np.broadcast_to(np.eye(dimensions), (count if shape.rotates else 0, dimensions, dimensions)).copy()
+        parameters = (parameter_columns(shape, values, unturned),)
         half_extents_kernel(shape, dimensions)(parameters, result, (0.0,) * dimensions)
         return result
 

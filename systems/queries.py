@@ -14,6 +14,7 @@ from ..framework.vectors import divided, length, row, store
 from .casts import ENDLESS
 from .neighbours import NeighbourSearch
 from .query_code import QueryKernels, query_kernels
+from .shape_code import parameter_columns
 from .tree_build import MAX_LEVELS
 
 if TYPE_CHECKING:
@@ -138,7 +139,9 @@ class Queries(QueryServices):
     ) -> CastHits:  # fmt: skip
         lengths, units = np.empty(len(positions)), np.empty_like(displacements)
         unit_vectors(displacements, lengths, units, self._state.like)
-        query = tuple(column for name, column in columns.items() if name != "offset")
+        shape = self._state.world.registry.shapes[component]
+        unturned = np.broadcast_to(np.eye(self._state.dimensions), (len(positions), *self._state.axes.shape[1:])).copy()
+        query = parameter_columns(shape, columns, unturned)
         starts = positions + columns["offset"]
         return self._cast(component, query, starts, units, lengths, mask, excluded, only_nearest)
 
@@ -192,10 +195,12 @@ class Queries(QueryServices):
             state.refresh_rotation()
             state.broad_phase.trees_now()
             self._stamp = stamp
-        if self._asked_of is not state.code:
-            self._asked_of, self._asked = state.code, {}
+        if self._asked_of != (state.code, state.world.registry.version):
+            self._asked_of, self._asked = (state.code, state.world.registry.version), {}
         if component not in self._asked:
-            self._asked[component] = query_kernels(state.world.registry, state.code.shapes, component)
+            self._asked[component] = query_kernels(
+                state.world.registry, state.code.shapes, component, state.dimensions
+            )
         return self._asked[component]
 
     def _columns(self) -> tuple[Any, ...]:

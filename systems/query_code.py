@@ -6,13 +6,14 @@ import collections
 import math
 from typing import Any
 
+from ..framework.array_columns import array_at
 from ..framework.compilation import inlined
 from ..framework.component import Component
 from ..framework.registry import Registry, Shape
-from ..framework.vectors import add, negative, row
+from ..framework.vectors import add, axes_at, negative, row
 from .casts import make_cast_kernel
 from .nearest import make_nearest_kernel
-from .shape_code import parameters_source, source_module
+from .shape_code import pair_call, parameters_source, source_module
 from .touching import make_touching_kernel
 
 
@@ -28,26 +29,33 @@ class QueryKernels:
 _made: dict[tuple[Any, ...], QueryKernels] = {}
 
 
-def query_kernels(registry: Registry, shapes: tuple[Shape, ...], component: type[Component]) -> QueryKernels:
+def query_kernels(
+    registry: Registry, shapes: tuple[Shape, ...], component: type[Component], dimensions: int
+) -> QueryKernels:
     """The kernels that ask with ``component`` for ``shapes``; ValueError if no plugin has registered it as a shape."""
     if component not in registry.shapes:
         raise ValueError(f"no plugin has registered {component.__name__} as a shape, which this question needs")
     asking = registry.shapes[component]
     pairs = tuple(registry.pair(component, shape.component) for shape in shapes)
-    key = (asking, shapes, pairs)
+    key = (asking, shapes, pairs, dimensions)
     if key not in _made:
-        _made[key] = _make(asking, shapes, pairs)
+        _made[key] = _make(asking, shapes, pairs, dimensions)
     return _made[key]
 
 
-def _make(asking: Shape, shapes: tuple[Shape, ...], pairs: tuple[Any, ...]) -> QueryKernels:
+def _make(
+    asking: Shape, shapes: tuple[Shape, ...], pairs: tuple[Any, ...], dimensions: int
+) -> QueryKernels:
     """Compile together against(query, q, shape, at, d, shapes, like) -> (hit, depth, normal, point).
 
     query: the parameter columns of what asks, q its row; d: from its centre to that of the body in row ``at``. The
     answer is seen from what asks. A shape that has no pair with it is never hit.
     """
     name = asking.component.__name__
-    scope: dict[str, Any] = {"row": row, "negative": negative, "add": add, "FAR": -math.inf, "bounds": asking.bounds}
+    scope: dict[str, Any] = {
+        "row": row, "negative": negative, "add": add, "FAR": -math.inf, "bounds": asking.bounds, "array_at": array_at,
+        "axes_at": axes_at,
+    }  # fmt: skip
     scope["Query"] = collections.namedtuple("Query", asking.parameters)
     query = parameters_source((asking,), 0, "q").replace("Shape0", "Query").replace("shapes[0]", "query")
     lines = [f'"""{name} against {", ".join(shape.component.__name__ for shape in shapes)}."""', ""]
@@ -57,17 +65,18 @@ def _make(asking: Shape, shapes: tuple[Shape, ...], pairs: tuple[Any, ...]) -> Q
         if pair is None:
             continue
         scope[f"Shape{index}"] = collections.namedtuple(f"Shape{index}", shape.parameters)
-        scope[f"pair{index}"] = pair.function
         body = parameters_source(shapes, index, "at")
         lines.append(f"    if shape == {index}:")
         if pair.first is asking.component:
-            lines.append(f"        hit, depth, normal, point = pair{index}({query}, {body}, d)")
+            call = pair_call(pair, f"pair{index}", scope, query, body, "d")
+            lines.append(f"        hit, depth, normal, point = {call}")
         else:
+            call = pair_call(pair, f"pair{index}", scope, body, query, "negative(d)")
             lines += [
-                f"        hit, depth, normal, point = pair{index}({body}, {query}, negative(d))",
+                f"        hit, depth, normal, point = {call}",
                 "        normal, point = negative(normal), add(point, d)",
             ]
     lines += ["    return hit, depth, normal, point", ""]
-    lines += ["def half_extents(query, q, like):", f"    return bounds({query}, like)", ""]
+    lines += ["def half_extents(query, q, like):", f"    return bounds({query}, {dimensions})", ""]
     module = source_module("\n".join(lines) + "\n", scope)
     return QueryKernels(inlined(module.against), inlined(module.half_extents))

@@ -10,15 +10,32 @@ from __future__ import annotations
 import collections
 import hashlib
 import linecache
+import math
 import sys
 import types
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..framework.array_columns import ArrayColumn, array_at
 from ..framework.compilation import deep_hash, inlined, kernel
 from ..framework.component import Component
-from ..framework.registry import Registry, Shape
-from ..framework.vectors import negative, row, store, sub
+from ..framework.registry import Pair, Registry, Shape
+from ..framework.vectors import axes_at, dot, negative, row, store, sub
+
+# Places in the trace.
+ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B = range(5)
+TRACE_SIZE = 5
+
+
+@inlined
+def sound(hit, depth, normal, point):
+    """Whether what a pair's function returned is a contact, or a miss."""
+    if hit:
+        return math.isfinite(depth + dot(normal, normal) + dot(point, point))
+    return depth < math.inf
 
 
 @dataclass(frozen=True)
@@ -27,10 +44,14 @@ class ShapeCode:
 
     evaluate(shape_a, a, shape_b, b, d, shapes, like) -> (hit, depth, normal, point)
         rows a and b, d = centre of b - centre of a; normal from a to b, point relative to a's centre;
-        depth is negative while the two are apart
+        depth is negative while the two are apart. Two shapes that no plugin has a pair for never hit
     corner(shape_a, a, shape_b, b, d, slop, shapes, like) -> whether the two touch at a corner only, which is no contact
     shape_bounds(shape, row, shapes, like) -> half extents
     write_world(shape, row, shapes, world, turn, axes, like); writes the parameters as turned into ``world``
+    unhandled
+        pairs of indices, of shapes that no plugin has a pair for
+
+    ``shapes`` is what :func:`parameter_columns` makes, one for each shape, and behind them the trace, see ``evaluate``.
     """
 
     shapes: tuple[Shape, ...]
@@ -39,6 +60,12 @@ class ShapeCode:
     shape_bounds: Any
     write_world: Any
     turns: bool
+    unhandled: tuple[tuple[int, int], ...]
+
+    @property
+    def rotates(self) -> bool:
+        """Whether some shape needs the bodies' axes."""
+        return any(shape.rotates for shape in self.shapes)
 
 
 _made: dict[tuple[Any, ...], ShapeCode] = {}
@@ -46,26 +73,31 @@ _half_extents: dict[tuple[int, Shape], Any] = {}
 
 
 def shape_code(registry: Registry, components: list[type[Component]], dimensions: int) -> ShapeCode:
-    """The code for these shapes, cheapest first; UnhandledPairError if a pair of them has no function."""
-    registry.require_pairs(components)
+    """The code for these shapes, cheapest first."""
     shapes = tuple(registry.shapes[component] for component in components)
-    functions = [registry.pair(a, b) for i, a in enumerate(components) for b in components[i:]]
-    key = (dimensions, shapes, tuple(functions))
+    pairs = {
+        (i, j): registry.pair(components[i], components[j]) for i in range(len(shapes)) for j in range(i, len(shapes))
+    }
+    key = (dimensions, shapes, tuple(pairs.values()))
     if key not in _made:
-        _made[key] = _make(registry, shapes, dimensions)
+        _made[key] = _make(shapes, pairs, dimensions)
     return _made[key]
 
 
-def _make(registry: Registry, shapes: tuple[Shape, ...], dimensions: int) -> ShapeCode:
-    scope: dict[str, Any] = {"row": row, "negative": negative, "sub": sub}
+def _make(shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], dimensions: int) -> ShapeCode:
+    scope: dict[str, Any] = {
+        "row": row, "negative": negative, "sub": sub, "array_at": array_at, "axes_at": axes_at, "finite": math.isfinite,
+        "APART": -math.inf, "sound": sound, "dot": dot, "ROW_A": ROW_A, "ROW_B": ROW_B, "UNSOUND": UNSOUND,
+        "UNSOUND_A": UNSOUND_A, "UNSOUND_B": UNSOUND_B,
+    }  # fmt: skip
     source = [f'"""Shapes: {", ".join(shape.component.__name__ for shape in shapes)}, {dimensions}D."""', ""]
     for index, shape in enumerate(shapes):
         scope[f"Shape{index}"] = collections.namedtuple(f"Shape{index}", shape.parameters)
         scope[f"bounds{index}"] = shape.bounds
         scope[f"turned{index}"] = shape.turned
-    source += _evaluate_source(registry, shapes, scope)
-    source += _corner_source(registry, shapes, scope)
-    source += _bounds_source(shapes)
+    source += _evaluate_source(shapes, pairs, scope)
+    source += _corner_source(shapes, pairs, scope)
+    source += _bounds_source(shapes, dimensions)
     source += _world_source(shapes)
     module = source_module("\n".join(source) + "\n", scope)
     return ShapeCode(
@@ -75,20 +107,22 @@ def _make(registry: Registry, shapes: tuple[Shape, ...], dimensions: int) -> Sha
         inlined(module.shape_bounds),
         inlined(module.write_world),
         any(shape.turned is not None for shape in shapes),
+        tuple(indices for indices, pair in pairs.items() if pair is None),
     )
 
 
 def half_extents_kernel(shape: Shape, dimensions: int) -> Any:
     """A kernel (shapes, half, like) that writes the half extents (n, d) of the boxes around n shapes of one kind.
 
-    shapes: a tuple with one tuple of the shape's parameters, each an array of n.
+    shapes: a tuple with the shape's :func:`parameter_columns`.
     """
     key = (dimensions, shape)
     if key not in _half_extents:
-        scope: dict[str, Any] = {"row": row, "bounds0": shape.bounds}
+        scope: dict[str, Any] = {"row": row, "array_at": array_at, "axes_at": axes_at, "bounds0": shape.bounds}
         scope["Shape0"] = collections.namedtuple("Shape0", shape.parameters)
-        source = [f'"""Bounds of {shape.component.__name__}, {dimensions}D."""', "", *_bounds_source((shape,))]
-        bounds = inlined(source_module("\n".join(source) + "\n", scope).shape_bounds)
+        title = f'"""Bounds of {shape.component.__name__}, {dimensions}D."""'
+        lines = [title, "", *_bounds_source((shape,), dimensions)]
+        bounds = inlined(source_module("\n".join(lines) + "\n", scope).shape_bounds)
 
         @kernel
         def half_extents(shapes, half, like):
@@ -99,20 +133,49 @@ def half_extents_kernel(shape: Shape, dimensions: int) -> Any:
     return _half_extents[key]
 
 
+def parameter_columns(shape: Shape, arrays: Mapping[str, np.ndarray], axes: np.ndarray) -> tuple[Any, ...]:
+    """What kernels need to make the parameters of any row; arrays: columns by name; axes (n, d, d) of the bodies."""
+    columns: list[Any] = []
+    for name in shape.columns:
+        column = shape.component.columns[name]
+        columns.append(column.parameters(arrays[name]) if isinstance(column, ArrayColumn) else arrays[name])
+    return (*columns, axes) if shape.rotates else tuple(columns)
+
+
 def parameters_source(shapes: tuple[Shape, ...], index: int, at: str) -> str:
     """Source of the parameter tuple of shape ``index`` at row ``at``."""
     shape = shapes[index]
     parts = []
-    for place, name in enumerate(shape.parameters):
+    for place, name in enumerate(shape.columns):
         array = f"shapes[{index}][{place}]"
-        vector = shape.component.columns[name].item == "vector"
-        parts.append(f"row({array}, {at}, like)" if vector else f"{array}[{at}]")
+        column = shape.component.columns[name]
+        if isinstance(column, ArrayColumn):
+            parts.append(f"array_at({array}[0], {array}[1], {array}[2], {at})")
+        else:
+            parts.append(f"row({array}, {at}, like)" if column.item == "vector" else f"{array}[{at}]")
+    if shape.rotates:
+        parts.append(f"axes_at(shapes[{index}][{len(shape.columns)}], {at}, like)")
     return f"Shape{index}({', '.join(parts)})"
 
 
-def _evaluate_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[str, Any]) -> list[str]:
-    many = len(shapes) > 1
+def pair_call(pair: Pair, name: str, scope: dict[str, Any], one: str, two: str, d: str) -> str:
+    """Source of a call of the pair's function, with its helpers; puts these into ``scope``."""
+    scope[name] = pair.function
+    helpers = ""
+    for place, helper in enumerate(pair.helpers):
+        scope[f"{name}_{place}"] = helper
+        helpers += f", {name}_{place}"
+    return f"{name}({one}, {two}, {d}{helpers})"
+
+
+def _evaluate_source(
+    shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], scope: dict[str, Any]
+) -> list[str]:
+    """The trace, an array behind the shapes' parameters, keeps the rows looked at last, for when a pair's function
+    raises; and those of a contact that is not finite, which counts as none."""
+    many, trace = len(shapes) > 1, f"shapes[{len(shapes)}]"
     lines = ["def evaluate(shape_a, a, shape_b, b, d, shapes, like):"]
+    lines += [f"    {trace}[ROW_A], {trace}[ROW_B] = a, b"]
     if many:  # a pair is tested in the order of its shapes, and turned round afterwards if that is not (a, b)
         lines += [
             "    swapped = shape_a > shape_b",
@@ -123,59 +186,64 @@ def _evaluate_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[
             "        d = negative(d)",
         ]
     opening = "if"
-    for i, first in enumerate(shapes):
-        for j in range(i, len(shapes)):
-            pair = registry.pair(first.component, shapes[j].component)
-            assert pair is not None
-            scope[f"pair{i}_{j}"] = pair.function
-            in_order = pair.first is first.component
-            one, two = parameters_source(shapes, i, "a"), parameters_source(shapes, j, "b")
-            indent = "    "
-            if many:
-                last = i == j == len(shapes) - 1
-                lines.append("    else:" if last else f"    {opening} shape_a == {i} and shape_b == {j}:")
-                opening = "elif"
-                indent = "        "
-            if in_order:
-                lines.append(f"{indent}hit, depth, normal, point = pair{i}_{j}({one}, {two}, d)")
-            else:
-                lines += [
-                    f"{indent}hit, depth, normal, point = pair{i}_{j}({two}, {one}, negative(d))",
-                    f"{indent}normal = negative(normal)",
-                    f"{indent}point = sub(point, negative(d))",
-                ]
+    for (i, j), pair in pairs.items():
+        indent = "    "
+        if many:
+            last = i == j == len(shapes) - 1
+            lines.append("    else:" if last else f"    {opening} shape_a == {i} and shape_b == {j}:")
+            opening = "elif"
+            indent = "        "
+        one, two = parameters_source(shapes, i, "a"), parameters_source(shapes, j, "b")
+        if pair is None:
+            lines.append(f"{indent}hit, depth, normal, point = False, APART, d, d")
+        elif pair.first is shapes[i].component:
+            lines.append(f"{indent}hit, depth, normal, point = {pair_call(pair, f'pair{i}_{j}', scope, one, two, 'd')}")
+        else:
+            call = pair_call(pair, f"pair{i}_{j}", scope, two, one, "negative(d)")
+            lines += [
+                f"{indent}hit, depth, normal, point = {call}",
+                f"{indent}normal = negative(normal)",
+                f"{indent}point = sub(point, negative(d))",
+            ]
+    lines += [
+        "    if not sound(hit, depth, normal, point):",
+        "        hit, depth, normal, point = False, APART, d, d",
+        "        if finite(dot(d, d)):",
+        f"            {trace}[UNSOUND], {trace}[UNSOUND_A], {trace}[UNSOUND_B] = 1, a, b",
+    ]
     if many:
         lines += ["    if swapped:", "        normal = negative(normal)"]
         lines += ["        point = sub(point, negative(direction))"]
     return [*lines, "    return hit, depth, normal, point", ""]
 
 
-def _corner_source(registry: Registry, shapes: tuple[Shape, ...], scope: dict[str, Any]) -> list[str]:
+def _corner_source(
+    shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], scope: dict[str, Any]
+) -> list[str]:
     """Only of the pairs that know corners; nearly all do not."""
     lines = ["def corner(shape_a, a, shape_b, b, d, slop, shapes, like):"]
-    for i, first in enumerate(shapes):
-        for j, second in enumerate(shapes):
-            pair = registry.pair(first.component, second.component)
-            if pair is None or pair.corner is None or pair.first is not first.component:
-                continue
-            scope[f"corner{i}_{j}"] = pair.corner
-            one, two = parameters_source(shapes, i, "a"), parameters_source(shapes, j, "b")
-            lines += [f"    if shape_a == {i} and shape_b == {j}:"]
-            lines += [f"        return corner{i}_{j}({one}, {two}, d, slop)"]
-            if i != j:
-                one, two = parameters_source(shapes, i, "b"), parameters_source(shapes, j, "a")
-                lines += [f"    if shape_a == {j} and shape_b == {i}:"]
-                lines += [f"        return corner{i}_{j}({one}, {two}, negative(d), slop)"]
+    for (one, two), pair in pairs.items():
+        if pair is None or pair.corner is None:
+            continue
+        i, j = (one, two) if pair.first is shapes[one].component else (two, one)
+        scope[f"corner{i}_{j}"] = pair.corner
+        first, second = parameters_source(shapes, i, "a"), parameters_source(shapes, j, "b")
+        lines += [f"    if shape_a == {i} and shape_b == {j}:"]
+        lines += [f"        return corner{i}_{j}({first}, {second}, d, slop)"]
+        if i != j:
+            first, second = parameters_source(shapes, i, "b"), parameters_source(shapes, j, "a")
+            lines += [f"    if shape_a == {j} and shape_b == {i}:"]
+            lines += [f"        return corner{i}_{j}({first}, {second}, negative(d), slop)"]
     return [*lines, "    return False", ""]
 
 
-def _bounds_source(shapes: tuple[Shape, ...]) -> list[str]:
+def _bounds_source(shapes: tuple[Shape, ...], dimensions: int) -> list[str]:
     lines = ["def shape_bounds(shape, at, shapes, like):"]
     for index in range(len(shapes) - 1):
         lines.append(f"    if shape == {index}:")
-        lines.append(f"        return bounds{index}({parameters_source(shapes, index, 'at')}, like)")
+        lines.append(f"        return bounds{index}({parameters_source(shapes, index, 'at')}, {dimensions})")
     last = len(shapes) - 1
-    return [*lines, f"    return bounds{last}({parameters_source(shapes, last, 'at')}, like)", ""]
+    return [*lines, f"    return bounds{last}({parameters_source(shapes, last, 'at')}, {dimensions})", ""]
 
 
 def _world_source(shapes: tuple[Shape, ...]) -> list[str]:
@@ -186,10 +254,10 @@ def _world_source(shapes: tuple[Shape, ...]) -> list[str]:
             continue
         lines += [f"    if shape == {index}:", "        if turn:"]
         lines.append(f"            new = turned{index}({parameters_source(shapes, index, 'at')}, axes[at])")
-        for place, name in enumerate(shape.parameters):
+        for place, name in enumerate(shape.columns):
             lines.append(_assign(shape, index, place, name, f"new[{place}]", 12))
         lines.append("        else:")
-        for place, name in enumerate(shape.parameters):
+        for place, name in enumerate(shape.columns):
             vector = shape.component.columns[name].item == "vector"
             value = f"shapes[{index}][{place}][at]" if not vector else f"row(shapes[{index}][{place}], at, like)"
             lines.append(_assign(shape, index, place, name, value, 12))

@@ -15,13 +15,14 @@ from ..framework.services import PhysicsServices
 from ..framework.table import Table
 from . import preparation
 from .energy import kinetic_energy, momentum, potential_energy
+from .handled_pairs import check_pairs
 from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
 from .levels import COUNTERS, LevelCheck, arrange, check_sensors, in_order
 from .pair_buffers import PairBuffers
 from .queries import Queries
 from .rotation import axes_of
-from .shape_code import ShapeCode, shape_code
+from .shape_code import TRACE_SIZE, ShapeCode, parameter_columns, shape_code
 
 if TYPE_CHECKING:
     from ..framework.world import World
@@ -71,6 +72,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self._set_levels(np.empty((1, 0), np.int8))
         self.rank = np.empty(0, np.int64)
         self.axes = np.empty((0, dimensions, dimensions))
+        self.trace = np.zeros(TRACE_SIZE, np.int64)
         self.turned = False
         self.collides = False
         self.limits_speed = False
@@ -83,7 +85,10 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def refresh_structure(self) -> None:
         """What follows from which bodies and colliders there are."""
         table = self.table
-        structure = (table.version, table.members_version, tuple(table.component_types), self.world.settings.geometry)
+        structure = (
+            table.version, table.members_version, tuple(table.component_types), self.world.settings.geometry,
+            self.world.registry.version,
+        )  # fmt: skip
         if structure == self.structure:
             return
         self.structure = structure
@@ -109,10 +114,10 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self._stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
         self.collides = bool((levels[0, : table.stops[1]] >= 0).any())
         self.slots = slots
-        self.rank = np.empty(count, np.int64)
-        self.rank[np.argsort(arrays["entity"][:count], kind="stable")] = np.arange(count)
         self.code = shape_code(self.world.registry, present, self.dimensions) if present else None
         self.kernels = kernels_for(self.code) if self.code else None
+        self.rank = np.empty(count, np.int64)
+        self.rank[np.argsort(arrays["entity"][:count], kind="stable")] = np.arange(count)
         self._bind_shapes()
 
     def _set_levels(self, levels: np.ndarray) -> None:
@@ -129,18 +134,19 @@ class PhysicsState(PairBuffers, PhysicsServices):
         """The parameter columns of each shape: as given, and as they are in the world."""
         shapes, world_shapes = [], []
         for shape in self.code.shapes if self.code else ():
-            keys = [shape.component.columns[name].key for name in shape.parameters]
-            columns = tuple(self.table.arrays[key] for key in keys)
-            shapes.append(columns)
+            keys = {name: shape.component.columns[name].key for name in shape.columns}
+            columns = {name: self.table.arrays[key] for name, key in keys.items()}
+            shapes.append(parameter_columns(shape, columns, self.axes))
             if shape.turned is None or not self.turned:
-                world_shapes.append(columns)
+                world_shapes.append(shapes[-1])
                 continue
-            for key, column in zip(keys, columns, strict=True):
+            for name, key in keys.items():
                 twin = self.scratch.get(key)
-                if twin is None or len(twin) != len(column):
-                    self.scratch[key] = np.zeros_like(column)
-            world_shapes.append(tuple(self.scratch[key] for key in keys))
-        self.shapes, self.world_shapes = tuple(shapes), tuple(world_shapes)
+                if twin is None or len(twin) != len(columns[name]):
+                    self.scratch[key] = np.zeros_like(columns[name])
+                columns[name] = self.scratch[key]
+            world_shapes.append(parameter_columns(shape, columns, self.axes))
+        self.shapes, self.world_shapes = (*shapes, self.trace), (*world_shapes, self.trace)
 
     def refresh_rotation(self) -> None:
         """Axes of the bodies, if any is turned; the shapes' parameters as they are in the world then."""
@@ -148,7 +154,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
             return
         rotation = self.table.column("rotation")
         self.turned = bool((rotation if self.dimensions == 2 else rotation[:, 1:]).any())
-        self.axes = axes_of(rotation, self.dimensions) if self.turned else self.axes[:0]
+        self.axes = axes_of(rotation, self.dimensions) if self.turned or self.code.rotates else self.axes[:0]
         if len(self.levels) > 1:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.dimensions == 2 else rotation[:, 1:].any(axis=1)
             self.outgrown[: self.table.count] = self._stretches & turned
@@ -203,6 +209,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         np.divide(1.0, arrays["mass"][:dynamic], out=arrays["inverse_mass"][:dynamic])
         arrays["inverse_mass"][dynamic : table.count] = 0.0
         check_sensors(self)
+        check_pairs(self)
         self.limits_speed = not bool(np.isnan(arrays["max_linear_speed"][:dynamic]).all())
         self.refresh_rotation()
         self.moved = False

@@ -251,10 +251,11 @@ def test_the_shape_of_a_plugin_is_met_and_casts():
 
     @plugin.shape(cost=2)
     class RhombusCollider(Collider):
+        dimensions = (2,)
         reach = column(positive=True)
 
         @staticmethod
-        def bounds(shape, like):
+        def bounds(shape, dimensions):
             return (shape.reach, shape.reach)
 
     @plugin.pair(RhombusCollider, SphereCollider)

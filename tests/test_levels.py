@@ -13,9 +13,9 @@ from worlds import EPS, ball, box, floor, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
-from carom.framework import Phase, Settings, System, World, column
+from carom.framework import Phase, Plugin, Settings, System, World, column
 from carom.framework.errors import UnhandledPairError
-from carom.framework.registry import Plugin
+from carom.framework.vectors import divided
 from carom.plugins import Physics
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -417,28 +417,31 @@ def test_sensor_and_solid_do_not_mix():
 class DiscCollider(Collider):
     """A sphere by another name, which costs more."""
 
+    dimensions = (2,)
     reach = column(minimum=0.0)
 
     @staticmethod
-    def bounds(shape, like):
-        return (shape.reach, shape.reach) if len(like) == 2 else (shape.reach, shape.reach, shape.reach)
+    def bounds(shape, dimensions):
+        return shape.reach, shape.reach
 
 
 def disc_disc(a, b, d):
-    gap = math.sqrt(d[0] * d[0] + d[1] * d[1])
-    return gap <= a.reach + b.reach, a.reach + b.reach - gap, (d[0] / gap, d[1] / gap), d
+    depth = a.reach + b.reach - math.hypot(d[0], d[1])
+    normal = divided(d, math.hypot(d[0], d[1])) if d != (0.0, 0.0) else (1.0, 0.0)
+    return depth >= 0.0, depth, normal, d
 
 
 def sphere_disc(a, b, d):
-    gap = math.sqrt(d[0] * d[0] + d[1] * d[1])
-    return gap <= a.radius + b.reach, a.radius + b.reach - gap, (d[0] / gap, d[1] / gap), d
+    depth = a.radius + b.reach - math.hypot(d[0], d[1])
+    normal = divided(d, math.hypot(d[0], d[1])) if d != (0.0, 0.0) else (1.0, 0.0)
+    return depth >= 0.0, depth, normal, d
 
 
 def box_disc(a, b, d):
     x = max(abs(d[0]) - a.half_extents[0], 0.0)
     y = max(abs(d[1]) - a.half_extents[1], 0.0)
-    gap = math.sqrt(x * x + y * y)
-    return gap <= b.reach, b.reach - gap, (1.0, 0.0), d
+    depth = b.reach - math.hypot(x, y)
+    return depth >= 0.0, depth, (1.0, 0.0), d
 
 
 def disc_world(cost=5.0):

@@ -1,0 +1,126 @@
+"""Columns whose value is an array of any length: the corners of a polygon, the cells of a map.
+
+A table holds a number per row, the arrays themselves stand in a pool that all worlds share: equal arrays once, never
+changed, never moved out. A snapshot stays a copy of the numbers, and a prefab of a thousand polygons costs one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .columns import Column
+from .compilation import inlined
+
+
+class Pool:
+    """Arrays (k, width), end to end in ``data``; number i is rows starts[i] to starts[i + 1]."""
+
+    def __init__(self, width: int) -> None:
+        self.data = np.empty((64, width))
+        self.starts = np.zeros(2, np.int64)  # number 0 is empty: what rows hold that lack the component
+        self.digests = np.zeros(1, np.int64)  # of the contents: hashes must not depend on who came first
+        self._known: dict[bytes, int] = {b"": 0}
+
+    def number_of(self, array: np.ndarray) -> int:
+        """The array's number, a new one if it is not here yet."""
+        content = (array + 0.0).tobytes()  # 0.0 and -0.0 are the same
+        if content not in self._known:
+            start = int(self.starts[-1])
+            stop = start + len(array)
+            if stop > len(self.data):
+                grown = np.empty((max(stop, 2 * len(self.data)), self.data.shape[1]))
+                grown[:start] = self.data[:start]
+                self.data = grown
+            self.data[start:stop] = array + 0.0
+            digest = int.from_bytes(hashlib.sha256(content).digest()[:8], "little", signed=True)
+            self._known[content] = len(self.digests)
+            self.starts = np.append(self.starts, stop)
+            self.digests = np.append(self.digests, digest)
+        return self._known[content]
+
+    def array(self, number: int) -> np.ndarray:
+        """A copy nobody can write to."""
+        array = self.data[self.starts[number] : self.starts[number + 1]].copy()
+        array.flags.writeable = False
+        return array
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayColumn(Column):
+    """See :func:`array_column`."""
+
+    width: int = 1
+    rows: tuple[int, int] = (1, 2**31)
+    check: Callable[[np.ndarray], str | None] | None = None
+    pool: Pool = field(default_factory=lambda: Pool(1))
+
+    def parameters(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What kernels need for :func:`array_at`."""
+        return numbers, self.pool.data, self.pool.starts
+
+    def checked(self, value: Any, entity: int | None = None) -> Any:
+        array = Column(item="vector", name=self.name, owner=self.owner)._as_numbers(value, entity)
+        if array.ndim == 1 and self.width == 1:
+            array = array[:, None]
+        if array.ndim != 2 or array.shape[1] != self.width:
+            raise self._error(value, f"must be an array of shape (n, {self.width})", entity)
+        least, most = self.rows
+        if not least <= len(array) <= most:
+            raise self._error(value, f"must have {least} to {most} rows", entity)
+        self.check_numbers(array, array.tolist(), entity)
+        wrong = None if self.check is None else self.check(array)
+        if wrong is not None:
+            raise self._error(array, wrong, entity)
+        return self.pool.number_of(array)
+
+    def checked_many(self, values: Any, count: int, dimensions: int) -> np.ndarray:
+        """One array for all, or a list with one per row."""
+        if isinstance(values, list) and len(values) == count and all(np.ndim(v) == 2 for v in values):
+            return np.array([self.checked(value) for value in values], np.int64)
+        return np.full(count, self.checked(values), np.int64)
+
+    def empty_value(self, dimensions: int) -> Any:
+        return 0
+
+    def unshared(self, value: Any) -> Any:
+        return self.pool.number_of(value)
+
+    def shown(self, value: Any) -> np.ndarray:
+        return self.pool.array(int(value))
+
+    def hashable(self, values: np.ndarray) -> np.ndarray:
+        return self.pool.digests[values]
+
+
+def array_column(
+    width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None
+) -> Any:
+    """A field of a component that is an array (n, width) of floats, with its own n on every entity.
+
+    rows
+        the fewest and the most rows it may have
+    check
+        gets the array; returns what is wrong with it ("must be convex"), or None
+
+    Pair functions see the array itself, and cannot write to it. To change it, assign another.
+    """
+    return ArrayColumn(
+        item="array", dtype=np.int64, width=width, rows=rows, check=check, pool=Pool(width), on_write=_array_changed
+    )
+
+
+def _array_changed(table: Any, row: int) -> None:
+    """The pool may have moved."""
+    table.members_version += 1
+
+
+@inlined
+def array_at(numbers, data, starts, at):
+    """The array of row ``at``."""
+    number = numbers[at]
+    return data[starts[number] : starts[number + 1]]

@@ -1,0 +1,238 @@
+"""Plugins: what a world can do, and the decorators that say so."""
+
+from __future__ import annotations
+
+import inspect
+import weakref
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from . import plugin_checks as checks
+from .compilation import inlined, pasted
+from .component import Component
+from .errors import PluginError
+from .registry import Convex, Pair, Registry, Shape
+
+if TYPE_CHECKING:
+    from .world import World
+
+Thing = TypeVar("Thing")
+
+
+class Plugin:
+    """Something a world can do: shapes, pairs, integrators, systems, rules. ``World(Physics(), plugin)`` takes it.
+
+    name
+        of the plugin, in messages and in ``carom plugins``
+    version
+        of the plugin, for ``carom plugins``
+
+    Registering is checked at once: a function that cannot work is refused with a PluginError that names it, before
+    anything is compiled. What is registered while worlds run is seen at their next step; to register something again
+    replaces it.
+    """
+
+    def __init__(self, name: str, version: str = "") -> None:
+        if not isinstance(name, str) or not name:
+            raise ValueError(f"a plugin needs a name, got {name!r}")
+        self.name = name
+        self.version = version
+        self.shapes: dict[type[Component], Shape] = {}
+        self.pairs: dict[tuple[type[Any], type[Any]], Pair] = {}
+        self.integrators: dict[str, Any] = {}
+        self.broad_phases: dict[str, Any] = {}
+        self.mixing_rules: dict[str, Any] = {}
+        self.pair_filters: list[Callable[..., Any]] = []
+        self.systems: list[Callable[[], Any]] = []
+        self.registries: weakref.WeakSet[Registry] = weakref.WeakSet()  # of the worlds it is in
+
+    # -- shapes and pairs -------------------------------------------------------------------------
+
+    def kernel(self, function: Thing) -> Thing:
+        """For helpers of the functions below: compiled into them. Called from Python it is the function as written."""
+        if not inspect.isfunction(function):
+            raise PluginError(f"plugin {self.name}: kernel takes a function, got {function!r}")
+        return inlined(function)
+
+    def shape(self, *, cost: float) -> Callable[[type[Component]], type[Component]]:
+        """Register a collider class as a shape.
+
+        cost
+            of testing it, relative to the sphere's 1; of several colliders on one body the cheapest is tested first
+
+        The class defines ``bounds(shape, dimensions)``, the half extents of the box around it as a tuple; it may define
+        ``support(shape, direction)``, its farthest point from its centre in a direction (of any length but 0), and with
+        it meets every other convex shape; and ``rounding(shape)``, how far it reaches beyond the core that support is
+        about. ``rotates = True`` in the class gives the functions ``shape.axes``, the body's axes in the world;
+        ``dimensions = (2,)`` makes it a shape of 2D worlds only.
+        """
+
+        def register(component: type[Component]) -> type[Component]:
+            checks.check_shape(self, component, cost)
+            bounds, support, rounding, turned = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
+            shape = Shape(
+                component, float(cost), pasted(bounds), None if turned is None else inlined(turned), self.name,
+                None if support is None else inlined(support),
+                inlined(rounding or _no_rounding) if support is not None else None,
+            )  # fmt: skip
+            self._register(self.shapes, component, shape)
+            return component
+
+        return register
+
+    def pair(
+        self, first: type[Any], second: type[Any], *, corner: Any | None = None
+    ) -> Callable[[Thing], Thing]:
+        """Register ``function(a, b, d) -> (hit, depth, normal, point)`` for two shapes.
+
+        a and b have the shapes' fields, d is the vector from a's centre to b's, a tuple of 2 or 3. ``depth`` is how far
+        they overlap, negative when they are apart; ``normal`` a unit vector from a to b; ``point`` the point of contact
+        relative to a's centre. One function serves overlap, contact and time of impact, both orders, and 2D and 3D if
+        it can. ``second`` may be :class:`Convex`, all shapes with a support function: the function then gets that and
+        the rounding as further arguments.
+
+        ``corner(a, b, d, slop)`` may tell a touch of two corners, which pushes nobody: what slides over a row of such
+        shapes would catch there.
+        """
+
+        def register(function: Any) -> Any:
+            checks.check_pair(self, first, second, function)
+            compiled = None if corner is None else inlined(corner)
+            sweep = self.pairs[first, second].sweep if (first, second) in self.pairs else None
+            pair = Pair(first, second, inlined(function), self.name, compiled, sweep)
+            if (second, first) in self.pairs and first is not second:
+                raise PluginError(
+                    f"plugin {self.name}: the pair of {pair.names} is registered already, in the other order"
+                )
+            self._register(self.pairs, (first, second), pair)
+            return function
+
+        return register
+
+    def sweep(self, first: type[Any], second: type[Any]) -> Callable[[Thing], Thing]:
+        """Register ``function(a, b, d, v) -> (hit, time)`` for a pair: b moves by v relative to a, from d on; time,
+        from 0 to 1, is the part of v after which they touch. Without it the time is found from the pair's depth.
+        """
+
+        def register(function: Any) -> Any:
+            checks.check_sweep(self, first, second, function)
+            pair = self.pairs[first, second]
+            changed = Pair(first, second, pair.function, self.name, pair.corner, inlined(function))
+            self._register(self.pairs, (first, second), changed)
+            return function
+
+        return register
+
+    # -- other things -----------------------------------------------------------------------------
+
+    def integrator(self, name: str) -> Callable[[Thing], Thing]:
+        """Register an integrator under the name that ``Settings.integrator`` uses."""
+
+        def register(integrator: Any) -> Any:
+            checks.check_integrator(self, name, integrator)
+            self._register(self.integrators, name, integrator)
+            return integrator
+
+        return register
+
+    def broad_phase(self, name: str) -> Callable[[Thing], Thing]:
+        """Register a broad phase under the name that ``Settings.broad_phase`` uses: a class, one instance per world.
+
+        ``pairs(lower, upper, moving)`` gets the boxes (n, d) around the motion of all bodies, the first ``moving`` of
+        which move; it returns two integer arrays, rows of bodies whose boxes overlap, each pair once, at least one of
+        both below ``moving``. Pairs too many cost time, pairs missing are contacts missed. Boxes with NaN meet nothing.
+        """
+
+        def register(broad_phase: Any) -> Any:
+            checks.check_broad_phase(self, name, broad_phase)
+            self._register(self.broad_phases, name, broad_phase)
+            return broad_phase
+
+        return register
+
+    def mixing_rule(self, name: str) -> Callable[[Thing], Thing]:
+        """Register ``function(x, y)``, how the restitutions or frictions of two bodies become the contact's, under the
+        name that ``Settings`` uses. Compiled, symmetric, not negative."""
+
+        def register(function: Any) -> Any:
+            checks.check_mixing_rule(self, name, function)
+            self._register(self.mixing_rules, name, inlined(function))
+            return function
+
+        return register
+
+    def pair_filter(self, function: Thing) -> Thing:
+        """Register ``function(bodies, a, b)``: which of the pairs of rows a[i], b[i] (arrays; the entity of a has the
+        smaller id) may meet, as an array of bool. Called in each step with the pairs that layers and masks let through.
+        """
+        checks.check_filter(self, function)
+        if function not in self.pair_filters:
+            self.pair_filters.append(function)  # type: ignore[arg-type]
+            self._refresh(lambda: self.pair_filters.remove(function))  # type: ignore[arg-type]
+        return function
+
+    def system(self, make: Thing) -> Thing:
+        """Register a class of System, ForceSystem or esper processor: each world that takes the plugin gets one."""
+        checks.check_system(self, make)
+        self.systems.append(make)  # type: ignore[arg-type]
+        return make
+
+    # -- being taken by a world -------------------------------------------------------------------
+
+    def install(self, world: World) -> None:
+        """Called by the world after all its plugins are registered."""
+        for make in self.systems:
+            world.add_system(make())
+
+    def adds(self) -> dict[str, list[str]]:
+        """What it brings, by kind, as names; for ``carom plugins``."""
+        found = {
+            "shapes": [component.__name__ for component in self.shapes],
+            "pairs": [pair.names for pair in self.pairs.values()],
+            "integrators": list(self.integrators),
+            "broad phases": list(self.broad_phases),
+            "mixing rules": list(self.mixing_rules),
+            "pair filters": [function.__name__ for function in self.pair_filters],
+            "systems": [getattr(make, "__name__", repr(make)) for make in self.systems],
+        }
+        return {kind: names for kind, names in found.items() if names}
+
+    def _register(self, known: dict[Any, Any], key: Any, value: Any) -> None:
+        """Put it in; take it out again if a world that has the plugin has something of that name from another."""
+        had, before = key in known, known.get(key)
+        known[key] = value
+
+        def undo() -> None:
+            if had:
+                known[key] = before
+            else:
+                del known[key]
+
+        self._refresh(undo)
+
+    def _refresh(self, undo: Callable[[], None]) -> None:
+        registries = list(self.registries)
+        try:
+            for registry in registries:
+                registry.refresh()
+        except PluginError:
+            undo()
+            for registry in registries:
+                registry.refresh()
+            raise
+
+    def __repr__(self) -> str:
+        return f"<plugin {self.name}>"
+
+
+def _function(component: type[Component], name: str) -> Any:
+    """The plain function behind a method, static or not; None if the class has none."""
+    found = inspect.getattr_static(component, name, None)
+    return getattr(found, "__func__", found)
+
+
+def _no_rounding(shape):
+    return 0.0
+
+
+__all__ = ["Convex", "Plugin"]

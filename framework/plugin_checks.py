@@ -1,0 +1,332 @@
+"""What a plugin's functions are checked for when they are registered, before anything compiles.
+
+They are run as plain Python on a few poses, ordinary and extreme. A message names plugin, shape, function, the input
+and the cure. More poses, and the compiled code, are looked at by ``carom plugins check``.
+"""
+
+from __future__ import annotations
+
+import collections
+import inspect
+import math
+import numbers
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .columns import REQUIRED
+from .component import Component
+from .errors import PluginError
+from .registry import Convex, Shape
+
+if TYPE_CHECKING:
+    from .plugin import Plugin
+
+SHAPE_FUNCTIONS = {
+    "bounds": ("shape", "dimensions"),
+    "support": ("shape", "direction"),
+    "rounding": ("shape",),
+    "turned": ("shape", "axes"),
+}
+# Poses of b as seen from a, in units of their size: touching, overlapping, apart, at one point, far away.
+POSES = (
+    (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.3, -0.2, 0.1), (-0.6, 0.5, -0.4), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0),
+    (1e6, 1e6, 1e6), (1e-9, 0.0, 0.0), (0.0, -1e-9, 0.0), (-0.1, 0.0, 0.0),
+)  # fmt: skip
+SCALES = (1.0, 1e-9, 1e9)
+UNIT = 1e-9  # how far from 1 a normal's length may be
+ENCLOSED = 1e-9  # how far a support point may stick out of the bounds, of their size
+
+
+# -- shapes ---------------------------------------------------------------------------------------
+
+
+def check_shape(plugin: Plugin, component: Any, cost: float) -> None:
+    """PluginError unless the class can be a shape; also tries its functions."""
+    where = f"plugin {plugin.name}: shape {getattr(component, '__name__', component)!s}"
+    if not (isinstance(component, type) and issubclass(component, Component)) or component._abstract:
+        raise PluginError(f"{where}: a shape is a class derived from Collider, got {component!r}")
+    if getattr(component, "stack", None) is None:
+        raise PluginError(f"{where} must derive from carom.components.Collider, which brings friction, layer and mask")
+    if isinstance(cost, bool) or not isinstance(cost, numbers.Real) or not (math.isfinite(cost) and cost > 0):
+        raise PluginError(f"{where}: cost must be a number above 0, the sphere's being 1, got {cost!r}")
+    allowed = tuple(getattr(component, "dimensions", (2, 3)))
+    if not allowed or not set(allowed) <= {2, 3}:
+        raise PluginError(f"{where}: dimensions must be (2,), (3,) or (2, 3), got {allowed!r}")
+    for name, arguments in SHAPE_FUNCTIONS.items():
+        function = inspect.getattr_static(component, name, None)
+        function = getattr(function, "__func__", function)
+        if function is None:
+            if name == "bounds":
+                raise PluginError(
+                    f"{where} has no bounds: write bounds(shape, dimensions) that returns the half extents of the box "
+                    f"around it, a tuple of {allowed[0]} numbers"
+                )
+            continue
+        if not inspect.isfunction(function):
+            raise PluginError(f"{where}: {name} must be a function, got {function!r}")
+        _check_arity(f"{where}: {name}", function, arguments)
+    shape = Shape(component, 1.0, None, None, plugin.name)
+    for dimensions in allowed:
+        for scale in SCALES:
+            _check_bounds(where, shape, component, dimensions, scale)
+
+
+def _check_bounds(where: str, shape: Shape, component: Any, dimensions: int, scale: float) -> None:
+    """The bounds of a sample, and that they hold what support says."""
+    sample = parameters_of(shape, dimensions, scale)
+    half = _call(f"{where}: bounds(shape, {dimensions})", component.bounds, (sample, dimensions), sample)
+    said = f"{where}: bounds(shape, {dimensions}) for {shown(sample)} returned {plain(half)!r}"
+    if not (isinstance(half, tuple) and len(half) == dimensions and all(map(_is_number, half))):
+        raise PluginError(f"{said}: return half extents of the box around it, a tuple of {dimensions} numbers")
+    if any(math.isnan(x) or x < 0 for x in half):
+        raise PluginError(f"{said}: half extents are not negative")
+    if not hasattr(component, "support"):
+        return
+    rounding = getattr(component, "rounding", lambda shape: 0.0)
+    beyond = _call(f"{where}: rounding(shape)", rounding, (sample,), sample)
+    if not _is_number(beyond) or not (math.isfinite(beyond) and beyond >= 0):
+        raise PluginError(f"{where}: rounding(shape) for {shown(sample)} returned {beyond!r}: return a number from 0")
+    for direction in directions(dimensions):
+        point = _call(f"{where}: support(shape, direction)", component.support, (sample, direction), sample)
+        said = f"{where}: support(shape, {plain(direction)}) for {shown(sample)} returned {plain(point)!r}"
+        if not (isinstance(point, tuple) and len(point) == dimensions and all(map(_is_number, point))):
+            raise PluginError(f"{said}: return a point, a tuple of {dimensions} numbers")
+        if not all(map(math.isfinite, point)):
+            raise PluginError(f"{said}: the shape's farthest point in a direction must be finite")
+        size = max(max(half), abs(max(point, key=abs)))
+        for k in range(dimensions):
+            if abs(point[k]) + beyond > half[k] + ENCLOSED * size:
+                raise PluginError(
+                    f"{said}, outside of its bounds {plain(half)!r}: the box of bounds must hold the whole shape"
+                )
+
+
+def directions(dimensions: int) -> list[tuple[float, ...]]:
+    """Some to look in: the axes, diagonals and oblique ones, long and short."""
+    found = []
+    for pose in POSES:
+        vector = tuple(np.float64(x) for x in pose[:dimensions])
+        if any(vector):
+            found += [vector, tuple(-x for x in vector)]
+    return found
+
+
+# -- pairs ----------------------------------------------------------------------------------------
+
+
+def check_pair(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
+    """PluginError unless the function can be that of the two shapes; also tries it."""
+    name = getattr(function, "__name__", repr(function))
+    where = f"plugin {plugin.name}: pair {name} of {_name(first)} and {_name(second)}"
+    for shape in (first, second):
+        if shape is not Convex and not (isinstance(shape, type) and issubclass(shape, Component)):
+            raise PluginError(f"{where}: a pair is of two collider classes, or one and Convex, got {shape!r}")
+    if not inspect.isfunction(function):
+        raise PluginError(f"{where}: register a plain function; carom compiles it itself")
+    helpers = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
+    convex = (first is Convex) + (second is Convex)
+    _check_arity(where, function, ("a", "b", "d", *helpers[convex]))
+    if not convex:
+        one, two = Shape(first, 1.0, None, None, ""), Shape(second, 1.0, None, None, "")
+        for dimensions in sorted(set(_dimensions(first)) & set(_dimensions(second))):
+            _try_poses(where, function, one, two, dimensions)
+
+
+def _try_poses(where: str, function: Any, first: Shape, second: Shape, dimensions: int) -> None:
+    for scale in SCALES:
+        a, b = parameters_of(first, dimensions, scale), parameters_of(second, dimensions, scale)
+        for pose in POSES:
+            d = tuple(np.float64(scale * x) for x in pose[:dimensions])
+            result = check_contact(where, function, a, b, d)
+            if first.component is second.component and any(d):
+                check_symmetry(where, function, a, b, d, result)
+    big, small = parameters_of(first, dimensions, 1e6), parameters_of(second, dimensions, 1e-6)
+    for pose in POSES:
+        check_contact(where, function, big, small, tuple(np.float64(1e6 * x) for x in pose[:dimensions]))
+
+
+def check_contact(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...]) -> Any:
+    """Call a pair function and look at what it returns; PluginError if that is no contact."""
+    at = f"a = {shown(a)}, b = {shown(b)}, d = {plain(d)}"
+    result = _call(f"{where}: {at}", function, (a, b, d), a)
+    said = f"{where}: for {at} it returned {plain(result)!r}"
+    if not (isinstance(result, tuple) and len(result) == 4):
+        raise PluginError(f"{said}: return (hit, depth, normal, point)")
+    hit, depth, normal, point = result
+    if not isinstance(hit, (bool, np.bool_)):
+        raise PluginError(f"{said}: hit, the first value, must be True or False")
+    if not _is_number(depth):
+        raise PluginError(f"{said}: depth, the second value, must be a number")
+    for what, vector in (("normal", normal), ("point", point)):
+        if not (isinstance(vector, tuple) and len(vector) == len(d) and all(map(_is_number, vector))):
+            raise PluginError(f"{said}: {what} must be a tuple of {len(d)} numbers")
+    if not hit and depth == -math.inf:  # far apart, and the function did not care how far
+        return result
+    if not all(map(math.isfinite, (depth, *normal, *point))):
+        centres = " (the centres coincide: choose any normal then)" if not any(d) else ""
+        raise PluginError(f"{said}: every value must be finite{centres}")
+    if bool(hit) != (depth >= 0):
+        raise PluginError(
+            f"{said}: depth is how far they overlap, so hit must be depth >= 0; apart, depth is minus the gap"
+        )
+    length = math.hypot(*normal)
+    if abs(length - 1.0) > UNIT:
+        raise PluginError(f"{said}: the normal's length is {length:.6g}, it must be 1: divide it by its length")
+    return result
+
+
+def check_symmetry(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...], result: Any) -> None:
+    """Two of one shape: seen from the other side it is the same contact, its normal turned round."""
+    back = check_contact(where, function, b, a, tuple(-x for x in d))
+    size = abs(result[1]) + max(map(abs, d)) + math.hypot(*result[3])
+    if abs(back[1] - result[1]) > 1e-9 * size:
+        raise PluginError(
+            f"{where}: for d = {plain(d)} depth is {float(result[1])!r}, and seen from the other body, d = "
+            f"{plain(tuple(-x for x in d))}, it is {float(back[1])!r}: both must be the same"
+        )
+    unequal = max(abs(x + y) for x, y in zip(result[2], back[2], strict=True))
+    if unequal > 1e-6 and sum(x * y for x, y in zip(result[2], back[2], strict=True)) > 0:
+        raise PluginError(
+            f"{where}: for d = {plain(d)} the normal is {plain(result[2])}, and seen from the other body "
+            f"{plain(back[2])}: it must point from a to b, so it turns round"
+        )
+
+
+def check_sweep(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
+    name = getattr(function, "__name__", repr(function))
+    where = f"plugin {plugin.name}: sweep {name} of {_name(first)} and {_name(second)}"
+    if (first, second) not in plugin.pairs:
+        raise PluginError(f"{where}: register the pair itself first, with @plugin.pair in the same order")
+    if not inspect.isfunction(function):
+        raise PluginError(f"{where}: register a plain function; carom compiles it itself")
+    _check_arity(where, function, ("a", "b", "d", "v"))
+
+
+# -- other things ---------------------------------------------------------------------------------
+
+
+def check_integrator(plugin: Plugin, name: str, integrator: Any) -> None:
+    where = f"plugin {plugin.name}: integrator {name!r}"
+    check_name(where, name)
+    missing = [part for part in ("advance", "order", "evaluations", "path") if not hasattr(integrator, part)]
+    if missing or not callable(integrator):
+        raise PluginError(
+            f"{where}: register a class with advance(motion, dt), order, evaluations and path"
+            + (f"; {getattr(integrator, '__name__', integrator)} has no {', '.join(missing)}" if missing else "")
+        )
+    _check_arity(f"{where}: advance", integrator.advance, ("self", "motion", "dt"))
+
+
+def check_broad_phase(plugin: Plugin, name: str, broad_phase: Any) -> None:
+    where = f"plugin {plugin.name}: broad phase {name!r}"
+    check_name(where, name)
+    if not isinstance(broad_phase, type) or not inspect.isfunction(getattr(broad_phase, "pairs", None)):
+        raise PluginError(f"{where}: register a class with pairs(lower, upper, moving), got {broad_phase!r}")
+    _check_arity(f"{where}: pairs", broad_phase.pairs, ("self", "lower", "upper", "moving"))
+
+
+def check_mixing_rule(plugin: Plugin, name: str, function: Any) -> None:
+    where = f"plugin {plugin.name}: mixing rule {name!r}"
+    check_name(where, name)
+    if not inspect.isfunction(function):
+        raise PluginError(f"{where}: register a plain function of two numbers, got {function!r}")
+    _check_arity(where, function, ("x", "y"))
+    for x, y in ((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0)):
+        there, back = _call(where, function, (x, y), None), _call(where, function, (y, x), None)
+        if not _is_number(there) or not (math.isfinite(there) and there >= 0):
+            raise PluginError(f"{where}: for {x} and {y} it returned {there!r}: return a number from 0")
+        if there != back:
+            raise PluginError(f"{where}: for {x} and {y} it returned {there!r}, for {y} and {x} {back!r}: both are one")
+
+
+def check_filter(plugin: Plugin, function: Any) -> None:
+    where = f"plugin {plugin.name}: pair filter {getattr(function, '__name__', function)!s}"
+    if not inspect.isfunction(function):
+        raise PluginError(f"{where}: register a function of (bodies, a, b), got {function!r}")
+    _check_arity(where, function, ("bodies", "a", "b"))
+
+
+def check_system(plugin: Plugin, make: Any) -> None:
+    if not callable(make):
+        raise PluginError(f"plugin {plugin.name}: system takes a class, or a function that makes one, got {make!r}")
+
+
+def check_name(where: str, name: Any) -> None:
+    if not isinstance(name, str) or not name:
+        raise PluginError(f"{where}: it needs a name")
+
+
+# -- helpers of these checks ----------------------------------------------------------------------
+
+
+def parameters_of(shape: Shape, dimensions: int, scale: float) -> Any:
+    """What a pair function gets for a sample of the shape, its lengths multiplied."""
+    component: Any = shape.component
+    sample = component.sample()
+    values: dict[str, Any] = {}
+    for name in shape.columns:
+        column = component.columns[name]
+        value = getattr(sample, name)
+        lengths = column.dtype is float and (column.default is REQUIRED or column.item == "vector")
+        factor = scale if lengths or column.item == "array" else 1.0
+        if column.item == "vector":
+            values[name] = tuple(np.float64(x) for x in np.broadcast_to(value, (dimensions,)) * factor)
+        elif column.item == "array":
+            values[name] = value * factor
+        elif column.dtype is float:
+            values[name] = np.float64(np.nan if value is None else value * factor)
+        else:
+            values[name] = column.checked(value)
+    if shape.rotates:
+        values["axes"] = tuple(tuple(row) for row in np.eye(dimensions))
+    return collections.namedtuple(component.__name__, values)(**values)
+
+
+def _call(where: str, function: Any, arguments: tuple[Any, ...], sample: Any) -> Any:
+    try:
+        with np.errstate(all="ignore"):
+            return function(*arguments)
+    except ZeroDivisionError as error:
+        raise PluginError(f"{where}: it divides by zero; handle that case first") from error
+    except AttributeError as error:
+        fields = f" (it has {', '.join(sample._fields)})" if sample is not None else ""
+        raise PluginError(f"{where}: {error}{fields}") from error
+    except Exception as error:  # whatever the plugin's function raises, its author has to hear of
+        raise PluginError(f"{where}: it raised {type(error).__name__}: {error}") from error
+
+
+def _check_arity(where: str, function: Any, names: tuple[str, ...]) -> None:
+    parameters = inspect.signature(function).parameters.values()
+    plain_ones = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    if len(plain_ones) != len(parameters) or len(plain_ones) != len(names):
+        got = ", ".join(str(p) for p in parameters)
+        raise PluginError(
+            f"{where} takes ({got}), it must take {len(names)} argument{'s' if len(names) > 1 else ''}: "
+            f"({', '.join(names)})"
+        )
+
+
+def _dimensions(component: Any) -> tuple[int, ...]:
+    return tuple(getattr(component, "dimensions", (2, 3)))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, numbers.Real) and not isinstance(value, (bool, np.bool_))
+
+
+def _name(shape: Any) -> str:
+    return getattr(shape, "__name__", repr(shape))
+
+
+def shown(parameters: Any) -> str:
+    """A parameter tuple without numpy's types, without axes."""
+    fields = ((name, value) for name, value in zip(parameters._fields, parameters, strict=True) if name != "axes")
+    return f"{type(parameters).__name__}({', '.join(f'{name}={plain(value)!r}' for name, value in fields)})"
+
+
+def plain(value: Any) -> Any:
+    """Numbers and tuples without numpy's types."""
+    if isinstance(value, tuple):
+        return tuple(plain(part) for part in value)
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else value
