@@ -15,6 +15,7 @@ from ..framework.services import PhysicsServices
 from ..framework.table import Table
 from . import preparation
 from .energy import kinetic_energy, momentum, potential_energy
+from .flat_columns import all_finite, any_turned, invert_masses
 from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
 from .levels import COUNTERS, LevelCheck, arrange, check_sensors, in_order
@@ -74,6 +75,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.turned = False
         self.collides = False
         self.limits_speed = False
+        self.pushed = True  # whether applied_force or step_force may hold something that has to be cleared
         self.moved = False  # whether the columns hold a motion from previous_position to position
         self.path_degree = 1
         self.motion_stamp = 0
@@ -146,13 +148,16 @@ class PhysicsState(PairBuffers, PhysicsServices):
         """Axes of the bodies, if any is turned; the shapes' parameters as they are in the world then."""
         if self.code is None:
             return
+        before, self.turned = self.turned, any_turned(self.table.count, self.table.arrays["rotation"])
+        if self.turned != before:
+            self._bind_shapes()
+        if not self.turned and not before:
+            return
         rotation = self.table.column("rotation")
-        self.turned = bool((rotation if self.dimensions == 2 else rotation[:, 1:]).any())
         self.axes = axes_of(rotation, self.dimensions) if self.turned else self.axes[:0]
         if len(self.levels) > 1:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.dimensions == 2 else rotation[:, 1:].any(axis=1)
             self.outgrown[: self.table.count] = self._stretches & turned
-        self._bind_shapes()
 
     def _allocate_scratch(self) -> None:
         """Room for every row the table can hold."""
@@ -167,12 +172,6 @@ class PhysicsState(PairBuffers, PhysicsServices):
         if degree > 1 and len(self.scratch["path_second"]) != self.table.capacity:
             for key, _, dtype in self.CURVES:
                 self.scratch[key] = np.zeros((self.table.capacity, self.dimensions), dtype)
-
-    def all_layers_meet(self) -> bool:
-        """Whether no layer or mask keeps any two bodies apart (usual, and then none need be looked at)."""
-        stacks, count = self.table.stacks, self.table.count
-        masks, layers = stacks["collider.mask"][:, :count], stacks["collider.layer"][:, :count]
-        return bool((masks == -1).all() and layers.all())
 
     def integrator(self) -> Integrator:
         name = self.world.settings.integrator
@@ -193,18 +192,19 @@ class PhysicsState(PairBuffers, PhysicsServices):
             raise ValueError(f"gravity must be {self.dimensions} finite numbers, got {gravity!r}")
         vector.flags.writeable = False
         self.gravity = vector
+        self.gravity_numbers = tuple(vector.tolist())  # as kernels take it
 
     # -- around a step ----------------------------------------------------------------------------
 
     def begin_step(self) -> None:
         self.refresh_structure()
         table, arrays = self.table, self.table.arrays
-        dynamic = table.stops[0]
-        np.divide(1.0, arrays["mass"][:dynamic], out=arrays["inverse_mass"][:dynamic])
-        arrays["inverse_mass"][dynamic : table.count] = 0.0
+        self.limits_speed = invert_masses(
+            table.stops[0], table.count, arrays["mass"], arrays["inverse_mass"], arrays["max_linear_speed"]
+        )
         check_sensors(self)
-        self.limits_speed = not bool(np.isnan(arrays["max_linear_speed"][:dynamic]).all())
         self.refresh_rotation()
+        self.pushed = True
         self.moved = False
         table.forces_summed = False  # type: ignore[attr-defined]
         self.motion_stamp += 1
@@ -222,16 +222,18 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     def report_faults(self, prefix: str) -> None:
         """Name the bodies whose state is not finite in the world's faults; they disturb no others."""
-        moving = self.table.stops[1]
+        moving, arrays = self.table.stops[1], self.table.arrays
+        if all_finite(moving, arrays["position"], arrays["linear_velocity"]):
+            return
         for name in ("position", "linear_velocity"):
-            column = self.table.arrays[name][:moving]
-            if not np.isfinite(column.sum()):
-                for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
-                    entity = int(self.table.arrays["entity"][row])
-                    self.world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
+            column = arrays[name][:moving]
+            for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
+                entity = int(arrays["entity"][row])
+                self.world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
 
     def end_window(self) -> None:
-        self.table.arrays["applied_force"][: self.table.stops[0]] = 0.0
+        if self.pushed or self.table.everything_kept:
+            self.table.arrays["applied_force"][: self.table.stops[0]] = 0.0
         self.table.arrays["applied_frame"][: self.table.stops[0]] = -1  # else state_hash would tell frame rates apart
 
     def tracking_state(self) -> Any:
