@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from .columns import Column
-from .compilation import inlined
+from .compilation import pasted
 
 
 class Pool:
@@ -57,6 +57,7 @@ class ArrayColumn(Column):
     width: int = 1
     rows: tuple[int, int] = (1, 2**31)
     check: Callable[[np.ndarray], str | None] | None = None
+    lengths: bool = True
     pool: Pool = field(default_factory=lambda: Pool(1))
 
     def parameters(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -98,19 +99,23 @@ class ArrayColumn(Column):
 
 
 def array_column(
-    width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None
-) -> Any:
+    width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None,
+    lengths: bool = True,
+) -> Any:  # fmt: skip
     """A field of a component that is an array (n, width) of floats, with its own n on every entity.
 
     rows
         the fewest and the most rows it may have
     check
         gets the array; returns what is wrong with it ("must be convex"), or None
+    lengths
+        whether its numbers are lengths, which checks of the shape at other sizes multiply
 
     Pair functions see the array itself, and cannot write to it. To change it, assign another.
     """
     return ArrayColumn(
-        item="array", dtype=np.int64, width=width, rows=rows, check=check, pool=Pool(width), on_write=_array_changed
+        item="array", dtype=np.int64, width=width, rows=rows, check=check, lengths=lengths, pool=Pool(width),
+        on_write=_array_changed,
     )
 
 
@@ -119,7 +124,7 @@ def _array_changed(table: Any, row: int) -> None:
     table.members_version += 1
 
 
-@inlined
+@pasted
 def array_at(numbers, data, starts, at):
     """The array of row ``at``."""
     number = numbers[at]

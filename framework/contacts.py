@@ -128,7 +128,7 @@ class Contacts(ContactRows):
         self._running_step = running_step  # the number of the step that is running, None between steps
         self.dimensions = dimensions
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
-        self._stay = empty_columns(dimensions)
+        self._no_stay = self._stay = empty_columns(dimensions)
 
     # -- what users read --------------------------------------------------------------------------
 
@@ -158,7 +158,7 @@ class Contacts(ContactRows):
         """Forget what the last window held."""
         for chunks in self._chunks.values():
             chunks.clear()
-        self._stay = empty_columns(self.dimensions)
+        self._stay = self._no_stay
 
     def set_current(self, columns: dict[str, np.ndarray]) -> None:
         self._columns = columns

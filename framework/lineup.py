@@ -65,6 +65,8 @@ class Lineup:
         self._wanted_forces: list[ForceSystem] = []
         self._later: list[Callable[[], None]] = []  # what is to happen to plain processors after the step
         self._known: list[esper.Processor] = []  # esper's processors when they were looked at last
+        self.changed = False  # whether something has been asked for that is not so yet
+        self.foreign = True  # whether code that is not carom's runs in the step and may write any column
         self._given: dict[int, dict[str, Any]] = {}  # what PLACED attributes a system had before it was added
 
     @property
@@ -205,13 +207,9 @@ class Lineup:
 
     # -- bringing it about ------------------------------------------------------------------------
 
-    @property
-    def changed(self) -> bool:
-        """Whether something has been asked for that is not so yet."""
-        return bool(self._later) or self._wanted_forces != self.force_systems or not _same(self._wanted, self.systems)
-
     def _soon(self, action: Callable[[], None] | None = None) -> None:
         """Now, or at the end of the step that is running."""
+        self.changed = True
         if action is not None:
             self._later.append(action)
         if not self._pipeline.in_step:
@@ -231,6 +229,8 @@ class Lineup:
         self.force_systems = list(self._wanted_forces)
         if not _same(self._wanted, self.systems):
             self._line_up()
+        self.changed = False
+        self.foreign = self._has_foreign()
 
     def _line_up(self) -> None:
         """Each phase has a band of esper priorities; its systems take the places below the top."""
@@ -263,6 +263,7 @@ class Lineup:
         self._known = esper_bridge.processors()
         for processor in self._known:
             self._guard(processor)
+        self.foreign = self._has_foreign()
 
     def detach(self) -> None:
         """Leave esper; called in the world's context when the world closes."""
@@ -271,9 +272,11 @@ class Lineup:
                 esper_bridge.remove_processor_instance(processor)
             self._unguard(processor)
 
-    def foreign(self) -> bool:
-        """Whether code that is not carom's runs in the step and may write any column."""
+    def _has_foreign(self) -> bool:
+        """Also true without the built-in INTEGRATION, which keeps the state that others overwrite after it."""
         if self.force_systems or len(self._known) > len(self.systems) + len(self._pipeline.OWN):
+            return True
+        if all(system.phase != Phase.INTEGRATION for system in self.systems):
             return True
         return any(not type(system).__module__.startswith("carom.systems") for system in self.systems)
 

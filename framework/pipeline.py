@@ -112,15 +112,14 @@ class Pipeline:
             self._open_window()
         self.lineup.reconcile()
         self.synchronize()
-        self._begin()
+        self._begin(self.lineup.foreign or self.world.events.any_handlers())
 
-    def _begin(self) -> None:
+    def _begin(self, everything_kept: bool) -> None:
         physics = self.world.physics
         self._set_in_step(True)
         if physics is None:
             return
-        everything = self.lineup.foreign() or self.world.events.any_handlers()
-        self._unfinished = snapshots.capture(physics, self.clock, everything)
+        self._unfinished = snapshots.capture(physics, self.clock, everything_kept)
         physics.table.in_step = True
         try:
             physics.begin_step()
@@ -169,7 +168,7 @@ class Pipeline:
         with esper_bridge.context(self.world.name):
             self.lineup.reconcile()
             self.synchronize()
-            self._begin()
+            self._begin(True)
             for system in [s for s in self.lineup.systems if s.phase == phase]:
                 system.process(self.world.settings.dt)
         self._unfinished = None

@@ -163,7 +163,8 @@ class Plugin:
 
     def pair_filter(self, function: Thing) -> Thing:
         """Register ``function(bodies, a, b)``: which of the pairs of rows a[i], b[i] (arrays; the entity of a has the
-        smaller id) may meet, as an array of bool. Called in each step with the pairs that layers and masks let through.
+        smaller id) may meet, as an array of bool. Called in each step with the pairs whose boxes touch; layers and
+        masks decide too.
         """
         checks.check_filter(self, function)
         if function not in self.pair_filters:

@@ -160,7 +160,8 @@ def check_contact(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...])
         raise PluginError(f"{said}: depth, the second value, must be a number")
     for what, vector in (("normal", normal), ("point", point)):
         if not (isinstance(vector, tuple) and len(vector) == len(d) and all(map(_is_number, vector))):
-            raise PluginError(f"{said}: {what} must be a tuple of {len(d)} numbers")
+            flat = "; a shape of 2D worlds only has dimensions = (2,)" if len(d) == 3 else ""
+            raise PluginError(f"{said}: {what} must be a tuple of {len(d)} numbers{flat}")
     if not hit and depth == -math.inf:  # far apart, and the function did not care how far
         return result
     if not all(map(math.isfinite, (depth, *normal, *point))):
@@ -269,7 +270,7 @@ def parameters_of(shape: Shape, dimensions: int, scale: float) -> Any:
         column = component.columns[name]
         value = getattr(sample, name)
         lengths = column.dtype is float and (column.default is REQUIRED or column.item == "vector")
-        factor = scale if lengths or column.item == "array" else 1.0
+        factor = scale if lengths or getattr(column, "lengths", False) else 1.0
         if column.item == "vector":
             values[name] = tuple(np.float64(x) for x in np.broadcast_to(value, (dimensions,)) * factor)
         elif column.item == "array":

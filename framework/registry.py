@@ -93,7 +93,7 @@ class Registry:
     integrators: dict[str, Any] = field(default_factory=dict)
     broad_phases: dict[str, Any] = field(default_factory=dict)
     mixing_rules: dict[str, Any] = field(default_factory=dict)
-    pair_filters: list[Any] = field(default_factory=list)
+    pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
 
     def add(self, plugin: Plugin) -> None:
         """PluginError if something of it is registered already; what it registers later is seen too."""
@@ -137,7 +137,7 @@ class Registry:
                 pairs[first, second] = pair
         self.shapes, self.pairs, self.integrators = shapes, pairs, integrators
         self.broad_phases, self.mixing_rules = broad_phases, mixing_rules
-        self.pair_filters = [filter_ for plugin in self.plugins for filter_ in plugin.pair_filters]
+        self.pair_filters = [(plugin.name, each) for plugin in self.plugins for each in plugin.pair_filters]
         self.version += 1
 
     def pair(self, first: type[Any], second: type[Any]) -> Pair | None:

@@ -7,12 +7,12 @@ import difflib
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Self
 
-MixingRule = Literal["average", "geometric_mean", "max", "min", "multiply"]
 MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
 COLLISION_MODES = ("discrete",)
 GEOMETRY_MODES = ("precise", "bounds")
+AUTOMATIC = "automatic"  # the broad phase that suits the scene
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,10 @@ class Settings:
     max_impacts_per_step
         of one body in one step; beyond it the solver for contacts at rest takes over, and it is counted
     restitution_mixing, friction_mixing
-        how the values of the two bodies become the contact's
+        how the values of the two bodies become the contact's: average, geometric_mean, max, min, multiply, or one that
+        a plugin brings
+    broad_phase
+        automatic: what suits the scene, see ``world.plan()``; or one that a plugin brings
     debug
         check the bodies' state for non-finite values at every system, not only at the end of the step
     """
@@ -53,8 +56,9 @@ class Settings:
     slop: float | None = None
     max_steps_per_advance: int = 8
     max_impacts_per_step: int = 8
-    restitution_mixing: MixingRule = "max"
-    friction_mixing: MixingRule = "geometric_mean"
+    restitution_mixing: str = "max"
+    friction_mixing: str = "geometric_mean"
+    broad_phase: str = "automatic"
     debug: bool = False
 
     def __post_init__(self) -> None:
@@ -66,15 +70,14 @@ class Settings:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise ValueError(f"Settings.{name} must be a whole number from 1, got {value!r}")
-        if not isinstance(self.integrator, str) or not self.integrator:
-            raise ValueError(f"Settings.integrator must be a name, got {self.integrator!r}")
+        for name in ("integrator", "restitution_mixing", "friction_mixing", "broad_phase"):  # a plugin may bring it
+            if not isinstance(getattr(self, name), str) or not getattr(self, name):
+                raise ValueError(f"Settings.{name} must be a name, got {getattr(self, name)!r}")
         if not isinstance(self.debug, bool):
             raise ValueError(f"Settings.debug must be True or False, got {self.debug!r}")
         for name, known in (
             ("collision", COLLISION_MODES),
             ("geometry", GEOMETRY_MODES),
-            ("restitution_mixing", MIXING_RULES),
-            ("friction_mixing", MIXING_RULES),
         ):
             if getattr(self, name) not in known:
                 raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")

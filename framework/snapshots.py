@@ -12,13 +12,15 @@ import numpy as np
 from .clock import Clock
 from .services import PhysicsServices
 
-# What carom's own systems write.
-MOVING = ("position", "previous_position", "linear_velocity", "applied_force", "step_force")
+NO_ENTITIES = np.empty(0, np.int64)  # rows do not move within a step
 
 
 @dataclass
 class StepState:
-    """A copy of what a step may change: columns, clock, contacts, which pairs touch."""
+    """A copy of what a step may change: columns, clock, contacts, which pairs touch.
+
+    entities: ids by row, for copies that outlast the step.
+    """
 
     entities: np.ndarray
     columns: dict[str, np.ndarray]
@@ -27,19 +29,17 @@ class StepState:
     tracking: Any
 
 
-def capture(physics: PhysicsServices, clock: Clock, everything: bool, lasting: bool = False) -> StepState:
-    """The state now; ``everything``: all columns, else only those that carom's own systems write.
+def capture(physics: PhysicsServices, clock: Clock, everything: bool) -> StepState:
+    """What going back to this moment takes, while the step lasts.
 
-    Unless it is ``lasting``, the next capture takes its memory.
+    everything: all columns; else those that carom's own systems overwrite, which they keep themselves when they do.
     """
-    table = physics.table
-    columns = (table.copy_columns if lasting else table.keep_columns)(None if everything else MOVING)
-    entities = columns.pop("entity", table.column("entity"))
-    return StepState(entities, columns, clock.state(), physics.contacts.state(), physics.tracking_state())
+    columns = physics.table.open_undo(everything)
+    return StepState(NO_ENTITIES, columns, clock.state(), physics.contacts.state(), physics.tracking_state())
 
 
 def put_back(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
-    """Undo what a step has done; rows do not move within a step."""
+    """Undo what a step has done."""
     physics.table.restore_columns(state.columns)
     clock.restore(state.clock)
     physics.contacts.restore_state(state.contacts)
@@ -48,9 +48,9 @@ def put_back(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
 
 def snapshot(physics: PhysicsServices, clock: Clock) -> StepState:
     """A capture that shares nothing with the world."""
-    state = capture(physics, clock, everything=True, lasting=True)
-    state.contacts, state.tracking = copy.deepcopy((state.contacts, state.tracking))
-    return state
+    columns = physics.table.copy_columns()
+    contacts, tracking = copy.deepcopy((physics.contacts.state(), physics.tracking_state()))
+    return StepState(columns.pop("entity"), columns, clock.state(), contacts, tracking)
 
 
 def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:

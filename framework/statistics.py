@@ -17,7 +17,7 @@ OTHER_UNITS = ("bodies",)
 SINGULAR = {"bodies": "body", "candidates": "candidate", "pairs": "pair", "contacts": "contact"}
 Key = TypeVar("Key")
 
-OUTSIDE = ""  # the system of kernels that no system has called: queries between two steps
+OUTSIDE = ""  # the system of kernels that no system has called: at the ends of a step, and queries between two
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Totals:
 
 @dataclass(frozen=True)
 class KernelStats:
-    """One kernel in one system (``""``: called by no system, as queries are).
+    """One kernel in one system (``""``: called by no system, as at the ends of a step and in queries).
 
     calls, milliseconds
         mean per step, compiling and loading left out
@@ -132,7 +132,8 @@ class Stats:
         for name, milliseconds in self.milliseconds.items():
             rows.append([name, f"{milliseconds:.4f}", *_cells(nanoseconds[name])])
             rows += [_row(row) for row in kernels if row.system == name]
-        rows += [_row(row) for row in kernels if row.system not in nanoseconds]
+        others = [_row(row) for row in kernels if row.system not in nanoseconds]
+        rows += [["no system", "", *_cells({})], *others] if others else []
         rows.append([f"all, {self.steps} steps", f"{self.total:.4f}", *_cells({})])
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines = []

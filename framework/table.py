@@ -6,7 +6,6 @@ leads to the same rows, the same order of every sum, the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,11 @@ class Table:
         self.frame = 0  # counts the calls of step() and advance()
         self.kind_changed = False
         self.arrays: dict[str, np.ndarray] = {}
-        self._kept: dict[str, np.ndarray] = {}  # see keep_columns
+        self.undo: dict[str, np.ndarray] = {}  # what a step has overwritten so far, see open_undo
+        self.everything_kept = False  # at the start of the step: code that keeps nothing may write any column in it
+        self._buffers: dict[str, np.ndarray] = {}  # behind undo; fresh memory costs ten times the copying
+        self._everything: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # copy and column, see open_undo
+        self._everything_of = (0, 0)  # what version and how many arrays they are of
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
         self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
@@ -236,23 +239,50 @@ class Table:
 
     # -- copies -----------------------------------------------------------------------------------
 
-    def copy_columns(self, keys: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-        """Copies of the rows in use, of all columns or of those named."""
-        return {key: self.column(key).copy() for key in (self.arrays if keys is None else keys)}
+    def copy_columns(self) -> dict[str, np.ndarray]:
+        """Copies of the rows in use, of all columns."""
+        return {key: self.column(key).copy() for key in self.arrays}
 
-    def keep_columns(self, keys: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-        """The same into buffers that the next call overwrites: fresh memory costs ten times the copying."""
-        kept: dict[str, np.ndarray] = {}
-        for key in self.arrays if keys is None else keys:
-            column = self.column(key)
-            buffer = self._kept.get(key)
-            if buffer is None or len(buffer) < self.count or buffer.shape[1:] != column.shape[1:]:
-                buffer = self._kept[key] = np.empty_like(self.arrays[key])
-            kept[key] = buffer[: self.count]
-            np.copyto(kept[key], column)
-        return kept
+    def open_undo(self, everything: bool) -> dict[str, np.ndarray]:
+        """A step begins: what it overwrites is kept from now on, in the dict that this returns.
+
+        everything: all columns at once; else each when a system says so with :meth:`keep`. Which bodies there are, and
+        which components they have, no step changes.
+        """
+        self.undo = {}
+        self.everything_kept = everything
+        if everything:
+            if self._everything_of != (self.version, len(self.arrays)):
+                keys = [key for key in self.arrays if key != "entity" and not key.startswith("has:")]
+                self._everything = {key: (self._buffer(key), self.column(key)) for key in keys}
+                self._everything_of = (self.version, len(self.arrays))
+            for key, (copy, column) in self._everything.items():
+                np.copyto(copy, column)
+                self.undo[key] = copy
+        return self.undo
+
+    def keep(self, key: str, copy: np.ndarray | None = None) -> None:
+        """To be called before a column is overwritten for the first time in a step.
+
+        copy: of its first rows, where there is one anyway; nobody may change it before the step ends. It may be a
+        column that was kept before this one, because the last is put back first.
+        """
+        if key in self.undo:
+            return
+        if copy is None:
+            copy = self._buffer(key)
+            np.copyto(copy, self.column(key))
+        self.undo[key] = copy
+
+    def _buffer(self, key: str) -> np.ndarray:
+        """Room for a copy of that column's rows in use."""
+        array, buffer = self.arrays[key], self._buffers.get(key)
+        if buffer is None or buffer.shape != array.shape:
+            buffer = self._buffers[key] = np.empty_like(array)
+        return buffer[: self.count]
 
     def restore_columns(self, columns: dict[str, np.ndarray]) -> None:
-        for key, array in columns.items():
+        """Put back what was kept, the last first: a copy may itself be a column that was kept before."""
+        for key, array in reversed(columns.items()):
             self.arrays[key][: len(array)] = array
         self.static_version += 1

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from ..framework.compilation import kernel
 from ..framework.schedule import Phase, System
+from ..framework.settings import AUTOMATIC
 from ..framework.vectors import add, item, replace, row, store
 from .even_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
 from .few_boxes import FEW, FewBoxes, pairs_between
+from .foreign_broad_phase import ForeignBroadPhase
 from .spatial_tree import SpatialTree
+from .still_grid import StillGrid
 
 if TYPE_CHECKING:
     from .shape_code import ShapeCode
@@ -21,6 +24,10 @@ if TYPE_CHECKING:
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
 MARGIN = 0.1
+
+EVEN, STILL = "even", "still"  # grids: one of what moves, or that and one of what does not
+
+Pairs: TypeAlias = tuple[np.ndarray, np.ndarray]
 
 
 def make_box_kernel(shape_bounds: Any, write_world: Any, several: bool = False) -> Callable[..., None]:
@@ -90,11 +97,11 @@ def box_kernel_with_levels(code: ShapeCode) -> Callable[..., None]:
 
 
 class BroadPhase(System):
-    """Finds candidate pairs with a uniform grid of what moves, where that suits, see :mod:`even_grid`; else with one
-    quadtree (octree) of what moves and one, built once, of what does not.
+    """Finds candidate pairs with uniform grids of what moves and of what does not, where these suit, see
+    :mod:`even_grid` and :mod:`still_grid`; else with a quadtree (octree) of each.
 
     Reads previous_position, position, rotation and the colliders; writes the candidate pairs. Pairs of static bodies
-    are never made.
+    are never made. What is built for them is kept until they change.
     """
 
     phase = Phase.BROAD
@@ -103,11 +110,15 @@ class BroadPhase(System):
         self._state = state
         self._moving_tree, self._static_tree = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
         self._moving: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
-        self._static: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
+        self._static: SpatialTree | FewBoxes | None = None  # built when first asked for
+        self._still: StillGrid | None = None  # likewise
+        self._outside = FewBoxes(state.dimensions)  # what does not move and is not in its grid
         self._grid, self._frame = EvenGrid(state.dimensions), np.zeros(FRAME_SIZE)
-        self._even = False
+        self._grids = ""  # which of the grids the last step used
+        self._foreign = ForeignBroadPhase(state)
         self._static_seen: Any = None
-        self._static_positions = np.empty((0, state.dimensions))
+        self._static_positions = b""
+        self._static_rows = np.empty(0, np.int32)
 
     def process(self, dt: float) -> None:
         state, table = self._state, self._state.table
@@ -118,36 +129,56 @@ class BroadPhase(System):
             first, second = self._pairs(table.stops[1], table.count)
         state.set_candidates(first, second)
 
-    def _pairs(self, moving: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    def _pairs(self, moving: int, count: int) -> Pairs:
         """Rows of overlapping boxes, at least one of each pair below ``moving``."""
-        self._even = False
-        if moving > FEW and count - moving <= moving:  # else what moves had better look at what does not
-            lower, upper = self._state.scratch["lower"], self._state.scratch["upper"]
-            pairs = self._grid.pairs(lower, upper, self._frame, moving, count)
-            self._even = pairs is not None
-            if pairs is not None:
-                return pairs
+        self._grids = ""
+        name = self._state.world.settings.broad_phase
+        if name != AUTOMATIC:
+            return self._foreign.pairs(name, moving, count)
+        pairs = None
+        if count - moving > max(moving, FEW):
+            still = self._still_grid()
+            if still.suits:
+                pairs = self._pairs_beside(still, moving)
+        elif moving > FEW:
+            pairs = self._even_pairs(moving, self._static_rows)
+            self._grids = EVEN
+        if pairs is not None:
+            return pairs
+        self._grids = ""
         self._moving = self._partition(self._moving_tree, 0, moving)
-        first, second = self._moving.pairs_within()
-        if self._static.count:
-            fixed, mover = pairs_between(self._static, self._moving)
-            if len(fixed):
-                first, second = np.concatenate((first, mover)), np.concatenate((second, fixed))
-        return first, second
+        pairs = self._moving.pairs_within()
+        static = self._static_partition()
+        return _joined(pairs, pairs_between(static, self._moving)) if static.count else pairs
+
+    def _pairs_beside(self, still: StillGrid, moving: int) -> Pairs | None:
+        """The same with a grid of what does not move; None if one of what moves does not suit."""
+        if moving > FEW:
+            pairs = self._even_pairs(moving, still.outside)
+        else:
+            self._moving = self._partition(self._moving_tree, 0, moving)
+            pairs = _joined(self._moving.pairs_within(), pairs_between(self._outside, self._moving))
+        between = None if pairs is None else still.pairs(np.arange(moving, dtype=np.int32))
+        self._grids = STILL
+        return None if pairs is None or between is None else _joined(pairs, between)
+
+    def _even_pairs(self, moving: int, others: np.ndarray) -> Pairs | None:
+        lower, upper = self._state.scratch["lower"], self._state.scratch["upper"]
+        return self._grid.pairs(lower, upper, self._frame, moving, others)
 
     def box_all(self) -> None:
         """Boxes around the motion of what moves; of what does not only if it has changed."""
         state, table = self._state, self._state.table
         moving, count = table.stops[1], table.count
         position, before = table.arrays["position"], table.arrays["previous_position"]
-        fixed = position[moving:count]
+        fixed = position[moving:count].tobytes()  # compared in one go
         seen = (table.static_version, state.structures, state.turned)
-        if seen != self._static_seen or not np.array_equal(fixed, self._static_positions):
-            before[moving:count] = fixed
+        if seen != self._static_seen or fixed != self._static_positions:
+            before[moving:count] = position[moving:count]
             self._box(moving, count, position)
-            self._static = self._partition(self._static_tree, moving, count)
-            self._static_seen = seen
-            self._static_positions = fixed.copy()
+            self._static = self._still = None
+            self._static_seen, self._static_positions = seen, fixed
+            self._static_rows = np.arange(moving, count, dtype=np.int32)
         self._box(0, moving, before if state.moved else position)
 
     def _box(self, start: int, stop: int, before: np.ndarray) -> None:
@@ -162,7 +193,7 @@ class BroadPhase(System):
     @property
     def partitions(self) -> tuple[SpatialTree | FewBoxes, SpatialTree | FewBoxes]:
         """Of what moves and of what does not."""
-        return self._moving, self._static
+        return self._moving, self._static_partition()
 
     def trees_now(self) -> None:
         """Build the trees from where the bodies are at this moment."""
@@ -179,15 +210,40 @@ class BroadPhase(System):
         boxes.build(self._state.scratch["lower"], self._state.scratch["upper"], start, stop)
         return boxes
 
+    def _static_partition(self) -> SpatialTree | FewBoxes:
+        if self._static is None:
+            self._static = self._partition(self._static_tree, self._state.table.stops[1], self._state.table.count)
+        return self._static
+
+    def _still_grid(self) -> StillGrid:
+        if self._still is None:
+            scratch, table = self._state.scratch, self._state.table
+            self._still = StillGrid(scratch["lower"], scratch["upper"], table.stops[1], table.count)
+            self._outside.take(scratch["lower"], scratch["upper"], self._still.outside)
+        return self._still
+
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
+        name = self._state.world.settings.broad_phase
+        if name != AUTOMATIC:
+            return f"{name}, as the settings say"
         moving, count = self._state.table.stops[1], self._state.table.count
-        if self._even:
+        if self._grids == EVEN:
             return f"uniform grid of {moving} moving bodies, and {count - moving} static ones that look into it"
+        if self._grids == STILL:
+            among = "uniform grid" if moving > FEW else "every pair"
+            return f"{among} of {moving} moving bodies, which look into a uniform grid of {count - moving} static ones"
         tree = "quadtree" if self._state.dimensions == 2 else "octree"
         if max(moving, count - moving) <= FEW:
             return f"every pair of {moving} moving and {count - moving} static bodies; a {tree} above {FEW}"
         return f"{tree} of {moving} moving bodies against itself" + (
             f" and against that of {count - moving} static ones" if count > moving else ""
         )
+
+
+def _joined(one: Pairs, other: Pairs) -> Pairs:
+    """Pairs of moving bodies, and pairs with these as the second."""
+    if not len(other[0]):
+        return one
+    return np.concatenate((one[0], other[1])), np.concatenate((one[1], other[0]))

@@ -103,7 +103,7 @@ def make_cast_kernel(against: Any, half_extents: Any) -> Callable[..., int]:
                 for part in range(parts):
                     c, stop = cells_of(part, wraps, first, n0, n1, n2, table, directory, level)
                     while c < stop:
-                        at = c
+                        at = np.uint64(c)  # an index without a sign is taken as it is
                         c += 1
                         enter, leave = 0.0, reach
                         for k in range(len(like)):
@@ -115,7 +115,7 @@ def make_cast_kernel(against: Any, half_extents: Any) -> Callable[..., int]:
                         # every body has its turn in the slice in which its box is entered
                         if not (enter <= leave and begin <= enter < end):
                             continue
-                        i = order[at]
+                        i = np.uint64(order[at])
                         if layers[material[i], i] & mask == 0 or entity[i] == excluded[q]:
                             continue
                         away = sub(add(row(position, i, like), row(offset, i, like)), start)

@@ -18,20 +18,27 @@ EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact")
 
 
 @kernel
-def compare_pairs(a0, b0, a1, b1, stayed0, stayed1):
-    """Mark the pairs that stand in both lists, each in canonical order; returns how many."""
-    i, j, count = 0, 0, 0
-    while i < len(a0) and j < len(a1):
-        if a0[i] == a1[j] and b0[i] == b1[j]:
-            stayed0[i] = stayed1[j] = True
+def compare_pairs(a0, b0, a1, b1, ended, began, stayed):
+    """Rows of the pairs that stand in the first list only, and of those in the second only and in both.
+
+    Both in canonical order. Returns how many rows are written to each.
+    """
+    i, j, ends, begins, stays = 0, 0, 0, 0, 0
+    while i < len(a0) or j < len(a1):
+        if j == len(a1) or (i < len(a0) and (a0[i] < a1[j] or (a0[i] == a1[j] and b0[i] < b1[j]))):
+            ended[ends] = i
+            ends += 1
             i += 1
+        elif i == len(a0) or a0[i] != a1[j] or b0[i] != b1[j]:
+            began[begins] = j
+            begins += 1
             j += 1
-            count += 1
-        elif a0[i] < a1[j] or (a0[i] == a1[j] and b0[i] < b1[j]):
-            i += 1
         else:
+            stayed[stays] = j
+            stays += 1
+            i += 1
             j += 1
-    return count
+    return ends, begins, stays
 
 
 class ContactEvents(System):
@@ -45,34 +52,51 @@ class ContactEvents(System):
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
-        self.touching: Columns = empty_columns(state.dimensions)
+        self._nothing = empty_columns(state.dimensions)
+        self.touching: Columns = self._nothing
         self._generation = state.table.generation
 
     def process(self, dt: float) -> None:
         self._state.queries.forget()  # the response has moved bodies
-        contacts = self._state.contacts
-        now = self._state.contact_columns
-        if not len(now["entity_a"]) and not len(self.touching["entity_a"]):
+        before, now = self.touching, self._touching_now()
+        olds, news = len(before["entity_a"]), len(now["entity_a"])
+        if not olds and not news:
             return
-        if len(now["entity_a"]) and not now["enabled"].all():
-            now = {key: column[now["enabled"]] for key, column in now.items()}
-        before = self.touching
-        stayed_before, stayed = np.zeros(len(before["entity_a"]), bool), np.zeros(len(now["entity_a"]), bool)
-        if self._generation == self._state.table.generation:
-            compare_pairs(
-                before["entity_a"], before["entity_b"], now["entity_a"], now["entity_b"], stayed_before, stayed
-            )
+        known = olds if self._generation == self._state.table.generation else 0
+        ended, began, stayed = np.empty(olds, np.int64), np.empty(news, np.int64), np.empty(news, np.int64)
+        ends, begins, stays = compare_pairs(
+            before["entity_a"][:known], before["entity_b"][:known], now["entity_a"], now["entity_b"], ended, began,
+            stayed,
+        )  # fmt: skip
         self._generation = self._state.table.generation
-        begin, stay = _select(now, ~stayed), _select(now, stayed)
-        end = _select(before, ~stayed_before)
-        end["step"] = np.full(len(end["entity_a"]), self.world.step_count)
-        end["normal_impulse"] = np.zeros(len(end["entity_a"]))
-        self.touching = {key: column for key, column in now.items() if key != "enabled"}
+        begin, stay = self._select(now, began[:begins]), self._select(now, stayed[:stays])
+        end = self._select(before, ended[:ends]) if known else before
+        ends = len(end["entity_a"])
+        if ends:
+            end = {**end, "step": np.full(ends, self.world.step_count), "normal_impulse": np.zeros(ends)}
+        self.touching = now
+        contacts = self._state.contacts
         contacts.record("begin", begin)
         contacts.record("end", end)
         contacts.set_stay(stay)
         for columns, event in zip((begin, stay, end, self._state.step_impacts), EVENTS, strict=True):
             self._tell(columns, event)
+
+    def _touching_now(self) -> Columns:
+        """The contacts that are enabled."""
+        columns = self._state.contact_columns
+        enabled = columns["enabled"]
+        if enabled.all():
+            return {key: column for key, column in columns.items() if key != "enabled"}
+        return {key: column[enabled] for key, column in columns.items() if key != "enabled"}
+
+    def _select(self, columns: Columns, rows: np.ndarray) -> Columns:
+        """Those rows, ascending; columns of which all are taken are not copied."""
+        if not len(rows):
+            return self._nothing
+        if len(rows) == len(columns["entity_a"]):
+            return columns
+        return {key: column.take(rows, axis=0) for key, column in columns.items()}
 
     def _tell(self, columns: Columns | None, event: str) -> None:
         if columns is None or not len(columns["entity_a"]) or not self.world.events.wanted(event):
@@ -82,11 +106,3 @@ class ContactEvents(System):
     def reason(self) -> str:
         wanted = [event for event in EVENTS if self.world.events.wanted(event)]
         return f"handlers of {', '.join(wanted)}" if wanted else "begin, stay, end; nobody listens to events"
-
-
-def _select(columns: Columns, mask: np.ndarray) -> Columns:
-    """Those rows, without ``enabled``; columns of which all are taken are not copied."""
-    rows = np.flatnonzero(mask)
-    if len(rows) == len(mask):
-        return {key: column for key, column in columns.items() if key != "enabled"}
-    return {key: column.take(rows, axis=0) for key, column in columns.items() if key != "enabled"}

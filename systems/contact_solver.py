@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..framework.settings import MIXING_RULES
 from .contact_bodies import COLOURS, gather, put_back, squeeze
 from .contact_memory import ContactMemory, recall, remember
+from .mixing import rule_number
 from .soft_step import solve_contacts
 from .support import drop_support, predict_support
 
@@ -29,7 +29,7 @@ class ContactSolver:
         self._rows_of: object = None
         self.supported = np.empty(0, bool)
         self._held = np.empty(0, bool)
-        self._any_support = False
+        self.any_support = False
         self.travels = 1.0
         self._allocate_bodies(0)
         self._allocate_contacts(16)
@@ -60,7 +60,7 @@ class ContactSolver:
         state, memory = self._state, self.memory
         count = state.table.count
         self.supported = np.zeros(count, bool)
-        self._any_support = False
+        self.any_support = False
         if len(self._place) < count:
             self._allocate_bodies(state.table.capacity)
         if not memory.count:
@@ -70,13 +70,13 @@ class ContactSolver:
         if len(disabled):
             first = self._without(first, second, disabled)
         arrays, scratch = state.table.arrays, state.scratch
-        self._any_support = True
+        self.any_support = True
         self.travels = self._force_travels()
         predict_support(
             dt, self.travels, first, second, memory.count, memory.normal, memory.total, np.empty(memory.count),
             arrays["inverse_mass"], state.table.stops[1], arrays["position"], arrays["linear_velocity"],
-            scratch["start_velocity"], scratch["path_velocity"], scratch["path_second"], state.path_degree > 1,
-            scratch["gravity_share"], self.supported, self.change, state.like,
+            scratch["path_velocity"], scratch["path_second"], state.path_degree > 1, self.supported, self.change,
+            state.like,
         )  # fmt: skip
 
     def _force_travels(self) -> float:
@@ -106,10 +106,12 @@ class ContactSolver:
     def solve(self, dt: float, resting: np.ndarray) -> None:
         """Hold the contacts ``resting`` (pairs, canonical order) and advance their bodies again from the start."""
         state, arrays = self._state, self._state.table.arrays
-        self._held = np.zeros(state.table.count, bool)
         state.resting = resting
+        if not len(resting) and not self.memory.count:
+            return
+        self._held = np.zeros(state.table.count, bool)
         self._solve(dt, resting)
-        if self._any_support:
+        if self.any_support:
             drop_support(
                 dt, self.travels, state.table.stops[1], self.supported, self._held, arrays["position"],
                 arrays["linear_velocity"], self.change, state.like,
@@ -141,7 +143,7 @@ class ContactSolver:
         state.kernels.linearise(
             resting, slot, state.pair_a, state.pair_b, scratch["shape"], scratch["offset"], state.world_shapes,
             position, start, scratch["size"], stacks["collider.friction"], scratch["material"],
-            MIXING_RULES.index(settings.friction_mixing), -1.0 if slop is None else slop, inverse_mass,
+            rule_number(state.world.registry, settings.friction_mixing), -1.0 if slop is None else slop, inverse_mass,
             state.pair_impulse, state.pair_parts, state.pair_normal, state.pair_point, normal, gap, mass, friction,
             extent, parting, state.like,
         )  # fmt: skip

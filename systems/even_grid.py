@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ..framework.compilation import kernel, part
 from ..framework.vectors import item, replace
 from .lanes import eight_at, four_at, lowest_bit
+from .spatial_tree import CANDIDATE_LIMIT
 
 CELLS_PER_OBJECT = 2.0  # at most; cells grow where there is more room than that
 SPARE_CELLS = 64
@@ -47,7 +48,7 @@ UNEVEN, FULL = -1, -2  # what the kernel returns in place of a number of pairs
 
 
 @part
-def _count_cells(frame, count, like):
+def count_cells(frame, count, like):
     """(1 / cell, cells a row, cells a layer, cells), with one empty cell around; 1 / cell is 0 if no grid suits."""
     largest = frame[LARGEST]
     farthest = 0.0
@@ -74,7 +75,7 @@ def _count_cells(frame, count, like):
 
 
 @part
-def _find_cells(lower, upper, count, frame, inverse, row, layer, total, keys, directory, like):
+def find_cells(lower, upper, count, frame, inverse, row, layer, total, keys, directory, like):
     """Each object's cell, those of invalid boxes behind the last; then directory[key + 1] is where cell key begins.
 
     Returns whether the objects are spread evenly enough.
@@ -107,7 +108,7 @@ def _find_cells(lower, upper, count, frame, inverse, row, layer, total, keys, di
 
 
 @part
-def _place(lower, upper, count, frame, inverse, keys, directory, order, cells, codes, like):
+def place_objects(lower, upper, count, frame, inverse, keys, directory, order, cells, codes, like):
     """The counting sort's last pass; afterwards directory[key] is where cell ``key`` begins."""
     d = len(like)
     field = CODE_BITS // (2 * d)
@@ -208,27 +209,31 @@ def _test(held, work, lower, upper, order, first, second, found, like):
 
 
 @part
-def _look_inside(
-    start, stop, lower, upper, frame, inverse, row, layer, directory, order, first, second, found, like
+def look_inside(
+    rows, lower, upper, frame, inverse, row, layer, directory, order, first, second, found, like
 ):  # fmt: skip
-    """Pairs of objects in the grid with boxes start..stop-1 of any size, which are not in it; returns as ``_test``."""
+    """Pairs of objects in the grid with boxes of any size, of ``rows`` that are not in it; returns as ``_test``."""
     d = len(like)
     one = np.int64(1)
-    for i in range(start, stop):
+    origin, last = like, like
+    for q in range(d):
+        origin = replace(origin, q, frame[LOWEST + q])
+        last = replace(last, q, math.floor((frame[HIGHEST + q] - frame[LOWEST + q]) * inverse))
+    for k in range(len(rows)):
+        i = np.uint64(rows[k])
         begin, end = (one, one, one), (one, one, one)
         for q in range(d):
-            origin = frame[LOWEST + q]
-            last = np.floor((frame[HIGHEST + q] - origin) * inverse)
-            low = min(max((lower[i, q] - origin) * inverse - 0.5 - SLACK, 0.0), last + 1.0)
-            high = min(max((upper[i, q] - origin) * inverse + 0.5 + SLACK, -1.0), last)
-            if not lower[i, q] <= upper[i, q]:
-                low, high = 0.0, -1.0
-            begin = tuple_setitem(begin, q, np.int64(low) + 1)
-            end = tuple_setitem(end, q, np.int64(np.floor(high)) + 1)
+            low, high = lower[i, q], upper[i, q]
+            valid = low <= high
+            low = min(max((low - item(origin, q)) * inverse - 0.5 - SLACK, 0.0), item(last, q) + 1.0)
+            high = min(max((high - item(origin, q)) * inverse + 0.5 + SLACK, -1.0), item(last, q))
+            begin = tuple_setitem(begin, q, np.int64(low if valid else 0.0) + 1)
+            end = tuple_setitem(end, q, np.int64((high if valid else -1.0) + 1.0))
         for z in range(begin[2], end[2] + 1):
             for y in range(begin[1], end[1] + 1):
                 at = y * row + (z * layer if d == 3 else 0)
-                place, behind = directory[at + begin[0]], directory[at + max(end[0] + 1, begin[0])]
+                place = np.int64(directory[np.uint64(at + begin[0])])
+                behind = np.int64(directory[np.uint64(at + max(end[0] + 1, begin[0]))])
                 if found + (behind - place) > len(first):
                     return np.int64(FULL)
                 while place < behind:
@@ -236,8 +241,8 @@ def _look_inside(
                     hit = True
                     for q in range(d):
                         hit &= (lower[i, q] <= upper[there, q]) & (lower[there, q] <= upper[i, q])
-                    first[found] = there
-                    second[found] = i
+                    first[np.uint64(found)] = there
+                    second[np.uint64(found)] = i
                     found += hit
                     place += 1
     return found
@@ -245,26 +250,26 @@ def _look_inside(
 
 @kernel
 def even_pairs(
-    lower, upper, inside, outside, frame, keys, directory, order, cells, codes, work, first, second, like
+    lower, upper, inside, others, frame, keys, directory, order, cells, codes, work, first, second, like
 ):  # fmt: skip
-    """Write the overlapping pairs of rows 0..inside-1 with each other and with rows inside..outside-1.
+    """Write the overlapping pairs of rows 0..inside-1 with each other and with the rows ``others`` (k,).
 
     Returns how many, UNEVEN if a grid does not suit the first rows, or FULL if the output is too short.
     """
-    inverse, row, layer, total = _count_cells(frame, inside, like)
+    inverse, row, layer, total = count_cells(frame, inside, like)
     if inverse == 0.0:
         return np.int64(UNEVEN)
-    if not _find_cells(lower, upper, inside, frame, inverse, row, layer, total, keys, directory, like):
+    if not find_cells(lower, upper, inside, frame, inverse, row, layer, total, keys, directory, like):
         return np.int64(UNEVEN)
-    _place(lower, upper, inside, frame, inverse, keys, directory, order, cells, codes, like)
+    place_objects(lower, upper, inside, frame, inverse, keys, directory, order, cells, codes, like)
     count = np.int64(directory[total])  # without invalid boxes
     at, found = np.int64(0), np.int64(0)
     while at < count and found >= 0:
         held, at = _look_around(at, count, row, layer, directory, order, cells, codes, work, like)
         found = _test(held, work, lower, upper, order, first, second, found, like)
     if found >= 0:
-        found = _look_inside(
-            inside, outside, lower, upper, frame, inverse, row, layer, directory, order, first, second, found, like
+        found = look_inside(
+            others, lower, upper, frame, inverse, row, layer, directory, order, first, second, found, like
         )
     return found
 
@@ -280,24 +285,27 @@ class EvenGrid:
 
     def pairs(
         self, lower: NDArray[np.float64], upper: NDArray[np.float64], frame: NDArray[np.float64], inside: int,
-        outside: int,
+        others: NDArray[np.int32],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:  # fmt: skip
-        """Rows (first, second) of all overlapping pairs of rows 0..inside-1, and of these with rows inside..outside-1.
+        """Rows (first, second) of all overlapping pairs of rows 0..inside-1, and of these with rows ``others`` (k,).
 
         frame (FRAME_SIZE,): the lowest and the highest coordinates of the boxes of rows 0..inside-1, and their longest
-        edge. None if a grid does not suit them. The arrays are views that hold until the next call.
+        edge. None if a grid does not suit them, or if there are more pairs than allowed: the tree counts them. The
+        arrays are views that hold until the next call.
         """
         if inside > len(self._keys):
             self._reserve(inside)
         while True:
             found = even_pairs(
-                lower, upper, inside, outside, frame, self._keys, self._directory, self._order, self._cells,
+                lower, upper, inside, others, frame, self._keys, self._directory, self._order, self._cells,
                 self._codes, self._work, self._first, self._second, self._like,
             )  # fmt: skip
             if found == UNEVEN:
                 return None
             if found != FULL:
                 return self._first[:found], self._second[:found]
+            if len(self._first) >= CANDIDATE_LIMIT:
+                return None
             room = 2 * len(self._first)
             self._first, self._second = np.empty(room, np.int32), np.empty(room, np.int32)
 

@@ -1,4 +1,4 @@
-"""The buffers of the event loop: a queue of impacts to come and a log of those that were."""
+"""The buffers of the event loop: a queue of impacts to come, a log of those that were, and whose turn it is."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ class EventQueue:
     """events (m, 3): pair and how often each body had been struck when the event was made; with times and order keys.
 
     values (m, 2 + 3 d): time, change of the speed along the normal, normal, point, change along the surface. heap (m,):
-    indices of events. log_pair (k,), log_value (k, 2 + 2 d): time, impulse, normal, point. counts (6,).
+    indices of events. log_pair (k,), log_value (k, 2 + 2 d): time, impulse, normal, point. counts (6,). heads,
+    links, looks: whose pairs are looked at, see ``impacts``.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -21,6 +22,8 @@ class EventQueue:
         self.values = np.empty((0, 2 + 3 * dimensions))
         self.heap = np.empty(0, np.int64)
         self.log_pair, self.log_value = np.empty(0, np.int64), np.empty((0, 2 + 2 * dimensions))
+        self.links, self.looks = np.empty(0, np.int32), np.empty(0, np.int32)
+        self.heads = np.empty(0, np.int32)
         self.grow(64)
 
     @property
@@ -29,7 +32,11 @@ class EventQueue:
         queue = (self.events, self.times, self.keys, self.values, self.heap)
         return *queue, self.log_pair, self.log_value, self.counts
 
-    def begin(self) -> None:
+    def begin(self, bodies: int, pairs: int) -> None:
+        if len(self.heads) != bodies:
+            self.heads = np.empty(bodies, np.int32)
+        if len(self.looks) <= pairs:
+            self.links, self.looks = np.empty(4 * pairs, np.int32), np.empty(2 * pairs + 1, np.int32)
         self.counts[:] = 0
         self.counts[LAST] = -1
 

@@ -54,6 +54,12 @@ class FewBoxes:
         self.count = stop - start
         self._tree = self._layout = None
 
+    def take(self, lower: np.ndarray, upper: np.ndarray, rows: np.ndarray) -> None:
+        """Take the boxes of any rows (k,) int32."""
+        self.boxes = np.concatenate((lower[rows], upper[rows]), axis=1)
+        self.rows, self.count = rows, len(rows)
+        self._tree = self._layout = None
+
     @property
     def layout(self) -> tuple[np.ndarray, ...]:
         """As that of a tree whose only level has one cell."""

@@ -9,7 +9,6 @@ import numpy as np
 from ..framework.bodies import SelectedBodies
 from ..framework.compilation import kernel
 from ..framework.schedule import ForceSystem, Phase, System
-from ..framework.vectors import item, replace, store
 from .motion import limit_speeds
 
 if TYPE_CHECKING:
@@ -17,14 +16,25 @@ if TYPE_CHECKING:
 
 
 @kernel
-def sum_constant_forces(force, mass, gravity, gravity_scale, constant, applied, for_step):
-    """force = m g s + the constant force + what was applied."""
-    for i in range(len(force)):
-        total = gravity
+def sum_constant_forces(dynamic, force, mass, gravity, gravity_scale, constant, applied, for_step):
+    """force = m g s + the constant force + what was applied, of the first rows; returns whether anything was applied.
+
+    Over flat columns, see :mod:`flat_columns`.
+    """
+    d, size = len(gravity), force.size
+    force, constant = force.reshape(size), constant.reshape(size)
+    applied, for_step = applied.reshape(size), for_step.reshape(size)
+    for i in range(dynamic):
         weight = mass[i] * gravity_scale[i]
-        for k in range(len(gravity)):
-            total = replace(total, k, weight * item(gravity, k) + constant[i, k] + applied[i, k] + for_step[i, k])
-        store(force, i, total)
+        for k in range(d):
+            j = i * d + k
+            force[j] = weight * gravity[k] + constant[j]
+    pushed = False
+    for j in range(dynamic * d):
+        pushed |= (applied[j] != 0.0) | (for_step[j] != 0.0)
+    for j in range(dynamic * d if pushed else 0):
+        force[j] = force[j] + applied[j] + for_step[j]
+    return pushed
 
 
 class ForceAccumulation(System):
@@ -46,23 +56,24 @@ class ForceAccumulation(System):
         if self._state.limits_speed:
             limit_speeds(self._state)  # before a drag force sees them
         self.evaluate(self.world.time)
-        stages = self._state.integrator().evaluations
-        self.summed = self._state.bodies.dynamic.force.copy() if self.world.force_systems and stages > 1 else None
+        self.summed = None
+        if self.world.force_systems and self._state.integrator().evaluations > 1:
+            self.summed = self._state.bodies.dynamic.force.copy()
         self._state.table.forces_summed = True
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""
         state = self._state
-        dynamic = state.bodies.dynamic
-        if not len(dynamic):
+        arrays, dynamic = state.table.arrays, state.table.stops[0]
+        if not dynamic:
             return
         self.evaluations += 1
-        sum_constant_forces(
-            dynamic.force, dynamic.mass, tuple(state.gravity.tolist()), dynamic.gravity_scale, dynamic.constant_force,
-            dynamic.applied_force, dynamic.step_force,
+        state.pushed = sum_constant_forces(
+            dynamic, arrays["force"], arrays["mass"], state.gravity_numbers, arrays["gravity_scale"],
+            arrays["constant_force"], arrays["applied_force"], arrays["step_force"],
         )  # fmt: skip
         for system in self.world.force_systems:
-            self._add(system, dynamic, time)
+            self._add(system, state.bodies.dynamic, time)
 
     def _add(self, system: ForceSystem, dynamic: Any, time: float) -> None:
         """A force system sees the bodies it requires: columns in place where that is all of them, else copies."""

@@ -10,42 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from ..framework.compilation import inlined, kernel, part
 from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, row, scale, store, sub
-
-AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(5)  # in the order of framework.settings.MIXING_RULES
+from .mixing import mix_friction
 
 TIME_ITERATIONS = 80
 ROUNDING = 4e-16  # of the distance between the centres: a separation smaller than that is none
 
 # places in ``counts``: events made, events waiting, impacts logged, impacts cut off by the cap, the event now, its pair
 EVENTS, WAITING, LOGGED, CAPPED, CURRENT, LAST = range(6)
-
-
-@inlined
-def mix(rule, a, b):
-    """The contact's value from those of its two bodies."""
-    if rule == MAX:
-        return max(a, b)
-    if rule == AVERAGE:
-        return 0.5 * (a + b)
-    if rule == GEOMETRIC_MEAN:
-        return np.sqrt(a * b)
-    if rule == MIN:
-        return min(a, b)
-    return a * b
-
-
-@inlined
-def mix_friction(rule, a, b):
-    """The contact's friction; who has none of his own (NaN) takes the partner's."""
-    if a != a:
-        a = b
-    if b != b:
-        b = a
-    return mix(rule, a, b) if a == a else 0.0
 
 
 @inlined
@@ -135,7 +108,22 @@ def bounce(
     counts[LOGGED] += 1
 
 
-def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
+@inlined
+def link_pairs(pair_a, pair_b, pairs, heads, links):
+    """Chain the pairs of each body, ascending: heads[i] is the first of row i, then follows links[it], till -1.
+
+    An entry is twice the pair for its first body, one more for its second.
+    """
+    for i in range(len(heads)):
+        heads[i] = -1
+    for c in range(pairs - 1, -1, -1):
+        for side in range(2):
+            i = pair_a[c] if side == 0 else pair_b[c]
+            links[2 * c + side] = heads[i]
+            heads[i] = 2 * c + side
+
+
+def make_impact_kernel(evaluate: Any, corner: Any, mix: Any) -> Callable[..., Any]:
     """The event loop over the shapes of a scene."""
 
     @inlined
@@ -201,10 +189,7 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
         speed = dot(w, normal)
         threshold = fixed_threshold
         if threshold < 0.0:
-            threshold = 2.0 * max(
-                gravity_share(a, share, velocity, start_velocity, like),
-                gravity_share(b, share, velocity, start_velocity, like),
-            )
+            threshold = 2.0 * max(share[a], share[b])
         if not speed < -threshold:
             return
         if degree == 1 and e != 1.0:
@@ -218,7 +203,7 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
             counts[CAPPED] += 1
             return
         pull = scale(like, 0.0)
-        mu = mix_friction(rules[1], friction[material[a], a], friction[material[b], b])
+        mu = mix_friction(mix, rules[1], friction[material[a], a], friction[material[b], b])
         if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast = length(sliding)
@@ -241,38 +226,51 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
 
     @kernel
     def resolve_impacts(
-        dt, pair_a, pair_b, responds, offsets, neighbours, rank, size, shape_of, offset, shapes, position, velocity,
-        start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits, share, struck,
-        pair_impulse, pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values,
+        dt, pair_a, pair_b, pairs, responds, hits, supported, heads, links, looks, rank, size, shape_of, offset, shapes,
+        position, velocity, start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits, share,
+        struck, pair_impulse, pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values,
         heap, log_pair, log_value, counts, like,
     ):  # fmt: skip
         """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
 
-        The pairs of row i are neighbours[offsets[i]:offsets[i + 1]]; those behind offsets[bodies] are looked at first.
+        hits: pairs that may have met; so may every pair of a body that is ``supported`` (n,). heads (n,), links
+        (2 pairs,), looks (pairs + 1,): room, see link_pairs.
         restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the
         threshold and the slop (below 0: from the bodies), the most impacts of a body.
-        share (n,): see gravity_share. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
+        share (n,): see reach. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
         the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see
         EVENTS.
         Returns False if the queue or the log may not suffice: call again with larger ones to go on.
         """
-        bodies = len(rank)
+        linked = False
         while True:
             # What is looked at: at first what may have met, later the pairs of the two bodies just struck.
             c = counts[LAST]
-            first, first_stop, second, second_stop = offsets[bodies], len(neighbours), 0, 0
-            if c >= 0:
-                a, b = pair_a[c], pair_b[c]
-                first, first_stop, second, second_stop = offsets[a], offsets[a + 1], offsets[b], offsets[b + 1]
-                if inverse_mass[a] == 0.0:
-                    first_stop = first
-                if inverse_mass[b] == 0.0:
-                    second_stop = second
-            wanted = first_stop - first + second_stop - second
+            wanted = 0
+            if c < 0:
+                for p in range(pairs):
+                    if supported[pair_a[p]] or supported[pair_b[p]]:
+                        looks[wanted] = p
+                        wanted += 1
+                for h in range(len(hits)):
+                    if not (supported[pair_a[hits[h]]] or supported[pair_b[hits[h]]]):
+                        looks[wanted] = hits[h]
+                        wanted += 1
+            else:
+                if not linked:
+                    link_pairs(pair_a, pair_b, pairs, heads, links)
+                    linked = True
+                for side in range(2):
+                    i = pair_a[c] if side == 0 else pair_b[c]
+                    entry = heads[i] if inverse_mass[i] > 0.0 else -1
+                    while entry >= 0:
+                        looks[wanted] = entry // 2
+                        wanted += 1
+                        entry = links[entry]
             if counts[EVENTS] + wanted > len(heap) or counts[LOGGED] == len(log_pair):
                 return False
             for q in range(wanted):
-                p = neighbours[first + q if first + q < first_stop else second + q - (first_stop - first)]
+                p = looks[q]
                 if responds[p]:
                     since = event_times[counts[CURRENT]] if c >= 0 else 0.0
                     consider(
@@ -299,14 +297,6 @@ def make_impact_kernel(evaluate: Any, corner: Any) -> Callable[..., Any]:
     return resolve_impacts
 
 
-@inlined
-def gravity_share(i, share, velocity, start_velocity, like):
-    """What forces change of a body's speed in a step; computed when first asked for (-1 before), before any impact."""
-    if share[i] < 0.0:
-        share[i] = length(sub(row(velocity, i, like), row(start_velocity, i, like)))
-    return share[i]
-
-
 SLOP = 0.005  # of the size of the smaller body
 MARGIN_STEPS = 2.0
 
@@ -325,39 +315,9 @@ def slop_of(a, b, size, fixed):
 
 
 @inlined
-def reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like):
-    """How near a pair is held before it touches: the slop, and twice the way that forces make in a step from rest."""
-    gained = max(
-        gravity_share(a, share, velocity, start_velocity, like), gravity_share(b, share, velocity, start_velocity, like)
-    )
-    return slop_of(a, b, size, fixed_slop) + MARGIN_STEPS * gained * dt
+def reach(dt, a, b, share, size, fixed_slop):
+    """How near a pair is held before it touches: the slop, and twice the way that forces make in a step from rest.
 
-
-@kernel
-def pairs_of_bodies(pair_a, pair_b, pairs, hits, found, supported, bodies, offsets, neighbours):
-    """The pairs of each body: those of row i are neighbours[offsets[i]:offsets[i + 1]], ascending.
-
-    Behind them stand those that may have met: the contacts found, and of bodies that do not fly freely every pair.
-    offsets (bodies + 2,), neighbours (3 * pairs,); returns how much of it is used.
+    share (n,): what forces change of a body's speed in a step.
     """
-    for i in range(bodies + 2):
-        offsets[i] = 0
-    for c in range(pairs):
-        offsets[pair_a[c] + 2] += 1
-        offsets[pair_b[c] + 2] += 1
-    for i in range(2, bodies + 2):
-        offsets[i] += offsets[i - 1]
-    used = 2 * pairs
-    for c in range(pairs):
-        neighbours[offsets[pair_a[c] + 1]] = c
-        offsets[pair_a[c] + 1] += 1
-        neighbours[offsets[pair_b[c] + 1]] = c
-        offsets[pair_b[c] + 1] += 1
-        if supported[pair_a[c]] or supported[pair_b[c]]:
-            neighbours[used] = c
-            used += 1
-    for h in range(found):
-        if not (supported[pair_a[hits[h]]] or supported[pair_b[hits[h]]]):
-            neighbours[used] = hits[h]
-            used += 1
-    return used
+    return slop_of(a, b, size, fixed_slop) + MARGIN_STEPS * max(share[a], share[b]) * dt

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,18 +27,30 @@ class Integration(System):
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
+        self._viewed = -1  # what state.structures was when the views below were taken
+        self._motion: Motion
+        self._starts: tuple[np.ndarray, ...]  # previous_position, position, start_velocity, linear_velocity
+        self._path: np.ndarray
 
     def process(self, dt: float) -> None:
         state, table = self._state, self._state.table
         dynamic, moving = table.stops[0], table.stops[1]
-        arrays, scratch = table.arrays, state.scratch
-        np.copyto(arrays["previous_position"][: table.count], arrays["position"][: table.count])
+        arrays = table.arrays
+        if self._viewed != state.structures:
+            self._take_views(dynamic, moving)
+        before, position, start_velocity, velocity = self._starts
+        table.keep("previous_position")
+        np.copyto(before, position)
+        table.keep("position", before)
         if state.limits_speed:
             limit_speeds(state)  # systems may have pushed since the forces were summed
-        np.copyto(scratch["start_velocity"][:moving], arrays["linear_velocity"][:moving])
+        np.copyto(start_velocity, velocity)
+        # Impacts change the start velocity of a body.
+        table.keep("linear_velocity", None if state.collides else start_velocity)
         integrator = state.integrator()
         if dynamic:
-            motion = self._motion(dynamic)
+            motion = self._motion
+            motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
             integrator.advance(motion, dt)
             if state.limits_speed:
                 limit_speeds(state)
@@ -46,46 +59,51 @@ class Integration(System):
             arrays["position"][dynamic:moving] += dt * arrays["linear_velocity"][dynamic:moving]
         state.path_degree = integrator.path
         self._keep_path(integrator, dt, dynamic, moving)
-        arrays["step_force"][:dynamic] = 0.0
+        if state.pushed or table.everything_kept:
+            table.keep("step_force")
+            arrays["step_force"][:dynamic] = 0.0
         table.forces_summed = False
         state.moved = True
         state.queries.forget()
 
-    def _motion(self, dynamic: int) -> Motion:
-        state = self._state
+    def _take_views(self, dynamic: int, moving: int) -> None:
+        """The arrays are the same until the structure changes."""
+        state, arrays, count = self._state, self._state.table.arrays, self._state.table.count
         names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping", "previous_position")
-        position, velocity, force, inverse_mass, damping, x0 = (state.table.arrays[n][:dynamic] for n in names)
-        v0 = state.scratch["start_velocity"][:dynamic]
-        evaluator = None
-        if self.world.force_systems:
-            forces, start = state.forces, self.world.time
-            # What systems of the game added after the forces were summed acts throughout the step.
-            extra = None if forces.summed is None else force - forces.summed
+        start_velocity, self._path = state.scratch["start_velocity"], state.scratch["path_velocity"][:moving]
+        self._motion = Motion(*(arrays[name][:dynamic] for name in names), start_velocity[:dynamic], None)
+        self._starts = (
+            arrays["previous_position"][:count], arrays["position"][:count],
+            start_velocity[:moving], arrays["linear_velocity"][:moving],
+        )  # fmt: skip
+        self._viewed = state.structures
 
-            def evaluator(seconds: float) -> None:
-                forces.evaluate(start + seconds)
-                if extra is not None and extra.any():
-                    np.add(force, extra, out=force)
+    def _evaluator(self, force: np.ndarray) -> Callable[[float], None]:
+        """Sums the forces at a later moment of the step."""
+        forces, start = self._state.forces, self.world.time
+        # What systems of the game added after the forces were summed acts throughout the step.
+        extra = None if forces.summed is None else force - forces.summed
 
-        return Motion(position, velocity, force, inverse_mass, damping, x0, v0, evaluator)
+        def evaluator(seconds: float) -> None:
+            forces.evaluate(start + seconds)
+            if extra is not None and extra.any():
+                np.add(force, extra, out=force)
+
+        return evaluator
 
     def _keep_path(self, integrator: object, dt: float, dynamic: int, moving: int) -> None:
         """x(t) = x0 + p1 t + p2 t^2 + p3 t^3 for the dynamic bodies, x0 + v t for the kinematic ones."""
         state = self._state
         if not state.collides:
             return
-        arrays, scratch = state.table.arrays, state.scratch
-        start, end = arrays["previous_position"], arrays["position"]
-        v0, v1 = scratch["start_velocity"], arrays["linear_velocity"]
-        path = scratch["path_velocity"]
+        start, end, v0, v1 = self._starts
         degree = state.path_degree
         if degree == LINE:
-            old = getattr(integrator, "moves_with_old_velocity", False)
-            np.copyto(path[:moving], (v0 if old else v1)[:moving])
+            np.copyto(self._path, v0 if getattr(integrator, "moves_with_old_velocity", False) else v1)
             return
-        np.copyto(path[:moving], v0[:moving])
+        np.copyto(self._path, v0)
         state.allocate_curves(degree)
-        second, third = scratch["path_second"], scratch["path_third"]
+        second, third = state.scratch["path_second"], state.scratch["path_third"]
         travel = end[:dynamic] - start[:dynamic]
         if degree == PARABOLA:
             second[:dynamic] = (travel - dt * v0[:dynamic]) / (dt * dt)

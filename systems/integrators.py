@@ -53,7 +53,7 @@ class ExplicitEuler(Integrator):
     moves_with_old_velocity = True
 
     def advance(self, motion: Motion, dt: float) -> None:
-        euler(*motion.arrays, dt, False)
+        euler(*motion.arrays, dt, False, motion.like)
 
 
 class SemiImplicitEuler(Integrator):
@@ -62,7 +62,7 @@ class SemiImplicitEuler(Integrator):
     order, evaluations, path = 1, 1, LINE
 
     def advance(self, motion: Motion, dt: float) -> None:
-        euler(*motion.arrays, dt, True)
+        euler(*motion.arrays, dt, True, motion.like)
 
 
 class VelocityVerlet(Integrator):
@@ -164,18 +164,29 @@ def phi3(z):
 
 
 @kernel
-def euler(position, velocity, force, inverse_mass, damping, h, new_velocity):
-    """v' = v e^(-c h) + a (1 - e^(-c h)) / c; x' = x + h (v' or v)."""
-    for i in range(len(position)):
+def euler(position, velocity, force, inverse_mass, damping, h, new_velocity, like):
+    """v' = v e^(-c h) + a (1 - e^(-c h)) / c; x' = x + h (v' or v); over flat columns, see :mod:`flat_columns`."""
+    size, d = position.size, len(like)
+    x, v, f = position.reshape(size), velocity.reshape(size), force.reshape(size)
+    damped = False
+    for i in range(len(damping)):
+        damped |= damping[i] != 0.0
+    for i in range(0 if damped else len(damping)):  # no exponentials and no branches in this loop
+        for k in range(d):
+            j = i * d + k
+            old = v[j]
+            v[j] = new = old + f[j] * inverse_mass[i] * h
+            x[j] += h * (new if new_velocity else old)
+    for i in range(len(damping) if damped else 0):
         c = damping[i]
         decay, gain = 1.0, h
         if c != 0.0:
             decay, gain = math.exp(-c * h), h * phi1(-c * h)
-        for k in range(position.shape[1]):
-            old = velocity[i, k]
-            new = old * decay + force[i, k] * inverse_mass[i] * gain
-            velocity[i, k] = new
-            position[i, k] += h * (new if new_velocity else old)
+        for k in range(d):
+            j = i * d + k
+            old = v[j]
+            v[j] = new = old * decay + f[j] * inverse_mass[i] * gain
+            x[j] += h * (new if new_velocity else old)
 
 
 @kernel

@@ -18,11 +18,13 @@ class SceneKernels:
     def __init__(self, code: ShapeCode) -> None:
         self.box_motion: Any = make_box_kernel(code.shape_bounds, code.write_world)
         self.find_contacts: Any = make_narrow_kernel(code.evaluate)
-        self.resolve_impacts: Any = make_impact_kernel(code.evaluate, code.corner)
+        self.resolve_impacts: Any = make_impact_kernel(code.evaluate, code.corner, code.mix)
         self.find_resting: Any
         self.linearise: Any
         self.find_touching: Any
-        self.find_resting, self.linearise, self.find_touching = make_resting_kernels(code.evaluate, code.corner)
+        self.find_resting, self.linearise, self.find_touching = make_resting_kernels(
+            code.evaluate, code.corner, code.mix
+        )
 
 
 @lru_cache(maxsize=64)

@@ -36,6 +36,11 @@ class Motion:
         return self.position, self.velocity, self.force, self.inverse_mass, self.damping
 
     @property
+    def like(self) -> tuple[float, ...]:
+        """Zeros, one for each dimension."""
+        return (0.0,) * self.position.shape[1]
+
+    @property
     def force_changes(self) -> bool:
         """Whether some force depends on position, velocity or time; else the forces of the start hold throughout."""
         return self.evaluator is not None
@@ -71,5 +76,6 @@ def limit_distance(points, origins, speed, seconds):
 def limit_speeds(state: PhysicsState) -> None:
     """Shorten the velocities of the dynamic bodies that exceed their max_linear_speed."""
     dynamic = state.bodies.dynamic
+    state.table.keep("linear_velocity")
     velocity = dynamic.linear_velocity
     limit_distance(velocity, np.zeros_like(velocity), dynamic.max_linear_speed, 1.0)

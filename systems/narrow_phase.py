@@ -8,15 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..framework.compilation import kernel
+from ..framework.compilation import inlined, kernel
 from ..framework.schedule import Phase, System
-from ..framework.vectors import add, row, store, sub
+from ..framework.vectors import add, length, row, store, sub
 from .impacts import reach
 from .levels import COUNTERS
+from .pair_filters import filtered
 
 if TYPE_CHECKING:
     from .shape_code import ShapeCode
     from .state import PhysicsState
+
+
+@inlined
+def all_layers_meet(layers, masks, bodies):
+    """Whether no layer or mask keeps any two bodies apart (usual, and then no pair need be asked)."""
+    apart = False
+    for slot in range(len(layers)):
+        for i in range(bodies):
+            apart |= masks[slot, i] != -1 or layers[slot, i] == 0
+    return not apart
 
 
 def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tuple[int, int, int, int, int]]:
@@ -27,9 +38,9 @@ def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tu
 
     @kernel
     def find_contacts(
-        first, second, position, levels, level_offsets, outgrown, material, shapes, layers, masks, all_meet,
+        first, second, bodies, entity, position, levels, level_offsets, outgrown, material, shapes, layers, masks,
         sensors, inverse_mass, dt, velocity, start_velocity, share, size, fixed_slop, pair_a, pair_b, responds,
-        pair_depth, hits, depths, normals, points, like,
+        involved, pair_depth, pair_normal, pair_point, hits, hit_a, hit_b, like,
     ):  # fmt: skip
         """Drop pairs whose layers do not meet, test the rest, level by level.
 
@@ -37,11 +48,16 @@ def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tu
         every level does, and the last one gives the contact. outgrown: whether a body's last level may reach out of
         one around it. material: the slot of the collider that gives layer, mask and sensor.
         pair_a, pair_b, responds, pair_depth (m,): the pairs kept, whether they push each other, and their overlap.
-        hits: their indices that touch, with depth, normal and point in the world; with dt above 0 also those so near
-        that the response may push them, with a negative depth. share (n,): see ``impacts.gravity_share``.
+        involved (m,): those that touch, or are so near that the response may push them, with a negative depth. hits,
+        hit_a, hit_b: the indices and entities of the contacts, which are the former and, with dt above 0, the latter;
+        they have pair_normal and pair_point, in the world. share (n,): what forces change of a body's speed in this
+        step, made here.
         Returns (pairs kept, hits, pairs tested by cheaper levels first, those of them that their first levels let
         pass, those of these that another level has kept apart).
         """
+        for i in range(bodies):
+            share[i] = length(sub(row(velocity, i, like), row(start_velocity, i, like))) if dt > 0.0 else 0.0
+        all_meet = all_layers_meet(layers, masks, bodies)
         kept, found = 0, 0
         tested, passed, wrong = 0, 0, 0
         last = len(levels) - 1 if several else 0
@@ -61,7 +77,7 @@ def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tu
             first_hit = False
             margin = 0.0
             if several and dt > 0.0 and responds[kept]:
-                margin = reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like)
+                margin = reach(dt, a, b, share, size, fixed_slop)
             for level in range(last + 1):
                 shape_a, shape_b = levels[level, a], levels[level, b]
                 centre = add(row(position, a, like), row(level_offsets[level], a, like))
@@ -85,13 +101,12 @@ def make_narrow_kernel(evaluate: Any, several: bool = False) -> Callable[..., tu
             if first_hit and not hit:
                 wrong += 1
             pair_depth[kept] = depth
-            if dt > 0.0 and not hit and responds[kept]:
-                hit = depth >= -reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like)
-            if hit:
-                hits[found] = kept
-                depths[found] = depth
-                store(normals, found, normal)
-                store(points, found, add(centre, point))
+            near = hit or (responds[kept] and depth >= -reach(dt, a, b, share, size, fixed_slop))
+            involved[kept] = near
+            if hit or (near and dt > 0.0):
+                store(pair_normal, kept, normal)
+                store(pair_point, kept, add(centre, point))
+                hits[found], hit_a[found], hit_b[found] = kept, entity[a], entity[b]
                 found += 1
             kept += 1
         return kept, found, tested, passed, wrong
@@ -128,26 +143,27 @@ class NarrowPhase(System):
 
     def _test(self, dt: float) -> None:
         state = self._state
-        first, second = state.sort_candidates()
-        kept, found, *counts = self._find(
-            dt, first, second, state.pair_a, state.pair_b, state.responds, state.pair_depth, state.hits, state.depths,
-            state.normals, state.points,
-        )  # fmt: skip
-        for name, count in zip(COUNTERS, counts, strict=True):
-            state.pair_counters[name] += count
+        first, second = filtered(state, *state.sort_candidates())
+        with state.blame:
+            kept, found, *counts = self._find(
+                dt, first, second, state.pair_a, state.pair_b, state.responds, state.involved, state.pair_depth,
+                state.pair_normal, state.pair_point, state.hits, state.hit_a, state.hit_b,
+            )  # fmt: skip
+        if len(state.levels) > 1:
+            for name, count in zip(COUNTERS, counts, strict=True):
+                state.pair_counters[name] += count
         state.set_pairs(kept, found)
 
     def _find(self, dt: float, first: np.ndarray, second: np.ndarray, *out: np.ndarray) -> tuple[int, ...]:
         """Call the kernel; ``out``: what it fills."""
         state, arrays, stacks = self._state, self._state.table.arrays, self._state.table.stacks
         scratch, slop = state.scratch, state.world.settings.slop
-        scratch["gravity_share"][: state.table.count] = -1.0
         several = len(state.levels) > 1
         find_contacts = narrow_kernel_with_levels(state.code) if several else state.kernels.find_contacts
         return find_contacts(
-            first, second, arrays["position"], state.levels, state.level_offsets, state.outgrown,
-            scratch["material"], state.world_shapes, stacks["collider.layer"], stacks["collider.mask"],
-            state.all_layers_meet(), stacks["collider.sensor"], arrays["inverse_mass"], dt if state.moved else 0.0,
+            first, second, state.table.count, arrays["entity"], arrays["position"], state.levels, state.level_offsets,
+            state.outgrown, scratch["material"], state.world_shapes, stacks["collider.layer"],
+            stacks["collider.mask"], stacks["collider.sensor"], arrays["inverse_mass"], dt if state.moved else 0.0,
             arrays["linear_velocity"], scratch["start_velocity"], scratch["gravity_share"], scratch["size"],
             -1.0 if slop is None else slop, *out, state.like,
         )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,14 +15,40 @@ from .pair_order import collect_contacts, sort_pairs
 if TYPE_CHECKING:
     from ..framework.table import Table
 
+Columns = dict[str, np.ndarray]
+NONE = np.empty(0, np.int64)
+
+
+class LateColumns(Columns):
+    """Columns that are made when somebody asks for one."""
+
+    def __init__(self, make: Callable[[], Columns]) -> None:
+        super().__init__()
+        self._make = make
+
+    def __missing__(self, key: str) -> np.ndarray:
+        if self:
+            raise KeyError(key)
+        self.fill()
+        return self[key]
+
+    def fill(self) -> None:
+        """Make them now, if they are not there yet."""
+        if not self:
+            self.update(self._make())
+
+    def __reduce__(self) -> tuple[type, tuple[Columns]]:  # so that copies are plain
+        self.fill()
+        return dict, (dict(self),)
+
 
 class PairBuffers:
     """Mixed into the physics state.
 
     candidates: rows (first, second) from the broad phase. pair_a, pair_b, responds (m,): the pairs whose layers meet,
-    a's entity id the smaller. hits (found,): indices of the pairs that touch at the end of their motion, with depths,
-    normals, points. pair_impulse, pair_normal, pair_point, pair_depth, pair_parts (see ``resting``): per pair, what
-    the response made of it.
+    a's entity id the smaller. hits (found,): indices of the pairs that touch or nearly do at the end of their motion,
+    with their entities; involved (m,): whether a pair may have to do with the response. pair_depth, pair_normal,
+    pair_point: per pair, how it touches; pair_impulse, pair_parts (see ``resting``): what the response made of it.
     """
 
     table: Table
@@ -34,13 +62,11 @@ class PairBuffers:
         self.candidates = (self.no_pairs, self.no_pairs)
         self.candidates_ready = self.contacts_ready = False
         self.pairs = self.found = 0
-        self._starts = np.empty(0, np.int64)
-        self.resting = np.empty(0, np.int64)
-        self.impact_pairs = np.empty(0, np.int64)
-        self.step_impacts: dict[str, np.ndarray] | None = None
+        self._starts = NONE
+        self.resting = self.impact_pairs = NONE
+        self.step_impacts: Columns | None = None
         self._no_contacts = empty_columns(dimensions, enabled=True)
         self.contact_columns = self._no_contacts
-        self._contact_pairs = np.empty(0, np.int64)  # the pair behind each row of the contacts
         names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "resting_contacts")
         self.pair_counters = dict.fromkeys(names, 0)
         self._allocate(64)
@@ -49,9 +75,8 @@ class PairBuffers:
         d = self.dimensions
         self.pair_a, self.pair_b = np.empty(size, np.int64), np.empty(size, np.int64)
         self._half_a, self._half_b = np.empty(size, np.int64), np.empty(size, np.int64)
-        self.responds = np.empty(size, bool)
-        self.hits, self.depths = np.empty(size, np.int64), np.empty(size)
-        self.normals, self.points = np.empty((size, d)), np.empty((size, d))
+        self.responds, self.involved = np.empty(size, bool), np.empty(size, bool)
+        self.hits, self.hit_a, self.hit_b = (np.empty(size, np.int64) for _ in range(3))
         self.pair_impulse, self.pair_depth = np.empty(size), np.empty(size)
         self.pair_parts = np.empty(size, np.uint8)
         self.pair_normal, self.pair_point = np.empty((size, d)), np.empty((size, d))
@@ -61,7 +86,7 @@ class PairBuffers:
         self.candidates_ready = self.contacts_ready = False
         self.pairs = self.found = 0
         self.step_impacts = None
-        self.resting = self.impact_pairs = np.empty(0, np.int64)
+        self.resting = self.impact_pairs = NONE
 
     def set_candidates(self, first: np.ndarray, second: np.ndarray) -> None:
         self.candidates = (first, second)
@@ -71,6 +96,8 @@ class PairBuffers:
 
     def sort_candidates(self) -> tuple[np.ndarray, np.ndarray]:
         """The candidates in canonical order, at the start of pair_a and pair_b, where all have room."""
+        if isinstance(self.contact_columns, LateColumns):  # no response has replaced them: they are read any time
+            self.contact_columns.fill()
         first, second = self.candidates
         count = len(first)
         if count > len(self.pair_a):
@@ -88,63 +115,66 @@ class PairBuffers:
 
     def take_enabled(self) -> np.ndarray:
         """Pairs whose contact a system has disabled push no more in this step; returns which they are."""
+        if "enabled" not in self.contact_columns:  # nobody has looked at the contacts
+            return self.no_pairs
         enabled = self.contact_columns["enabled"]
         if enabled.all():
             return self.no_pairs
-        disabled = self._contact_pairs[~enabled]
+        disabled = self.hits[: self.found][~enabled]
         self.responds[disabled] = False
         return disabled
 
     def publish_found(self) -> None:
         """The contacts' columns after NARROW: what overlaps where free flight leads, or is near."""
-        if not self.found:
-            self._publish(self.no_pairs, self._no_contacts)
-            return
-        pairs = self.hits[: self.found].copy()
-        depth, normal, point = (array[: self.found].copy() for array in (self.depths, self.normals, self.points))
-        self._publish(pairs, self._columns(pairs, depth, normal, point, np.zeros(self.found)))
+        late = partial(self._found_columns, self.found, self.world.step_count)
+        self._publish(LateColumns(late) if self.found else self._no_contacts)
+
+    def _found_columns(self, found: int, step: int) -> Columns:
+        pairs = self.hits[:found]
+        return {
+            "entity_a": self.hit_a[:found].copy(),
+            "entity_b": self.hit_b[:found].copy(),
+            "point": self.pair_point[pairs],
+            "normal": self.pair_normal[pairs],
+            "depth": self.pair_depth[pairs],
+            "normal_impulse": np.zeros(found),
+            "step": np.full(found, step),
+            "enabled": np.ones(found, bool),
+        }
 
     def publish_final(self, pairs: np.ndarray, disabled: np.ndarray) -> None:
         """The contacts' columns after RESPONSE; disabled: the pairs that were not to push."""
-        self.pair_counters["contacts"] += len(pairs)
-        self.pair_counters["resting_contacts"] += len(self.resting)
-        if not len(pairs):
-            self._publish(self.no_pairs, self._no_contacts)
-            return
         d, count = self.dimensions, len(pairs)
-        depth, normal, point, impulse = np.empty(count), np.empty((count, d)), np.empty((count, d)), np.empty(count)
-        columns = self._columns(pairs, depth, normal, point, impulse)
+        self.pair_counters["contacts"] += count
+        self.pair_counters["resting_contacts"] += len(self.resting)
+        if not count:
+            self._publish(self._no_contacts)
+            return
+        columns = {
+            "entity_a": np.empty(count, np.int64),
+            "entity_b": np.empty(count, np.int64),
+            "point": np.empty((count, d)),
+            "normal": np.empty((count, d)),
+            "depth": np.empty(count),
+            "normal_impulse": np.empty(count),
+            "step": np.empty(count, np.int64),
+            "enabled": np.empty(count, bool),
+        }
         collect_contacts(
-            pairs, self.pair_depth, self.pair_normal, self.pair_point, self.pair_impulse, depth, normal, point, impulse
-        )
+            pairs, self.table.arrays["entity"], self.pair_a, self.pair_b, self.pair_depth, self.pair_normal,
+            self.pair_point, self.pair_impulse, self.world.step_count, *columns.values(),
+        )  # fmt: skip
         if len(disabled):
             columns["enabled"][np.isin(pairs, disabled)] = False
-        self._publish(pairs, columns)
+        self._publish(columns)
 
-    def _columns(
-        self, pairs: np.ndarray, depth: np.ndarray, normal: np.ndarray, point: np.ndarray, impulse: np.ndarray
-    ) -> dict[str, np.ndarray]:
-        entity = self.table.arrays["entity"]
-        return {
-            "entity_a": entity[self.pair_a[pairs]],
-            "entity_b": entity[self.pair_b[pairs]],
-            "point": point,
-            "normal": normal,
-            "depth": depth,
-            "normal_impulse": impulse,
-            "step": np.full(len(pairs), self.world.step_count),
-            "enabled": np.ones(len(pairs), bool),
-        }
-
-    def _publish(self, pairs: np.ndarray, columns: dict[str, np.ndarray]) -> None:
-        self._contact_pairs, self.contact_columns = pairs, columns
+    def _publish(self, columns: Columns) -> None:
+        self.contact_columns = columns
         self.contacts.set_current(columns)
 
     def log_impacts(self, pairs: np.ndarray, values: np.ndarray, counts: np.ndarray) -> None:
         """Record the impacts of the step, in the order of their times; values: time, impulse, normal, point."""
         logged, capped = int(counts[LOGGED]), int(counts[CAPPED])
-        pair, value = pairs[:logged].copy(), values[:logged]
-        self.impact_pairs = pair
         self.pair_counters["impacts"] += logged
         self.pair_counters["capped_impacts"] += capped
         if capped:
@@ -154,6 +184,8 @@ class PairBuffers:
             )
         if not logged:
             return
+        self.impact_pairs = pair = pairs[:logged].copy()
+        value = values[:logged]
         entity, d = self.table.arrays["entity"], self.dimensions
         self.step_impacts = {
             "entity_a": entity[self.pair_a[pair]],

@@ -39,11 +39,13 @@ def sort_pairs(first, second, rank, starts, half_a, half_b, sorted_a, sorted_b):
 
 @kernel
 def collect_contacts(
-    pairs, pair_depth, pair_normal, pair_point, pair_impulse, depth, normal, point, impulse,
+    pairs, entity, pair_a, pair_b, pair_depth, pair_normal, pair_point, pair_impulse, now, entity_a, entity_b, point,
+    normal, depth, impulse, step, enabled,
 ):  # fmt: skip
-    """Copy what is known of some pairs (k,) into columns of their own."""
+    """Copy what is known of some pairs (k,) into columns of their own; now: the number of the step."""
     for r in range(len(pairs)):
         c = pairs[r]
-        depth[r], impulse[r] = pair_depth[c], pair_impulse[c]
+        entity_a[r], entity_b[r] = entity[pair_a[c]], entity[pair_b[c]]
+        depth[r], impulse[r], step[r], enabled[r] = pair_depth[c], pair_impulse[c], now, True
         for axis in range(normal.shape[1]):
             normal[r, axis], point[r, axis] = pair_normal[c, axis], pair_point[c, axis]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .state import PhysicsState
 
 STEPS = 3  # contacts begin, stay and end
+MANY = 4 * FEW  # static bodies, more than move
 LANE = 8.0  # m between things that are not to meet; samples of shapes are about one metre wide
 
 
@@ -93,13 +94,16 @@ def _strike_and_rest(world: World, colliders: list[type[Collider]]) -> None:
 
 
 def _crowd(world: World, collider: type[Collider], count: int) -> None:
-    """So many moving and so many static bodies: enough for trees, of several levels because speeds differ."""
-    places = np.zeros((count, world.dimensions))
-    places[:, 0] = 2.0 * LANE + LANE * np.arange(count)
+    """So many moving bodies: enough for trees, of several levels because speeds differ. And static ones: as many, or,
+    where none of these move, enough for a grid of them."""
+    places = np.zeros((count or MANY, world.dimensions))
+    behind, beside = np.divmod(np.arange(len(places)), count or 32)
+    places[:, 0], places[:, 1] = 2.0 * LANE * (1 + beside), -2.0 * LANE * behind
     for index, place in enumerate(places):
         velocity = np.zeros(world.dimensions)
         velocity[1] = 4.0 ** (index % 6) / world.settings.dt
-        world.create_entity(Transform(place), RigidBody(linear_velocity=velocity), collider.sample())
+        if count:
+            world.create_entity(Transform(place), RigidBody(linear_velocity=velocity), collider.sample())
         world.create_entity(Transform(place), collider.sample())
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..framework.schedule import Phase, System
-from ..framework.settings import MIXING_RULES
+from ..framework.settings import Settings
 from .contact_solver import ContactSolver
 from .event_queue import EventQueue
-from .impacts import pairs_of_bodies
+from .mixing import rule_number
 
 if TYPE_CHECKING:
     from .state import PhysicsState
@@ -29,21 +29,37 @@ class Response(System):
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
         self._queue = EventQueue(state.dimensions)
+        self._settings: Settings | None = None
+        self._bounces = False
         state.contact_solver = self._solver = ContactSolver(state)
 
     def process(self, dt: float) -> None:
         state = self._state
         if not state.contacts_ready:
             state.narrow_phase.process(dt)
-        if not state.pairs and not self._solver.memory.count:
+        near = state.found if state.moved else state.pairs  # in a step, who is near at its end is among those found
+        if not near and not self._solver.memory.count:
             return
+        self._read_settings(state.world.settings)
         disabled = state.take_enabled()
         self._start_paths()
         self._solver.predict(dt, disabled)
-        struck = self._impacts(dt)
-        resting = self._resting(dt, struck)
-        self._solver.solve(dt, resting)
-        self._publish(disabled)
+        with state.blame:
+            struck = self._impacts(dt)
+            resting = self._resting(dt, struck)
+            self._solver.solve(dt, resting)
+            self._publish(disabled)
+
+    def _read_settings(self, settings: Settings) -> None:
+        """As the kernels take them."""
+        if settings is self._settings:
+            return
+        self._settings = settings
+        self._restitution_rule = rule_number(self.world.registry, settings.restitution_mixing)
+        self._friction_rule = rule_number(self.world.registry, settings.friction_mixing)
+        self._threshold = -1.0 if settings.restitution_threshold is None else float(settings.restitution_threshold)
+        self._slop = -1.0 if settings.slop is None else float(settings.slop)
+        self._cap = settings.max_impacts_per_step
 
     def _start_paths(self) -> None:
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
@@ -61,30 +77,23 @@ class Response(System):
     def _impacts(self, dt: float) -> np.ndarray:
         """Bounce what bounces; returns how often each row was struck."""
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
-        settings, count, stacks = self.world.settings, state.table.count, state.table.stacks
+        count, stacks = state.table.count, state.table.stacks
         struck = np.zeros(count, np.int64)
         restitution = stacks["collider.restitution"]
-        if not state.pairs or not restitution[:, :count].any():
+        if not state.found and not self._solver.any_support:
             return struck
-        offsets = np.empty(count + 2, np.int64)
-        neighbours = np.empty(3 * state.pairs, np.int64)
-        used = pairs_of_bodies(
-            state.pair_a, state.pair_b, state.pairs, state.hits, state.found, self._solver.supported, count, offsets,
-            neighbours,
-        )  # fmt: skip
-        if used == 2 * state.pairs:
-            return struck
+        if not self._bounces:  # once something has bounced this is not asked again: the kernel is there
+            self._bounces = bool(restitution[:, :count].any())
+            if not self._bounces:
+                return struck
         queue = self._queue
-        queue.begin()
+        queue.begin(count, state.pairs)
         curves = (scratch["path_second"], scratch["path_third"])
         motion = (scratch["origin"], scratch["path_velocity"], *curves, state.path_degree)
-        rules = (MIXING_RULES.index(settings.restitution_mixing), MIXING_RULES.index(settings.friction_mixing))
-        threshold, slop = settings.restitution_threshold, settings.slop
-        limits = (
-            -1.0 if threshold is None else threshold, -1.0 if slop is None else slop, settings.max_impacts_per_step,
-        )  # fmt: skip
+        rules, limits = (self._restitution_rule, self._friction_rule), (self._threshold, self._slop, self._cap)
         while not state.kernels.resolve_impacts(
-            dt, state.pair_a, state.pair_b, state.responds, offsets, neighbours[:used], state.rank, scratch["size"],
+            dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.hits[: state.found],
+            self._solver.supported, queue.heads, queue.links, queue.looks, state.rank, scratch["size"],
             scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
             scratch["start_velocity"], arrays["inverse_mass"], motion, restitution, stacks["collider.friction"], rules,
             scratch["material"], limits, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
@@ -97,18 +106,15 @@ class Response(System):
     def _resting(self, dt: float, struck: np.ndarray) -> np.ndarray:
         """The pairs that neither bounce nor are apart."""
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
-        settings = self.world.settings
-        threshold, slop = settings.restitution_threshold, settings.slop
         result = np.empty(state.pairs, np.int64)
         if not state.pairs:
             return result
         count = state.kernels.find_resting(
-            dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.pair_depth, scratch["shape"],
-            scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
-            scratch["start_velocity"], state.start_positions, scratch["size"],
+            dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.involved, state.pair_depth,
+            scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
+            state.start_positions, scratch["size"],
             state.table.stacks["collider.restitution"], scratch["material"],
-            MIXING_RULES.index(settings.restitution_mixing),
-            -1.0 if threshold is None else threshold, -1.0 if slop is None else slop, scratch["gravity_share"], struck,
+            self._restitution_rule, self._threshold, self._slop, scratch["gravity_share"], struck,
             self._solver.supported, self._solver.change, self._solver.travels * dt, state.pair_impulse,
             state.pair_parts, result, state.like,
         )  # fmt: skip
@@ -120,14 +126,12 @@ class Response(System):
         if not state.pairs:
             state.publish_final(state.no_pairs, disabled)
             return
-        involved = np.zeros(state.pairs, bool)
-        for pairs in (state.hits[: state.found], state.resting, state.impact_pairs):
-            involved[pairs] = True
         touching = np.empty(state.pairs, np.int64)
         count = state.kernels.find_touching(
-            state.pair_a, state.pair_b, state.pairs, state.responds, involved, scratch["shape"], scratch["offset"],
-            state.world_shapes, arrays["position"], scratch["size"], state.pair_impulse, state.pair_depth,
-            state.pair_normal, state.pair_point, touching, state.like,
+            state.pair_a, state.pair_b, state.pairs, state.responds, state.involved, state.resting,
+            state.impact_pairs, scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"],
+            scratch["size"], state.pair_impulse, state.pair_depth, state.pair_normal, state.pair_point, touching,
+            state.like,
         )  # fmt: skip
         state.publish_final(touching[:count], disabled)
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from ..framework.compilation import inlined, kernel, part
 from ..framework.vectors import add, add_scaled, dot, row, store, sub
-from .impacts import mix, mix_friction, reach, slop_of, smaller
+from .impacts import reach, slop_of, smaller
+from .mixing import mix_friction
 
 ENTRY_ITERATIONS = 24
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
@@ -21,7 +22,7 @@ def between(a, b, position, offset, like):
     return sub(at_b, at_a)
 
 
-def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any], Callable[..., None], Any]:
+def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable[..., Any], Callable[..., None], Any]:
     """The kernels over the shapes of a scene: (find the contacts at rest, linearise them, measure what touches)."""
 
     @inlined
@@ -63,24 +64,27 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
 
     @kernel
     def find_resting(
-        dt, pair_a, pair_b, pairs, responds, pair_depth, shape_of, offset, shapes, position, velocity, start_velocity,
+        dt, pair_a, pair_b, pairs, responds, involved, pair_depth, shape_of, offset, shapes, position, velocity,
         start, size, restitution, material, rule, fixed_threshold, fixed_slop, share, struck, supported, change,
         travelled, pair_impulse, pair_parts, result, like,
     ):  # fmt: skip
         """Pairs whose gap is below the margin after the impacts and that are not bouncing; returns how many.
 
-        pair_depth (m,) is that of the free flight, and still holds for bodies neither struck nor supported. supported
-        (n,), change (n, d): see ``support``; travelled: the displacement by the latter, over it.
+        pair_depth (m,) is that of the free flight, and still holds for bodies neither struck nor supported; only who is
+        ``involved`` (m,) may be near then. supported (n,), change (n, d): see ``support``; travelled: the displacement
+        by the latter, over it.
         """
         count = 0
         for c in range(pairs):
             if not responds[c]:
                 continue
             a, b = pair_a[c], pair_b[c]
-            slop = slop_of(a, b, size, fixed_slop)
-            margin = reach(dt, a, b, velocity, start_velocity, share, size, fixed_slop, like)
             hit = struck[a] > 0 or struck[b] > 0
             carried = supported[a] or supported[b]
+            if not involved[c] and not hit and not carried:
+                continue
+            slop = slop_of(a, b, size, fixed_slop)
+            margin = reach(dt, a, b, share, size, fixed_slop)
             near = pair_depth[c] >= -margin and not hit
             if not near and not hit and not carried:
                 continue
@@ -148,17 +152,21 @@ def make_resting_kernels(evaluate: Any, corner: Any) -> tuple[Callable[..., Any]
             # After a blow at time t the body seems to come from dv t behind: no overlap to be pushed out.
             parting[k] = pair_parts[c] == PARTS or (pair_impulse[c] > 0.0 and gap > 0.0)
             extents[k] = smaller(a, b, size)
-            frictions[k] = mix_friction(rule, friction[material[a], a], friction[material[b], b])
+            frictions[k] = mix_friction(mix, rule, friction[material[a], a], friction[material[b], b])
 
     @kernel
     def find_touching(
-        pair_a, pair_b, pairs, responds, involved, shape_of, offset, shapes, position, size, pair_impulse, pair_depth,
-        pair_normal, pair_point, result, like,
+        pair_a, pair_b, pairs, responds, involved, resting, struck, shape_of, offset, shapes, position, size,
+        pair_impulse, pair_depth, pair_normal, pair_point, result, like,
     ):  # fmt: skip
         """Pairs that touch now that all is done, or pushed each other in the step; returns how many.
 
-        involved (m,): pairs that may; those that push nobody are looked at in any case.
+        Those that may are the ``involved`` (m,), the resting and struck ones, and those that push nobody.
         """
+        for r in range(len(resting)):
+            involved[resting[r]] = True
+        for r in range(len(struck)):
+            involved[struck[r]] = True
         count = 0
         for c in range(pairs):
             if responds[c] and not involved[c]:

@@ -24,6 +24,7 @@ from ..framework.compilation import deep_hash, inlined, kernel
 from ..framework.component import Component
 from ..framework.registry import Pair, Registry, Shape
 from ..framework.vectors import axes_at, dot, negative, row, store, sub
+from .mixing import mixing
 
 # Places in the trace.
 ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B = range(5)
@@ -48,6 +49,7 @@ class ShapeCode:
     corner(shape_a, a, shape_b, b, d, slop, shapes, like) -> whether the two touch at a corner only, which is no contact
     shape_bounds(shape, row, shapes, like) -> half extents
     write_world(shape, row, shapes, world, turn, axes, like); writes the parameters as turned into ``world``
+    mix(rule, a, b) -> the contact's restitution or friction, see :mod:`mixing`
     unhandled
         pairs of indices, of shapes that no plugin has a pair for
 
@@ -59,6 +61,7 @@ class ShapeCode:
     corner: Any
     shape_bounds: Any
     write_world: Any
+    mix: Any
     turns: bool
     unhandled: tuple[tuple[int, int], ...]
 
@@ -78,13 +81,16 @@ def shape_code(registry: Registry, components: list[type[Component]], dimensions
     pairs = {
         (i, j): registry.pair(components[i], components[j]) for i in range(len(shapes)) for j in range(i, len(shapes))
     }
-    key = (dimensions, shapes, tuple(pairs.values()))
+    rules = tuple(registry.mixing_rules.values())
+    key = (dimensions, shapes, tuple(pairs.values()), rules)
     if key not in _made:
-        _made[key] = _make(shapes, pairs, dimensions)
+        _made[key] = _make(shapes, pairs, rules, dimensions)
     return _made[key]
 
 
-def _make(shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], dimensions: int) -> ShapeCode:
+def _make(
+    shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], rules: tuple[Any, ...], dimensions: int
+) -> ShapeCode:
     scope: dict[str, Any] = {
         "row": row, "negative": negative, "sub": sub, "array_at": array_at, "axes_at": axes_at, "finite": math.isfinite,
         "APART": -math.inf, "sound": sound, "dot": dot, "ROW_A": ROW_A, "ROW_B": ROW_B, "UNSOUND": UNSOUND,
@@ -106,6 +112,7 @@ def _make(shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], 
         inlined(module.corner),
         inlined(module.shape_bounds),
         inlined(module.write_world),
+        mixing(rules),
         any(shape.turned is not None for shape in shapes),
         tuple(indices for indices, pair in pairs.items() if pair is None),
     )

@@ -12,9 +12,12 @@ from ..framework.bodies import Bodies
 from ..framework.component import Component
 from ..framework.contacts import Contacts, EntityLookup
 from ..framework.services import PhysicsServices
+from ..framework.settings import AUTOMATIC, MIXING_RULES
 from ..framework.table import Table
 from . import preparation
+from .blame import Blame
 from .energy import kinetic_energy, momentum, potential_energy
+from .flat_columns import all_finite, any_turned, invert_masses
 from .handled_pairs import check_pairs
 from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
@@ -72,10 +75,12 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self._set_levels(np.empty((1, 0), np.int8))
         self.rank = np.empty(0, np.int64)
         self.axes = np.empty((0, dimensions, dimensions))
-        self.trace = np.zeros(TRACE_SIZE, np.int64)
+        self.trace, self.blame = np.zeros(TRACE_SIZE, np.int64), Blame(self)
         self.turned = False
+        self._unturned: int | None = None  # the structure that was last seen with nothing turned
         self.collides = False
         self.limits_speed = False
+        self.pushed = True  # whether applied_force or step_force may hold something that has to be cleared
         self.moved = False  # whether the columns hold a motion from previous_position to position
         self.path_degree = 1
         self.motion_stamp = 0
@@ -149,16 +154,24 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.shapes, self.world_shapes = (*shapes, self.trace), (*world_shapes, self.trace)
 
     def refresh_rotation(self) -> None:
-        """Axes of the bodies, if any is turned; the shapes' parameters as they are in the world then."""
+        """Axes of the bodies where something needs them; the shapes' parameters as they are in the world then."""
         if self.code is None:
             return
-        rotation = self.table.column("rotation")
-        self.turned = bool((rotation if self.dimensions == 2 else rotation[:, 1:]).any())
-        self.axes = axes_of(rotation, self.dimensions) if self.turned or self.code.rotates else self.axes[:0]
+        before, self.turned = self.turned, any_turned(self.table.count, self.table.arrays["rotation"])
+        if not self.turned and self._unturned == self.structures:
+            return
+        self._unturned = None if self.turned else self.structures
+        count, rotation = self.table.count, self.table.column("rotation")
+        fresh = (self.turned or self.code.rotates) and len(self.axes) != self.table.capacity
+        if fresh:
+            self.axes = np.zeros((self.table.capacity, self.dimensions, self.dimensions))
+        if fresh or self.turned != before:
+            self._bind_shapes()
+        if self.turned or self.code.rotates:
+            self.axes[:count] = axes_of(rotation, self.dimensions)
         if len(self.levels) > 1:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.dimensions == 2 else rotation[:, 1:].any(axis=1)
-            self.outgrown[: self.table.count] = self._stretches & turned
-        self._bind_shapes()
+            self.outgrown[:count] = self._stretches & turned
 
     def _allocate_scratch(self) -> None:
         """Room for every row the table can hold."""
@@ -174,12 +187,6 @@ class PhysicsState(PairBuffers, PhysicsServices):
             for key, _, dtype in self.CURVES:
                 self.scratch[key] = np.zeros((self.table.capacity, self.dimensions), dtype)
 
-    def all_layers_meet(self) -> bool:
-        """Whether no layer or mask keeps any two bodies apart (usual, and then none need be looked at)."""
-        stacks, count = self.table.stacks, self.table.count
-        masks, layers = stacks["collider.mask"][:, :count], stacks["collider.layer"][:, :count]
-        return bool((masks == -1).all() and layers.all())
-
     def integrator(self) -> Integrator:
         name = self.world.settings.integrator
         if name not in self._integrators:
@@ -187,9 +194,16 @@ class PhysicsState(PairBuffers, PhysicsServices):
         return self._integrators[name]
 
     def check_settings(self, settings: Any) -> None:
-        known = self.world.registry.integrators
-        if settings.integrator not in known:
-            raise ValueError(f"Settings.integrator must be one of {', '.join(known)}, got {settings.integrator!r}")
+        registry = self.world.registry
+        for name, known in (
+            ("integrator", registry.integrators),
+            ("restitution_mixing", (*MIXING_RULES, *registry.mixing_rules)),
+            ("friction_mixing", (*MIXING_RULES, *registry.mixing_rules)),
+            ("broad_phase", (AUTOMATIC, *registry.broad_phases)),
+        ):
+            value = getattr(settings, name)
+            if value not in known:
+                raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {value!r}")
 
     def set_gravity(self, gravity: Any) -> None:
         vector = np.array(gravity, float)
@@ -199,19 +213,20 @@ class PhysicsState(PairBuffers, PhysicsServices):
             raise ValueError(f"gravity must be {self.dimensions} finite numbers, got {gravity!r}")
         vector.flags.writeable = False
         self.gravity = vector
+        self.gravity_numbers = tuple(vector.tolist())  # as kernels take it
 
     # -- around a step ----------------------------------------------------------------------------
 
     def begin_step(self) -> None:
         self.refresh_structure()
         table, arrays = self.table, self.table.arrays
-        dynamic = table.stops[0]
-        np.divide(1.0, arrays["mass"][:dynamic], out=arrays["inverse_mass"][:dynamic])
-        arrays["inverse_mass"][dynamic : table.count] = 0.0
+        self.limits_speed = invert_masses(
+            table.stops[0], table.count, arrays["mass"], arrays["inverse_mass"], arrays["max_linear_speed"]
+        )
         check_sensors(self)
         check_pairs(self)
-        self.limits_speed = not bool(np.isnan(arrays["max_linear_speed"][:dynamic]).all())
         self.refresh_rotation()
+        self.pushed = True
         self.moved = False
         table.forces_summed = False  # type: ignore[attr-defined]
         self.motion_stamp += 1
@@ -229,16 +244,18 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     def report_faults(self, prefix: str) -> None:
         """Name the bodies whose state is not finite in the world's faults; they disturb no others."""
-        moving = self.table.stops[1]
+        moving, arrays = self.table.stops[1], self.table.arrays
+        if all_finite(moving, arrays["position"], arrays["linear_velocity"]):
+            return
         for name in ("position", "linear_velocity"):
-            column = self.table.arrays[name][:moving]
-            if not np.isfinite(column.sum()):
-                for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
-                    entity = int(self.table.arrays["entity"][row])
-                    self.world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
+            column = arrays[name][:moving]
+            for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
+                entity = int(arrays["entity"][row])
+                self.world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
 
     def end_window(self) -> None:
-        self.table.arrays["applied_force"][: self.table.stops[0]] = 0.0
+        if self.pushed or self.table.everything_kept:
+            self.table.arrays["applied_force"][: self.table.stops[0]] = 0.0
         self.table.arrays["applied_frame"][: self.table.stops[0]] = -1  # else state_hash would tell frame rates apart
 
     def tracking_state(self) -> Any:

@@ -8,20 +8,20 @@ shock is not played again, and they never pull.
 from __future__ import annotations
 
 from ..framework.compilation import kernel
-from ..framework.vectors import add_scaled, dot, length, row, store, sub
+from ..framework.vectors import add_scaled, dot, row, store, sub
 
 
 @kernel
 def predict_support(
-    dt, travels, first, second, count, normal, total, impulse, inverse_mass, moving, position, velocity,
-    start_velocity, path, path_second, curved, share, supported, change, like,
+    dt, travels, first, second, count, normal, total, impulse, inverse_mass, moving, position, velocity, path,
+    path_second, curved, supported, change, like,
 ):  # fmt: skip
     """Correct velocity, position and path of the bodies that were held in the last step.
 
     first, second (count,): rows of the pairs, -1 for one that is gone; normal (count, d); total (count,): the impulses
     of last step's contacts, canonical order; impulse (count,): room. They act like a force throughout the step, which
     displaces by ``travels`` times dt times the change of velocity: what the integrator makes of a force. supported (n,)
-    is set, change (n, d) is that of the velocity. share (n,): see ``impacts.gravity_share``, which needs free flight.
+    is set, change (n, d) is that of the velocity.
     """
     for m in range(count):
         a, b = first[m], second[m]
@@ -34,7 +34,6 @@ def predict_support(
             if inverse_mass[i] > 0.0 and not supported[i]:
                 supported[i] = True
                 store(change, i, row(velocity, i, like))
-                share[i] = length(sub(row(velocity, i, like), row(start_velocity, i, like)))
         n = row(normal, m, like)
         store(velocity, a, add_scaled(row(velocity, a, like), n, -impulse[m] * inverse_mass[a]))
         store(velocity, b, add_scaled(row(velocity, b, like), n, impulse[m] * inverse_mass[b]))

@@ -179,17 +179,18 @@ def assign_cells(lower, upper, start, stop, directory, keys, table, frame, like)
         # Sizes up to 1 in finest cells belong to level 0, up to 2 to level 1, up to 4 to level 2: the binary exponent.
         level = min(max(((np.float64(size).view(np.int64) - 1) >> 52) - 1022, 0), levels)
         level = level if valid & tame & (size < 1e300) else levels
-        number = table[level, SHIFT]
+        place = np.uint64(level)  # indices without a sign are taken as they are
+        number = table[place, SHIFT]
         for q in range(d):
             at = item(middle, q) if level < levels else 0.0
-            lowest = replace(lowest, q, min(item(lowest, q), at))
-            highest = replace(highest, q, max(item(highest, q), at))
-            number += np.int64(math.floor(at * frame[SCALES + level])) * table[level, STRIDE + q]
-        if number < 0 or number >= table[level, CELLS]:
-            number %= table[level, CELLS]
-        key = number + table[level, BASE] if valid else used - 1
-        keys[row - start] = key
-        directory[key + 2] += 1
+            lowest = replace(lowest, q, at if at < item(lowest, q) else item(lowest, q))
+            highest = replace(highest, q, at if at > item(highest, q) else item(highest, q))
+            number += np.int64(math.floor(at * frame[np.uint64(SCALES) + place])) * table[place, STRIDE + q]
+        if number < 0 or number >= table[place, CELLS]:
+            number %= table[place, CELLS]
+        key = number + table[place, BASE] if valid else used - 1
+        keys[np.uint64(row - start)] = key
+        directory[np.uint64(key + 2)] += 1
     for q in range(d):
         frame[LOWEST + q] = item(lowest, q)
         frame[HIGHEST + q] = item(highest, q)
@@ -227,9 +228,9 @@ def place(lower, upper, start, stop, directory, keys, order, cells, boxes, codes
         scale = replace(scale, q, largest / (frame[EXTENT + q] + frame[FINE]))
         offset = replace(offset, q, frame[ORIGIN + q] - 0.5 * frame[FINE])
     for row in range(start, stop):
-        key = keys[row - start]
-        at = directory[key + 1]
-        directory[key + 1] = at + 1
+        key = np.uint64(keys[row - start])
+        at = np.uint64(directory[key + np.uint64(1)])
+        directory[key + np.uint64(1)] += 1
         order[at] = row
         cells[at] = key
         code = 0

@@ -29,7 +29,8 @@ def brute_force(lower, upper, inside):
 def check(lower, upper, inside, grid=None):
     """None if the grid does not suit, else the number of pairs, after comparing them with brute force."""
     grid = grid or EvenGrid(lower.shape[1])
-    found = grid.pairs(lower, upper, frame_of(lower[:inside], upper[:inside]), inside, len(lower))
+    others = np.arange(inside, len(lower), dtype=np.int32)
+    found = grid.pairs(lower, upper, frame_of(lower[:inside], upper[:inside]), inside, others)
     if found is None:
         return None
     pairs = [(min(p), max(p)) for p in zip(found[0].tolist(), found[1].tolist(), strict=True)]
@@ -100,7 +101,7 @@ def test_what_does_not_suit(d):
     assert check(centre - half, centre + half, 1000) is None
     nothing, frame = np.full((10, d), np.nan), np.zeros(FRAME_SIZE)
     frame[LOWEST : LOWEST + d], frame[HIGHEST : HIGHEST + d] = np.inf, -np.inf
-    assert EvenGrid(d).pairs(nothing, nothing, frame, 10, 10) is None
+    assert EvenGrid(d).pairs(nothing, nothing, frame, 10, np.arange(0, dtype=np.int32)) is None
 
 
 @both_dimensions

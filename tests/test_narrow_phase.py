@@ -12,7 +12,7 @@ from oracles import narrow_naive
 from worlds import EPS, ball, box, floor, make_world, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Phase
+from carom.framework import Phase, StepError, System
 
 both_dimensions = pytest.mark.parametrize("d", [2, 3])
 lengths = st.one_of(st.sampled_from([0.0, 0.25, 0.5, 1.0, 2.0]), st.floats(1e-3, 3))
@@ -293,3 +293,41 @@ def test_static_bodies_do_not_meet_each_other():
     ball(world, (0.0, 5.0))
     world.step()
     assert len(world.contacts) == 0
+
+
+@pytest.mark.parametrize("copied", [False, True])
+def test_contacts_read_late_are_those_of_their_step(copied):
+    """Made when first read, whatever rows have moved and steps have begun since; also those of a snapshot."""
+    world = make_world()
+    gone = ball(world, (9.0, 0.0))
+    a, b = ball(world, (0.0, 0.0)), ball(world, (0.9, 0.0))
+    world.remove_system(next(system for system in world.systems if system.name == "Response"))
+    world.step()
+    if copied:
+        world.restore(world.snapshot())
+    world.delete_entity(gone)
+    world.bodies.linear_velocity[:] = (0.0, 1.0)
+    contacts = world.contacts
+    assert (contacts.entity_a.tolist(), contacts.entity_b.tolist(), contacts.step.tolist()) == ([a], [b], [0])
+    np.testing.assert_allclose(contacts.depth, 0.1, atol=EPS)
+    np.testing.assert_allclose(contacts.point, [[0.45, 0.0]], atol=EPS)
+    with pytest.raises(AttributeError, match="no column 'speed'; they have entity_a, entity_b"):
+        _ = contacts.speed
+
+
+def test_contacts_nobody_has_read_outlast_the_start_of_a_step_that_fails():
+    class Failing(System):
+        phase = Phase.NARROW
+
+        def process(self, dt):
+            raise RuntimeError("no")
+
+    world = make_world()
+    a, b = ball(world, (0.0, 0.0)), ball(world, (0.9, 0.0))
+    world.run(Phase.NARROW)
+    world.add_system(Failing())
+    world.bodies.position[1] = (0.8, 0.0)
+    with pytest.raises(StepError, match="no"):
+        world.step()
+    assert (world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist()) == ([a], [b])
+    np.testing.assert_allclose(world.contacts.depth, 0.1, atol=EPS)

@@ -1,0 +1,47 @@
+"""Whose fault it is when the function of a pair raises, or returns what is no contact."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..framework.errors import PluginError
+from .shape_code import ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B
+
+if TYPE_CHECKING:
+    from .state import PhysicsState
+
+
+class Blame:
+    """``with blame:`` around kernels that ask pairs: what goes wrong names plugin, pair and entities."""
+
+    def __init__(self, state: PhysicsState) -> None:
+        self._state = state
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
+        trace = self._state.trace
+        if error is not None:
+            about = self._describe(int(trace[ROW_A]), int(trace[ROW_B]))
+            if isinstance(error, Exception) and about:
+                error.add_note(about)
+        elif trace[UNSOUND]:
+            trace[UNSOUND] = 0
+            about = self._describe(int(trace[UNSOUND_A]), int(trace[UNSOUND_B]))
+            raise PluginError(f"{about} returned a contact that is not finite")
+
+    def _describe(self, a: int, b: int) -> str:
+        """The pair of two rows: plugin, function, shapes, entities; of bodies with levels every pair it can be."""
+        state = self._state
+        if state.code is None or max(a, b) >= state.table.count:
+            return ""
+        found: dict[str, None] = {}
+        for level in reversed(state.levels):
+            shapes = [state.code.shapes[int(level[row])].component for row in (a, b)]
+            pair = state.world.registry.pair(shapes[0], shapes[1])
+            if pair is not None:
+                names = f"{shapes[0].__name__} and {shapes[1].__name__}"
+                found[f"plugin {pair.plugin}: pair {pair.function.__name__} of {names}"] = None
+        entities = sorted(int(state.table.arrays["entity"][row]) for row in (a, b))
+        return f"{' or '.join(found)}, entities {entities[0]} and {entities[1]}"

@@ -1,0 +1,175 @@
+"""Grids of what does not move against brute force, alone and in the broad phase of whole worlds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics
+from carom.systems import even_grid, spatial_tree, still_grid
+from carom.systems.still_grid import OUTSIDE, StillGrid
+
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+
+
+def check(lower, upper, start, stop):
+    """The grid of rows start..stop-1, after comparing what all other rows find in it with brute force."""
+    grid = StillGrid(lower, upper, start, stop)
+    if not grid.suits:
+        return grid
+    inside = np.setdiff1d(np.arange(start, stop), grid.outside)
+    others = np.setdiff1d(np.arange(len(lower)), np.arange(start, stop)).astype(np.int32)
+    found, askers = grid.pairs(others)
+    pairs = list(zip(found.tolist(), askers.tolist(), strict=True))
+    meet = (lower[inside][:, None] <= upper[others]) & (lower[others] <= upper[inside][:, None])
+    expected = {(int(inside[i]), int(others[j])) for i, j in zip(*np.nonzero(meet.all(axis=2)), strict=True)}
+    assert len(set(pairs)) == len(pairs)
+    assert set(pairs) == expected
+    return grid
+
+
+@both_dimensions
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_any_boxes_look_into_even_ones(d, data):
+    """Boxes of all sizes, touching, infinite and without shape; the largest of what does not move stay outside."""
+    rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    count, large = data.draw(st.integers(OUTSIDE + 1, 300)), data.draw(st.integers(0, OUTSIDE))
+    unit = 10.0 ** data.draw(st.integers(-100, 100))
+    centre = rng.integers(0, data.draw(st.integers(2, 40)), (count + 100, d)) * 0.5 + data.draw(
+        st.sampled_from([0.0, 0.25, 1e6])
+    )
+    half = np.full((count + 100, 1), 0.25)
+    half[:100] = 10.0 ** rng.uniform(-2, 2, (100, 1))
+    half[100 : 100 + large] = 50.0
+    lower, upper = (centre - half) * unit, (centre + half) * unit
+    lower[3], upper[4, 0], lower[5:9, d - 1], lower[9], upper[9] = np.nan, np.inf, -np.inf, -np.inf, np.inf
+    lower[-1] = np.nan
+    check(lower, upper, 100, len(lower))
+
+
+@both_dimensions
+def test_walls_stay_outside(d):
+    centre = np.random.default_rng(1).random((2000, d)) * 2000 ** (1 / d)
+    half = np.full((2000, 1), 0.4)
+    half[500:504] = 1e3
+    grid = check(centre - half, centre + half, 500, 2000)
+    assert grid.suits
+    assert grid.outside.tolist() == [500, 501, 502, 503]
+
+
+@both_dimensions
+def test_what_does_not_suit(d):
+    """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
+    rng = np.random.default_rng(2)
+    centre, half = rng.random((1000, d)) * 40, np.full((1000, 1), 0.01)
+    half[: OUTSIDE + 1] = 15.0
+    nothing = np.full((1000, d), np.nan)
+    for lower, upper, stop in (
+        (centre - half, centre + half, 1000),
+        (0 * centre - 0.5, 0 * centre + 0.5, 1000),
+        (centre, centre, 1000),
+        (nothing, nothing, 1000),
+        (centre, centre + 1.0, 0),
+        (centre, centre + 1.0, OUTSIDE),
+    ):
+        assert not StillGrid(lower, upper, 0, stop).suits
+
+
+@both_dimensions
+def test_output_grows_up_to_the_limit(d, monkeypatch):
+    """Each of 40 boxes meets all 1,000 in the grid."""
+    centre = np.random.default_rng(3).random((1040, d)) * 2 * 1000 ** (1 / d)
+    lower, upper = centre - 0.1, centre + 0.1
+    lower[:40], upper[:40] = -1.0, 1e3
+    grid, rows = StillGrid(lower, upper, 40, 1040), np.arange(40, dtype=np.int32)
+    assert len(grid.pairs(rows)[0]) == 40 * (1000 - len(grid.outside))
+    monkeypatch.setattr(still_grid, "CANDIDATE_LIMIT", 10_000)
+    assert StillGrid(lower, upper, 40, 1040).pairs(rows) is None
+
+
+def test_too_many_pairs_are_left_to_the_tree(monkeypatch):
+    """One place per box, and each of 40 others covers all of them: what the limit does not allow, no grid finds."""
+    centre = np.random.default_rng(4).random((1040, 2)) * 60
+    lower, upper = centre - 0.1, centre + 0.1
+    lower[1000:], upper[1000:] = -1.0, 1e3
+    frame = np.array((lower[:1000, 0].min(), lower[:1000, 1].min(), 0, 61.0, 61.0, 0, 0.2))
+    others = np.arange(1000, 1040, dtype=np.int32)
+    assert even_grid.EvenGrid(2).pairs(lower, upper, frame, 1000, others) is not None
+    monkeypatch.setattr(even_grid, "CANDIDATE_LIMIT", 10_000)
+    assert even_grid.EvenGrid(2).pairs(lower, upper, frame, 1000, others) is None
+    assert spatial_tree.CANDIDATE_LIMIT > 10_000
+
+
+def level(d, movers, speed=1.0):
+    """A lattice of 900 static boxes with walls around it, and ``movers`` spheres among them."""
+    world = World(Physics(dimensions=d, gravity=(0.0,) * d), settings=Settings.balanced())
+    rng = np.random.default_rng(5)
+    side = 30 if d == 2 else 10
+    for axis in range(d):
+        half = np.full(d, 2.0 * side)
+        half[axis] = 0.5
+        at = np.full(d, 1.5 * side)
+        for place in (-2.0, 3.0 * side + 2.0):
+            at[axis] = place
+            world.create_entity(Transform(at.copy()), AABBCollider(half))
+    places = np.stack(np.unravel_index(np.arange(900), (side,) * d), axis=1) * 3.0
+    world.create_entities(900, Transform.many(places), AABBCollider.many(half_extents=(0.5,) * d))
+    world.create_entities(
+        movers,
+        Transform.many(rng.random((movers, d)) * 3.0 * side),
+        RigidBody.many(linear_velocity=rng.standard_normal((movers, d)) * speed),
+        SphereCollider.many(radius=0.4),
+    )
+    return world
+
+
+def reason(world):
+    return next(line for line in str(world.plan()).splitlines() if "BroadPhase" in line)
+
+
+def touching(world):
+    """Pairs of ids whose shapes overlap, by brute force, at least one of them a sphere."""
+    bodies = world.bodies
+    position, entity, moving = bodies.position, bodies.entity, len(bodies.dynamic)
+    half = bodies.aabb_collider.half_extents[moving:]
+    found = set()
+    for i in range(moving):
+        gap = np.maximum(np.abs(position[moving:] - position[i]) - half, 0.0)
+        near = moving + np.flatnonzero((gap**2).sum(axis=1) < 0.39**2)
+        near = [*near, *np.flatnonzero(((position[:moving] - position[i]) ** 2).sum(axis=1) < 0.78**2)]
+        found |= {(min(entity[i], entity[j]), max(entity[i], entity[j])) for j in near if j != i}
+    return found
+
+
+@both_dimensions
+@pytest.mark.parametrize("movers", [1, 60, 400])
+def test_a_level_is_seen_as_it_is(d, movers):
+    """All that overlaps is in contact; also after static boxes were moved by their handles or in the columns."""
+    with level(d, movers, speed=0.0) as world:
+        sphere = int(world.bodies.entity[0])
+        for turn in range(4):
+            world.step()
+            assert "uniform grid" in reason(world)
+            contacts = set(zip(world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist(), strict=True))
+            assert touching(world) <= contacts
+            box = int(world.bodies.static.entity[40 + turn])
+            beside = world.component_for_entity(sphere, Transform).position + np.eye(d)[0] * 0.2
+            if turn % 2:
+                world.component_for_entity(box, Transform).position = beside
+            else:
+                world.bodies.position[world.bodies.row_of(box)] = beside
+            world.component_for_entity(sphere, RigidBody).linear_velocity = (0.0,) * d
+
+
+def test_what_is_uneven_is_left_to_trees():
+    with level(2, 300) as world:
+        world.step()
+        assert "uniform grid" in reason(world)
+        world.component_for_entity(int(world.bodies.entity[0]), RigidBody).linear_velocity = (1e5, 0.0)
+        world.step()
+        assert "quadtree" in reason(world)
