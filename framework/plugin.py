@@ -99,7 +99,7 @@ class Plugin:
             checks.check_pair(self, first, second, function)
             compiled = None if corner is None else inlined(corner)
             sweep = self.pairs[first, second].sweep if (first, second) in self.pairs else None
-            pair = Pair(first, second, inlined(function), self.name, compiled, sweep)
+            pair = Pair(first, second, _compiled(function), self.name, compiled, sweep)
             if (second, first) in self.pairs and first is not second:
                 raise PluginError(
                     f"plugin {self.name}: the pair of {pair.names} is registered already, in the other order"
@@ -230,6 +230,11 @@ def _function(component: type[Component], name: str) -> Any:
     """The plain function behind a method, static or not; None if the class has none."""
     found = inspect.getattr_static(component, name, None)
     return getattr(found, "__func__", found)
+
+
+def _compiled(function: Any) -> Any:
+    """A helper is compiled already."""
+    return function if hasattr(function, "py_func") else inlined(function)
 
 
 def _no_rounding(shape):

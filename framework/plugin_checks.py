@@ -122,11 +122,11 @@ def check_pair(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
     for shape in (first, second):
         if shape is not Convex and not (isinstance(shape, type) and issubclass(shape, Component)):
             raise PluginError(f"{where}: a pair is of two collider classes, or one and Convex, got {shape!r}")
-    if not inspect.isfunction(function):
+    if not inspect.isfunction(plain_function(function)):
         raise PluginError(f"{where}: register a plain function; carom compiles it itself")
     helpers = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
     convex = (first is Convex) + (second is Convex)
-    _check_arity(where, function, ("a", "b", "d", *helpers[convex]))
+    _check_arity(where, plain_function(function), ("a", "b", "d", *helpers[convex]))
     if not convex:
         one, two = Shape(first, 1.0, None, None, ""), Shape(second, 1.0, None, None, "")
         for dimensions in sorted(set(_dimensions(first)) & set(_dimensions(second))):
@@ -306,6 +306,11 @@ def _check_arity(where: str, function: Any, names: tuple[str, ...]) -> None:
             f"{where} takes ({got}), it must take {len(names)} argument{'s' if len(names) > 1 else ''}: "
             f"({', '.join(names)})"
         )
+
+
+def plain_function(function: Any) -> Any:
+    """What a compiled helper was made from."""
+    return getattr(function, "py_func", function)
 
 
 def _dimensions(component: Any) -> tuple[int, ...]:

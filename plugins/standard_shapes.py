@@ -11,8 +11,9 @@ import math
 
 from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import inlined
-from ..framework.plugin import Plugin
+from ..framework.plugin import Convex, Plugin
 from ..framework.vectors import divided, item, length, replace, scale
+from ..systems.convex import convex_convex
 
 standard_shapes = Plugin("standard shapes")
 
@@ -94,3 +95,6 @@ def box_box(a, b, d):
         high = min(item(a.half_extents, k), item(d, k) + item(b.half_extents, k))
         point = replace(point, k, 0.5 * (low + high))
     return depth >= 0.0, depth, axis_normal(d, axis, sign), point
+
+
+standard_shapes.pair(Convex, Convex)(convex_convex)

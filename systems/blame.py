@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from numba.core.errors import NumbaError
+
 from ..framework.errors import PluginError
 from .shape_code import ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B
 
@@ -23,13 +25,22 @@ class Blame:
     def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
         trace = self._state.trace
         if error is not None:
-            about = self._describe(int(trace[ROW_A]), int(trace[ROW_B]))
+            uncompiled = isinstance(error, NumbaError)
+            about = self._uncompiled(error) if uncompiled else self._describe(int(trace[ROW_A]), int(trace[ROW_B]))
             if isinstance(error, Exception) and about:
                 error.add_note(about)
         elif trace[UNSOUND]:
             trace[UNSOUND] = 0
             about = self._describe(int(trace[UNSOUND_A]), int(trace[UNSOUND_B]))
             raise PluginError(f"{about} returned a contact that is not finite")
+
+    def _uncompiled(self, error: BaseException) -> str:
+        """The pairs whose functions numba's message mentions."""
+        text = str(error)
+        pairs = self._state.world.registry.pairs.values()
+        found = [pair for pair in pairs if f"<function {pair.function.py_func.__qualname__} " in text]
+        names = " or ".join(f"plugin {p.plugin}: pair {p.function.__name__} of {p.names}" for p in found)
+        return f"{names} cannot be compiled; functions that it calls need @plugin.kernel" if names else ""
 
     def _describe(self, a: int, b: int) -> str:
         """The pair of two rows: plugin, function, shapes, entities; of bodies with levels every pair it can be."""

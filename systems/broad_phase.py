@@ -69,7 +69,7 @@ def make_box_kernel(shape_bounds: Any, write_world: Any, several: bool = False) 
                 smallest = half[0]
                 for k in range(1, len(like)):
                     smallest = min(smallest, item(half, k))
-                size[i] = 2.0 * smallest
+                size[i] = 2.0 * smallest if smallest < np.inf else 0.0  # what has no end is to others as a point
                 margin = MARGIN * smallest
                 first, last = add(row(before, i, like), at), add(row(after, i, like), at)
                 for k in range(len(like)):

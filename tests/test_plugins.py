@@ -1,0 +1,522 @@
+"""What plugins bring is at work in a world: shapes, pairs, helpers, rules, filters, broad phases, systems, arrays."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components.colliders import Collider
+from carom.framework import (
+    Plugin,
+    PluginError,
+    Settings,
+    StepError,
+    System,
+    UnhandledPairError,
+    World,
+    array_column,
+    column,
+)
+from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
+from carom.plugins import Physics
+
+
+class RodCollider(Collider):
+    """A rounded rod along the body's y axis: a shape that turns, written with the public functions only."""
+
+    rotates = True
+
+    radius = column(positive=True)
+    half_length = column(positive=True)
+
+    def bounds(shape, dimensions):
+        axis = shape.axes[1]
+        x, y = abs(axis[0]) * shape.half_length + shape.radius, abs(axis[1]) * shape.half_length + shape.radius
+        if dimensions == 2:
+            return x, y
+        return x, y, abs(axis[2]) * shape.half_length + shape.radius
+
+    def support(shape, direction):
+        end = scale(shape.axes[1], shape.half_length)
+        return end if dot(end, direction) >= 0.0 else negative(end)
+
+    def rounding(shape):
+        return shape.radius
+
+
+def make_plugin():
+    plugin = Plugin("rods")
+    plugin.shape(cost=2)(RodCollider)
+
+    @plugin.kernel
+    def on_rod(rod, d):
+        """The point of the rod's core that is nearest to d."""
+        along = dot(rod.axes[1], d)
+        return scale(rod.axes[1], max(-rod.half_length, min(rod.half_length, along)))
+
+    @plugin.pair(RodCollider, SphereCollider)
+    def rod_sphere(a, b, d):
+        nearest = on_rod(a, d)
+        gap = sub(d, nearest)
+        distance = length(gap)
+        depth = a.radius + b.radius - distance
+        normal = divided(gap, distance) if distance > 0.0 else a.axes[0]
+        return depth >= 0.0, depth, normal, add(nearest, scale(normal, a.radius - 0.5 * depth))
+
+    return plugin
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("sphere_first", [True, False])
+def test_a_shape_of_a_plugin_bounces_at_the_right_height(d, sphere_first):
+    """Dropped from h with restitution e a ball comes back to e^2 h; here e = 1, over a rod that lies flat."""
+    up, here = np.eye(d)[1], np.zeros(d)
+    turned = math.pi / 2 if d == 2 else (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+    settings = Settings(integrator="velocity_verlet")
+    world = World(Physics(dimensions=d, gravity=-10 * up), make_plugin(), settings=settings)
+
+    def make_ball():
+        return world.create_entity(Transform(5 * up), RigidBody(), SphereCollider(0.5, restitution=1.0))
+
+    ball = make_ball() if sphere_first else None
+    world.create_entity(Transform(here, rotation=turned), RodCollider(1.0, 6.0))
+    ball = make_ball() if ball is None else ball
+    lowest, highest, falling = 5.0, 0.0, True
+    for _ in range(200):
+        world.step()
+        y = world.component_for_entity(ball, Transform).y
+        lowest = min(lowest, y)
+        falling = falling and not world.contacts.impacts.pairs(RodCollider, SphereCollider)
+        highest = highest if world.time < 1.0 else max(highest, y)
+    assert lowest == pytest.approx(1.5, abs=0.2)  # lowest between two steps of up to .14 m
+    assert highest == pytest.approx(5.0, abs=10 / 8 / 60**2 + 1e-9)  # the apex lies between two steps
+    assert world.kinetic_energy() + world.potential_energy() == pytest.approx(50.0, rel=1e-12)
+    world.close()
+
+
+def test_a_rod_turns_with_its_body():
+    world = World(Physics(), make_plugin())
+    rod = world.create_entity(Transform((0, 0)), RodCollider(0.5, 3.0))
+    ball = world.create_entity(Transform((0, 3.9)), RigidBody(), SphereCollider(0.5))
+    world.step()
+    assert [contact.normal.tolist() for contact in world.contacts] == [[0.0, 1.0]]
+    world.component_for_entity(rod, Transform).rotation = math.pi / 2
+    world.component_for_entity(ball, Transform).position = (3.9, 0.0)
+    world.step()
+    (contact,) = world.contacts
+    np.testing.assert_allclose(contact.normal, (1, 0), atol=1e-12)
+    world.component_for_entity(ball, Transform).position = (0.0, 3.9)
+    world.step()
+    assert len(world.contacts) == 0
+    world.close()
+
+
+# -- pairs that are missing -----------------------------------------------------------------------
+
+
+def lonely_plugin():
+    plugin = Plugin("lonely")
+
+    @plugin.shape(cost=2)
+    class LonelyCollider(Collider):
+        reach = column(positive=True)
+
+        def bounds(shape, dimensions):
+            return (shape.reach, shape.reach) if dimensions == 2 else (shape.reach, shape.reach, shape.reach)
+
+    return plugin, LonelyCollider
+
+
+_helpers = Plugin("helpers")
+
+
+@_helpers.kernel
+def first_axis(d):
+    if len(d) == 2:
+        return 1.0, 0.0
+    return 1.0, 0.0, 0.0
+
+
+def lonely_lonely(a, b, d):
+    depth = a.reach + b.reach - length(d)
+    normal = divided(d, length(d)) if length(d) > 0.0 else first_axis(d)
+    return depth >= 0.0, depth, normal, scale(d, 0.5)
+
+
+lonely_lonely_kernel = _helpers.kernel(lonely_lonely)
+
+
+def test_a_pair_that_nobody_handles_is_an_error_with_both_and_the_ways_out():
+    plugin, lonely = lonely_plugin()
+    world = World(Physics(), plugin)
+    a = world.create_entity(Transform((0, 0)), lonely(1.0))
+    b = world.create_entity(Transform((9, 0)), RigidBody(), SphereCollider(1.0))
+    message = (
+        rf"LonelyCollider.* can meet in this world, entity {b} and entity {a} for instance, .*register it with "
+        r"@plugin.pair, give LonelyCollider a support function, or keep them apart with layer and mask"
+    )
+    for _ in range(2):
+        with pytest.raises(UnhandledPairError, match=message):
+            world.step()
+    assert world.step_count == 0
+    world.component_for_entity(a, lonely).mask = 2  # now nobody can meet it
+    world.step()
+    world.component_for_entity(a, lonely).mask = -1
+    with pytest.raises(UnhandledPairError):
+        world.step()
+    world.delete_entity(b)
+    world.step()
+    world.close()
+
+
+def test_what_stands_still_never_meets():
+    plugin, lonely = lonely_plugin()
+    world = World(Physics(), plugin)
+    for place in ((0, 0), (0.5, 0)):
+        world.create_entity(Transform(place), lonely(1.0))
+    world.create_entity(Transform((0.5, 0)), SphereCollider(1.0))
+    world.step()
+    alone = world.create_entity(Transform((50, 0)), RigidBody(), lonely(1.0))
+    with pytest.raises(UnhandledPairError, match="LonelyCollider and SphereCollider can meet|SphereCollider and Lonely"):
+        world.step()
+    world.component_for_entity(alone, lonely).layer = 0
+    world.step()
+    world.close()
+
+
+def test_registering_late_and_again_is_seen_at_the_next_step():
+    plugin, lonely = lonely_plugin()
+    world = World(Physics(), plugin)
+    for x in (0.0, 1.5):
+        world.create_entity(Transform((x, 0)), RigidBody(), lonely(1.0))
+    with pytest.raises(UnhandledPairError):
+        world.step()
+    plugin.pair(lonely, lonely)(lonely_lonely)
+    world.step()
+    assert len(world.contacts) == 1
+
+    def never(a, b, d):
+        return False, -length(d) - 1.0, lonely_lonely_kernel(a, b, d)[2], d
+
+    plugin.pair(lonely, lonely)(never)
+    world.step()
+    assert len(world.contacts) == 0
+    world.close()
+
+
+def test_a_plugin_may_join_later():
+    plugin, lonely = lonely_plugin()
+    plugin.pair(lonely, lonely)(lonely_lonely)
+    world = World(Physics())
+    world.create_entity(Transform((0, 0)), RigidBody(), lonely(1.0))
+    with pytest.raises(UnhandledPairError, match="LonelyCollider is a collider that no plugin of this world"):
+        world.step()
+    world.add_plugin(plugin)
+    world.step()
+    assert plugin in world.plugins
+    world.close()
+
+
+def test_a_flat_shape_is_not_for_3d():
+    plugin, _ = lonely_plugin()
+
+    @plugin.shape(cost=2)
+    class FlatCollider(Collider):
+        dimensions = (2,)
+        reach = column(positive=True)
+
+        def bounds(shape, dimensions):
+            return shape.reach, shape.reach
+
+    world = World(Physics(dimensions=3), plugin)
+    entity = world.create_entity(Transform((0, 0, 0)), FlatCollider(1.0))
+    with pytest.raises(ValueError, match=f"entity {entity}: FlatCollider is a shape of 2D worlds, this world is 3D"):
+        world.step()
+    world.close()
+
+
+# -- what goes wrong at run time ------------------------------------------------------------------
+
+
+def fragile_plugin():
+    """Works on everything the checks try, and fails on sizes between."""
+    plugin, fragile = lonely_plugin()
+
+    @plugin.pair(fragile, fragile)
+    def touchy(a, b, d):
+        if 3.0 < max(a.reach, b.reach) < 4.0:
+            raise ValueError("this size is too much")
+        hit, depth, normal, point = lonely_lonely_kernel(a, b, d)
+        return hit, (math.nan if 5.0 < max(a.reach, b.reach) < 6.0 else depth), normal, point
+
+    return plugin, fragile
+
+
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [(3.5, "entities 2 and 3: ValueError: this size is too much"),
+     (5.5, "entities 2 and 3 returned a contact that is not finite")],
+)  # fmt: skip
+def test_a_pair_that_fails_names_itself_and_the_step_is_undone(size, message):
+    """Columns and clock are what they were; without the culprit the world goes on."""
+    plugin, fragile = fragile_plugin()
+    world = World(Physics(gravity=(0, -10)), plugin)
+    bystander = world.create_entity(Transform((0, 50)), RigidBody(linear_velocity=(1, 0)), fragile(1.0))
+    world.create_entity(Transform((0, 0)), RigidBody(), fragile(1.0))
+    culprit = world.create_entity(Transform((1, 0)), RigidBody(), fragile(size))
+    state = world.state_hash()
+    with pytest.raises(StepError, match="plugin lonely: pair touchy of LonelyCollider and LonelyCollider") as caught:
+        world.step()
+    if size < 5:
+        assert "ValueError: this size is too much" in str(caught.value)
+    else:
+        assert message.split(" ", 3)[3] in str(caught.value)
+    assert f"entities {culprit - 1} and {culprit}" in str(caught.value)
+    assert (world.step_count, world.state_hash()) == (0, state)
+    world.delete_entity(culprit)
+    world.step()
+    assert world.component_for_entity(bystander, Transform).x == pytest.approx(1 / 60)
+    world.close()
+
+
+# -- rules, filters, broad phases, systems --------------------------------------------------------
+
+
+def approaching(world, distance=1.9, **collider):
+    for x, speed in ((0.0, 1.0), (distance, -1.0)):
+        world.create_entity(
+            Transform((x, 0)), RigidBody(linear_velocity=(speed, 0)), SphereCollider(1.0, restitution=1.0, **collider)
+        )
+
+
+def test_a_mixing_rule_of_a_plugin():
+    """Both have e = 1, the rule makes .25 of it: relative speed after / before."""
+    plugin = Plugin("rules")
+    plugin.mixing_rule("quarter")(lambda x, y: 0.125 * (x + y))
+    world = World(Physics(), plugin, settings=Settings(restitution_mixing="quarter", restitution_threshold=0.0))
+    approaching(world, 2.01)
+    world.step()
+    world.step()
+    np.testing.assert_allclose(world.bodies.linear_velocity[:, 0], (-0.25, 0.25), rtol=1e-12)
+    world.close()
+    with pytest.raises(ValueError, match=r"Settings.restitution_mixing must be one of average, .*, got 'quarter'"):
+        World(Physics(), settings=Settings(restitution_mixing="quarter"))
+    with pytest.raises(ValueError, match="Settings.friction_mixing must be one of"):
+        World(Physics(), plugin, settings=Settings(friction_mixing="third"))
+
+
+def test_a_filter_decides_who_may_meet():
+    plugin = Plugin("teams")
+    seen = []
+
+    @plugin.pair_filter
+    def not_of_one_team(bodies, a, b):
+        seen.extend(zip(bodies.entity[a].tolist(), bodies.entity[b].tolist(), strict=True))
+        return bodies.entity[a] % 2 != bodies.entity[b] % 2
+
+    world = World(Physics(), plugin)
+    for x in (0.0, 0.5, 1.0):
+        world.create_entity(Transform((x, 0)), RigidBody(), SphereCollider(1.0))
+    world.step()
+    assert seen == [(1, 2), (1, 3), (2, 3)]
+    assert list(zip(world.contacts.entity_a, world.contacts.entity_b, strict=True)) == [(1, 2), (2, 3)]
+    world.close()
+
+
+@pytest.mark.parametrize("answer", [None, np.ones(7, bool), np.ones(1), True])
+def test_a_filter_answers_for_each_pair(answer):
+    plugin = Plugin("teams")
+
+    @plugin.pair_filter
+    def vague(bodies, a, b):
+        return answer
+
+    world = World(Physics(), plugin)
+    approaching(world)
+    with pytest.raises(StepError, match="plugin teams: pair filter vague must return an array of 1 bool"):
+        world.step()
+    assert world.step_count == 0
+    world.close()
+
+
+class AllPairs:
+    """Every pair whose boxes overlap, the plain way."""
+
+    def pairs(self, lower, upper, moving):
+        touching = (lower[:, None] <= upper).all(axis=2) & (lower <= upper[:, None]).all(axis=2)
+        first, second = np.nonzero(np.triu(touching, 1))
+        return first[first < moving], second[first < moving]
+
+
+def test_a_broad_phase_of_a_plugin_finds_the_same():
+    """The same bits as with carom's own."""
+    plugin = Plugin("plain")
+    plugin.broad_phase("all pairs")(AllPairs)
+    hashes = []
+    for settings in (Settings(), Settings(broad_phase="all pairs")):
+        world = World(Physics(gravity=(0, -5)), plugin, settings=settings)
+        rng = np.random.default_rng(3)
+        world.create_entity(Transform((0, -1)), AABBCollider((50, 1)))
+        world.create_entities(
+            60, Transform.many(rng.uniform(0, 12, (60, 2))), RigidBody.many(), SphereCollider.many(radius=0.5)
+        )
+        for _ in range(60):
+            world.step()
+        assert ("all pairs, as the settings say" in str(world.plan())) == (settings.broad_phase != "automatic")
+        hashes.append(world.state_hash())
+        world.close()
+    assert hashes[0] == hashes[1]
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (None, "must return two arrays of rows"),
+        ((np.zeros(2), np.zeros(2)), "two integer arrays of one length"),
+        ((np.array([0]), np.array([5])), "returned rows 0 and 5: a pair is of two of the 2 rows"),
+        ((np.array([1]), np.array([1])), "returned rows 1 and 1"),
+    ],
+)
+def test_a_broad_phase_that_answers_nonsense(answer, message):
+    plugin = Plugin("plain")
+
+    @plugin.broad_phase("strange")
+    class Strange:
+        def pairs(self, lower, upper, moving):
+            return answer
+
+    world = World(Physics(), plugin, settings=Settings(broad_phase="strange"))
+    approaching(world)
+    with pytest.raises(StepError, match=f"broad phase 'strange' .*{message}"):
+        world.step()
+    world.close()
+
+
+def test_each_world_gets_its_own_system():
+    plugin = Plugin("counting")
+
+    @plugin.system
+    class Counter(System):
+        steps = 0
+
+        def process(self, dt):
+            self.steps += 1
+
+    worlds = [World(Physics(), plugin), World(Physics(), plugin)]
+    for _ in range(3):
+        worlds[0].step()
+    worlds[1].step()
+    found = [[s for s in world.systems if isinstance(s, Counter)] for world in worlds]
+    assert [[s.steps for s in systems] for systems in found] == [[3], [1]]
+    for world in worlds:
+        world.close()
+
+
+# -- arrays ---------------------------------------------------------------------------------------
+
+
+class CloudCollider(Collider):
+    """Points around the centre: as far as anybody is concerned, a sphere around the farthest."""
+
+    dimensions = (2,)
+    points = array_column(2, rows=(1, 100), check=lambda p: "must be near" if np.abs(p).max() > 1e12 else None)
+
+    @classmethod
+    def sample(cls, **common):
+        return cls([[0.5, 0.0], [0.0, -0.5]], **common)
+
+    def bounds(shape, dimensions):
+        reach = 0.0
+        for k in range(len(shape.points)):
+            reach = max(reach, math.sqrt(shape.points[k, 0] ** 2 + shape.points[k, 1] ** 2))
+        return reach, reach
+
+
+def cloud_plugin():
+    plugin = Plugin("clouds")
+    plugin.shape(cost=3)(CloudCollider)
+
+    @plugin.pair(CloudCollider, SphereCollider)
+    def cloud_sphere(a, b, d):
+        nearest, x, y = math.inf, 1.0, 0.0
+        for k in range(len(a.points)):
+            gap = math.hypot(d[0] - a.points[k, 0], d[1] - a.points[k, 1])
+            if gap < nearest:
+                nearest, x, y = gap, d[0] - a.points[k, 0], d[1] - a.points[k, 1]
+        depth = b.radius - nearest
+        normal = (x / nearest, y / nearest) if nearest > 0.0 else (1.0, 0.0)
+        return depth >= 0.0, depth, normal, (d[0] - normal[0] * b.radius, d[1] - normal[1] * b.radius)
+
+    return plugin
+
+
+def test_a_field_may_be_an_array():
+    """Each body has its own number of rows; what is assigned is seen by the next step; equal arrays are one."""
+    world = World(Physics(), cloud_plugin())
+    one = world.create_entity(Transform((0, 0)), CloudCollider([(3.0, 0.0), (0.0, 1.0), (0.0, 2.0)]))
+    world.create_entity(Transform((20, 0)), CloudCollider([(1.0, 0.0)]))
+    ball = world.create_entity(Transform((3.5, 0)), RigidBody(), SphereCollider(1.0))
+    world.step()
+    assert [contact.normal.tolist() for contact in world.contacts] == [[1.0, 0.0]]
+    cloud = world.component_for_entity(one, CloudCollider)
+    np.testing.assert_array_equal(cloud.points, [(3, 0), (0, 1), (0, 2)])
+    before = world.snapshot()
+    seen = world.state_hash()
+    cloud.points = np.ones((90, 2)) * np.arange(90)[:, None]
+    assert world.state_hash() != seen
+    world.step()
+    assert len(world.contacts) == 0
+    world.component_for_entity(ball, Transform).position = (70.5, 70.0)
+    world.step()
+    assert len(world.contacts) == 1
+    world.restore(before)
+    assert world.state_hash() == seen
+    assert len(world.component_for_entity(one, CloudCollider).points) == 3
+    with pytest.raises(ValueError, match="read-only"):
+        cloud.points[0, 0] = 7
+    world.close()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ([], "must be an array of shape|must have 1 to 100 rows"),
+        ([(1, 2, 3)], r"must be an array of shape \(n, 2\)"),
+        ([(1, math.nan)], "must be finite"),
+        ("abc", "must be numbers"),
+        ([(0, 0)] * 101, "must have 1 to 100 rows"),
+        ([(1e13, 0)], "must be near"),
+    ],
+)
+def test_an_array_is_checked_where_it_enters(value, message):
+    with pytest.raises(ValueError, match=rf"CloudCollider.points ({message})"):
+        CloudCollider(value)
+    cloud = CloudCollider([(1, 0)])
+    with pytest.raises(ValueError, match=rf"CloudCollider.points ({message})"):
+        cloud.points = value
+    np.testing.assert_array_equal(cloud.copy().points, [(1, 0)])
+
+
+def test_arrays_in_bulk():
+    world = World(Physics(), cloud_plugin())
+    arrays = [np.full((k, 2), float(k)) for k in (1, 2, 3)]
+    world.create_entities(3, Transform.many(np.zeros((3, 2))), CloudCollider.many(points=arrays))
+    entities = world.create_entities(2, Transform.many(np.ones((2, 2))), CloudCollider.many(points=arrays[2]))
+    world.step()
+    assert [len(world.component_for_entity(e, CloudCollider).points) for e in (1, 2, 3, *entities)] == [1, 2, 3, 3, 3]
+    with pytest.raises(PluginError):
+        Plugin("x").shape(cost=1)(type("Other", (Collider,), {"points": array_column(2)}))
+    world.close()
+
+
+def test_queries_know_shapes_with_arrays():
+    world = World(Physics(), cloud_plugin())
+    cloud = world.create_entity(Transform((5, 0)), CloudCollider([(0.0, 0.0), (2.0, 0.0)]))
+    assert world.query_sphere((8.5, 0), 2.0) == [cloud]
+    assert [hit.distance for hit in world.shape_cast(SphereCollider(0.5), (0, 0), (20, 0))] == [pytest.approx(4.5)]
+    world.create_entity(Transform((0, 9)), RigidBody(), SphereCollider(1.0))
+    (hit,) = world.shape_cast(CloudCollider([(0.0, 0.0), (1.0, 0.0)]), (-9, 9), (20, 0), exclude=cloud)
+    assert hit.distance == pytest.approx(7.0)
+    world.close()
