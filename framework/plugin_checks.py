@@ -34,6 +34,8 @@ POSES = (
     (1e6, 1e6, 1e6), (1e-9, 0.0, 0.0), (0.0, -1e-9, 0.0), (-0.1, 0.0, 0.0),
 )  # fmt: skip
 SCALES = (1.0, 1e-9, 1e9)
+# What functions of pairs with Convex get besides, by how many of the two it is.
+HELPERS = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
 UNIT = 1e-9  # how far from 1 a normal's length may be
 ENCLOSED = 1e-9  # how far a support point may stick out of the bounds, of their size
 
@@ -124,9 +126,8 @@ def check_pair(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
             raise PluginError(f"{where}: a pair is of two collider classes, or one and Convex, got {shape!r}")
     if not inspect.isfunction(plain_function(function)):
         raise PluginError(f"{where}: register a plain function; carom compiles it itself")
-    helpers = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
     convex = (first is Convex) + (second is Convex)
-    _check_arity(where, plain_function(function), ("a", "b", "d", *helpers[convex]))
+    _check_arity(where, plain_function(function), ("a", "b", "d", *HELPERS[convex]))
     if not convex:
         one, two = Shape(first, 1.0, None, None, ""), Shape(second, 1.0, None, None, "")
         for dimensions in sorted(set(_dimensions(first)) & set(_dimensions(second))):
@@ -201,7 +202,8 @@ def check_sweep(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
         raise PluginError(f"{where}: register the pair itself first, with @plugin.pair in the same order")
     if not inspect.isfunction(function):
         raise PluginError(f"{where}: register a plain function; carom compiles it itself")
-    _check_arity(where, function, ("a", "b", "d", "v"))
+    convex = (first is Convex) + (second is Convex)
+    _check_arity(where, function, ("a", "b", "d", "v", *HELPERS[convex]))
 
 
 # -- other things ---------------------------------------------------------------------------------

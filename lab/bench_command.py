@@ -1,4 +1,4 @@
-"""``carom bench``, ``carom bench scaling`` and ``carom bench startup``: measure, and show as asked for."""
+"""``carom bench`` and the commands below it, one for each benchmark: measure, and show as asked for."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from . import bench_report, bench_scaling, bench_startup
+from . import bench_ladder, bench_pairs, bench_report, bench_scaling, bench_startup
 from .bench import bench
 from .bench_output import Output
 from .bench_progress import Bar
@@ -80,7 +80,7 @@ def bench_command(
 ) -> None:
     """Time scenes of the library in carom and in pymunk, on the same bodies, in one process.
 
-    `carom bench scaling` and `carom bench startup` measure other things.
+    The commands below measure other things.
     """
     if context.invoked_subcommand is not None:
         return
@@ -132,6 +132,29 @@ def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path |
     with Bar(Console(stderr=True)) as bar:
         result = bench_startup.startup(repeats=repeats, progress=bar)
     output.show(result, [bench_startup.table(result)], [])
+
+
+@bench_command.command("pairs", short_help="What a pair of a plugin costs, next to one written by hand.")
+@_repeats(15)
+@_shown
+def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time the narrow phase with a registered pair, and with the same maths written into its kernel by hand."""
+    output = Output.checked("carom bench pairs", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_pairs.pair_costs(repeats, bar)
+    output.show(result, [bench_pairs.table(result)], [])
+
+
+@bench_command.command("ladder", short_help="What each feature costs, switched on alone.")
+@click.option("--bodies", type=click.IntRange(min=1), default=bench_ladder.BODIES, show_default=True)
+@_repeats(5)
+@_shown
+def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time scenes that differ in one feature: nanoseconds per body per step beside the scene without it."""
+    output = Output.checked("carom bench ladder", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_ladder.ladder(bodies, repeats, bar)
+    output.show(result, [bench_ladder.table(result)], [])
 
 
 def _sizes(text: str) -> tuple[int, ...]:

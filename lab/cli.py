@@ -1,4 +1,4 @@
-"""The ``carom`` command: run a scene, list the scenes, benchmark."""
+"""The ``carom`` command: run a scene, list the scenes, and what the other modules add."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from .. import __version__, scenes
 from .bench_command import bench_command
 from .choices import parse_assignments, preset
 from .commands import Commands
+from .installed_plugins import plugin_named
 from .loading import Loaded, load, stdout_kept_clean
+from .options import plugin_option, seed_number, seed_option, set_option, settings_option
+from .plan_command import plan_command
+from .plugins_command import plugins_command
 from .problems import Problem
 from .progress import StepProgress
 from .report import print_report
@@ -41,19 +45,10 @@ def cli(context: click.Context) -> None:
 @click.argument("target", metavar="SCENE|FILE.py")
 @click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
 @click.option("--seconds", type=float, help="How long to simulate (default: what the scene recommends).")
-@click.option(
-    "--settings", "preset_name", metavar="fast|balanced|accurate", help="Default: what the scene recommends."
-)
-@click.option(
-    "--set",
-    "assignments",
-    multiple=True,
-    metavar="FIELD=VALUE",
-    help="Set one field of Settings; repeatable.",
-)
-@click.option(
-    "--seed", default="0", show_default=True, metavar="NUMBER", help="Which variant of the scene: 0, 1, 2, ..."
-)
+@settings_option
+@set_option
+@seed_option
+@plugin_option
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -74,6 +69,7 @@ def run_command(
     preset_name: str | None,
     assignments: tuple[str, ...],
     seed: str,
+    plugins: tuple[str, ...],
     out: Path,
     as_json: bool,
     no_pictures: bool,
@@ -88,12 +84,13 @@ def run_command(
         raise Problem("--steps and --seconds exclude each other")
     if seconds is not None and not (math.isfinite(seconds) and seconds >= 0):
         raise Problem(f"--seconds takes a number of at least 0, not {seconds:g}")
-    number = _seed(seed)
+    number = seed_number(seed)
+    added = [plugin_named(name) for name in plugins]
     loaded = load(target)
     draw = _drawing(no_pictures, out)
     screen = Console(stderr=True)
 
-    world = loaded.build(settings, changes, number)
+    world = loaded.build(settings, changes, number, added)
     if loaded.view is not None and len(loaded.view[0]) != world.dimensions:
         raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
@@ -126,6 +123,8 @@ def scenes_command() -> None:
     Console().print(table)
 
 
+cli.add_command(plan_command)
+cli.add_command(plugins_command)
 cli.add_command(bench_command)
 cli.add_command(warm_up_command)
 
@@ -156,12 +155,6 @@ def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:
         return [str(path) for path in draw(finished, out, loaded.view)]
     except OSError as error:
         raise Problem(f"--out {out}: {error.strerror or error}") from error
-
-
-def _seed(text: str) -> int:
-    if not text.strip().isdecimal():
-        raise Problem(f"--seed takes a whole number of at least 0, not {text!r}")
-    return int(text)
 
 
 def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:

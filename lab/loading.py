@@ -9,16 +9,17 @@ import importlib.util
 import inspect
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from .. import scenes
-from ..framework import Settings, World
+from ..framework import Plugin, Settings, World
 from .choices import apply
 from .problems import Problem, did_you_mean, one_line
 
@@ -35,15 +36,30 @@ class Loaded:
     seconds: float | None = None
     view: Bounds | None = None
 
-    def build(self, settings: Settings | None, changes: dict[str, Any], seed: int) -> World:
-        """A world with ``settings`` (None: the scene's own, for a file the default); Problem if it fails."""
+    def build(
+        self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
+    ) -> World:
+        """A world with ``settings`` (None: the scene's own, for a file the default), and with plugins besides its own;
+        Problem if it fails."""
         if settings is None and self.file is not None:
             settings = Settings()
+        brought = {name for plugin in plugins for name in _names_for_settings(plugin)}
+        late = {field: value for field, value in changes.items() if value in brought}
+        early = {field: value for field, value in changes.items() if field not in late}
         world = self._call(settings, seed)
-        if changes:  # the scene's own settings are known only once it is built
-            changed = apply(world.settings, changes)
+        if early:  # the scene's own settings are known only once it is built
+            changed = apply(world.settings, early)
             world.close()
             world = self._call(changed, seed)
+        for plugin in plugins:
+            try:
+                with stdout_kept_clean():
+                    world.add_plugin(plugin)
+            except Exception as error:  # its systems are made there: somebody else's code
+                raise Problem(f"--plugin {plugin.name}: {one_line(error)}") from error
+        if late:
+            with self.blame():
+                world.settings = apply(world.settings, late)
         return world
 
     def _call(self, settings: Settings | None, seed: int) -> World:
@@ -64,6 +80,11 @@ class Loaded:
             if isinstance(error, Problem):
                 raise
             raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
+
+
+def _names_for_settings(plugin: Plugin) -> list[str]:
+    """What a world's settings can name once it has the plugin."""
+    return [*plugin.integrators, *plugin.broad_phases, *plugin.mixing_rules]
 
 
 def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
@@ -90,13 +111,23 @@ def load(target: str) -> Loaded:
     )
 
 
-def _load_file(path: Path) -> Loaded:
+def import_file(path: Path) -> ModuleType:
+    """The module in that file, imported; Problem if there is none or it raises."""
+    _must_exist(path)
+    return _execute(path)
+
+
+def _must_exist(path: Path) -> None:
     if not path.exists():
         siblings = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
         hint = did_you_mean(path.name, siblings) if siblings else ""
         raise Problem(f"no file {str(path)!r}{hint if 'mean' in hint else ''}")
     if not path.is_file():
         raise Problem(f"{str(path)!r} is not a file")
+
+
+def _load_file(path: Path) -> Loaded:
+    _must_exist(path)
     _check_source(path)
     module = _execute(path)
     function = getattr(module, "build", None)

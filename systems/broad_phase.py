@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Iterator
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from ..framework.compilation import kernel
+from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
 from ..framework.settings import AUTOMATIC
 from ..framework.vectors import add, item, replace, row, store
+from .broad_plan import EVEN, STILL, planned_pairs
 from .even_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
 from .few_boxes import FEW, FewBoxes, pairs_between
 from .foreign_broad_phase import ForeignBroadPhase
@@ -24,8 +26,6 @@ if TYPE_CHECKING:
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
 MARGIN = 0.1
-
-EVEN, STILL = "even", "still"  # grids: one of what moves, or that and one of what does not
 
 Pairs: TypeAlias = tuple[np.ndarray, np.ndarray]
 
@@ -108,17 +108,28 @@ class BroadPhase(System):
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
-        self._moving_tree, self._static_tree = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
         self._moving: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
         self._static: SpatialTree | FewBoxes | None = None  # built when first asked for
         self._still: StillGrid | None = None  # likewise
         self._outside = FewBoxes(state.dimensions)  # what does not move and is not in its grid
-        self._grid, self._frame = EvenGrid(state.dimensions), np.zeros(FRAME_SIZE)
-        self._grids = ""  # which of the grids the last step used
+        self._frame = np.zeros(FRAME_SIZE)
+        self._grids: str | None = None  # which of the grids the last step used, if there was one
         self._foreign = ForeignBroadPhase(state)
         self._static_seen: Any = None
         self._static_positions = b""
         self._static_rows = np.empty(0, np.int32)
+
+    @cached_property
+    def _moving_tree(self) -> SpatialTree:
+        return SpatialTree(self._state.dimensions)
+
+    @cached_property
+    def _static_tree(self) -> SpatialTree:
+        return SpatialTree(self._state.dimensions)
+
+    @cached_property
+    def _grid(self) -> EvenGrid:
+        return EvenGrid(self._state.dimensions)
 
     def process(self, dt: float) -> None:
         state, table = self._state, self._state.table
@@ -146,7 +157,7 @@ class BroadPhase(System):
         if pairs is not None:
             return pairs
         self._grids = ""
-        self._moving = self._partition(self._moving_tree, 0, moving)
+        self._moving = self._partition("_moving_tree", 0, moving)
         pairs = self._moving.pairs_within()
         static = self._static_partition()
         return _joined(pairs, pairs_between(static, self._moving)) if static.count else pairs
@@ -156,7 +167,7 @@ class BroadPhase(System):
         if moving > FEW:
             pairs = self._even_pairs(moving, still.outside)
         else:
-            self._moving = self._partition(self._moving_tree, 0, moving)
+            self._moving = self._partition("_moving_tree", 0, moving)
             pairs = _joined(self._moving.pairs_within(), pairs_between(self._outside, self._moving))
         between = None if pairs is None else still.pairs(np.arange(moving, dtype=np.int32))
         self._grids = STILL
@@ -195,6 +206,11 @@ class BroadPhase(System):
         """Of what moves and of what does not."""
         return self._moving, self._static_partition()
 
+    def few(self) -> dict[str, np.ndarray]:
+        """What is kept of what moves, if that is few; for ``world.plan()``."""
+        few = self._moving
+        return {"boxes": few.boxes, "rows": few.rows} if isinstance(few, FewBoxes) else {}
+
     def trees_now(self) -> None:
         """Build the trees from where the bodies are at this moment."""
         moved, self._state.moved = self._state.moved, False
@@ -202,17 +218,18 @@ class BroadPhase(System):
             self.box_all()
         finally:
             self._state.moved = moved
-        self._moving = self._partition(self._moving_tree, 0, self._state.table.stops[1])
+        self._moving = self._partition("_moving_tree", 0, self._state.table.stops[1])
 
-    def _partition(self, tree: SpatialTree, start: int, stop: int) -> SpatialTree | FewBoxes:
-        """The boxes of rows start..stop-1, as a tree unless they are few."""
-        boxes = FewBoxes(self._state.dimensions) if stop - start <= FEW else tree
+    def _partition(self, tree: str, start: int, stop: int) -> SpatialTree | FewBoxes:
+        """The boxes of rows start..stop-1, as the tree of that name unless they are few."""
+        boxes = FewBoxes(self._state.dimensions) if stop - start <= FEW else getattr(self, tree)
         boxes.build(self._state.scratch["lower"], self._state.scratch["upper"], start, stop)
         return boxes
 
     def _static_partition(self) -> SpatialTree | FewBoxes:
         if self._static is None:
-            self._static = self._partition(self._static_tree, self._state.table.stops[1], self._state.table.count)
+            moving, count = self._state.table.stops[1], self._state.table.count
+            self._static = self._partition("_static_tree", moving, count if self._state.code else moving)
         return self._static
 
     def _still_grid(self) -> StillGrid:
@@ -222,6 +239,21 @@ class BroadPhase(System):
             self._outside.take(scratch["lower"], scratch["upper"], self._still.outside)
         return self._still
 
+    def _grids_now(self) -> str:
+        """Which of the grids the last step used; before the first one, which the next one will try."""
+        if self._grids is not None:
+            return self._grids
+        moving, still = self._state.table.stops[1], self._state.table.count - self._state.table.stops[1]
+        return STILL if still > max(moving, FEW) else EVEN if moving > FEW else ""
+
+    def kernels(self) -> Iterator[PlannedKernel]:
+        state, table = self._state, self._state.table
+        if not state.collides:
+            return
+        yield PlannedKernel("box_motion", "boxes around the motion of what moves; of the rest when it changes")
+        if state.world.settings.broad_phase == AUTOMATIC:
+            yield from planned_pairs(table.stops[1], table.count - table.stops[1], self._grids_now())
+
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
@@ -229,9 +261,10 @@ class BroadPhase(System):
         if name != AUTOMATIC:
             return f"{name}, as the settings say"
         moving, count = self._state.table.stops[1], self._state.table.count
-        if self._grids == EVEN:
+        grids = self._grids_now()
+        if grids == EVEN:
             return f"uniform grid of {moving} moving bodies, and {count - moving} static ones that look into it"
-        if self._grids == STILL:
+        if grids == STILL:
             among = "uniform grid" if moving > FEW else "every pair"
             return f"{among} of {moving} moving bodies, which look into a uniform grid of {count - moving} static ones"
         tree = "quadtree" if self._state.dimensions == 2 else "octree"

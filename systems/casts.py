@@ -4,7 +4,8 @@ The time of touch is found with the pair functions alone, which serves any shape
 a plane with the pair's normal lies between them and the gap is at least -depth wide, so the shape is free to move until
 it has closed that gap along the normal; from there it looks again. For convex shapes that never steps past a touch, and
 it converges as Newton's method does (the gap is a convex function of the way): a box in a few steps exactly, a sphere
-with the square of the error, a graze by halves. If the shape does not approach the plane, they never meet.
+with the square of the error, a graze by halves. If the shape does not approach the plane, they never meet. A
+pair that has a sweep of its own says itself when it touches; shapes that are not convex need one.
 
 The way through the tree is cut into slices, for each level of the tree by itself, a few cells long. The level whose
 next slice begins first is looked at first, and once that is beyond the nearest hit, nothing nearer can come.
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..framework.compilation import inlined, kernel
-from ..framework.vectors import add, add_scaled, dot, item, length, replace, row, store, sub
+from ..framework.vectors import add, add_scaled, dot, item, length, replace, row, scale, store, sub
 from .tree_build import BEGIN, END, EXTENT, INVERSE, LEVELS, ORIGIN, SCALES
 from .tree_pairs import cover
 from .tree_queries import cells_of, parts_of, uncertainty
@@ -41,7 +42,7 @@ def inverse_of(direction):
     return result
 
 
-def make_cast_kernel(against: Any, half_extents: Any) -> Callable[..., int]:
+def make_cast_kernel(against: Any, swept: Any, half_extents: Any) -> Callable[..., int]:
     """The kernel that moves shapes of one kind through one tree, over the shapes of a scene."""
 
     @kernel
@@ -120,12 +121,21 @@ def make_cast_kernel(against: Any, half_extents: Any) -> Callable[..., int]:
                             continue
                         away = sub(add(row(position, i, like), row(offset, i, like)), start)
                         distance, touches, normal, point = 0.0, False, like, like
+                        way = scale(direction, leave)
+                        known, met, part_of_way = swept(query, q, shape_of[i], i, away, way, shapes, like)
+                        if known:
+                            if not met:
+                                continue
+                            distance = part_of_way * leave
                         for look in range(LOOKS):
                             d = add_scaled(away, direction, -distance)
                             hit, depth, n, point = against(query, q, shape_of[i], i, d, shapes, like)
                             rate = dot(direction, n)
                             if look == 0 or rate > 0.0:  # a step too far by a rounding error may turn the normal round
                                 normal = n
+                            if known:
+                                touches = True
+                                break
                             near = abs(depth) <= ROUNDING * length(d)
                             touches = hit or (near and (look > 0 or rate > 0.0))
                             further = distance - depth / rate

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
-from .integrators import CUBIC, LINE, PARABOLA
+from .integrators import CUBIC, LINE, PARABOLA, STANDARD_INTEGRATORS, Integrator, drift
 from .motion import Motion, limit_distance, limit_speeds
 
 if TYPE_CHECKING:
     from .state import PhysicsState
+
+
+STANDARD = frozenset(STANDARD_INTEGRATORS.values())
 
 
 class Integration(System):
@@ -50,8 +55,9 @@ class Integration(System):
         integrator = state.integrator()
         if dynamic:
             motion = self._motion
-            motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
-            integrator.advance(motion, dt)
+            if not self._drifts(integrator) or not drift(motion.position, motion.velocity, motion.damping, dt):
+                motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
+                integrator.advance(motion, dt)
             if state.limits_speed:
                 limit_speeds(state)
                 limit_distance(motion.position, motion.start_position, arrays["max_linear_speed"][:dynamic], dt)
@@ -77,6 +83,11 @@ class Integration(System):
             start_velocity[:moving], arrays["linear_velocity"][:moving],
         )  # fmt: skip
         self._viewed = state.structures
+
+    def _drifts(self, integrator: Integrator) -> bool:
+        """Whether nothing acts on any body; all the standard integrators do the same then, unless one is damped."""
+        state = self._state
+        return state.unforced and not state.table.everything_kept and type(integrator) in STANDARD
 
     def _evaluator(self, force: np.ndarray) -> Callable[[float], None]:
         """Sums the forces at a later moment of the step."""
@@ -113,6 +124,25 @@ class Integration(System):
             third[:dynamic] = (dt * (v0[:dynamic] + v1[:dynamic]) - 2 * travel) / dt**3
         second[dynamic:moving] = 0.0
         third[dynamic:moving] = 0.0
+
+    def kernels(self) -> Iterator[PlannedKernel]:
+        state, integrator = self._state, self._state.integrator()
+        if not state.table.stops[0]:
+            return
+        if state.limits_speed:
+            yield PlannedKernel("limit_distance", "some body has a max_linear_speed")
+        why = "free flight of the bodies that forces move"
+        if state.forces.nothing_acts() and not state.table.everything_kept and type(integrator) in STANDARD:
+            yield PlannedKernel("drift", "no force acts: position + dt velocity, unless a body is damped")
+            if not state.table.column("linear_damping")[: state.table.stops[0]].any():
+                return
+            why = "some body is damped"
+        called = getattr(integrator, "kernels", None)  # a plugin's need not say
+        for name in called(bool(self.world.force_systems)) if called is not None else ():
+            yield PlannedKernel(name, why)
+        if self.world.force_systems and integrator.evaluations > 1:
+            for kernel in state.forces.kernels_of_a_stage():
+                yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")
 
     def reason(self) -> str:
         name = self.world.settings.integrator

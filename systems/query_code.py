@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import math
+from dataclasses import replace
 from typing import Any
 
 from ..framework.array_columns import array_at
@@ -20,9 +21,9 @@ from .touching import make_touching_kernel
 class QueryKernels:
     """The kernels of one asking shape; each compiles when first called."""
 
-    def __init__(self, against: Any, half_extents: Any) -> None:
+    def __init__(self, against: Any, swept: Any, half_extents: Any) -> None:
         self.touching: Any = make_touching_kernel(against)
-        self.cast: Any = make_cast_kernel(against, half_extents)
+        self.cast: Any = make_cast_kernel(against, swept, half_extents)
         self.nearest: Any = make_nearest_kernel(against)
 
 
@@ -46,7 +47,8 @@ def query_kernels(
 def _make(
     asking: Shape, shapes: tuple[Shape, ...], pairs: tuple[Any, ...], dimensions: int
 ) -> QueryKernels:
-    """Compile together against(query, q, shape, at, d, shapes, like) -> (hit, depth, normal, point).
+    """Compile together against(query, q, shape, at, d, shapes, like) -> (hit, depth, normal, point), and
+    swept(query, q, shape, at, d, way, shapes, like) -> (whether the pair has a sweep, hit, part of the way).
 
     query: the parameter columns of what asks, q its row; d: from its centre to that of the body in row ``at``. The
     answer is seen from what asks. A shape that has no pair with it is never hit.
@@ -77,6 +79,17 @@ def _make(
                 "        normal, point = negative(normal), add(point, d)",
             ]
     lines += ["    return hit, depth, normal, point", ""]
+    lines.append("def swept(query, q, shape, at, d, way, shapes, like):")
+    for index, pair in enumerate(pairs):
+        if pair is None or pair.sweep is None:
+            continue
+        body, moving = parameters_source(shapes, index, "at"), replace(pair, function=pair.sweep)
+        if pair.first is asking.component:
+            call = pair_call(moving, f"sweep{index}", scope, query, body, "d, negative(way)")
+        else:
+            call = pair_call(moving, f"sweep{index}", scope, body, query, "negative(d), way")
+        lines += [f"    if shape == {index}:", f"        hit, time = {call}", "        return True, hit, time"]
+    lines += ["    return False, False, 0.0", ""]
     lines += ["def half_extents(query, q, like):", f"    return bounds({query}, {dimensions})", ""]
     module = source_module("\n".join(lines) + "\n", scope)
-    return QueryKernels(inlined(module.against), inlined(module.half_extents))
+    return QueryKernels(inlined(module.against), inlined(module.swept), inlined(module.half_extents))

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from carom import scenes
 from carom.framework.compilation import CompilationLog
-from carom.lab import bench_clock, bench_report, bench_results, bench_scaling, bench_startup, peer_pymunk
+from carom.lab import bench_clock, bench_ladder, bench_report, bench_results, bench_scaling, bench_startup, peer_pymunk
 from carom.lab.bench import bench
 from carom.lab.bench_clock import Spread
 from carom.lab.bench_progress import Progress
@@ -244,6 +244,33 @@ def test_scaling_by_command(carom, tmp_path):
     assert done.exit_code == 0, done.stderr
     assert [point["bodies"] for point in json.loads(done.stdout)["points"]] == [10, 20]
     assert (tmp_path / "p" / "scaling.png").exists()
+
+
+def test_the_ladder_measures_each_rung_beside_another():
+    found = bench_ladder.ladder(bodies=30, repeats=2, steps=2)
+    costs = {cost.feature: cost for cost in found.costs}
+    assert list(costs) == [rung.feature for rung in bench_ladder.RUNGS]
+    for cost in found.costs:
+        assert len(cost.nanoseconds.values) == 2
+        assert cost.bytes > 0
+        if cost.extra is not None:
+            beside = costs[cost.beside].nanoseconds.values
+            assert cost.extra.values == tuple(a - b for a, b in zip(cost.nanoseconds.values, beside, strict=True))
+    assert costs["gravity"].kernels == ["sum_constant_forces", "euler"]
+    assert costs["linear_damping"].kernels == ["euler"]
+    assert costs["rotation"].kernels == costs["friction"].kernels == costs["a handler"].kernels == []
+    assert "solve_contacts" in costs["contacts at rest"].kernels
+    assert "resolve_impacts" in costs["restitution, at rest"].kernels
+    assert costs["spheres, apart"].bytes > costs["drifting"].bytes
+    assert bench_ladder.Ladder.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+
+
+def test_the_ladder_by_command(carom, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- carom bench ladder -->\n<!-- end of carom bench ladder -->\n")
+    done = carom("bench", "ladder", "--bodies", "20", "--repeats", "1", "--into", "page.md")
+    assert done.exit_code == 0, done.stderr
+    assert "| drifting |  | " in page.read_text()
 
 
 def test_startup_by_command(carom, monkeypatch):

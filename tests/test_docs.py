@@ -7,10 +7,13 @@ page's own name and lines, so a traceback shows the line of the page.
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
 import sys
 import traceback
 import types
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -156,6 +159,38 @@ def test_the_scene_file_page_has_every_option():
     parameters = cli.commands["run"].params
     options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
     assert set(re.findall(r"^\| `(--[a-z-]+)", text, re.MULTILINE)) == options - {"--help"}
+
+
+@pytest.mark.slow  # over a minute of compiling where the cache is empty
+def test_the_package_of_the_shape_page_can_be_built_found_and_tested(tmp_path):
+    """Its files as the page has them, built into a wheel, in a folder where Python looks; then the page's commands."""
+    blocks, _ = split((ROOT / "docs" / "write-a-shape.md").read_text(encoding="utf-8"), "write-a-shape.md")
+    source, site = tmp_path / "source", tmp_path / "site"
+    source.mkdir()
+    python = [block for block in blocks if block.info[:1] == ["python"]]
+    (project,) = [block for block in blocks if block.info == ["toml"]]
+    (test,) = [block for block in python if "no-run" in block.info]
+    for name, block in {"diamond.py": python[0], "pyproject.toml": project, "test_diamond.py": test}.items():
+        (source / name).write_text(block.text, encoding="utf-8")
+    places = os.pathsep.join(filter(None, (str(site), os.environ.get("PYTHONPATH"))))
+
+    def run_python(*arguments: str, folder: Path = tmp_path) -> str:
+        done = subprocess.run(
+            [sys.executable, *arguments], cwd=folder, capture_output=True, text=True,
+            env={**os.environ, "PYTHONPATH": places, "COLUMNS": "200"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    build = "import setuptools.build_meta as b; print(b.build_wheel('..'))"
+    wheel = run_python("-c", build, folder=source).strip().splitlines()[-1]
+    with zipfile.ZipFile(tmp_path / wheel) as archive:
+        archive.extractall(site)
+    (source / "diamond.py").unlink()  # what counts is what was installed
+    assert "3 passed" in run_python("-m", "pytest", "-q", "-p", "no:cacheprovider", folder=source)
+    listed = run_python("-m", "carom", "plugins")
+    assert re.search(r"diamond +1\.0 +carom-diamond +shapes DiamondCollider; pairs DiamondCollider and Sphere", listed)
+    run_python("-m", "carom", "run", "gas2d", "--plugin", "diamond", "--steps", "2", "--no-pictures")
 
 
 # -- links ---------------------------------------------------------------------------------------

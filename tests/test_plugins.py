@@ -21,6 +21,7 @@ from carom.framework import (
 )
 from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
 from carom.plugins import Physics
+from carom.systems import Integrator
 
 
 class RodCollider(Collider):
@@ -203,6 +204,30 @@ def test_registering_late_and_again_is_seen_at_the_next_step():
     plugin.pair(lonely, lonely)(never)
     world.step()
     assert len(world.contacts) == 0
+    world.close()
+
+
+def test_an_integrator_registered_again_is_seen_at_the_next_step():
+    plugin = Plugin("steppers")
+
+    class Still(Integrator):
+        order, evaluations = 1, 1
+
+        def advance(self, motion, dt):
+            pass
+
+    class Ahead(Still):
+        def advance(self, motion, dt):
+            motion.position[:, 0] += 1.0
+
+    plugin.integrator("mine")(Still)
+    world = World(Physics(), plugin, settings=Settings(integrator="mine"))
+    body = world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)))
+    world.step()
+    assert world.component_for_entity(body, Transform).x == 0.0
+    plugin.integrator("mine")(Ahead)
+    world.step()
+    assert world.component_for_entity(body, Transform).x == 1.0
     world.close()
 
 

@@ -1,0 +1,198 @@
+"""A capsule: a segment along the body's y axis, and all that lies within a radius of it; in 2D a stadium.
+
+It meets every convex shape through its support function. With spheres and other capsules it does so in closed form:
+two capsules are two segments, their distance less both radii.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..components import ALL_LAYERS, Collider, SphereCollider
+from ..framework import Plugin, column
+from ..framework.vectors import add_scaled, divided, dot, item, length, negative, replace, scale, sub
+
+plugin = Plugin("capsule", version="1.0")
+
+CROSSING = 1e-8  # sine of the angle below which two segments count as parallel: where rounding has the better of it
+TOUCHING = 1e-12  # of the sizes: segments so near to each other have no direction between them
+
+
+@plugin.shape(cost=2)
+class CapsuleCollider(Collider):
+    """All that lies within a radius of a segment along the body's y axis; it turns with the Transform.
+
+    radius
+        m, 0 or more
+    half_height
+        m, half the length of the segment, 0 or more; the whole capsule is 2 * (half_height + radius) high
+    """
+
+    __slots__ = ()
+
+    rotates = True
+    radius = column(minimum=0.0)
+    half_height = column(minimum=0.0)
+
+    def __init__(
+        self,
+        radius: float,
+        half_height: float,
+        *,
+        offset: Any = 0.0,
+        restitution: float = 0.0,
+        friction: float | None = None,
+        sensor: bool = False,
+        layer: int = 1,
+        mask: int = ALL_LAYERS,
+    ) -> None:
+        common = {"offset": offset, "restitution": restitution, "friction": friction}
+        common |= {"sensor": sensor, "layer": layer, "mask": mask}
+        self._fill({"radius": radius, "half_height": half_height, **common})
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        x, y = shape.axes[1][0], shape.axes[1][1]
+        half_x = shape.radius + abs(x) * shape.half_height
+        half_y = shape.radius + abs(y) * shape.half_height
+        if dimensions == 2:
+            return half_x, half_y
+        return half_x, half_y, shape.radius + abs(shape.axes[1][2]) * shape.half_height
+
+    @staticmethod
+    def support(shape, direction):
+        end = scale(shape.axes[1], shape.half_height)
+        return end if dot(end, direction) >= 0.0 else negative(end)
+
+    @staticmethod
+    def rounding(shape):
+        return shape.radius
+
+
+@plugin.kernel
+def nearest_along(axis, half, d):
+    """How far along the segment of half length ``half`` its point nearest to d lies."""
+    return max(-half, min(half, dot(axis, d)))
+
+
+@plugin.kernel
+def across(axis):
+    """Some unit vector at a right angle to a unit vector."""
+    if len(axis) == 2:
+        return replace(replace(axis, 0, item(axis, 1)), 1, -item(axis, 0))
+    k = 0  # the axis of the world that it is farthest from
+    for j in range(1, len(axis)):
+        k = j if abs(item(axis, j)) < abs(item(axis, k)) else k
+    result = scale(axis, -item(axis, k))
+    result = replace(result, k, item(result, k) + 1.0)
+    return divided(result, length(result))
+
+
+@plugin.kernel
+def towards(normal, axis, d):
+    """The normal or its opposite, whichever looks towards d; if neither does, one that -d would turn round."""
+    side = dot(normal, d)
+    if side == 0.0:
+        side = dot(axis, d)
+    return normal if side >= 0.0 else negative(normal)
+
+
+@plugin.pair(CapsuleCollider, SphereCollider)
+def capsule_sphere(a, b, d):
+    """The sphere against the nearest point of the segment."""
+    axis = a.axes[1]
+    nearest = scale(axis, nearest_along(axis, a.half_height, d))
+    apart = sub(d, nearest)
+    distance = length(apart)
+    depth = a.radius + b.radius - distance
+    normal = divided(apart, distance) if distance > 0.0 else across(axis)
+    return depth >= 0.0, depth, normal, add_scaled(nearest, normal, a.radius - 0.5 * depth)
+
+
+@plugin.kernel
+def crossing_plane(d, u, v, half_u, half_v):
+    """2D: (whether two segments cross, how far they then overlap, along which normal), d from one to the other.
+
+    The points of one less those of the other fill a parallelogram: whether the origin is in it, and the nearest side.
+    """
+    depth, normal = math.inf, across(u)
+    for turn in range(2):
+        axis = u if turn == 0 else v
+        side = across(axis)
+        overlap = half_v * abs(dot(side, v)) if turn == 0 else half_u * abs(dot(side, u))
+        overlap -= abs(dot(side, d))
+        if overlap < depth:
+            depth, normal = overlap, towards(side, axis, d)
+    return depth > 0.0, depth, normal
+
+
+@plugin.kernel
+def common_normal(d, u, v):
+    """3D: (unit vector at right angles to both unit vectors, towards d; sine of the angle between them)."""
+    last = len(d) - 1  # 2: an index that compiles in 2D, where this is never called
+    x = item(u, 1) * item(v, last) - item(u, last) * item(v, 1)
+    y = item(u, last) * item(v, 0) - item(u, 0) * item(v, last)
+    z = item(u, 0) * item(v, 1) - item(u, 1) * item(v, 0)
+    normal = replace(replace(replace(d, 0, x), 1, y), last, z)
+    sine = length(normal)
+    if sine <= TOUCHING:
+        return towards(across(u), u, d), 0.0
+    normal = divided(normal, sine)
+    normal = add_scaled(normal, u, -dot(normal, u))  # of nearly parallel ones the product is not exact
+    return towards(divided(normal, length(normal)), u, d), sine
+
+
+@plugin.kernel
+def segment_gap(d, u, v, half_u, half_v):
+    """(distance, unit normal, point of the first) of two segments, d from the middle of one to that of the other.
+
+    u, v: unit vectors along them. The best of these: each end with the other segment, and in 3D the nearest points of
+    the two lines. Each is a distance between true points, so that nearly parallel segments lose nothing.
+    """
+    best, apart, point, axis, inner = math.inf, d, d, u, False
+    normal, sine, s = d, 0.0, 0.0
+    if len(d) == 3:
+        normal, sine = common_normal(d, u, v)
+    if sine > CROSSING:
+        s = dot(add_scaled(u, v, -dot(u, v)), d) / (sine * sine)  # where on the first line the second is nearest
+    for turn in range(5 if sine > CROSSING and abs(s) <= half_u else 4):
+        if turn < 2:  # the ends of the second
+            other = add_scaled(d, v, -half_v if turn == 0 else half_v)
+            foot = nearest_along(u, half_u, other)
+            mine = scale(u, foot)
+        else:  # the ends of the first, and the lines
+            mine = scale(u, s if turn == 4 else (-half_u if turn == 2 else half_u))
+            foot = nearest_along(v, half_v, sub(mine, d))
+            other = add_scaled(d, v, foot)
+        between = sub(other, mine)
+        distance = length(between)
+        if distance < best:
+            best, apart, point = distance, between, mine
+            axis = u if turn < 2 else v  # the segment with the foot: if they touch, it is what is left
+            inner = abs(foot) < (half_u if turn < 2 else half_v)
+    size = length(d) + half_u + half_v
+    if best > TOUCHING * size:
+        if inner:  # a right angle, which rounding would spoil where the gap is small
+            apart = add_scaled(apart, axis, -dot(apart, axis))
+        return best, divided(apart, length(apart)), point
+    if min(half_u, half_v) <= TOUCHING * size:  # a point: it leaves across the other
+        axis = u if half_u >= half_v else v
+    elif len(d) == 3:
+        return best, normal, point
+    return best, towards(across(axis), axis, d), point
+
+
+@plugin.pair(CapsuleCollider, CapsuleCollider)
+def capsule_capsule(a, b, d):
+    """The distance of the segments, less both radii; in 2D segments may cross, and then overlap themselves."""
+    u, v = a.axes[1], b.axes[1]
+    distance, normal, point = segment_gap(d, u, v, a.half_height, b.half_height)
+    if len(d) == 2:
+        cross, overlap, out = crossing_plane(d, u, v, a.half_height, b.half_height)
+        if cross:
+            distance, normal = -overlap, out
+            lines = dot(across(v), d) / dot(across(v), u)
+            point = scale(u, max(-a.half_height, min(a.half_height, lines)))
+    depth = a.radius + b.radius - distance
+    return depth >= 0.0, depth, normal, add_scaled(point, normal, a.radius - 0.5 * (depth + min(distance, 0.0)))

@@ -1,0 +1,151 @@
+"""Convex polygons in 2D, turned by the Transform: triangles, oriented boxes, regular polygons, rounded ones."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..components.colliders import ALL_LAYERS, Collider
+from ..framework import Plugin, array_column, column
+from ..framework.vectors import add_scaled, dot, scale
+
+STRAIGHT = 1e-12  # sine of the turn at a corner below which it is none
+FULL_TURN = 2.0 * math.pi
+
+plugin = Plugin("convex polygon", version="1.0")
+
+
+def wrong_with(vertices: np.ndarray) -> str | None:
+    """What keeps these corners from being a convex polygon, None if they are one; the order may be either."""
+    extent = np.abs(vertices - vertices[0]).max()
+    if not extent > 0.0:
+        return "must not be one point"
+    corners = vertices / extent  # any size, without overflow
+    edges = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    if not lengths.all():
+        i = int(np.argmin(lengths))
+        return f"must not have the same corner twice in a row (corners {i} and {(i + 1) % len(vertices)})"
+    before = np.roll(edges, 1, axis=0)
+    size = np.roll(lengths, 1) * lengths
+    sines = (before[:, 0] * edges[:, 1] - before[:, 1] * edges[:, 0]) / size
+    cosines = (before * edges).sum(axis=1) / size
+    straight = np.abs(sines) <= STRAIGHT
+    if straight.any():
+        i = int(np.argmax(straight))
+        return f"must not have three corners on a line (corner {i} and its neighbours)"
+    turns = np.arctan2(sines, cosines)
+    if not (np.all(sines > 0.0) or np.all(sines < 0.0)):
+        main = 1.0 if turns.sum() > 0.0 else -1.0
+        return f"must be convex (it is not at corner {int(np.argmin(main * sines))})"
+    if abs(turns.sum()) > 1.5 * FULL_TURN:
+        return "must be convex (its edges cross each other)"
+    return None
+
+
+def _counter_clockwise(vertices: Any) -> Any:
+    """Turned round if they run clockwise; what is no polygon as it is, for the column's own messages."""
+    try:
+        corners = np.asarray(vertices)
+    except ValueError:  # rows of different lengths
+        return vertices
+    if corners.ndim != 2 or corners.shape[1] != 2 or corners.dtype.kind not in "iuf" or len(corners) < 3:
+        return vertices
+    corners = corners.astype(float)
+    size = np.abs(corners).max()
+    if not (np.isfinite(size) and size > 0.0):
+        return vertices
+    x, y = ((corners - corners[0]) / size).T
+    area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
+    return corners[::-1] if area < 0.0 else corners
+
+
+@plugin.shape(cost=4)
+class ConvexPolygonCollider(Collider):
+    """A convex polygon in a 2D world; it turns with the Transform.
+
+    vertices
+        (n, 2) m, three corners or more around the shape's centre, in either order; kept counter-clockwise
+    corner_radius
+        m, the polygon reaches that far beyond its corners and edges, which rounds the corners
+    """
+
+    __slots__ = ()
+
+    dimensions: ClassVar[tuple[int, ...]] = (2,)
+    rotates: ClassVar[bool] = True
+
+    vertices = array_column(2, rows=(3, 2**31), check=wrong_with)
+    corner_radius = column(0.0, minimum=0.0)
+
+    def __init__(
+        self,
+        vertices: Any,
+        *,
+        corner_radius: float = 0.0,
+        offset: Any = 0.0,
+        restitution: float = 0.0,
+        friction: float | None = None,
+        sensor: bool = False,
+        layer: int = 1,
+        mask: int = ALL_LAYERS,
+    ) -> None:
+        shape = {"vertices": _counter_clockwise(vertices), "corner_radius": corner_radius, "offset": offset}
+        material = {"restitution": restitution, "friction": friction}
+        self._fill({**shape, **material, "sensor": sensor, "layer": layer, "mask": mask})
+
+    @classmethod
+    def box(cls, half_extents: Any, **common: Any) -> Self:
+        """A box that turns with the Transform; ``half_extents`` (2,) or one number, above 0."""
+        half = np.asarray(half_extents, float)
+        if half.shape not in ((), (2,)) or not (np.isfinite(half).all() and (half > 0.0).all()):
+            raise ValueError(
+                f"ConvexPolygonCollider.box: half_extents must be positive, one number or two, got {half_extents!r}"
+            )
+        return cls(np.array(((-1, -1), (1, -1), (1, 1), (-1, 1))) * half, **common)
+
+    @classmethod
+    def regular(cls, n: int, radius: float, **common: Any) -> Self:
+        """A regular polygon of n corners on a circle; the first corner lies on the x axis."""
+        try:
+            count = operator.index(n)
+        except TypeError:
+            count = 0
+        if count < 3:
+            raise ValueError(f"ConvexPolygonCollider.regular: n must be a whole number from 3, got {n!r}")
+        if not (math.isfinite(radius) and radius > 0.0):
+            raise ValueError(f"ConvexPolygonCollider.regular: radius must be positive, got {radius!r}")
+        angles = np.arange(count) * (FULL_TURN / count)
+        return cls(radius * np.stack((np.cos(angles), np.sin(angles)), axis=1), **common)
+
+    @classmethod
+    def sample(cls, **common: Any) -> Self:
+        return cls.box(0.5, **common)
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        x, y = shape.axes
+        wide, high = 0.0, 0.0
+        for k in range(len(shape.vertices)):
+            one, two = shape.vertices[k, 0], shape.vertices[k, 1]
+            wide = max(wide, abs(one * x[0] + two * y[0]))
+            high = max(high, abs(one * x[1] + two * y[1]))
+        return wide + shape.corner_radius, high + shape.corner_radius
+
+    @staticmethod
+    def support(shape, direction):
+        x, y = shape.axes
+        along_x, along_y = dot(x, direction), dot(y, direction)
+        farthest, at = -math.inf, 0
+        for k in range(len(shape.vertices)):
+            reach = shape.vertices[k, 0] * along_x + shape.vertices[k, 1] * along_y
+            if reach > farthest:
+                farthest, at = reach, k
+        return add_scaled(scale(x, shape.vertices[at, 0]), y, shape.vertices[at, 1])
+
+    @staticmethod
+    def rounding(shape):
+        return shape.corner_radius

@@ -1,0 +1,97 @@
+"""A half-space: everything below a plane through the body's centre, without end. Ground that nobody falls off."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..components import ALL_LAYERS, Collider
+from ..framework import Column, Convex, Plugin
+from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
+
+plugin = Plugin("half_space", version="1.0")
+
+TILT = 1e-6  # radians; a face that lies on the plane but for that touches it all over, not at a corner
+
+
+class DirectionColumn(Column):
+    """A vector field that is not zero."""
+
+    def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
+        super().check_numbers(array, shown, entity)
+        zero = ~np.atleast_1d(array).any(axis=-1)
+        if zero.any():
+            where = "" if array.ndim < 2 else f" (row {int(np.argmax(zero))})"
+            raise self._error(array[int(np.argmax(zero))] if where else array, f"must not be zero{where}", entity)
+
+    def _usual(self, value: Any) -> Any:
+        usual = super()._usual(value)
+        return usual if np.any(usual) else None
+
+
+@plugin.shape(cost=1)
+class HalfSpaceCollider(Collider):
+    """Everything below a plane through the body's centre; whatever is convex rests on it.
+
+    normal
+        (d,) out of the half-space, up for ground; of any length but 0. It turns with the Transform
+    """
+
+    __slots__ = ()
+
+    rotates = True
+    normal = DirectionColumn(item="vector")
+
+    def __init__(
+        self,
+        normal: Any,
+        *,
+        offset: Any = 0.0,
+        restitution: float = 0.0,
+        friction: float | None = None,
+        sensor: bool = False,
+        layer: int = 1,
+        mask: int = ALL_LAYERS,
+    ) -> None:
+        common = {"offset": offset, "restitution": restitution, "friction": friction}
+        self._fill({"normal": normal, **common, "sensor": sensor, "layer": layer, "mask": mask})
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        if dimensions == 2:
+            return math.inf, math.inf
+        return math.inf, math.inf, math.inf
+
+
+@plugin.kernel
+def outwards(shape):
+    """The unit normal in the world."""
+    turned = scale(shape.axes[0], item(shape.normal, 0))
+    turned = add_scaled(turned, shape.axes[1], item(shape.normal, 1))
+    if len(turned) == 3:
+        turned = add_scaled(turned, shape.axes[len(turned) - 1], item(shape.normal, len(turned) - 1))
+    return divided(turned, length(turned))
+
+
+@plugin.pair(HalfSpaceCollider, Convex)
+def half_space_convex(a, b, d, support, rounding):
+    """How far the other's lowest point is below the plane. Whatever is inside leaves upwards, however deep it is."""
+    normal = outwards(a)
+    down = negative(normal)
+    radius = rounding(b)
+    depth = radius + dot(add(d, support(b, down)), down)
+    # The point is in the middle of what touches: looks a little to either side find opposite ends of a face.
+    tilt = scale(d, 0.0)
+    for k in range(len(d)):
+        tilt = replace(tilt, k, TILT / (1.0 + k))
+    point = add(support(b, add(down, tilt)), support(b, sub(down, tilt)))
+    point = add_scaled(d, point, 0.5)
+    return depth >= 0.0, depth, normal, add_scaled(point, normal, -dot(point, normal) - 0.5 * depth)
+
+
+@plugin.pair(HalfSpaceCollider, HalfSpaceCollider)
+def two_half_spaces(a, b, d):
+    """They never meet: all but parallel ones overlap somewhere, and could never part."""
+    return False, -math.inf, d, d

@@ -1,0 +1,284 @@
+"""A segment that is solid from one side only, in 2D: jump through it from below, stand on it, slide off its ends.
+
+The segment meets every convex shape like any other. Between NARROW, which finds the contacts, and RESPONSE, which acts
+on them, a system switches off those of bodies that do not come from its front. Nothing is remembered for it that
+``world.snapshot()`` would not hold.
+"""
+
+from __future__ import annotations
+
+import collections
+import weakref
+from functools import lru_cache
+from typing import Any, Self
+
+import numpy as np
+
+from ..components import ALL_LAYERS, AABBCollider, Collider, SphereCollider
+from ..framework import Phase, Plugin, System, World, column
+from ..framework.vectors import add_scaled, dot, item, scale
+
+plugin = Plugin("one_way_segment", version="1.0")
+
+SLACK = 0.02  # of its height: who has sunk in no deeper, when it begins to touch, comes from the front all the same
+UPRIGHT = 0.5  # cosine: contacts that look more to the side than this are with the segment's ends
+FRONTS = ("left", "right")
+
+
+@plugin.kernel
+def in_world(shape, point):
+    """A point of the shape as it is in the world, relative to its centre."""
+    return add_scaled(scale(shape.axes[0], item(point, 0)), shape.axes[1], item(point, 1))
+
+
+@plugin.shape(cost=2)
+class OneWaySegmentCollider(Collider):
+    """A segment that holds what comes from its front and lets everything else pass; in 2D worlds.
+
+    start, end
+        (2,) m, relative to the centre, turned with the Transform
+    front
+        the side that is solid, as seen on the way from start to end: ``"left"`` or ``"right"``
+    """
+
+    __slots__ = ()
+
+    rotates = True
+    dimensions = (2,)
+    start = column(item="vector")
+    end = column(item="vector")
+    front = column("left", choices=FRONTS)
+
+    def __init__(
+        self,
+        start: Any,
+        end: Any,
+        front: str = "left",
+        *,
+        offset: Any = 0.0,
+        restitution: float = 0.0,
+        friction: float | None = None,
+        sensor: bool = False,
+        layer: int = 1,
+        mask: int = ALL_LAYERS,
+    ) -> None:
+        common = {"offset": offset, "restitution": restitution, "friction": friction}
+        common |= {"sensor": sensor, "layer": layer, "mask": mask}
+        self._fill({"start": start, "end": end, "front": front, **common})
+        if np.array_equal(self.start, self.end):
+            raise ValueError(f"OneWaySegmentCollider: start and end must differ, both are {start!r}")
+
+    @classmethod
+    def sample(cls, **common: Any) -> Self:
+        return cls((-0.5, 0.0), (0.5, 0.0), **common)
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        one, two = in_world(shape, shape.start), in_world(shape, shape.end)
+        return max(abs(one[0]), abs(two[0])), max(abs(one[1]), abs(two[1]))
+
+    @staticmethod
+    def support(shape, direction):
+        one, two = in_world(shape, shape.start), in_world(shape, shape.end)
+        return one if dot(one, direction) >= dot(two, direction) else two
+
+
+# Who was held when the last step ended, by world: (step, pairs). Read from the contacts, never from the step before.
+_held: weakref.WeakKeyDictionary[World, tuple[int, set[tuple[int, int]]]] = weakref.WeakKeyDictionary()
+
+
+@plugin.system
+class WhoStands(System):
+    """Notes, as the step begins, who touched a one-way segment when the last one ended."""
+
+    phase = Phase.START
+
+    def process(self, dt: float) -> None:
+        world, held = self.world, set()
+        chosen = _segments_among(world)
+        if chosen is not None:
+            rows = np.flatnonzero((chosen[0] | chosen[1]) & world.contacts.enabled)
+            held.update(zip(*(getattr(world.contacts, name)[rows].tolist() for name in PAIR), strict=True))
+        _held[world] = world.step_count, held
+
+    def reason(self) -> str:
+        return _reason(self.world)
+
+
+@plugin.system
+class OneWay(System):
+    """Clears ``enabled`` of the contacts of one-way segments with bodies that do not come from their front."""
+
+    phase = Phase.NARROW
+
+    def process(self, dt: float) -> None:
+        chosen = _segments_among(self.world)
+        if chosen is None:
+            return
+        enabled = self.world.contacts.enabled
+        for of_second in (False, True):  # which of the two is the segment; two segments look at each other
+            rows = np.flatnonzero(chosen[of_second])
+            if len(rows):
+                enabled[rows] &= self._holds(rows, of_second)
+
+    def reason(self) -> str:
+        return _reason(self.world)
+
+    def _holds(self, contacts: np.ndarray, of_second: bool) -> np.ndarray:
+        """Whether the segments of these contacts hold their partners."""
+        world, bodies, found = self.world, self.world.bodies, self.world.contacts
+        entities = [getattr(found, name)[contacts] for name in PAIR]
+        if of_second:
+            entities.reverse()
+        order = np.argsort(bodies.entity, kind="stable")
+        segment, other = (order[np.searchsorted(bodies.entity, which, sorter=order)] for which in entities)
+        shapes = _Shapes(world, other, entities[1])
+        fields = bodies.one_way_segment_collider
+        turn = _rotations(bodies, segment)
+        start, end = (_turned(turn, getattr(fields, name)[segment]) for name in ("start", "end"))
+        way = end - start
+        size = np.hypot(*way.T)
+        with np.errstate(invalid="ignore", divide="ignore"):  # ends that have become one: no front, nothing is held
+            along = way / size[:, None]
+        sign = np.where(fields.front[segment] == FRONTS.index("left"), 1.0, -1.0)[:, None]
+        front = sign * np.stack((-along[:, 1], along[:, 0]), axis=1)
+        corner = start + _turned(turn, fields.offset[segment])
+        # The other's lowest point over the segment's line when the step began, and where free flight leads.
+        below = shapes.reach(-front)
+        before, after = (
+            shapes.centres(column) - column[segment] - corner for column in (bodies.previous_position, bodies.position)
+        )
+        low, lower = ((place * front).sum(axis=1) - below for place in (before, after))
+        slack = SLACK * 2.0 * below
+        # Where along the segment the other is when it meets the line: who then is beside it, or hardly over its end,
+        # comes from the side.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.where((low > 0.0) & (lower < 0.0), low / (low - lower), 0.0)[:, None]
+        at = ((before + share * (after - before)) * along).sum(axis=1)
+        shared = np.minimum(at + shapes.reach(along), size - at + shapes.reach(-along))
+        over = (shared > np.maximum(-low, 0.0)) | (lower >= 0.0)
+        comes = (low >= 0.0) | ((low >= -slack) & (lower <= low))
+        stands = self._stood(entities, of_second) & (low >= -np.where(below > 0.0, below, SLACK * size))
+        # Contacts with the ends are nobody's wall; but who has come deep from the front is held, wherever it is now.
+        normal = found.normal[contacts] * (-1.0 if of_second else 1.0)
+        beside = ((normal * front).sum(axis=1) < UPRIGHT) & ~(comes & over & (lower < -slack))
+        return (comes | stands) & over & ~beside | self._passive(segment, shapes)
+
+    def _stood(self, entities: list[np.ndarray], of_second: bool) -> np.ndarray:
+        step, held = _held.get(self.world, (-1, set()))
+        if step != self.world.step_count or not held:
+            return np.zeros(len(entities[0]), bool)
+        pairs = zip(*(which.tolist() for which in (reversed(entities) if of_second else entities)), strict=True)
+        return np.array([pair in held for pair in pairs], bool)
+
+    def _passive(self, segment: np.ndarray, shapes: _Shapes) -> np.ndarray:
+        """Contacts of sensors push nobody, and are left alone."""
+        return self.world.bodies.one_way_segment_collider.sensor[segment] | shapes.sensors()
+
+
+class _Shapes:
+    """The colliders that decide for some bodies: of several on one body the costliest."""
+
+    def __init__(self, world: World, rows: np.ndarray, entities: np.ndarray) -> None:
+        self._world, self._rows, self._entities = world, rows, entities
+        self._samples: dict[int, Any] = {}  # parameters of those that are looked at one by one
+        shapes = sorted(world.registry.shapes.values(), key=lambda shape: (shape.cost, shape.component.__name__))
+        self._of: dict[type[Any], np.ndarray] = {}  # indices of the bodies by their collider
+        taken = np.zeros(len(rows), bool)
+        for shape in shapes if world.settings.geometry == "bounds" else reversed(shapes):
+            has = world.bodies.has(shape.component)[self._rows] & ~taken
+            taken |= has
+            if has.any():
+                self._of[shape.component] = np.flatnonzero(has)
+        self._turn = _rotations(world.bodies, self._rows)
+
+    def _column(self, component: type[Any], name: str) -> np.ndarray:
+        return getattr(getattr(self._world.bodies, component.prefix[:-1]), name)[self._rows[self._of[component]]]
+
+    def sensors(self) -> np.ndarray:
+        result = np.zeros(len(self._rows), bool)
+        for component, chosen in self._of.items():
+            result[chosen] = self._column(component, "sensor")
+        return result
+
+    def centres(self, positions: np.ndarray) -> np.ndarray:
+        """Of the shapes, (m, 2), with the bodies at these positions."""
+        result = positions[self._rows].copy()
+        for component, chosen in self._of.items():
+            result[chosen] += _turned(self._turn[chosen], self._column(component, "offset"))
+        return result
+
+    def reach(self, directions: np.ndarray) -> np.ndarray:
+        """How far each shape reaches from its centre in its direction, a unit vector; (m,) m."""
+        result = np.zeros(len(self._rows))
+        for component, chosen in self._of.items():
+            looks = directions[chosen]
+            if component is SphereCollider:
+                result[chosen] = self._column(component, "radius")
+            elif component is AABBCollider:
+                half = _turned(np.abs(self._turn[chosen]), self._column(component, "half_extents"))
+                result[chosen] = (np.abs(looks) * half).sum(axis=1)
+            else:
+                for index, look in zip(chosen.tolist(), looks.tolist(), strict=True):
+                    result[index] = self._reach_of(component, index, tuple(look))
+        return result
+
+    def _reach_of(self, component: type[Any], index: int, look: tuple[float, ...]) -> float:
+        """The same of one shape of any kind, with its own functions."""
+        if index not in self._samples:
+            self._samples[index] = self._parameters(component, index)
+        sample = self._samples[index]
+        if not hasattr(component, "support"):
+            return float(np.abs(look) @ component.bounds(sample, 2))
+        rounding = component.rounding(sample) if hasattr(component, "rounding") else 0.0
+        return float(np.dot(component.support(sample, look), look)) + rounding
+
+    def _parameters(self, component: type[Any], index: int) -> Any:
+        """What the shape's functions get, as the body is turned."""
+        columns = self._world.registry.shapes[component].columns
+        handle = self._world.component_for_entity(int(self._entities[index]), component)
+        axes = self._turn[index]
+        values = [_plain(getattr(handle, name)) for name in columns]
+        sample = _tuple_type(component, columns)(*values, tuple(map(tuple, axes.T.tolist())))
+        if hasattr(component, "turned"):
+            sample = sample._replace(**dict(zip(columns, component.turned(sample, axes), strict=True)))
+        return sample
+
+
+PAIR = ("entity_a", "entity_b")
+
+
+def _segments_among(world: World) -> tuple[np.ndarray, np.ndarray] | None:
+    """Masks of the contacts whose first and whose second body is a one-way segment; None if there are none."""
+    segments = world.bodies.has(OneWaySegmentCollider)
+    if not len(world.contacts) or not segments.any():
+        return None
+    entities = world.bodies.entity[segments]
+    first, second = (np.isin(getattr(world.contacts, name), entities) for name in PAIR)
+    return (first, second) if first.any() or second.any() else None
+
+
+def _reason(world: World) -> str:
+    count = int(world.bodies.has(OneWaySegmentCollider).sum())
+    return f"{count} one-way segments" if count else "no one-way segments: nothing to do"
+
+
+def _rotations(bodies: Any, rows: Any) -> np.ndarray:
+    """Rotation matrices (m, 2, 2)."""
+    angle = bodies.rotation[rows]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.stack((np.stack((cosine, -sine), axis=-1), np.stack((sine, cosine), axis=-1)), axis=-2)
+
+
+def _turned(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return (matrices @ vectors[:, :, None])[:, :, 0]
+
+
+@lru_cache(maxsize=64)
+def _tuple_type(component: type[Any], columns: tuple[str, ...]) -> Any:
+    return collections.namedtuple(component.__name__, (*columns, "axes"))
+
+
+def _plain(value: Any) -> Any:
+    """A field as shape functions get it: vectors as tuples, arrays as they are."""
+    return tuple(value.tolist()) if isinstance(value, np.ndarray) and value.ndim == 1 else value

@@ -1,0 +1,354 @@
+"""Capsules: pairs against an independent oracle, and what they do in worlds, in 2D and 3D."""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+import pytest
+from oracles import convex_brute
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.framework.compilation import kernel
+from carom.framework.vectors import axes_at, row, store
+from carom.plugins import Physics, capsule
+from carom.plugins.capsule import CapsuleCollider, capsule_capsule, capsule_sphere
+
+G = 10.0
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+Capsule = namedtuple("Capsule", "radius half_height axes")
+Sphere = namedtuple("Sphere", "radius")
+Met = namedtuple("Met", "hit depth normal point")
+capsules = capsule.plugin.pairs[CapsuleCollider, CapsuleCollider].function
+spheres = capsule.plugin.pairs[CapsuleCollider, SphereCollider].function
+
+
+# -- the pairs against brute force -----------------------------------------------------------------
+
+
+@kernel
+def meet_all(sizes, axes_a, axes_b, offsets, hits, depths, normals, points, like):
+    """sizes (n, 4): radius and half height of the one, of the other; a half height below 0 makes it a sphere."""
+    for i in range(len(offsets)):
+        one = Capsule(sizes[i, 0], sizes[i, 1], axes_at(axes_a, i, like))
+        d = row(offsets, i, like)
+        if sizes[i, 3] < 0.0:
+            hits[i], depths[i], normal, point = spheres(one, Sphere(sizes[i, 2]), d)
+        else:
+            two = Capsule(sizes[i, 2], sizes[i, 3], axes_at(axes_b, i, like))
+            hits[i], depths[i], normal, point = capsules(one, two, d)
+        store(normals, i, normal)
+        store(points, i, point)
+
+
+def meet(sizes, axes_a, axes_b, offsets):
+    n, d = offsets.shape
+    met = Met(np.zeros(n, bool), np.zeros(n), np.zeros((n, d)), np.zeros((n, d)))
+    meet_all(sizes, axes_a, axes_b, offsets, *met, (0.0,) * d)
+    assert np.isfinite(met.depth).all()
+    assert np.isfinite(met.point).all()
+    assert abs(np.linalg.norm(met.normal, axis=1) - 1).max() < 1e-12
+    assert (met.hit == (met.depth >= 0)).all()
+    return met
+
+
+def rotations(rng, n, d):
+    return np.ascontiguousarray(np.linalg.qr(rng.normal(size=(n, d, d)))[0])
+
+
+def cores(half, axes, centre=0.0):
+    """The ends of the segments, (n, 2, d)."""
+    way = np.maximum(half, 0.0)[:, None] * axes[:, :, 1]
+    return np.stack((centre - way, centre + way), 1)
+
+
+def to_segment(points, ends):
+    """Distances of points from segments."""
+    way = ends[:, 1] - ends[:, 0]
+    square = (way**2).sum(1)
+    along = ((points - ends[:, 0]) * way).sum(1) / np.where(square > 0, square, 1)
+    return np.linalg.norm(points - ends[:, 0] - np.clip(along, 0, 1)[:, None] * way, axis=1)
+
+
+def overlap(a, b):
+    """Of the cores; in 3D two segments overlap in a point at most."""
+    return convex_brute.meet(a, b)[0] if a.shape[2] == 2 else -convex_brute.separation(a, b)[0]
+
+
+@both_dimensions
+@pytest.mark.parametrize("other", ["capsule", "sphere"])
+def test_ten_thousand_random_poses(d, other):
+    rng, n = np.random.default_rng(d), 10_000
+    sizes = 10.0 ** rng.uniform(-1, 0.5, (n, 4))
+    axes_a, axes_b, offsets = rotations(rng, n, d), rotations(rng, n, d), 2 * rng.normal(size=(n, d))
+    if other == "sphere":
+        sizes[:, 3] = -1.0
+    met = meet(sizes, axes_a, axes_b, offsets)
+    reach = sizes[:, 0] + sizes[:, 2]
+    a, b = cores(sizes[:, 1], axes_a), cores(sizes[:, 3], axes_b, offsets)
+    expected = reach - to_segment(offsets, a) if other == "sphere" else reach + overlap(a, b)
+    assert 0.2 < met.hit.mean() < 0.95
+    np.testing.assert_allclose(met.depth, expected, rtol=0, atol=1e-12)
+    # moved by the depth along the normal they just touch
+    moved = b + (met.depth[:, None] * met.normal)[:, None]
+    gap = to_segment(moved[:, 0], a) if other == "sphere" else -overlap(a, moved)
+    np.testing.assert_allclose(gap, reach, rtol=0, atol=1e-7)  # nearly parallel normals: the oracle's, of 1e-15 squares
+    # the point is in the middle of the overlap, or of the gap; where segments cross, near there
+    crossing = 0.5 * abs(sizes[:, 0] - sizes[:, 2]) * (met.depth > reach)
+    for ends, radius in ((a, sizes[:, 0]), (b, sizes[:, 2])):
+        assert (to_segment(met.point, ends) <= np.maximum(abs(radius - 0.5 * met.depth), crossing) + 1e-9).all()
+
+
+@both_dimensions
+def test_a_capsule_seen_from_the_other_is_the_same(d):
+    rng, n = np.random.default_rng(5), 2000
+    sizes = 10.0 ** rng.uniform(-1, 0.5, (n, 4))
+    axes_a, axes_b, offsets = rotations(rng, n, d), rotations(rng, n, d), 2 * rng.normal(size=(n, d))
+    axes_b[: n // 2] = axes_a[: n // 2]  # parallel, and in line
+    offsets[: n // 4] = axes_a[: n // 4, :, 1] * rng.uniform(-3, 3, (n // 4, 1))
+    one, two = meet(sizes, axes_a, axes_b, offsets), meet(sizes[:, [2, 3, 0, 1]], axes_b, axes_a, -offsets)
+    np.testing.assert_allclose(one.depth, two.depth, rtol=0, atol=1e-13)
+    # parallel segments are nearest at an end of one of them
+    a, b = cores(sizes[:, 1], axes_a), cores(sizes[:, 3], axes_b, offsets)
+    ends = [to_segment(b[:, k], a) for k in range(2)] + [to_segment(a[:, k], b) for k in range(2)]
+    expected = (sizes[:, 0] + sizes[:, 2] - np.min(ends, 0))[: n // 2]
+    np.testing.assert_allclose(one.depth[: n // 2], expected, rtol=0, atol=1e-12)
+
+
+@both_dimensions
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("ratio", [1.0, 1e-12])
+def test_extremes(d, size, ratio):
+    """Coincident, in line, across, parallel, far away; with no radius, no height, and another 1e12 times smaller."""
+    offsets = np.array([(0, 0, 0), (0, 1, 0), (1, 0, 0), (0, 3, 0), (1e12, 0, 0), (1e-12, 1e-12, 0), (0, -1, 0)])
+    turns = [np.eye(d), np.eye(d)[:, [1, 0, *range(2, d)]], rotations(np.random.default_rng(1), 1, d)[0]]
+    poses = [
+        (np.array([r, h, r2, h2]), offset[:d], turn)
+        for r in (0.0, 0.5) for h in (0.0, 1.0) for r2 in (0.0, 0.5) for h2 in (0.0, 1.0, -1.0)
+        for offset in offsets for turn in turns
+    ]  # fmt: skip
+    sizes = np.array([pose[0] for pose in poses]) * size * np.array([1, 1, ratio, ratio])
+    offsets = np.array([pose[1] for pose in poses]) * size
+    axes_a, axes_b = np.array([np.eye(d)] * len(poses)), np.array([pose[2] for pose in poses])
+    met = meet(sizes, axes_a, axes_b, offsets)
+    a, b = cores(sizes[:, 1], axes_a), cores(sizes[:, 3], axes_b, offsets)
+    distance = convex_brute.separation(a, b)[0]
+    reach = sizes[:, 0] + sizes[:, 2]
+    crossing = distance <= 1e-12 * size
+    if d == 2:
+        through = convex_brute.penetration(a, b)[0]
+        crossing |= np.isfinite(through) & (through > 1e-12 * size)
+    scale = np.abs(offsets).max(1) + size
+    assert (abs(met.depth - reach + distance) / scale)[~crossing].max() < 1e-14
+    assert ((met.depth - reach) / size)[crossing].min() > -2e-12
+
+
+@both_dimensions
+def test_cores_that_just_touch_part_by_their_radii(d):
+    """Ends on sides, ends on ends, points on segments, parallel and nearly so: moved by the depth they are apart."""
+    rng, n = np.random.default_rng(3), 3000
+    axes_a, axes_b = rotations(rng, n, d), rotations(rng, n, d)
+    angle = 10.0 ** rng.uniform(-18, 0, n)[:, None]
+    near = np.cos(angle) * axes_a[:, :, 1] + np.sin(angle) * axes_a[:, :, 0]
+    axes_b[: n // 2, :, 1] = near[: n // 2]  # only this one counts
+    sizes = rng.choice((0.0, 1e-15, 0.5, 2.0), (n, 4))
+    places = rng.choice((-1.0, 0.0, 0.3, 1.0), (n, 2))
+    places *= sizes[:, [1, 3]]
+    offsets = places[:, :1] * axes_a[:, :, 1] - places[:, 1:] * axes_b[:, :, 1]
+    met = meet(sizes, axes_a, axes_b, offsets)
+    reach = sizes[:, 0] + sizes[:, 2]
+    assert (met.depth >= reach - 5e-8).all()  # by angles below 1e-8, of which lines lie how is not known
+    # along the normal no point of the one core is then farther than the nearest of the other less the radii
+    along_a, along_b = ((axes[:, :, 1] * met.normal).sum(1) for axes in (axes_a, axes_b))
+    between = ((offsets + met.depth[:, None] * met.normal) * met.normal).sum(1)
+    between -= abs(along_a) * sizes[:, 1] + abs(along_b) * sizes[:, 3]
+    assert (between >= reach - 1e-4).all()  # gaps above 1e-12 count: rounding of 1e-16 makes that of their direction
+
+
+def test_crossing_segments_in_the_plane_part_by_the_shorter_way():
+    """A plus of two capsules of half height 1 and 2, moved by 0.2: the short one leaves along the long one's side."""
+    upright, lying = ((1.0, 0.0), (0.0, 1.0)), ((0.0, -1.0), (1.0, 0.0))
+    hit, depth, normal, _ = capsule_capsule(Capsule(0.5, 2.0, upright), Capsule(0.25, 1.0, lying), (0.2, 0.0))
+    assert hit
+    assert depth == pytest.approx(0.75 + 0.8)
+    assert normal == pytest.approx((1.0, 0.0))
+
+
+def test_a_sphere_on_the_axis_leaves_sideways():
+    hit, depth, normal, point = capsule_sphere(Capsule(0.5, 2.0, np.eye(3)), Sphere(0.25), (0.0, 1.0, 0.0))
+    assert hit
+    assert depth == 0.75
+    assert normal[1] == 0.0
+    assert point == pytest.approx((0.125 * normal[0], 1.0, 0.125 * normal[2]))
+
+
+# -- in worlds --------------------------------------------------------------------------------------
+
+
+def make_world(d, **settings):
+    """One with a floor, its top at 0, and a sphere far away: all three shapes, so that all tests share their code."""
+    options = {"integrator": "velocity_verlet"} | settings
+    world = World(Physics(dimensions=d, gravity=at(d, 0, -G)), capsule.plugin, settings=Settings(**options))
+    world.create_entity(Transform(at(d, 0, -1)), AABBCollider(at(d, 50, 1, 50), friction=1.0))
+    world.create_entity(Transform(at(d, 1e4, 0)), SphereCollider(1.0))
+    return world
+
+
+def at(d, *place):
+    return tuple(map(float, (*place, 0, 0, 0)[:d]))
+
+
+def turn(d, angle):
+    """In the plane of x and y."""
+    return angle if d == 2 else (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
+
+
+def drop(world, d, x, y, angle=0.0, velocity=0.0, **collider):
+    return world.create_entity(
+        Transform(at(d, x, y), turn(d, angle)), RigidBody(linear_velocity=velocity),
+        CapsuleCollider(0.25, 0.5, **collider))  # fmt: skip
+
+
+def place_of(world, entity):
+    return np.array(world.component_for_entity(entity, Transform).position)
+
+
+def velocity_of(world, entity):
+    return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
+
+
+@both_dimensions
+def test_bounces_at_the_right_height_however_it_is_turned(d):
+    """From 2 m above the floor to e^2 2 m; verlet's flight is exact, impacts are at their time: 1e-3 is sampling."""
+    world, e = make_world(d), 0.5
+    lowest = {0.0: 0.75, math.pi / 2: 0.25, math.pi / 6: 0.25 + 0.5 * math.cos(math.pi / 6)}
+    entities = [drop(world, d, 5 * k, 2 + low, a, restitution=e) for k, (a, low) in enumerate(lowest.items())]
+    fall, rise = math.sqrt(2 * 2 / G), math.sqrt(2 * 2 * e**2 / G)
+    world.step()
+    heights = []
+    while world.time < fall + 2 * rise - 1 / 60:
+        world.step()
+        if world.time > fall:
+            heights.append([place_of(world, entity)[1] for entity in entities])
+    assert np.max(heights, 0) - list(lowest.values()) == pytest.approx([2 * e**2] * 3, abs=2e-3)
+    world.close()
+
+
+@both_dimensions
+def test_rests_on_boxes_spheres_and_capsules(d):
+    """Each a slop, 0.005 of its size 0.5, into what is below it at most."""
+    world = make_world(d)
+    lying = math.pi / 2
+    floor = drop(world, d, 0, 0.26, lying)
+    on_sphere_at = 5.0
+    world.create_entity(Transform(at(d, on_sphere_at, 0.5)), SphereCollider(0.5))
+    on_sphere = drop(world, d, on_sphere_at, 1.76)
+    world.create_entity(Transform(at(d, 10, 0.25), turn(d, lying)), CapsuleCollider(0.25, 0.5))
+    on_capsule = drop(world, d, 10.2, 0.76, lying)
+    upright = drop(world, d, 15, 0.76)
+    on_upright = drop(world, d, 15, 2.27)
+    box = world.create_entity(Transform(at(d, 20, 1.02)), RigidBody(), AABBCollider(0.25))
+    world.create_entity(Transform(at(d, 20, 0.25), turn(d, lying)), CapsuleCollider(0.5, 0.5))
+    for _ in range(240):
+        world.step()
+    heights = [place_of(world, entity)[1] for entity in (floor, on_sphere, on_capsule, upright, on_upright, box)]
+    assert np.abs(np.array(heights) - (0.25, 1.75, 0.75, 0.75, 2.25, 1.0)).max() < 0.005
+    assert np.abs(world.bodies.dynamic.linear_velocity).max() < 1e-3
+    world.close()
+
+
+@both_dimensions
+def test_a_ball_slides_down_a_turned_capsule(d):
+    """Frictionless on a slope of 30 degrees: a = g sin 30 along it, v = a t."""
+    world = make_world(d)
+    angle = math.pi / 3  # of the axis with the vertical
+    ramp = CapsuleCollider(0.5, 20.0)
+    world.create_entity(Transform(at(d, 0, 100), turn(d, angle)), ramp)
+    down = np.array(at(d, math.sin(angle), -math.cos(angle)))
+    out = np.array(at(d, math.cos(angle), math.sin(angle)))
+    start = np.array(at(d, 0, 100)) - 10 * down + 1.0 * out
+    ball = world.create_entity(Transform(start), RigidBody(), SphereCollider(0.5))
+    for _ in range(60):
+        world.step()
+    assert velocity_of(world, ball) @ down == pytest.approx(G * 0.5, rel=1e-3)
+    assert (place_of(world, ball) - start) @ down == pytest.approx(0.5 * G * 0.5, rel=0.03)
+    assert abs((place_of(world, ball) - start) @ out) < 0.005
+    world.close()
+
+
+@both_dimensions
+def test_is_carried_by_a_moving_platform(d):
+    world = make_world(d)
+    world.create_entity(
+        Transform(at(d, 0, 10), turn(d, math.pi / 2)), RigidBody(kind="kinematic", linear_velocity=at(d, 1, 0.5)),
+        CapsuleCollider(0.5, 5.0))  # fmt: skip
+    rider = drop(world, d, 0, 11.25, friction=1.0)
+    for _ in range(120):
+        world.step()
+    assert velocity_of(world, rider)[:2] == pytest.approx((1, 0.5), abs=1e-3)
+    assert place_of(world, rider)[1] == pytest.approx(12.25, abs=0.01)
+    world.close()
+
+
+@both_dimensions
+def test_equal_capsules_exchange_their_speeds(d):
+    world = make_world(d)
+    one = drop(world, d, 0, 50, velocity=at(d, 3, 0), restitution=1.0)
+    two = drop(world, d, 2, 50.7, velocity=at(d, -1, 0), restitution=1.0)
+    energy = world.kinetic_energy() + world.potential_energy()
+    for _ in range(60):
+        world.step()
+    assert velocity_of(world, one)[0] == pytest.approx(-1)
+    assert velocity_of(world, two)[0] == pytest.approx(3)
+    assert world.kinetic_energy() + world.potential_energy() == pytest.approx(energy, rel=1e-12)
+    world.close()
+
+
+@both_dimensions
+def test_queries_and_casts_find_it(d):
+    world = make_world(d)
+    place = np.array(at(d, 0, 100))
+    leaning = world.create_entity(Transform(place, turn(d, -math.pi / 4)), CapsuleCollider(0.5, 2.0))
+    axis = np.array(at(d, 1, 1)) / math.sqrt(2)
+    assert world.query_point(place + 2.4 * axis) == [leaning]
+    assert world.query_point(place + 2.6 * axis) == []
+    assert world.query_point(place + at(d, 1.5, -1.5)) == []  # in its box, not in it
+    assert world.query_sphere(place + at(d, 1.0, -1.0), math.sqrt(2) - 0.4) == [leaning]
+    assert world.query_sphere(place + at(d, 1.0, -1.0), math.sqrt(2) - 0.6) == []
+    hit = world.ray_cast(place + at(d, 1, 10), at(d, 0, -1))[0]
+    assert hit.entity == leaning
+    assert hit.distance == pytest.approx(9 - 0.5 * math.sqrt(2))
+    assert hit.normal[:2] == pytest.approx((-math.sqrt(0.5), math.sqrt(0.5)))
+    end = world.ray_cast(place + 10 * axis, -axis)[0]
+    assert end.distance == pytest.approx(7.5)
+    swept = world.shape_cast(CapsuleCollider(0.25, 1.0), place + at(d, 0.5, 10), at(d, 0, -20))[0]
+    assert swept.entity == leaning
+    # its lower end, at x = 0.5, comes to within 0.75 of the line
+    assert swept.distance == pytest.approx(9.5 - 0.75 * math.sqrt(2) - 1.0)
+    world.close()
+
+
+def test_levels_a_sphere_around_a_capsule():
+    """What meets the sphere only passes."""
+    world = make_world(2)
+    statue = CapsuleCollider(0.25, 1.0, restitution=1.0)
+    world.create_entity(Transform((0, 50)), statue, SphereCollider(1.3, restitution=1.0))
+    passes = world.create_entity(Transform((1.1, 54)), RigidBody(linear_velocity=(0, -10)), SphereCollider(0.25))
+    strikes = world.create_entity(Transform((0.0, 54)), RigidBody(linear_velocity=(0, -10)), SphereCollider(0.25))
+    for _ in range(40):
+        world.step()
+    assert place_of(world, passes)[0] == 1.1
+    assert place_of(world, passes)[1] < 48
+    assert place_of(world, strikes)[1] > 51
+    world.create_entity(Transform((20, 50)), CapsuleCollider(0.25, 1.0), SphereCollider(1.0))
+    with pytest.raises(ValueError, match="sticks out"):
+        world.step()
+    world.close()
+
+
+@pytest.mark.parametrize("arguments", [(-0.1, 1.0), (0.1, -1.0), (math.nan, 1.0), ("x", 1.0)])
+def test_wrong_sizes_are_named(arguments):
+    with pytest.raises(ValueError, match=r"CapsuleCollider\.(radius|half_height)"):
+        CapsuleCollider(*arguments)

@@ -1,0 +1,276 @@
+"""Convex polygons: what is refused, 10,000 poses against brute force over features, and falling, sliding, queries."""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+import pytest
+from oracles import convex_brute
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import World
+from carom.framework.compilation import inlined, kernel
+from carom.framework.vectors import row, store
+from carom.plugins import Physics, convex_polygon
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.standard_shapes import convex_convex
+
+COUNT = 10_000
+SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
+
+Parameters = namedtuple("Parameters", "vertices corner_radius axes")
+support, rounding = inlined(ConvexPolygonCollider.support), inlined(ConvexPolygonCollider.rounding)
+bounds = inlined(ConvexPolygonCollider.bounds)
+
+
+@inlined
+def parameters(vertices, radii, angles, i):
+    axes = ((math.cos(angles[i]), math.sin(angles[i])), (-math.sin(angles[i]), math.cos(angles[i])))
+    return Parameters(vertices[i], radii[i], axes)
+
+
+@kernel
+def meet_all(a, b, offsets, depths, normals, points, half, like):
+    for i in range(len(offsets)):
+        one, two = parameters(a[0], a[1], a[2], i), parameters(b[0], b[1], b[2], i)
+        d = row(offsets, i, like)
+        _, depths[i], normal, point = convex_convex(one, two, d, support, support, rounding, rounding)
+        store(normals, i, normal)
+        store(points, i, point)
+        store(half, i, bounds(one, 2))
+
+
+def meet(a, b, offsets):
+    """Depths, normals, points, and half extents of a's boxes; a, b: (vertices (n, v, 2), radii (n,), angles (n,))."""
+    n = len(offsets)
+    results = np.zeros(n), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
+    meet_all(a, b, offsets, *results, (0.0, 0.0))
+    return results
+
+
+def in_world(polygons):
+    """Corners where they are, turned."""
+    vertices, _, angles = polygons
+    turn = np.array(((np.cos(angles), -np.sin(angles)), (np.sin(angles), np.cos(angles))))
+    return np.einsum("kjn,nvj->nvk", turn, vertices)
+
+
+def random_polygons(rng, corners, size=1.0):
+    """Corners on an ellipse, so convex, in random places of it; somewhere around the origin."""
+    angles = np.sort(rng.uniform(0, 2 * np.pi, (COUNT, corners)) * 0.1 + np.linspace(0, 1.7 * np.pi, corners), axis=1)
+    points = np.stack((np.cos(angles), np.sin(angles)), 2) * rng.uniform(0.2, 1, (COUNT, 1, 2))
+    return size * (points + rng.normal(size=(COUNT, 1, 2)) * 0.3)
+
+
+@pytest.mark.parametrize(("corners", "others", "ratio"), [(3, 4, 1.0), (5, 7, 1.0), (4, 4, 1e3), (3, 6, 1e-4)])
+def test_random_poses_agree_with_brute_force(corners, others, ratio):
+    rng = np.random.default_rng(corners + others)
+    a = random_polygons(rng, corners), rng.uniform(0, 0.2, COUNT), rng.uniform(-10, 10, COUNT)
+    b = random_polygons(rng, others, ratio), rng.uniform(0, 0.2 * ratio, COUNT), rng.uniform(-10, 10, COUNT)
+    size = 1.0 + ratio
+    offsets = rng.normal(size=(COUNT, 2)) * size
+    offsets[:50] = 0.0
+    depths, normals, points, half = meet(a, b, offsets)
+    first, second = in_world(a), in_world(b) + offsets[:, None]
+    expected, _ = convex_brute.meet(first, second)
+    assert abs(depths - (expected + a[1] + b[1])).max() < 1e-13 * size  # measured 2e-15
+    along = convex_brute.overlap_along(first, second, normals)
+    tilt = np.where(expected < 0, 1e-14 * size / np.maximum(-expected, 1e-300), 0)  # of directions between near points
+    assert (abs(along - expected) - tilt * size).max() < 1e-12 * size
+    # The point lies in the middle of the overlap or gap, along the normal.
+    surface = np.einsum("nvk,nk->nv", first, normals).max(1) + a[1]
+    middle = np.einsum("nk,nk->n", points, normals) + depths / 2
+    assert (abs(middle - surface) - tilt * size).max() < 1e-12 * size
+    # The box around the turned polygon touches it.
+    np.testing.assert_allclose(half, abs(first).max(1) + a[1][:, None], rtol=1e-14)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("ratio", [1.0, 1e12])
+def test_extreme_sizes(size, ratio):
+    """Two boxes side by side, and on top of each other; the small one in the middle of the large one's side."""
+    box = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))[None]
+    zero = np.zeros(1)
+    for at in ((1.0, 0.0), (0.0, -1.0), (0.0, 0.0)):
+        offset = np.array([at]) * size * (1.0 + ratio)
+        depths, normals, points, _ = meet((box * size * ratio, zero, zero), (box * size, zero, zero), offset)
+        away = 0.0 if any(at) else size * (1 + ratio)
+        assert depths[0] == pytest.approx(away, abs=1e-15 * size * ratio)
+        if any(at):
+            np.testing.assert_allclose(normals[0], at, atol=1e-15)
+            np.testing.assert_allclose(points[0], np.array(at) * size * ratio, atol=1e-15 * size * ratio)
+    far = np.array([[3e12, 4e12]]) * size
+    depths, normals, _, _ = meet((box * size, zero, zero), (box * size, zero, zero), far)
+    assert depths[0] == pytest.approx(-5e12 * size, rel=1e-11)
+    np.testing.assert_allclose(normals[0], (0.6, 0.8), atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "rule"),
+    [
+        (((0, 0), (1, 0)), "must have 3"),
+        (((0, 0), (1, 0), (1, 0), (0, 1)), "same corner twice in a row"),
+        (((1, 0), (0, 1), (0, 0), (1, 0)), "same corner twice in a row"),
+        (((0, 0), (1, 0), (2, 0), (0, 1)), "three corners on a line"),
+        (((0, 0), (1, 1), (2, 2)), "three corners on a line"),
+        (((0, 0), (2, 0), (1, 0), (0, 1)), "three corners on a line"),
+        (((5, 5), (5, 5), (5, 5)), "one point"),
+        (((0, 0), (4, 0), (1, 1), (0, 4)), r"must be convex \(it is not at corner"),
+        (((0, 0), (1, 1), (1, 0), (0, 1)), "must be convex"),
+        ([(math.cos(k * 4 * math.pi / 5), math.sin(k * 4 * math.pi / 5)) for k in range(5)], "cross each other"),
+        (((0, 0), (1, 0), (0, math.nan)), "finite"),
+        (((0, 0, 0), (1, 0, 0), (0, 1, 0)), r"shape \(n, 2\)"),
+        (((0, 0), (1, 0), (0,)), "numbers"),
+        ("triangle", "numbers"),
+        (7, r"shape \(n, 2\)"),
+    ],
+)
+def test_what_is_no_convex_polygon_is_refused(vertices, rule):
+    with pytest.raises(ValueError, match=f"ConvexPolygonCollider.vertices .*{rule}"):
+        ConvexPolygonCollider(vertices)
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-9, 1.0, 1e200])
+def test_either_order_is_taken_at_any_size(size):
+    square = np.array(SQUARE, float) * size
+    for corners in (square, square[::-1], np.roll(square, 1, axis=0)):
+        kept = ConvexPolygonCollider(corners).vertices / size
+        area = (kept[:, 0] * np.roll(kept[:, 1], -1) - kept[:, 1] * np.roll(kept[:, 0], -1)).sum() / 2
+        assert area == pytest.approx(1.0)
+
+
+def test_boxes_and_regular_polygons():
+    np.testing.assert_array_equal(ConvexPolygonCollider.box((2, 1)).vertices, ((-2, -1), (2, -1), (2, 1), (-2, 1)))
+    hexagon = ConvexPolygonCollider.regular(6, 2.0, corner_radius=0.1)
+    np.testing.assert_allclose(np.hypot(*hexagon.vertices.T), 2.0)
+    assert hexagon.corner_radius == 0.1
+    assert len(ConvexPolygonCollider.regular(1000, 1e-6).vertices) == 1000
+    for wrong in (0, (1, 0), (1, 2, 3), math.nan):
+        with pytest.raises(ValueError, match="box: half_extents must be positive"):
+            ConvexPolygonCollider.box(wrong)
+    for n, radius in ((2, 1), (2.5, 1), (3, 0), (3, math.inf)):
+        with pytest.raises(ValueError, match="regular: "):
+            ConvexPolygonCollider.regular(n, radius)
+    with pytest.raises(ValueError, match="corner_radius"):
+        ConvexPolygonCollider(SQUARE, corner_radius=-1)
+
+
+def test_a_triangle_is_no_shape_of_a_3d_world():
+    world = World(Physics(dimensions=3), convex_polygon.plugin)
+    world.create_entity(Transform((0, 0, 0)), ConvexPolygonCollider(SQUARE))
+    with pytest.raises(ValueError, match=r"ConvexPolygonCollider.* 2D"):
+        world.step()
+
+
+# -- in a world: polygons, spheres and boxes in every one, so that all share their compiled code -------------------
+
+
+def make_world(gravity=(0, -10)):
+    world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)
+    world.create_entity(Transform((0, -500)), SphereCollider(1.0))
+    world.create_entity(Transform((0, -600)), AABBCollider(1.0))
+    world.create_entity(Transform((0, -700)), ConvexPolygonCollider.box(1.0))
+    return world
+
+
+def run(world, steps):
+    for _ in range(steps):
+        world.step()
+
+
+FALLING = {
+    "polygon": lambda **material: ConvexPolygonCollider.box((0.3, 0.5), **material),
+    "rounded": lambda **material: ConvexPolygonCollider.box((0.2, 0.4), corner_radius=0.1, **material),
+    "sphere": lambda **material: SphereCollider(0.5, **material),
+    "box": lambda **material: AABBCollider((0.3, 0.5), **material),
+}
+
+
+@pytest.mark.parametrize("shape", FALLING)
+def test_it_bounces_at_the_right_height_and_rests(shape):
+    world = make_world()
+    world.create_entity(Transform((0, -1), rotation=math.pi / 2), ConvexPolygonCollider.box((1, 20)))
+    bouncing = world.create_entity(Transform((-5, 2)), RigidBody(), FALLING[shape](restitution=0.8))
+    resting = world.create_entity(Transform((5, 0.6)), RigidBody(), FALLING[shape]())
+    heights = []
+    for _ in range(120):
+        world.step()
+        heights.append(world.component_for_entity(bouncing, Transform).y)
+    top = max(heights[40:])
+    # From 1.5 m above the floor to 0.64 of it; a step's sampling misses at most g dt^2 / 8 of the top.
+    assert top - 0.5 == pytest.approx(0.64 * 1.5, rel=0.01)
+    place = world.component_for_entity(resting, Transform).position
+    assert place[0] == 5.0
+    assert place[1] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_it_slides_down_a_slope_as_fast_as_physics_says():
+    """g (sin a - mu cos a) along the slope, for a box turned like it."""
+    angle, friction = math.radians(30), 0.2
+    world = make_world()
+    along, up = np.array((math.cos(angle), math.sin(angle))), np.array((-math.sin(angle), math.cos(angle)))
+    world.create_entity(
+        Transform((0, 0), rotation=angle), ConvexPolygonCollider.box((100, 1), friction=friction)
+    )
+    box = world.create_entity(Transform(up * 1.25 + along * 20, rotation=angle), RigidBody(),
+                              ConvexPolygonCollider.box((0.5, 0.25), friction=friction))  # fmt: skip
+    run(world, 60)
+    body = world.component_for_entity(box, RigidBody)
+    expected = 10 * (math.sin(angle) - friction * math.cos(angle))
+    assert -body.linear_velocity @ along == pytest.approx(expected, rel=0.01)
+    assert abs(body.linear_velocity @ up) < 1e-6
+    assert world.component_for_entity(box, Transform).position @ up == pytest.approx(1.25, abs=1e-3)
+
+
+def test_turning_the_transform_turns_the_polygon():
+    world = make_world(gravity=(0, 0))
+    stick = world.create_entity(Transform((0, 0)), ConvexPolygonCollider.box((2, 0.1)))
+    world.step()
+    assert world.query_sphere((1.5, 0), 0.1) == [stick]
+    assert world.query_sphere((0, 1.5), 0.1) == []
+    world.component_for_entity(stick, Transform).rotation = math.pi / 2
+    world.refresh_queries()
+    assert world.query_sphere((1.5, 0), 0.1) == []
+    assert world.query_sphere((0, 1.5), 0.1) == [stick]
+    assert world.query_aabb((0.05, 1), (1, 1.5)) == [stick]
+
+
+def test_rays_and_moving_shapes_meet_it():
+    world = make_world(gravity=(0, 0))
+    diamond = world.create_entity(Transform((5, 0), rotation=math.pi / 4), ConvexPolygonCollider.box(1.0))
+    world.step()
+    hit = world.ray_cast((0, 0.5), (1, 0), 20)[0]
+    assert hit.entity == diamond
+    assert hit.distance == pytest.approx(5 - math.sqrt(2) + 0.5, abs=1e-12)
+    np.testing.assert_allclose(hit.normal, (-math.sqrt(0.5), math.sqrt(0.5)), atol=1e-12)
+    hit = world.shape_cast(ConvexPolygonCollider.box(1.0), (0, 0), (10, 0))[0]
+    assert hit.distance == pytest.approx(5 - math.sqrt(2) - 1, abs=1e-12)
+    nearest = world.query_nearest((5, 3))
+    assert nearest.distance == pytest.approx(3 - math.sqrt(2), abs=1e-12)
+
+
+def test_as_a_second_level_it_decides():
+    """A body with a sphere around a triangle: who touches the sphere alone is not touched."""
+    world = make_world(gravity=(0, 0))
+    triangle = ConvexPolygonCollider(((0, 1), (-0.8, -0.6), (0.8, -0.6)))
+    world.create_entity(Transform((0, 0)), SphereCollider(1.0), triangle)
+    ball = world.create_entity(Transform((0.9, 0.6)), RigidBody(), SphereCollider(0.3))
+    world.step()
+    assert len(world.contacts.of(ball)) == 0
+    world.component_for_entity(ball, Transform).position = (0.3, 0.6)
+    world.step()
+    assert len(world.contacts.of(ball)) == 1
+
+
+def test_new_corners_count_from_the_next_step_on():
+    world = make_world(gravity=(0, 0))
+    polygon = world.create_entity(Transform((0, 0)), ConvexPolygonCollider.box(1.0))
+    world.step()
+    assert world.query_point((1.5, 0)) == []
+    world.component_for_entity(polygon, ConvexPolygonCollider).vertices = ((-2, -2), (2, -2), (2, 2), (-2, 2))
+    world.step()
+    assert world.query_point((1.5, 0)) == [polygon]
+    copy = world.component_for_entity(polygon, ConvexPolygonCollider).copy()
+    np.testing.assert_array_equal(copy.vertices[0], (-2, -2))

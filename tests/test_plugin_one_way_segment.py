@@ -1,0 +1,411 @@
+"""One-way segments: solid for what comes from the front, nothing for all else, and for how long."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Phase, Settings, World
+from carom.plugins import Physics, one_way_segment
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.capsule import plugin as capsule
+from carom.plugins.one_way_segment import OneWaySegmentCollider
+
+G = 10.0
+REST = 0.0025  # half the slop of 0.005 of a size of 1, or less
+SHAPES = {"ball": lambda **c: SphereCollider(0.5, **c), "box": lambda **c: AABBCollider(0.5, **c)}
+each_shape = pytest.mark.parametrize("shape", SHAPES)
+
+
+def make_world(*segments, with_capsules=False, **settings):
+    """One segment from x = -2 to 2 unless given; a box and a ball far away, so that all tests share their code."""
+    plugins = (capsule,) if with_capsules else ()
+    world = World(
+        Physics(dimensions=2, gravity=(0, -G)), one_way_segment.plugin, *plugins, settings=Settings(**settings))
+    for segment in segments or ((Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0))),):
+        world.create_entity(*segment)
+    world.create_entity(Transform((1e5, -1)), AABBCollider(0.5))
+    world.create_entity(Transform((2e5, -1)), SphereCollider(0.5))
+    return world
+
+
+def throw(world, place, velocity=(0.0, 0.0), shape="box", **collider):
+    made = SHAPES[shape](**collider) if isinstance(shape, str) else shape
+    return world.create_entity(Transform(place), RigidBody(linear_velocity=velocity), made)
+
+
+def place_of(world, entity):
+    return np.array(world.component_for_entity(entity, Transform).position)
+
+
+def velocity_of(world, entity):
+    return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
+
+
+def run(world, seconds, *entities):
+    """Heights of the entities after each step, (steps, entities)."""
+    heights = []
+    for _ in range(round(60 * seconds)):
+        world.step()
+        heights.append([place_of(world, entity)[1] for entity in entities])
+    return np.array(heights)
+
+
+# -- through from below, held from above ------------------------------------------------------------
+
+
+@each_shape
+def test_a_jump_passes_and_lands(shape):
+    """As high as without the platform, to the bit; then it stands on it, and has touched it once."""
+    free = World(Physics(dimensions=2, gravity=(0, -G)))
+    alone = throw(free, (0, -2), (0, 9), shape)
+    world = make_world()
+    jumper = throw(world, (0, -2), (0, 9), shape)
+    rise = run(free, 0.9, alone)
+    heights = run(world, 0.9, jumper)
+    assert np.array_equal(heights, rise)
+    assert not len(world.contacts.begin)
+    begun = []
+    for _ in range(120):
+        world.step()
+        begun += list(world.contacts.begin)
+    assert place_of(world, jumper)[1] == pytest.approx(0.5, abs=REST)
+    assert velocity_of(world, jumper)[1] == pytest.approx(0, abs=1e-6)
+    assert [(contact.entity_a, contact.entity_b) for contact in begun] == [(1, jumper)]
+    assert begun[0].normal == pytest.approx((0, 1))
+    world.close()
+    free.close()
+
+
+@each_shape
+@pytest.mark.parametrize("apex", [-0.4, 0.0, 0.3, 0.47])
+def test_a_jump_that_ends_inside_falls_back(shape, apex):
+    """The centre's highest point over the platform; from 0.5 on it would stand. The fall is free."""
+    world = make_world(integrator="velocity_verlet")
+    speed = math.sqrt(2 * G * (apex + 2))
+    jumper = throw(world, (0, -2), (0, speed), shape)
+    t = np.arange(1, 91) / 60
+    heights = run(world, 1.5, jumper)[:, 0]
+    assert abs(heights - (-2 + speed * t - G * t**2 / 2)).max() < 1e-12
+    assert heights.max() == pytest.approx(apex, abs=G / 60**2 / 8)  # sampled
+    world.close()
+
+
+@each_shape
+@pytest.mark.parametrize("speed", [0, 10, 30, 45])
+def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed):
+    """A body of size 1 at 45 m/s goes 0.75 in a step: its centre may come to be below the platform in between."""
+    for phase in (0.0, 0.1, 0.2, 0.35, 0.6):
+        world = make_world()
+        faller = throw(world, (0.3, 2 + phase), (1.0, -speed), shape)
+        heights = run(world, 0.9, faller)
+        assert heights[-1] == pytest.approx(0.5, abs=REST)
+        assert heights.min() > 0.45
+        world.close()
+
+
+@each_shape
+def test_bounces_at_the_right_height(shape):
+    """From 2 m to e^2 2 m; verlet's flight is exact, impacts are at their time: 2e-3 is what sampling may miss."""
+    world, e = make_world(integrator="velocity_verlet"), 0.5
+    bouncer = throw(world, (0, 2.5), shape=shape, restitution=e)
+    fall, rise = math.sqrt(2 * 2 / G), math.sqrt(2 * 2 * e**2 / G)
+    heights = run(world, fall + 2 * rise - 1 / 60, bouncer)[int(60 * fall) + 1 :]
+    assert heights.max() - 0.5 == pytest.approx(2 * e**2, abs=2e-3)
+    world.close()
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, -2.0])
+def test_ten_thousand_bodies_from_everywhere(angle):
+    """Balls that do not meet each other fly at the segment. Against their free flight, known from a world without it:
+    who never was wholly in front flies freely, to the bit; who came down on it from the front never gets behind it."""
+    rng, n, radius, size, seconds = np.random.default_rng(7), 10_000, 0.3, 4.0, 1.0
+    places, speeds = rng.uniform(-5, 5, (n, 2)), rng.uniform(-8, 8, (n, 2))
+    paths = []
+    for segment in (True, False):
+        world = World(Physics(dimensions=2, gravity=(0, -G)), one_way_segment.plugin)
+        collider = OneWaySegmentCollider((-size / 2, 0), (size / 2, 0), mask=-1 if segment else 0)
+        world.create_entity(Transform((0, 0), angle), collider)
+        world.create_entity(Transform((1e5, -1)), AABBCollider(0.5))
+        balls = SphereCollider.many(radius=radius, layer=2, mask=1)
+        world.create_entities(n, Transform.many(places), RigidBody.many(linear_velocity=speeds), balls)
+        path = [world.bodies.dynamic.position.copy()]
+        for _ in range(round(60 * seconds)):
+            world.step()
+            path.append(world.bodies.dynamic.position.copy())
+        paths.append(np.array(path))
+        world.close()
+    met, free = paths
+    along, out = np.array((math.cos(angle), math.sin(angle))), np.array((-math.sin(angle), math.cos(angle)))
+    low, at = free @ out - radius, free @ along
+    behind = (low < -0.05).all(0)  # all the time
+    assert behind.sum() > 1000
+    assert np.array_equal(met[:, behind], free[:, behind])
+    crosses = (low[:-1] > 0) & (low[1:] < 0)
+    first = crosses.argmax(0)
+    lands = crosses.any(0) & (low[0] > 0) & (abs(at) < size / 2)[[first, first + 1], np.arange(n)].all(0)
+    lands &= abs(met @ along).max(0) < size / 2  # as long as it is over the segment
+    assert lands.sum() > 50
+    assert (met[:, lands] @ out).min() > radius - 0.01
+
+
+def test_a_stack_stands_on_it_however_heavy():
+    """A light box under 400 times its mass sinks in by more than the slack; who was held is held."""
+    world = make_world()
+    light = throw(world, (0, 0.5))
+    heavy = world.create_entity(Transform((0, 1.5)), RigidBody(mass=400.0), AABBCollider(0.5))
+    heights = run(world, 5, light, heavy)
+    assert heights[-1, 0] > 0.4
+    assert heights[-1, 1] > 1.2
+    assert [contact.entity_a for contact in world.contacts.of(light)].count(light) == 2
+    assert 1 in [contact.entity_b for contact in world.contacts.of(light)]
+    world.close()
+
+
+# -- ends, sides, angles ----------------------------------------------------------------------------
+
+
+@each_shape
+def test_who_comes_from_the_side_passes(shape):
+    """At any height of its middle below half its own: the end of a platform is no wall."""
+    for height in (-0.45, 0.0, 0.4):
+        world = make_world()
+        walker = world.create_entity(
+            Transform((-4, height)), RigidBody(linear_velocity=(6, 0), gravity_scale=0), SHAPES[shape]())  # fmt: skip
+        run(world, 1.3, walker)
+        assert place_of(world, walker) == pytest.approx((-4 + 6 * 78 / 60, height))
+        world.close()
+
+
+def test_who_falls_past_the_end_is_not_caught():
+    """A box that comes down beside the end, moving in under it: it meets the line when it is not over the segment."""
+    world = make_world()
+    faller = throw(world, (-2.7, 2.0), (1.5, -20.0))
+    run(world, 0.2, faller)
+    assert velocity_of(world, faller)[0] == pytest.approx(1.5)
+    assert place_of(world, faller)[1] < -1.0
+    on_the_edge = throw(world, (-2.45, 2.0), (0.0, -20.0))
+    run(world, 0.5, on_the_edge)
+    assert place_of(world, on_the_edge)[1] == pytest.approx(0.5, abs=REST)
+    world.close()
+
+
+@each_shape
+def test_slides_off_the_end(shape):
+    """Never thrown: it leaves at the speed it had, and falls freely, past the end."""
+    world = make_world()
+    slider = throw(world, (0, 0.5), (2.0, 0.0), shape)
+    heights = run(world, 2.2, slider)
+    assert velocity_of(world, slider)[0] == pytest.approx(2.0, abs=0.6 if shape == "ball" else 1e-9)
+    assert heights.max() < 0.5 + 1e-6
+    assert heights[-1, 0] < -1.0
+    assert velocity_of(world, slider)[1] < -5.0
+    world.close()
+
+
+@each_shape
+def test_a_row_of_segments_and_floors_has_no_seams(shape):
+    """From a floor onto segments, over their seams, and onto a floor again."""
+    pieces = [(Transform((4 * k, 0)), OneWaySegmentCollider((-2, 0), (2, 0))) for k in range(3)]
+    floors = [(Transform((x, -0.5)), AABBCollider((2, 0.5))) for x in (-4, 12)]
+    world = make_world(*pieces, *floors)
+    slider = throw(world, (-4, 0.5), (5.0, 0.0), shape)
+    heights = run(world, 3.2, slider)
+    assert velocity_of(world, slider)[0] == pytest.approx(5.0, abs=1e-9)
+    assert abs(heights - 0.5).max() < REST
+    world.close()
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, math.pi / 2, 2.5, math.pi])
+@pytest.mark.parametrize("front", ["left", "right"])
+def test_the_front_turns_with_the_transform(angle, front):
+    """Without gravity: a ball from the front stays outside, one from the back comes through."""
+    for offset in ((0.0, 0.0), (1.0, -2.0)):
+        world = World(Physics(dimensions=2), one_way_segment.plugin)
+        world.create_entity(
+            Transform((3, 4), angle), OneWaySegmentCollider((-2, 0), (2, 0), front, restitution=1.0, offset=offset))
+        world.create_entity(Transform((1e5, -1)), AABBCollider(0.5))
+        turn = np.array(((math.cos(angle), -math.sin(angle)), (math.sin(angle), math.cos(angle))))
+        middle = np.array((3, 4)) + turn @ offset
+        out = turn @ (0, 1 if front == "left" else -1)
+        ahead = throw(world, middle + 2.9 * out, -5 * out, "ball")
+        behind = throw(world, middle + turn @ (1.2, 0) - 3 * out, 5 * out, "ball")
+        run(world, 1.0)
+        assert (place_of(world, ahead) - middle) @ out == pytest.approx(0.5 + 2.6, abs=1e-9)
+        assert (place_of(world, behind) - middle) @ out == pytest.approx(2.0)
+        world.close()
+
+
+def test_a_slope_to_slide_down():
+    """Frictionless at 30 degrees: v = g sin 30 t along it."""
+    angle = math.pi / 6
+    world = make_world((Transform((0, 0), angle), OneWaySegmentCollider((-20, 0), (20, 0))))
+    up = np.array((-math.sin(angle), math.cos(angle)))
+    slider = throw(world, tuple(0.5 * up), shape="ball")
+    run(world, 1.0)
+    assert velocity_of(world, slider) == pytest.approx((-5 * math.cos(angle), -5 * math.sin(angle)), abs=0.02)
+    assert place_of(world, slider) @ up == pytest.approx(0.5, abs=REST)
+    world.close()
+
+
+# -- moving platforms -------------------------------------------------------------------------------
+
+
+@each_shape
+def test_a_lift_carries_and_is_jumped_through(shape):
+    """It rises at 2 m/s; what jumps through it does so as the lift sees it, and rides on it."""
+    lift = RigidBody(kind="kinematic", linear_velocity=(0, 2))
+    world = make_world((Transform((0, 0)), OneWaySegmentCollider((-5, 0), (5, 0)), lift))
+    rider = throw(world, (-2, 0.5), shape=shape)
+    jumper = throw(world, (2, -2), (0, 12), shape)
+    still = world.create_entity(Transform((3.5, 3)), RigidBody(gravity_scale=0), SHAPES[shape]())
+    run(world, 3.0)
+    top = place_of(world, 1)[1]
+    assert top == pytest.approx(6.0)
+    for entity in (rider, jumper, still):  # what hangs in the air is picked up
+        assert place_of(world, entity)[1] - top == pytest.approx(0.5, abs=0.01)
+        assert velocity_of(world, entity)[1] == pytest.approx(2, abs=0.01)
+    world.close()
+
+
+@each_shape
+def test_a_platform_that_sinks_over_somebody_passes(shape):
+    """From above with its back: whoever stands below is not pushed."""
+    sinks = RigidBody(kind="kinematic", linear_velocity=(0, -2))
+    world = make_world(
+        (Transform((0, 3)), OneWaySegmentCollider((-5, 0), (5, 0)), sinks), (Transform((0, -1)), AABBCollider((9, 1))))
+    stands = throw(world, (0, 0.5), shape=shape)
+    heights = run(world, 2.0, stands)
+    assert abs(heights - 0.5).max() < REST
+    world.close()
+
+
+def test_a_ferry_takes_along_by_friction():
+    moves = RigidBody(kind="kinematic", linear_velocity=(1.5, 0))
+    world = make_world((Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0), friction=1.0), moves))
+    rider = throw(world, (0, 0.5), friction=1.0)
+    run(world, 2.0)
+    assert place_of(world, rider)[0] == pytest.approx(3.0, abs=0.2)
+    assert velocity_of(world, rider)[0] == pytest.approx(1.5, abs=1e-6)
+    world.close()
+
+
+# -- what else may happen ---------------------------------------------------------------------------
+
+
+def test_dropping_through_by_the_mask():
+    """Without the platform's layer for a moment; once it passes it goes on passing."""
+    world = make_world((Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0), layer=2)))
+    player = throw(world, (0, 0.5))
+    run(world, 0.5)
+    collider = world.component_for_entity(player, AABBCollider)
+    collider.mask = ~2
+    run(world, 0.15)
+    assert place_of(world, player)[1] > 0.3  # its feet are still in it
+    collider.mask = -1
+    run(world, 1.0)
+    assert place_of(world, player)[1] < -2
+    world.close()
+
+
+def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
+    world = make_world(with_capsules=True)
+    jumpers = [
+        throw(world, (-1.5, -2), (0, 9), CapsuleCollider(0.2, 0.3)),
+        world.create_entity(
+            Transform((0, -2), math.pi / 2), RigidBody(linear_velocity=(0, 9)), CapsuleCollider(0.2, 0.3)),
+        world.create_entity(
+            Transform((1.3, -2), math.pi / 2), RigidBody(linear_velocity=(0, 9)),
+            AABBCollider((0.3, 0.1), offset=(0.25, 0.0)), SphereCollider(0.6)),
+    ]  # fmt: skip
+    lows = 0.5, 0.2, 0.3 - 0.25
+    low_jump = throw(world, (0.7, -2.0), (0, 6.0), CapsuleCollider(0.2, 0.3))
+    heights = run(world, 3.0, *jumpers)
+    assert heights.max(0) == pytest.approx([2.0 - 0.15 / 2] * 3, abs=0.1)
+    assert heights[-1] == pytest.approx(lows, abs=REST)
+    assert place_of(world, low_jump)[1] < -5
+    world.close()
+
+
+def test_sensors_and_contacts_switched_off_by_others_are_left_alone():
+    world = make_world(
+        (Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0))),
+        (Transform((0, 1)), OneWaySegmentCollider((-2, 0), (2, 0), sensor=True)))  # fmt: skip
+    jumper = throw(world, (0, -2), (0, 9))
+    ghost = throw(world, (1.5, -2), (0, 9), sensor=True)
+    seen = set()
+    for _ in range(60):
+        world.step()
+        seen |= {(contact.entity_a, contact.entity_b) for contact in world.contacts.begin}
+    assert seen == {(2, jumper), (1, ghost), (2, ghost)}
+    world.close()
+
+
+def test_a_snapshot_holds_all_that_decides():
+    """Restored in the middle of passing and standing, the same steps give the same bits."""
+    world = make_world()
+    throw(world, (-1, -0.7), (0, 5.5))
+    throw(world, (1, 0.5))
+    world.create_entity(Transform((1, 1.5)), RigidBody(mass=400.0), AABBCollider(0.5))
+    run(world, 0.25)
+    state = world.snapshot()
+    hashes = []
+    for _ in range(2):
+        run(world, 2.0)
+        hashes.append(world.state_hash())
+        world.restore(state)
+    assert hashes[0] == hashes[1]
+    world.close()
+
+
+def test_the_order_of_ids_does_not_matter():
+    """A body created before the segment: the segment is then the second of the pair."""
+    results = []
+    for first in (True, False):
+        world = World(Physics(dimensions=2, gravity=(0, -G)), one_way_segment.plugin)
+        segment = Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0))
+        if not first:
+            world.create_entity(*segment)
+        jumpers = [throw(world, (-1, -2), (0, 9)), throw(world, (1, 3), (0, -20), "ball")]
+        if first:
+            world.create_entity(*segment)
+        run(world, 2.0)
+        results.append([place_of(world, entity)[1] for entity in jumpers])
+        world.close()
+    assert results[0] == results[1] == pytest.approx([0.5, 0.5], abs=REST)
+
+
+def test_queries_find_it_from_both_sides():
+    world = make_world()
+    for side in (1, -1):
+        hit = world.ray_cast((1, 5 * side), (0, -side))[0]
+        assert (hit.entity, hit.distance) == (1, pytest.approx(5))
+        assert hit.normal == pytest.approx((0, side))
+    assert world.query_sphere((0, 0.4), 0.5) == [1]
+    assert world.query_sphere((2.4, 0.4), 0.5) == []
+    world.close()
+
+
+def test_a_scene_without_segments_has_nothing_to_do():
+    world = World(Physics(dimensions=2, gravity=(0, -G)), one_way_segment.plugin)
+    throw(world, (0, 3))
+    world.step()
+    assert str(world.plan()).count("no one-way segments") == 2
+    world.run(Phase.NARROW)
+    world.close()
+
+
+def test_bad_values_are_named():
+    with pytest.raises(ValueError, match="start and end must differ"):
+        OneWaySegmentCollider((1, 0), (1, 0))
+    with pytest.raises(ValueError, match=r"OneWaySegmentCollider\.front must be one of left, right"):
+        OneWaySegmentCollider((0, 0), (1, 0), "up")
+    with pytest.raises(ValueError, match=r"OneWaySegmentCollider\.end"):
+        OneWaySegmentCollider((0, 0), (math.nan, 0))
+    world = World(Physics(dimensions=3), one_way_segment.plugin)
+    with pytest.raises(ValueError, match="OneWaySegmentCollider"):
+        world.create_entity(Transform((0, 0, 0)), OneWaySegmentCollider((0, 0), (1, 0)))
+    world.close()

@@ -1,0 +1,237 @@
+"""A plugin as somebody else ships it: a package built, installed, found, checked, used; and its kernels kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+PROJECT = """
+[build-system]
+requires = ["setuptools>=68"]
+build-backend = "setuptools.build_meta"
+
+[project]
+name = "{name}"
+version = "{version}"
+
+[project.entry-points."carom.plugins"]
+{point} = "{value}"
+
+[tool.setuptools]
+packages = ["{package}"]
+"""
+SHAPE = '''
+"""A diamond: all points with |x| + |y| up to its size."""
+from carom.components import SphereCollider
+from carom.components.colliders import Collider
+from carom.framework import Plugin, column
+from carom.framework.vectors import scale, sub
+
+from .geometry import surface
+
+plugin = Plugin("diamonds", version="2.5")
+
+@plugin.shape(cost=3)
+class DiamondCollider(Collider):
+    dimensions = (2,)
+    size = column(positive=True)
+    def bounds(shape, dimensions):
+        return shape.size, shape.size
+
+@plugin.pair(DiamondCollider, SphereCollider)
+def diamond_sphere(a, b, d):
+    distance, normal = surface(a.size, d)
+    depth = b.radius - distance
+    return depth >= 0.0, depth, normal, sub(d, scale(normal, distance + 0.5 * depth))
+'''
+GEOMETRY = '''
+import math
+
+from carom.framework.compilation import inlined
+
+@inlined
+def sign(x):
+    return 1.0 if x >= 0.0 else -1.0
+
+@inlined
+def surface(size, d):
+    """Distance of d from a diamond's surface, negative inside, and the normal there."""
+    x, y = abs(d[0]), abs(d[1])
+    root = math.sqrt(2.0)
+    distance = (x + y - size) / root
+    part = min(max(0.5 * (y - x + size) / size, 0.0), 1.0)  # along the edge from (size, 0) to (0, size)
+    u, v = x - size * (1.0 - part), y - size * part
+    if distance > 0.0 and 0.0 < math.hypot(u, v):
+        distance = math.hypot(u, v)
+        return distance, (sign(d[0]) * u / distance, sign(d[1]) * v / distance)
+    return distance, (sign(d[0]) / root, sign(d[1]) / root)
+'''
+START = """
+import json
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import World
+from carom.framework.compilation import log
+from carom.framework.discovery import find
+from carom.plugins import Physics
+from diamonds_package.shapes import DiamondCollider
+
+world = World(Physics(gravity=(0.0, -9.81)), find("diamonds"))
+world.create_entity(Transform((0, 0)), DiamondCollider(1.0))
+"""
+GAME = START + """
+ball = world.create_entity(Transform((0.5, 2)), RigidBody(), SphereCollider(0.25, restitution=1.0))
+while not world.contacts.impacts and world.step_count < 120:
+    world.step()
+impact = world.contacts.impacts
+print(json.dumps({"normal": impact.normal[0].tolist(), "step": world.step_count, "a": impact.entity_a.tolist()}))
+"""
+SENSOR = START + """
+world.create_entity(Transform((0.5, 0.75)), RigidBody(gravity_scale=0), SphereCollider(0.5, sensor=True))
+world.step()
+found = world.contacts
+print(json.dumps({"depth": found.depth.tolist(), "normal": found.normal.tolist(), "loaded": log.loaded,
+                  "compiled": [name for name, _ in log.compiled]}))
+"""
+
+
+def write_package(folder: Path, name: str, version: str, point: str, value: str, files: dict[str, str]) -> Path:
+    package = value.partition(":")[0].partition(".")[0]
+    (folder / package).mkdir(parents=True)
+    text = PROJECT.format(name=name, version=version, point=point, value=value, package=package)
+    (folder / "pyproject.toml").write_text(text, encoding="utf-8")
+    for file, content in {"__init__.py": "", **files}.items():
+        (folder / package / file).write_text(content, encoding="utf-8")
+    return folder
+
+
+def install(source: Path, target: Path) -> None:
+    """Into a folder of its own, without a network."""
+    options = ["--no-build-isolation", "--no-deps", "--no-index", "--quiet", "--disable-pip-version-check"]
+    command = [sys.executable, "-m", "pip", "install", *options, "--target", str(target), str(source)]
+    result = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""})
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    """Where a good plugin's package is installed, and a broken one's beside it."""
+    base = tmp_path_factory.mktemp("third-party")
+    files = {"shapes.py": SHAPE, "geometry.py": GEOMETRY}
+    good = write_package(
+        base / "good", "diamonds-package", "0.3", "diamonds", "diamonds_package.shapes:plugin", files
+    )
+    bad = write_package(
+        base / "bad", "broken-package", "0.1", "broken", "broken_package.it:plugin", {"it.py": "import no_such_thing\n"}
+    )
+    target = base / "site"
+    install(good, target)
+    install(bad, target)
+    return target
+
+
+@pytest.fixture(scope="module")
+def python(site, tmp_path_factory):
+    """Runs Python with that folder on its path, in an empty one."""
+    empty = tmp_path_factory.mktemp("empty")
+
+    def run(*arguments: str, cache: Path | None = None, site: Path = site) -> subprocess.CompletedProcess[str]:
+        path = os.pathsep.join([str(site), *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {**os.environ, "PYTHONPATH": path, "COLUMNS": "180"}
+        if cache is not None:
+            environment["CAROM_CACHE_DIR"] = str(cache)
+        command = [sys.executable, *arguments]
+        return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=empty)
+
+    return run
+
+
+def row_of(output: str, start: str) -> str:
+    return next(line for line in output.splitlines() if line.startswith(start))
+
+
+def test_an_installed_plugin_is_listed_and_a_broken_one_stops_nothing(python):
+    result = python("-m", "carom", "plugins")
+    assert result.returncode == 0, result.stderr
+    row = row_of(result.stdout, "diamonds")
+    for part in ("2.5", "diamonds-package", "DiamondCollider and SphereCollider"):
+        assert part in row
+    assert "broken: ModuleNotFoundError: No module named 'no_such_thing'" in row_of(result.stdout, "broken")
+
+
+def test_an_installed_plugin_is_checked_by_its_name(python):
+    result = python("-m", "carom", "plugins", "check", "diamonds")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "ok" in row_of(result.stdout, "pair DiamondCollider and SphereCollider")
+    assert "no pair with AABBCollider, DiamondCollider" in result.stdout
+    result = python("-m", "carom", "plugins", "check", "broken")
+    assert result.returncode == 2
+    assert "plugin 'broken' of package broken-package cannot be loaded" in result.stderr
+
+
+def test_a_ball_falls_on_its_shape_and_bounces(python):
+    """On the upper right side, x + y = 1: centre 0.5 beside the middle, so the side is met at 0.5 - 0.25 cos 45 deg."""
+    result = python("-c", GAME)
+    assert result.returncode == 0, result.stderr
+    said = json.loads(result.stdout.splitlines()[-1])
+    assert said["normal"] == pytest.approx([0.5**0.5, 0.5**0.5])
+    height = 1.0 - 0.5 + 0.25 * 2**0.5  # of the ball's centre when it touches
+    assert abs(said["step"] - (2 * (2.0 - height) / 9.81) ** 0.5 * 60) <= 1.0
+
+
+@pytest.fixture
+def look(python, site, tmp_path):
+    """Has a sensor look at a copy of the installed package's shape, edited before, with a kernel cache of its own."""
+    copy = tmp_path / "site"
+    shutil.copytree(site, copy)
+
+    def run(edit: tuple[str, str, str] | None = None) -> dict:
+        if edit is not None:
+            name, old, new = edit
+            file = copy / "diamonds_package" / name
+            text = file.read_text(encoding="utf-8")
+            assert old in text
+            file.write_text(text.replace(old, new), encoding="utf-8")
+        result = python("-B", "-c", SENSOR, cache=tmp_path / "cache", site=copy)
+        assert result.returncode == 0, result.stderr
+        return json.loads(result.stdout.splitlines()[-1])
+
+    return run
+
+
+def test_its_kernels_are_kept_until_something_they_call_is_edited(look):
+    side = 0.25 / 2**0.5  # m, from the sensor's centre to the line x + y = 1
+    first = look()
+    assert first["depth"] == pytest.approx([0.5 - side])
+    assert first["compiled"]
+    assert first["loaded"] == 0
+
+    again = look()
+    assert again["compiled"] == []
+    assert again["loaded"] > 0
+    assert again["depth"] == first["depth"]
+
+    # The pair's own function.
+    nearer = look(("shapes.py", "depth = b.radius - distance", "depth = b.radius + 0.125 - distance"))
+    assert nearer["compiled"]
+    assert nearer["depth"] == pytest.approx([0.625 - side])
+
+    # A helper in another file: the diamond shrinks by a tenth.
+    smaller = look(("geometry.py", "x, y = abs(d[0]), abs(d[1])", "x, y, size = abs(d[0]), abs(d[1]), 0.9 * size"))
+    assert smaller["compiled"]
+    assert smaller["depth"] == pytest.approx([0.625 - side - 0.1 / 2**0.5])
+
+    # A helper that only the helper calls: the normal turns round.
+    turned = look(("geometry.py", "return 1.0 if x >= 0.0 else -1.0", "return -1.0 if x >= 0.0 else 1.0"))
+    assert turned["compiled"]
+    assert turned["normal"] == pytest.approx(-np.array(smaller["normal"]))
+
+    # A comment changes no byte code: nothing is compiled.
+    commented = look(("geometry.py", "import math\n", "import math  # roots\n"))
+    assert commented["compiled"] == []

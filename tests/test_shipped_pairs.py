@@ -1,0 +1,117 @@
+"""Every pair of convex shapes that carom brings, on ten thousand random poses and the extremes, against an oracle that
+knows the shapes only by how far they reach in a direction.
+
+Two convex shapes are apart by the largest, over all unit directions n, of d.n - reach_a(n) - reach_b(-n); negative, it
+is how far they overlap. So a depth is right if the normal that comes with it attains it, and if no direction at all
+gives more. The second is tried for many directions, those near the normal among them.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, SphereCollider
+from carom.framework.registry import Registry
+from carom.lab.plugin_check_code import PairCode
+from carom.lab.plugin_samples import Poses, Rows, poses
+from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment
+from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.half_space import HalfSpaceCollider
+from carom.plugins.one_way_segment import OneWaySegmentCollider
+
+SHAPES = (
+    AABBCollider, CapsuleCollider, ConvexPolygonCollider, HalfSpaceCollider, OneWaySegmentCollider, SphereCollider
+)  # fmt: skip
+DIRECTIONS = 24  # of each pose: half of them anywhere, half near the normal
+ROUNDING = 1e-9  # of distance and sizes
+
+
+def registry():
+    made = Registry()
+    for plugin in (Physics(), capsule.plugin, convex_polygon.plugin, half_space.plugin, one_way_segment.plugin):
+        made.add(plugin)
+    return made
+
+
+REGISTRY = registry()
+PAIRS = [
+    (first, second, d)
+    for first, second in itertools.combinations_with_replacement(SHAPES, 2)
+    for d in sorted(set(first.dimensions) & set(second.dimensions))
+    if not first is second is HalfSpaceCollider
+]
+
+
+def turned(rows: Rows, vectors: np.ndarray) -> np.ndarray:
+    """The bodies' own vectors (n, d) in the world."""
+    return np.einsum("pij,pj->pi", rows.axes, vectors)
+
+
+def reach(rows: Rows, n: np.ndarray) -> np.ndarray:
+    """(poses, directions): how far each shape reaches from its centre along n (poses, directions, d)."""
+    arrays = rows.arrays
+    component = rows.shape.component
+    if component is SphereCollider:
+        return np.broadcast_to(arrays["radius"][:, None], n.shape[:2])
+    if component is AABBCollider:
+        return np.einsum("pkd,pd->pk", np.abs(n), arrays["half_extents"])
+    if component is CapsuleCollider:
+        along = np.abs(np.einsum("pkd,pd->pk", n, rows.axes[:, :, 1]))
+        return along * arrays["half_height"][:, None] + arrays["radius"][:, None]
+    if component is OneWaySegmentCollider:
+        ends = [np.einsum("pkd,pd->pk", n, turned(rows, arrays[name])) for name in ("start", "end")]
+        return np.maximum(*ends)
+    assert component is ConvexPolygonCollider
+    result = np.empty(n.shape[:2])
+    for number in np.unique(arrays["vertices"]):
+        those = arrays["vertices"] == number
+        corners = np.einsum("pij,cj->pci", rows.axes[those], component.columns["vertices"].shown(number))
+        result[those] = np.einsum("pkd,pcd->pkc", n[those], corners).max(axis=2)
+    return result + arrays["corner_radius"][:, None]
+
+
+def gap(cases: Poses, n: np.ndarray) -> np.ndarray:
+    """(poses, directions): how far apart the two are along n."""
+    return np.einsum("pkd,pd->pk", n, cases.d) - reach(cases.a, n) - reach(cases.b, -n)
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("first", "second", "d"), PAIRS)
+def test_depth_and_normal_of(first, second, d):
+    pair = REGISTRY.pair(first, second)
+    assert pair is not None
+    first, second = pair.first, pair.second
+    cases = poses(REGISTRY.shapes[first], REGISTRY.shapes[second], d, seed=5)
+    found = PairCode(pair, REGISTRY.shapes[first], REGISTRY.shapes[second], d)(cases.a, cases.b, cases.d)
+    allowed = ROUNDING * cases.scale()
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, rtol=0, atol=1e-12)
+    assert (found.hit == (found.depth >= 0.0)).all()
+    if HalfSpaceCollider in (first, second):  # only one direction counts, its own
+        plane, other, sign = (cases.a, cases.b, 1.0) if first is HalfSpaceCollider else (cases.b, cases.a, -1.0)
+        normal = unit(turned(plane, plane.arrays["normal"]))
+        height = np.einsum("pd,pd->p", sign * cases.d, normal) - reach(other, -normal[:, None])[:, 0]
+        np.testing.assert_allclose(found.normal, sign * normal, rtol=0, atol=1e-12)
+        np.testing.assert_array_less(np.abs(-found.depth - height), allowed + 1e-300)
+        return
+    attained = gap(cases, found.normal[:, None])[:, 0]
+    worst = np.argmax(np.abs(attained + found.depth) - allowed)
+    assert (np.abs(attained + found.depth) <= allowed).all(), (worst, attained[worst], found.depth[worst])
+    rng = np.random.default_rng(6)
+    noise = rng.normal(size=(len(cases.d), DIRECTIONS, d))
+    width = 10.0 ** rng.uniform(-6, 0, (len(cases.d), DIRECTIONS // 2, 1))
+    near = found.normal[:, None] + width * noise[:, : DIRECTIONS // 2]
+    tried = gap(cases, unit(np.concatenate((near, noise[:, DIRECTIONS // 2 :]), axis=1))).max(axis=1)
+    if first is second is AABBCollider:  # apart, their depth is the gap along one axis: less than the distance
+        tried = np.where(found.hit, tried, attained)
+    worst = np.argmax(tried + found.depth - allowed)
+    assert (tried <= -found.depth + allowed).all(), (worst, tried[worst], found.depth[worst])
+    assert found.hit.any()
+    assert not found.hit.all()
