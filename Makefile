@@ -24,10 +24,10 @@ run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
 
 test: $(TEST)
-	$(BIN)/pytest -m "not slow" $(ARGS)
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow" $(ARGS)
 
 test-slow: $(TEST)
-	$(BIN)/pytest -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
+	$(BIN)/pytest -n 2 --dist loadfile -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
 
 bench: $(BENCH)
 	$(BIN)/carom bench $(ARGS)

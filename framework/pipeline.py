@@ -112,7 +112,17 @@ class Pipeline:
             self._open_window()
         self.lineup.reconcile()
         self.synchronize()
-        self._begin(self.lineup.foreign or self.world.events.any_handlers())
+        self._begin(self._others_write())
+
+    def _others_write(self) -> bool:
+        """Whether code that is not carom's runs in a step."""
+        return self.lineup.foreign or self.world.events.any_handlers()
+
+    def look_ahead(self) -> None:
+        """Between two steps: know what the next one will do."""
+        self.synchronize()
+        if self.world.physics is not None and not self.in_step:
+            self.world.physics.look_ahead(self._others_write())
 
     def _begin(self, everything_kept: bool) -> None:
         physics = self.world.physics

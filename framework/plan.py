@@ -1,38 +1,139 @@
-"""``world.plan()``: what runs in a step, in order, and why."""
+"""``world.plan()``: what runs in a step, in order, with which kernels, on which columns, and why."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .world import World
 
+NO_SYSTEM = "no system"
+WIDTH = 120  # of the printed lines
+
+
+@dataclass(frozen=True)
+class PlannedKernel:
+    """A compiled loop that a system calls, by the name that ``world.profile()`` shows.
+
+    when
+        what has to happen for it to be called, and so to be compiled; empty: in every step
+    """
+
+    kernel: str
+    reason: str
+    when: str = ""
+
+
+@dataclass(frozen=True)
+class PlannedColumn:
+    """An array with a value for each body (or pair, contact, impact) there is room for.
+
+    column
+        as in ``world.bodies`` where it is the field of a component
+    of
+        "body", "pair", "contact" or "impact"
+    group
+        the component whose field it is, or what uses it
+    bytes
+        for one of them
+    """
+
+    column: str
+    of: str
+    group: str
+    bytes: int
+    reason: str
+
+    @property
+    def name(self) -> str:
+        """Without the component's prefix."""
+        return self.column.rpartition(".")[2] if "." in self.column.rstrip(".") else self.column
+
 
 @dataclass(frozen=True)
 class PlanEntry:
-    """One system of a step: its phase, its esper priority, and what it has to do in this world."""
+    """One system of a step: its phase, its esper priority, what it has to do in this world, and its kernels."""
 
     phase: str
     system: str
     priority: int
     reason: str
+    kernels: tuple[PlannedKernel, ...] = ()
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Printable; ``entries`` are in the order of a step."""
+    """Printable.
+
+    entries
+        in the order of a step
+    around
+        kernels that no system calls: at the start and at the end of a step
+    columns
+        all arrays there are of bodies, pairs, contacts and impacts
+    """
 
     entries: tuple[PlanEntry, ...]
+    around: tuple[PlannedKernel, ...] = ()
+    columns: tuple[PlannedColumn, ...] = ()
 
     @classmethod
     def of(cls, world: World) -> Plan:
-        return cls(
-            tuple(
-                PlanEntry(s.phase.name, s.name, s.priority, s.reason() if hasattr(s, "reason") else "added by the game")
-                for s in world.systems
+        physics = world.physics
+        entries = [
+            PlanEntry(
+                s.phase.name,
+                s.name,
+                s.priority,
+                s.reason() if hasattr(s, "reason") else "added by the game",
+                tuple(s.kernels()) if hasattr(s, "kernels") else (),
             )
-        )
+            for s in world.systems
+        ]
+        if physics is None:
+            return cls(tuple(entries))
+        return cls(tuple(entries), tuple(physics.planned_kernels()), tuple(physics.planned_columns()))
+
+    @property
+    def kernels(self) -> tuple[PlannedKernel, ...]:
+        """Those of all systems in their order, then those around the step."""
+        return *(kernel for entry in self.entries for kernel in entry.kernels), *self.around
 
     def __str__(self) -> str:
-        return "\n".join(f"{e.phase:<12}{e.priority:>5}  {e.system:<20} {e.reason}" for e in self.entries)
+        rows = [row for entry in self.entries for row in _system_rows(entry)]
+        if self.around:
+            rows += [(NO_SYSTEM, "", "", "at the start and the end of the step"), *_kernel_rows(self.around)]
+        wide = max((len(name) for _, _, name, _ in rows), default=0)
+        lines = [f"{phase:<12}{priority:>5}  {name:<{wide}}  {what}".rstrip() for phase, priority, name, what in rows]
+        return "\n".join((*lines, *self._column_lines()))
+
+    def _column_lines(self) -> Iterator[str]:
+        """A line for each group of columns that are there for the same reason."""
+        groups: dict[tuple[str, str, str], list[PlannedColumn]] = {}
+        for column in self.columns:
+            groups.setdefault((column.of, column.group, column.reason), []).append(column)
+        of = ""
+        for key, columns in groups.items():
+            if key[0] != of:
+                of = key[0]
+                total = sum(column.bytes for column in self.columns if column.of == of)
+                yield ""
+                yield f"{f'columns, bytes per {of}':<28}{total:>4}"
+            size = sum(column.bytes for column in columns)
+            names = ", ".join(column.name for column in columns)
+            yield from textwrap.wrap(
+                f"{names}: {key[2]}", WIDTH, initial_indent=f"  {key[1]:<26}{size:>4}  ", subsequent_indent=" " * 34
+            )
+
+
+def _system_rows(entry: PlanEntry) -> Iterator[tuple[str, str, str, str]]:
+    yield entry.phase, str(entry.priority), entry.system, entry.reason
+    yield from _kernel_rows(entry.kernels)
+
+
+def _kernel_rows(kernels: tuple[PlannedKernel, ...]) -> Iterator[tuple[str, str, str, str]]:
+    for kernel in kernels:
+        yield "", "", f"  {kernel.kernel}", kernel.reason + (f" (when {kernel.when})" if kernel.when else "")

@@ -65,8 +65,8 @@ class Pair:
     corner
         compiled, or None; (a, b, d, slop) -> whether they touch by less than the slop, and only at a corner or an edge
     sweep
-        compiled, or None; (a, b, d, v) -> (hit, time, normal, point) of b moving by v relative to a from d on, the time
-        as a part of v
+        compiled, or None; (a, b, d, v, *helpers) -> (hit, time) of b moving by v relative to a from d on, the time as a
+        part of v
     """
 
     first: type[Any]

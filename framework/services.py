@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from .adoption import Adoption
 from .bodies import Bodies
 from .contacts import Contacts
 from .hits import CastHits, Hits, NearestHits, Neighbours
+from .plan import PlannedColumn, PlannedKernel
 from .table import Table
 
 
@@ -96,6 +98,18 @@ class PhysicsServices(ABC):
     @abstractmethod
     def check_settings(self, settings: Any) -> None:
         """ValueError if the settings name something that no plugin has."""
+
+    @abstractmethod
+    def look_ahead(self, others_write: bool) -> None:
+        """Before a plan is made, between two steps. others_write: whether code that is not carom's runs in a step."""
+
+    @abstractmethod
+    def planned_kernels(self) -> Iterable[PlannedKernel]:
+        """Those that no system calls, at the start and the end of a step."""
+
+    @abstractmethod
+    def planned_columns(self) -> Iterable[PlannedColumn]:
+        """The arrays there are."""
 
     @abstractmethod
     def kinetic_energy(self) -> float: ...

@@ -281,6 +281,10 @@ class Table:
             buffer = self._buffers[key] = np.empty_like(array)
         return buffer[: self.count]
 
+    def undo_buffers(self) -> list[tuple[str, np.ndarray]]:
+        """By column, the room for its copies that there is."""
+        return list(self._buffers.items())
+
     def restore_columns(self, columns: dict[str, np.ndarray]) -> None:
         """Put back what was kept, the last first: a copy may itself be a column that was kept before."""
         for key, array in reversed(columns.items()):

@@ -363,10 +363,10 @@ class World(EntityVerbs, QueryVerbs):
         del self._pipeline.faults[:-100]
 
     def plan(self) -> Plan:
-        """What runs in a step, in order, and why."""
+        """What a step of the bodies there are now runs, in order, with which kernels, on which columns, and why."""
         with self._context():
             self._pipeline.lineup.reconcile()
-            self._pipeline.synchronize()
+            self._pipeline.look_ahead()
             return Plan.of(self)
 
     def snapshot(self) -> snapshots.StepState:

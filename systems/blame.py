@@ -20,12 +20,12 @@ class Blame:
         self._state = state
 
     def __enter__(self) -> None:
-        pass
+        self._state.trace[ROW_A] = -1  # no pair has been asked yet
 
     def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
         trace = self._state.trace
         if error is not None:
-            uncompiled = isinstance(error, NumbaError)
+            uncompiled = isinstance(error, NumbaError) or trace[ROW_A] < 0
             about = self._uncompiled(error) if uncompiled else self._describe(int(trace[ROW_A]), int(trace[ROW_B]))
             if isinstance(error, Exception) and about:
                 error.add_note(about)
@@ -40,7 +40,10 @@ class Blame:
         pairs = self._state.world.registry.pairs.values()
         found = [pair for pair in pairs if f"<function {pair.function.py_func.__qualname__} " in text]
         names = " or ".join(f"plugin {p.plugin}: pair {p.function.__name__} of {p.names}" for p in found)
-        return f"{names} cannot be compiled; functions that it calls need @plugin.kernel" if names else ""
+        cure = "use numbers, tuples, math and carom.framework.vectors"
+        if "Untyped global name" in text:
+            cure = "functions that it calls need @plugin.kernel"
+        return f"{names} cannot be compiled; {cure}" if names else ""
 
     def _describe(self, a: int, b: int) -> str:
         """The pair of two rows: plugin, function, shapes, entities; of bodies with levels every pair it can be."""

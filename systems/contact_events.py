@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..framework.compilation import kernel
 from ..framework.contacts import ContactRows, empty_columns
+from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
 
 if TYPE_CHECKING:
@@ -103,6 +105,12 @@ class ContactEvents(System):
             return
         self.world.events.dispatch_many(event, ContactRows(columns, self._state.lookup))
 
+    def kernels(self) -> Iterator[PlannedKernel]:
+        if self._state.collides or len(self.touching["entity_a"]):
+            yield PlannedKernel("compare_pairs", "contacts of this step and the last", "bodies touch, or did")
+
     def reason(self) -> str:
+        if not self._state.collides:
+            return "no colliders: nothing to do"
         wanted = [event for event in EVENTS if self.world.events.wanted(event)]
         return f"handlers of {', '.join(wanted)}" if wanted else "begin, stay, end; nobody listens to events"

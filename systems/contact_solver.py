@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..framework.plan import PlannedKernel
 from .contact_bodies import COLOURS, gather, put_back, squeeze
 from .contact_memory import ContactMemory, recall, remember
 from .mixing import rule_number
@@ -32,7 +34,7 @@ class ContactSolver:
         self.any_support = False
         self.travels = 1.0
         self._allocate_bodies(0)
-        self._allocate_contacts(16)
+        self._allocate_contacts(0)
 
     def _allocate_bodies(self, rows: int) -> None:
         d = self._state.dimensions
@@ -52,6 +54,21 @@ class ContactSolver:
         self._in_block, self._worked, self._parting = (np.empty(count, bool) for _ in range(3))
         self._active, self._soft = np.empty(count, bool), np.empty(count, bool)
         self._blocks = np.empty((count, 2), np.int64)
+
+    def kernels(self) -> Iterator[PlannedKernel]:
+        """For ``world.plan()``."""
+        friction = self._state.table.stacks["collider.friction"][:, : self._state.table.count]
+        rubs = "with friction" if (friction > 0.0).any() else "no collider has friction: without its sweeps"
+        rest, rested = "contacts rest", "contacts rested in the step before"
+        yield PlannedKernel("predict_support", "what carried a body carries it in the prediction too", rested)
+        yield PlannedKernel("gather", "the resting bodies and their contacts, by colour", rest)
+        yield PlannedKernel("linearise", "normal and gap of each resting contact", rest)
+        yield PlannedKernel("recall", "the impulses of the step before, to start with", rest)
+        yield PlannedKernel("squeeze", "light bodies between heavy ones", rest)
+        yield PlannedKernel("solve_contacts", rubs, rest)
+        yield PlannedKernel("put_back", "where the resting bodies are at the end", rest)
+        yield PlannedKernel("remember", "the impulses, for the next step", rest)
+        yield PlannedKernel("drop_support", "takes predicted support back from who was not held", rested)
 
     # -- before the impacts -----------------------------------------------------------------------
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..framework.bodies import SelectedBodies
 from ..framework.compilation import kernel
+from ..framework.plan import PlannedKernel
 from ..framework.schedule import ForceSystem, Phase, System
 from .motion import limit_speeds
 
@@ -35,6 +37,19 @@ def sum_constant_forces(dynamic, force, mass, gravity, gravity_scale, constant, 
     for j in range(dynamic * d if pushed else 0):
         force[j] = force[j] + applied[j] + for_step[j]
     return pushed
+
+
+@kernel
+def any_force(dynamic, force, constant, applied, for_step):
+    """Whether any of the first rows is given a force; and whether ``force`` still holds one. Over flat columns."""
+    d, size = force.shape[1], force.size
+    force, constant = force.reshape(size), constant.reshape(size)
+    applied, for_step = applied.reshape(size), for_step.reshape(size)
+    given, held = False, False
+    for j in range(dynamic * d):
+        given |= (constant[j] != 0.0) | (applied[j] != 0.0) | (for_step[j] != 0.0)
+        held |= force[j] != 0.0
+    return given, held
 
 
 class ForceAccumulation(System):
@@ -67,6 +82,8 @@ class ForceAccumulation(System):
         arrays, dynamic = state.table.arrays, state.table.stops[0]
         if not dynamic:
             return
+        if not self.world.force_systems and not any(state.gravity_numbers) and self._find_nothing(dynamic):
+            return
         self.evaluations += 1
         state.pushed = sum_constant_forces(
             dynamic, arrays["force"], arrays["mass"], state.gravity_numbers, arrays["gravity_scale"],
@@ -74,6 +91,43 @@ class ForceAccumulation(System):
         )  # fmt: skip
         for system in self.world.force_systems:
             self._add(system, state.bodies.dynamic, time)
+
+    def _find_nothing(self, dynamic: int) -> bool:
+        """Look for forces of single bodies; whether there is nothing to sum. The column is zero then."""
+        state, arrays = self._state, self._state.table.arrays
+        given, held = any_force(
+            dynamic, arrays["force"], arrays["constant_force"], arrays["applied_force"], arrays["step_force"]
+        )
+        if given:
+            return False
+        if held:
+            arrays["force"][:dynamic] = 0.0
+        state.unforced, state.pushed = True, False
+        return True
+
+    def nothing_acts(self) -> bool:
+        """Whether there is no gravity, no force system and, at the moment, no force given to a dynamic body."""
+        arrays, dynamic = self._state.table.arrays, self._state.table.stops[0]
+        if self.world.force_systems or any(self._state.gravity_numbers):
+            return False
+        return not any(arrays[key][:dynamic].any() for key in ("constant_force", "applied_force", "step_force"))
+
+    def kernels(self) -> Iterator[PlannedKernel]:
+        state = self._state
+        if not state.table.stops[0]:
+            return
+        if state.limits_speed:
+            yield PlannedKernel("limit_distance", "some body has a max_linear_speed")
+        if not self.world.force_systems and not any(state.gravity_numbers):
+            yield PlannedKernel("any_force", "no gravity: looks whether a force is given to any body")
+        if not self.nothing_acts():
+            yield from self.kernels_of_a_stage()
+
+    def kernels_of_a_stage(self) -> Iterator[PlannedKernel]:
+        """Those of :meth:`evaluate`, where something acts; force systems name theirs if they have ``kernels``."""
+        yield PlannedKernel("sum_constant_forces", "m g, constant_force and what was applied")
+        for system in self.world.force_systems:
+            yield from getattr(system, "kernels", tuple)()
 
     def _add(self, system: ForceSystem, dynamic: Any, time: float) -> None:
         """A force system sees the bodies it requires: columns in place where that is all of them, else copies."""
@@ -91,6 +145,8 @@ class ForceAccumulation(System):
     def reason(self) -> str:
         names = ", ".join(system.name for system in self.world.force_systems)
         gravity = "gravity and " if self._state.gravity.any() else ""
+        if self.nothing_acts():
+            return "nothing acts: no gravity, no force"
         return f"{gravity}constant and applied forces" + (f"; force systems {names}" if names else "")
 
 

@@ -45,6 +45,10 @@ class Integrator:
         """Move ``motion.position`` and ``motion.velocity`` of the dynamic bodies by ``dt`` seconds."""
         raise NotImplementedError
 
+    def kernels(self, force_changes: bool) -> tuple[str, ...]:
+        """Names of the kernels that :meth:`advance` calls, for ``world.plan()``; force_changes: see Motion."""
+        return ()
+
 
 class ExplicitEuler(Integrator):
     """Position with the old velocity. Drifts upwards by g dt t / 2; unstable for springs."""
@@ -55,6 +59,9 @@ class ExplicitEuler(Integrator):
     def advance(self, motion: Motion, dt: float) -> None:
         euler(*motion.arrays, dt, False, motion.like)
 
+    def kernels(self, force_changes: bool) -> tuple[str, ...]:
+        return ("euler",)
+
 
 class SemiImplicitEuler(Integrator):
     """Velocity first, position with the new one. Symplectic: energy stays within bounds below z = 2."""
@@ -64,6 +71,9 @@ class SemiImplicitEuler(Integrator):
     def advance(self, motion: Motion, dt: float) -> None:
         euler(*motion.arrays, dt, True, motion.like)
 
+    def kernels(self, force_changes: bool) -> tuple[str, ...]:
+        return ("euler",)
+
 
 class VelocityVerlet(Integrator):
     """Second order, symplectic; for velocity-dependent forces the velocity at the end is predicted by v + a dt."""
@@ -72,6 +82,9 @@ class VelocityVerlet(Integrator):
 
     def advance(self, motion: Motion, dt: float) -> None:
         verlet(motion, dt, 0.0)
+
+    def kernels(self, force_changes: bool) -> tuple[str, ...]:
+        return verlet_kernels(force_changes)
 
 
 class RungeKutta4(Integrator):
@@ -91,6 +104,9 @@ class RungeKutta4(Integrator):
             runge_kutta_stage(
                 stage, *motion.arrays, motion.start_position, motion.start_velocity, first, middle, speeds, kicks, dt
             )
+
+    def kernels(self, force_changes: bool) -> tuple[str, ...]:
+        return ("runge_kutta_stage",) if force_changes else verlet_kernels(False)
 
 
 class Yoshida4(Integrator):
@@ -115,6 +131,14 @@ class Yoshida4(Integrator):
         verlet(motion, outer * dt, 0.0, heavy, 0.0)
         verlet(motion, inner * dt, outer * dt, heavy, dt)
         verlet(motion, outer * dt, (outer + inner) * dt, heavy, 0.0)
+
+    def kernels(self, force_changes: bool) -> tuple[str, ...]:
+        return verlet_kernels(force_changes)
+
+
+def verlet_kernels(force_changes: bool) -> tuple[str, ...]:
+    """What :func:`verlet` calls."""
+    return ("verlet_drift", "verlet_kick") if force_changes else ("verlet_drift",)
 
 
 def verlet(motion: Motion, h: float, start: float, heavy: float = math.inf, heavy_h: float = 0.0) -> None:
@@ -161,6 +185,19 @@ def phi3(z):
         total += term
         term *= z
     return total
+
+
+@kernel
+def drift(position, velocity, damping, h):
+    """x' = x + h v, if no body is damped; returns whether. Over flat columns, see :mod:`flat_columns`."""
+    damped = False
+    for i in range(len(damping)):
+        damped |= damping[i] != 0.0
+    size = position.size
+    x, v = position.reshape(size), velocity.reshape(size)
+    for j in range(0 if damped else size):
+        x[j] += h * v[j]
+    return not damped
 
 
 @kernel

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..framework.compilation import inlined, kernel
+from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
 from ..framework.vectors import add, length, row, store, sub
 from .impacts import reach
@@ -167,6 +168,11 @@ class NarrowPhase(System):
             arrays["linear_velocity"], scratch["start_velocity"], scratch["gravity_share"], scratch["size"],
             -1.0 if slop is None else slop, *out, state.like,
         )  # fmt: skip
+
+    def kernels(self) -> Iterator[PlannedKernel]:
+        if self._state.collides:
+            yield PlannedKernel("sort_pairs", "canonical order of the candidates, by entity id")
+            yield PlannedKernel("find_contacts", "layers and masks, then the shapes' functions")
 
     def reason(self) -> str:
         if not self._state.collides:

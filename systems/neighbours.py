@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,8 +50,11 @@ class NeighbourSearch:
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
         self._stamp: Any = None
-        self._tree = SpatialTree(state.dimensions)
-        self._points: SpatialTree | FewBoxes = self._tree
+        self._points: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
+
+    @cached_property
+    def _tree(self) -> SpatialTree:
+        return SpatialTree(self._state.dimensions)
 
     def find(self, radius: float, mask: int, askers: np.ndarray | None, stamp: Any) -> Neighbours:
         """The neighbours of some entities or of all; ``stamp`` changes whenever bodies may have moved."""

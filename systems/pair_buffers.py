@@ -69,7 +69,7 @@ class PairBuffers:
         self.contact_columns = self._no_contacts
         names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "resting_contacts")
         self.pair_counters = dict.fromkeys(names, 0)
-        self._allocate(64)
+        self._allocate(0)
 
     def _allocate(self, size: int) -> None:
         d = self.dimensions

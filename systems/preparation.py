@@ -57,6 +57,9 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
                 small.create_entity(Transform(np.zeros(state.dimensions)), SphereCollider(LANE), collider.sample())
             for _ in range(STEPS):
                 small.step()
+            small.gravity = 0
+            small.bodies.constant_force[:] = 0.0
+            small.step()  # nothing acts
             _ask(small, colliders)
         finally:
             small.close()

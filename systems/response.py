@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
 from ..framework.settings import Settings
 from .contact_solver import ContactSolver
@@ -28,10 +31,14 @@ class Response(System):
 
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
-        self._queue = EventQueue(state.dimensions)
         self._settings: Settings | None = None
         self._bounces = False
         state.contact_solver = self._solver = ContactSolver(state)
+
+    @cached_property
+    def _queue(self) -> EventQueue:
+        queue = self._state.event_queue = EventQueue(self._state.dimensions)
+        return queue
 
     def process(self, dt: float) -> None:
         state = self._state
@@ -82,10 +89,8 @@ class Response(System):
         restitution = stacks["collider.restitution"]
         if not state.found and not self._solver.any_support:
             return struck
-        if not self._bounces:  # once something has bounced this is not asked again: the kernel is there
-            self._bounces = bool(restitution[:, :count].any())
-            if not self._bounces:
-                return struck
+        if not self._may_bounce():
+            return struck
         queue = self._queue
         queue.begin(count, state.pairs)
         curves = (scratch["path_second"], scratch["path_third"])
@@ -102,6 +107,12 @@ class Response(System):
             queue.grow(state.found)
         state.log_impacts(queue.log_pair, queue.log_value, queue.counts)
         return struck
+
+    def _may_bounce(self) -> bool:
+        """Whether a collider has a restitution; once one has had it this is not asked again: the kernel is there."""
+        table = self._state.table
+        self._bounces = self._bounces or bool(table.stacks["collider.restitution"][:, : table.count].any())
+        return self._bounces
 
     def _resting(self, dt: float, struck: np.ndarray) -> np.ndarray:
         """The pairs that neither bounce nor are apart."""
@@ -135,7 +146,20 @@ class Response(System):
         )  # fmt: skip
         state.publish_final(touching[:count], disabled)
 
+    def kernels(self) -> Iterator[PlannedKernel]:
+        if not self._state.collides:
+            return
+        near = "bodies are near each other"
+        if self._may_bounce():
+            yield PlannedKernel("resolve_impacts", "some collider has a restitution", near)
+        yield PlannedKernel("find_resting", "which pairs neither bounce nor are apart", near)
+        yield from self._solver.kernels()
+        yield PlannedKernel("find_touching", "which pairs touch now that all is done", near)
+        yield PlannedKernel("collect_contacts", "world.contacts", "bodies touch")
+
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
+        if not self._may_bounce():
+            return "contacts at rest; nothing bounces: every restitution is 0"
         return "impacts at their time on the path, then contacts at rest"

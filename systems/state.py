@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from ..framework.adoption import Adoption
 from ..framework.bodies import Bodies
 from ..framework.component import Component
 from ..framework.contacts import Contacts, EntityLookup
+from ..framework.plan import PlannedColumn, PlannedKernel
 from ..framework.services import PhysicsServices
 from ..framework.settings import AUTOMATIC, MIXING_RULES
 from ..framework.table import Table
@@ -23,6 +26,7 @@ from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
 from .levels import COUNTERS, LevelCheck, arrange, check_sensors, in_order
 from .pair_buffers import PairBuffers
+from .planned_columns import planned_columns
 from .queries import Queries
 from .rotation import axes_of
 from .shape_code import TRACE_SIZE, ShapeCode, parameter_columns, shape_code
@@ -34,10 +38,12 @@ if TYPE_CHECKING:
 class PhysicsState(PairBuffers, PhysicsServices):
     """What the systems share."""
 
-    SCRATCH = (
-        ("start_velocity", "vector", float), ("path_velocity", "vector", float), ("origin", "vector", float),
-        ("size", "scalar", float), ("material", "scalar", np.int64), ("gravity_share", "scalar", float),
-        ("lower", "vector", float), ("upper", "vector", float),
+    # Per row: for every body that moves, where anything has a collider, and on curved paths.
+    FLIGHT = (("start_velocity", "vector", float),)
+    COLLISIONS = (
+        ("path_velocity", "vector", float), ("origin", "vector", float), ("size", "scalar", float),
+        ("material", "scalar", np.int64), ("gravity_share", "scalar", float), ("lower", "vector", float),
+        ("upper", "vector", float),
     )  # fmt: skip
     CURVES = (("path_second", "vector", float), ("path_third", "vector", float))
 
@@ -55,7 +61,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
             self.table.add_array(key, "vector")
         self.table.add_array("inverse_mass")
         self.scratch: dict[str, np.ndarray] = {}  # per row, made anew within a step or when rows have moved
-        self._allocate_scratch()
+        self._allocate_scratch(False)
         self.adoption = Adoption(self.table, Transform, _makes_body, LevelCheck(self.table, world.registry))
         self.bodies = Bodies(self.table)
         self.lookup = EntityLookup(self._living_with)
@@ -63,7 +69,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.queries = Queries(self)
         PairBuffers.__init__(self, dimensions)
         self.pair_counters.update(dict.fromkeys(COUNTERS, 0))
-        self._integrators: dict[str, Integrator] = {}
+        self._integrators: dict[type[Integrator], Integrator] = {}
         self.prepared: set[type[Any]] = set()  # colliders whose kernels are kept ready
         self.structure: Any = None
         self.structures = 0  # how often refresh_structure has made everything anew
@@ -81,6 +87,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.collides = False
         self.limits_speed = False
         self.pushed = True  # whether applied_force or step_force may hold something that has to be cleared
+        self.unforced = False  # whether nothing acts on any body in this step, unless a system of the game adds it yet
         self.moved = False  # whether the columns hold a motion from previous_position to position
         self.path_degree = 1
         self.motion_stamp = 0
@@ -98,12 +105,12 @@ class PhysicsState(PairBuffers, PhysicsServices):
             return
         self.structure = structure
         self.structures += 1
-        self._allocate_scratch()
         count, arrays = table.count, table.arrays
         arrays["linear_velocity"][table.stops[1] : count] = 0.0
         known = table.stacked_types(Collider.stack)
         present = [c for c in known if c in self.prepared or table.has_mask(c)[:count].any()]
         present = in_order(self.world.registry, present)
+        self._allocate_scratch(bool(present))
         masks = [table.has_mask(component)[:count] for component in present]
         levels = arrange(np.array(masks).reshape(len(present), count))
         slots = np.array([table.slot_of(component) for component in present], np.int64)
@@ -116,13 +123,15 @@ class PhysicsState(PairBuffers, PhysicsServices):
             present, slots = [present[index] for index in used], slots[used]
         self._set_levels(levels)
         boxes = present.index(AABBCollider) if AABBCollider in present else len(present)
-        self._stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
+        if len(levels) > 1:
+            self.stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
         self.collides = bool((levels[0, : table.stops[1]] >= 0).any())
         self.slots = slots
         self.code = shape_code(self.world.registry, present, self.dimensions) if present else None
         self.kernels = kernels_for(self.code) if self.code else None
-        self.rank = np.empty(count, np.int64)
-        self.rank[np.argsort(arrays["entity"][:count], kind="stable")] = np.arange(count)
+        self.rank = np.empty(count if self.code else 0, np.int64)
+        if self.code:
+            self.rank[np.argsort(arrays["entity"][:count], kind="stable")] = np.arange(count)
         self._bind_shapes()
 
     def _set_levels(self, levels: np.ndarray) -> None:
@@ -130,9 +139,9 @@ class PhysicsState(PairBuffers, PhysicsServices):
         count, capacity = len(levels), self.table.capacity
         self.levels = np.full((count, capacity), -1, np.int8)
         self.levels[:, : levels.shape[1]] = levels
-        self.level_offsets = np.zeros((count, capacity, self.dimensions))
+        self.level_offsets = np.zeros((count, capacity if (levels >= 0).any() else 0, self.dimensions))
         self.scratch["shape"], self.scratch["offset"] = self.levels[-1], self.level_offsets[-1]
-        self._stretches = np.zeros(levels.shape[1], bool)
+        self.stretches = np.zeros(levels.shape[1] if count > 1 else 0, bool)
         self.outgrown = np.zeros(capacity if count > 1 else 0, bool)
 
     def _bind_shapes(self) -> None:
@@ -171,15 +180,15 @@ class PhysicsState(PairBuffers, PhysicsServices):
             self.axes[:count] = axes_of(rotation, self.dimensions)
         if len(self.levels) > 1:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.dimensions == 2 else rotation[:, 1:].any(axis=1)
-            self.outgrown[:count] = self._stretches & turned
+            self.outgrown[:count] = self.stretches & turned
 
-    def _allocate_scratch(self) -> None:
-        """Room for every row the table can hold."""
+    def _allocate_scratch(self, colliders: bool) -> None:
+        """Room for every row the table can hold, in what is needed with colliders or without."""
         capacity = self.table.capacity
-        for key, item, dtype in (*self.SCRATCH, *self.CURVES):
-            rows = capacity if (key, item, dtype) in self.SCRATCH else 0
-            if key not in self.scratch or (rows and len(self.scratch[key]) != rows):
-                self.scratch[key] = np.zeros((rows, self.dimensions) if item == "vector" else rows, dtype)
+        for group, rows in ((self.FLIGHT, capacity), (self.COLLISIONS, capacity if colliders else 0), (self.CURVES, 0)):
+            for key, item, dtype in group:
+                if key not in self.scratch or (rows and len(self.scratch[key]) != rows):
+                    self.scratch[key] = np.zeros((rows, self.dimensions) if item == "vector" else rows, dtype)
 
     def allocate_curves(self, degree: int) -> None:
         """Room for the path's second and third coefficient, once an integrator needs it."""
@@ -189,9 +198,10 @@ class PhysicsState(PairBuffers, PhysicsServices):
 
     def integrator(self) -> Integrator:
         name = self.world.settings.integrator
-        if name not in self._integrators:
-            self._integrators[name] = self.world.registry.integrators[name]()
-        return self._integrators[name]
+        make = self.world.registry.integrators[name]  # another one may be registered under the name at any time
+        if make not in self._integrators:
+            self._integrators[make] = make()
+        return self._integrators[make]
 
     def check_settings(self, settings: Any) -> None:
         registry = self.world.registry
@@ -203,7 +213,9 @@ class PhysicsState(PairBuffers, PhysicsServices):
         ):
             value = getattr(settings, name)
             if value not in known:
-                raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {value!r}")
+                near = difflib.get_close_matches(value, known, 1)
+                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {value!r}{hint}")
 
     def set_gravity(self, gravity: Any) -> None:
         vector = np.array(gravity, float)
@@ -227,6 +239,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         check_pairs(self)
         self.refresh_rotation()
         self.pushed = True
+        self.unforced = False
         self.moved = False
         table.forces_summed = False  # type: ignore[attr-defined]
         self.motion_stamp += 1
@@ -264,6 +277,24 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def restore_tracking(self, state: Any) -> None:
         self.contact_events.touching, memory = state
         self.contact_solver.restore(memory)
+
+    # -- looking inside ---------------------------------------------------------------------------
+
+    def look_ahead(self, others_write: bool) -> None:
+        self.refresh_structure()
+        self.refresh_rotation()
+        self.table.everything_kept = others_write
+        limits = self.table.arrays["max_linear_speed"][: self.table.stops[0]]
+        self.limits_speed = not np.isnan(limits).all()
+
+    def planned_kernels(self) -> Iterator[PlannedKernel]:
+        yield PlannedKernel("invert_masses", "1 / mass of what moves freely; whether any has a max_linear_speed")
+        if self.code is not None:
+            yield PlannedKernel("any_turned", "whether any Transform.rotation is set")
+        yield PlannedKernel("all_finite", "positions and velocities, for world.faults")
+
+    def planned_columns(self) -> Iterator[PlannedColumn]:
+        return planned_columns(self)
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -304,6 +335,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
     narrow_phase: Any
     contact_events: Any
     contact_solver: Any
+    event_queue: Any = None  # once something may bounce
     start_positions: np.ndarray  # where the bodies were at the start of the step
 
 

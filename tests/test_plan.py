@@ -354,6 +354,28 @@ def test_fields_at_their_defaults_are_told_from_those_in_use():
     assert columns["rotation"] == columns["max_linear_speed"] == "what the game has set"
 
 
+def test_integrators_of_plugins_name_their_kernels_or_none():
+    plugin = Plugin("flights")
+
+    @plugin.integrator("silent")
+    class Silent:
+        order, evaluations, path = 1, 1, 1
+
+        def advance(self, motion, dt):
+            motion.position += dt * motion.velocity
+
+    @plugin.integrator("named")
+    class Named(Silent):
+        def kernels(self, force_changes):
+            return ("mine",)
+
+    for name, expected in (("silent", set()), ("named", {"mine"})):
+        world = World(Physics(), plugin, settings=Settings(integrator=name))
+        world.create_entity(Transform((0.0, 0.0)), RigidBody())
+        assert {k.kernel for k in world.plan().kernels} == AROUND | {"any_force"} | expected
+        assert {k for _, k in set.union(*record_calls(world, 2))} == AROUND | {"any_force"}
+
+
 def test_what_comes_later_is_in_the_plan_at_once():
     world = drifting()
     world.step()
