@@ -14,6 +14,7 @@ from .testing_oracle_bodies import Body, Pair, only_corners, touch
 
 SEARCHES = 24  # for the place where a pair first touches
 ROUNDING = 1e-12  # of what was subtracted: a number this small may as well be zero
+SAME_PLACE = 1e-9  # of the size: an overlap of rounding errors is none
 LIGHT = 10.0  # a body between two that have this many times its mass is squeezed
 SHOCK, SHOCK_PASSES, SHOCK_LEFT = 0.01, 16, 0.02  # of the size per step; at most; of the largest, when to stop
 DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap pushed out in position, part of it, and limit per step
@@ -91,7 +92,8 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     bounced, at_end, parting = pair.impulse > 0.0, False, False
     if pair.restitution(settings) > 0.0:
         speed = float((b.velocity - a.velocity) @ now.normal)
-        if now.depth < 0.0 and speed < -threshold:
+        touches = now.depth > (0.0 if bounced else SAME_PLACE * pair.size)
+        if not touches and speed < -threshold:
             return None  # an impact of the next step
         at_end, parting = speed > 0.0, speed > threshold and speed * dt > slop
         if bounced and speed > threshold and touch(a, b, pair.between(a.start, b.start)).depth < 0.0:
