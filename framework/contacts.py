@@ -36,6 +36,15 @@ class Contact:
         )  # fmt: skip
 
 
+def _refuse(contact: Contact, name: str, value: Any) -> None:
+    raise AttributeError(
+        f"a contact is a copy of its row, {name} cannot be set; write the columns: world.contacts.enabled[i] = False"
+    )
+
+
+Contact.__setattr__ = _refuse  # type: ignore[method-assign]  # the generated one cannot say this
+
+
 class ContactRows:
     """Columns of contacts or contact events, rows ordered by (entity_a, entity_b), entity_a < entity_b.
 

@@ -55,7 +55,11 @@ def _chart() -> Option:
 
 @click.group("bench", cls=Commands, invoke_without_command=True, short_help="Time carom on this machine.")
 @click.option("--scenes", "scene_names", metavar="NAME,NAME", help=f"Only these of {NAMES}.")
-@click.option("--sizes", metavar="N,N", help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}).")
+@click.option(
+    "--sizes", metavar="N,N",
+    help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}) of scenes that come in sizes; pyramid, "
+    "static_world, fastgas and freefall have their own.",
+)  # fmt: skip
 @click.option(
     "--repeats", type=click.IntRange(min=1), help=f"Runs of everything; the median counts (default: {REPEATS})."
 )

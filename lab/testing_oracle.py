@@ -133,7 +133,7 @@ class Oracle:
         contacts = find_resting(pairs, travels, self.settings)
         in_order = pairwise(self.impacts)
         self.doubts = [two.pair.key for one, two in in_order if two.time - one.time <= ROUNDING * two.time]
-        solved = solve(contacts, self._memory, self.settings) if contacts else {}
+        solved = solve(contacts, self._memory, self.settings, not self.impacts) if contacts else {}
         self.doubts += [contact.pair.key for contact in contacts if contact.doubtful]
         held = {body for body, moving in solved.items() if moving.held and body.inverse_mass > 0.0}
         for body in self.bodies:

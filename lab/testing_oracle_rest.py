@@ -14,7 +14,9 @@ from .testing_oracle_bodies import Body, Pair, only_corners, touch
 
 SEARCHES = 24  # for the place where a pair first touches
 ROUNDING = 1e-12  # of what was subtracted: a number this small may as well be zero
+SAME_PLACE = 1e-9  # of the size: an overlap of rounding errors is none
 LIGHT = 10.0  # a body between two that have this many times its mass is squeezed
+SHOCK, SHOCK_PASSES, SHOCK_LEFT = 0.01, 16, 0.02  # of the size per step; at most; of the largest, when to stop
 DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap pushed out in position, part of it, and limit per step
 
 
@@ -90,7 +92,8 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     bounced, at_end, parting = pair.impulse > 0.0, False, False
     if pair.restitution(settings) > 0.0:
         speed = float((b.velocity - a.velocity) @ now.normal)
-        if now.depth < 0.0 and speed < -threshold:
+        touches = now.depth > (0.0 if bounced else SAME_PLACE * pair.size)
+        if not touches and speed < -threshold:
             return None  # an impact of the next step
         at_end, parting = speed > 0.0, speed > threshold and speed * dt > slop
         if bounced and speed > threshold and touch(a, b, pair.between(a.start, b.start)).depth < 0.0:
@@ -148,10 +151,13 @@ def entry(pair: Pair, at_end: bool, slop: float) -> tuple[float, Floats]:
 # -- the solver -------------------------------------------------------------------------------------
 
 
-def solve(contacts: list[Resting], memory: dict[tuple[int, int], Kept], settings: Settings) -> dict[Body, Moving]:
+def solve(
+    contacts: list[Resting], memory: dict[tuple[int, int], Kept], settings: Settings, plastic: bool
+) -> dict[Body, Moving]:
     """Advance the bodies of ``contacts`` (in canonical order) from the start of the step; returns where to.
 
-    memory: the contacts of the step before, by pair. Those of the bodies that no contact has pushed are not ``held``.
+    memory: the contacts of the step before, by pair; plastic: nothing has bounced in this step. Those of the bodies
+    that no contact has pushed are not ``held``.
     """
     dt, substeps = settings.dt, settings.substeps
     h = dt / substeps
@@ -164,15 +170,17 @@ def solve(contacts: list[Resting], memory: dict[tuple[int, int], Kept], settings
     stiff = h * omega * damping
     soft = omega / damping, stiff / (1.0 + stiff), 1.0 / (1.0 + stiff)
     sweep = Sweep(contacts, blocks, bodies, h, soft)
+    shock = strike(contacts, bodies, dt) if plastic else 0.0
     for substep in range(substeps):
         for body in bodies.values():
             body.velocity = body.velocity + h * body.acceleration
         for contact in contacts:
             if contact.impulse > 0.0:
                 sweep.push(contact, contact.tangent + contact.impulse * contact.normal)
-        if any_loose and substep == 0:
-            for _ in range(4):
-                sweep.over(spread(contacts, bodies), biased=False)
+        for _ in range(SHOCK_PASSES if shock else 4 if any_loose and substep == 0 else 0):
+            sweep.over(spread(contacts, bodies), biased=False)
+            if sweep.largest < SHOCK_LEFT * shock:
+                break
         sweep.over(contacts, biased=True)
         for contact in contacts:
             contact.pushed = contact.pushed or contact.impulse > 0.0
@@ -225,6 +233,19 @@ def warm_start(
             if entity in by_entity:
                 by_entity[entity].loose = True
     return any(moving.loose for moving in bodies.values())
+
+
+def strike(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: float) -> float:
+    """The bodies of contacts that close fast are loose; returns the largest such speed, 0 if there is none."""
+    largest = 0.0
+    for contact in contacts:
+        a, b = (bodies[body] for body in contact.pair.bodies)
+        speed = float((a.velocity - b.velocity) @ contact.normal)
+        contact.doubtful |= abs(speed * dt - contact.gap) <= ROUNDING * contact.pair.size
+        if speed * dt > max(SHOCK * contact.pair.size, contact.gap):
+            largest = max(largest, speed)
+            a.loose = b.loose = True
+    return largest
 
 
 def spread(contacts: Sequence[Resting], bodies: dict[Body, Moving]) -> list[Resting]:
@@ -301,9 +322,11 @@ class Sweep:
     bodies: dict[Body, Moving]
     h: float
     soft: tuple[float, float, float]
+    largest: float = 0.0  # change of a relative velocity in the last pass
 
     def over(self, chosen: Sequence[Resting], biased: bool) -> None:
         """Stop the approach of each chosen contact, then what slides; ``biased``: overlap is pushed apart too."""
+        self.largest = 0.0
         for contact in chosen:
             if not contact.in_block:
                 self._stop(contact, biased)
@@ -343,6 +366,7 @@ class Sweep:
             wanted = self.soft[1] * wanted + self.soft[2] * old
         contact.impulse = max(0.0, old - wanted)
         contact.doubtful |= old > 0.0 and abs(old - wanted) <= ROUNDING * old
+        self.largest = max(self.largest, abs(contact.impulse - old) / contact.pair.mass)
         self.push(contact, (contact.impulse - old) * contact.normal)
 
     def _rub(self, contact: Resting) -> None:

@@ -178,10 +178,10 @@ class ContactSolver:
         )
         substeps = settings.substeps
         solve_contacts(
-            substeps, dt / substeps, any_loose, loose, self._active, first, second, normal, gap, mass,
-            bool(friction.any()), friction, extent, parting, in_block, self._blocks[:blocks], impulse, tangent, total,
-            worked, self._opening, self._pushing, self._soft, body_velocity, shift, self._acceleration, body_mass,
-            state.like,
+            substeps, dt / substeps, not len(state.impact_pairs), any_loose, loose, self._active, first, second, normal,
+            gap, mass, bool(friction.any()), friction, extent, parting, in_block, self._blocks[:blocks], impulse,
+            tangent, total, worked, self._opening, self._pushing, self._soft, body_velocity, shift, self._acceleration,
+            body_mass, state.like,
         )  # fmt: skip
         put_back(
             resting, slot, first, second, total, worked, self._body_rows, bodies, self._place, self._held, start,

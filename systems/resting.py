@@ -107,7 +107,8 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
             if e > 0.0:
                 threshold = fixed_threshold if fixed_threshold >= 0.0 else (margin - slop) / dt
                 speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
-                if depth < 0.0 and speed < -threshold:
+                touches = depth > (SAME_PLACE * smaller(a, b, size) if pair_impulse[c] == 0.0 else 0.0)
+                if not touches and speed < -threshold:
                     continue  # the next step's impact
                 if speed > 0.0:
                     pair_parts[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY

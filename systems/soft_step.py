@@ -22,6 +22,9 @@ DAMPING_RATIO = 10.0
 RELAX_PASSES = 2
 LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
 LET_GO_PASSES = 4  # once, after contacts have been lost
+SHOCK = 0.01  # of the size, per step: a contact that closes faster is a shock
+SHOCK_PASSES = 16  # at most, in each substep of a step with shocks
+SETTLED = 0.02  # of the largest shock's speed: corrections below it are left to the other passes
 DEEP = 0.02  # of the size: overlap beyond it is pushed out in position only, for a speed given to many adds up
 PUSH_RATE = 0.2  # of the deep overlap, per step
 PUSH_LIMIT = 0.05  # of the size, per step
@@ -29,8 +32,9 @@ PUSH_LIMIT = 0.05  # of the size, per step
 
 @kernel
 def solve_contacts(
-    substeps, h, any_loose, loose, active, first, second, normal, gap, mass, rubs, friction, extent, parting, in_block,
-    blocks, impulse, tangent, total, worked, opening, pushing, soft, velocity, shift, acceleration, inverse_mass, like,
+    substeps, h, plastic, any_loose, loose, active, first, second, normal, gap, mass, rubs, friction, extent, parting,
+    in_block, blocks, impulse, tangent, total, worked, opening, pushing, soft, velocity, shift, acceleration,
+    inverse_mass, like,
 ):  # fmt: skip
     """Advance the bodies by ``substeps`` of ``h`` seconds under ``acceleration`` and their contacts.
 
@@ -41,7 +45,7 @@ def solve_contacts(
     over the step; worked (m,): it pushed at some time; active, opening, pushing, soft (m,): room.
     Of bodies: velocity, shift (n, d), the displacement since the start; acceleration (n, d); inverse_mass (n,); loose
     (n,): a contact that pushed in the last step has gone, so that the others push too much: before anything else
-    these let go, and their neighbours.
+    these let go, and their neighbours. plastic: nothing has bounced in this step, so what closes fast is a shock.
     """
     omega = 2.0 * math.pi * FREQUENCY / h
     damping = 2.0 * DAMPING_RATIO + h * omega
@@ -51,6 +55,7 @@ def solve_contacts(
         total[k] = 0.0
         worked[k] = False
     measure(h, bias_rate, first, second, normal, gap, extent, parting, shift, opening, pushing, soft, like)
+    shock = strike(substeps * h, first, second, normal, gap, extent, velocity, loose, like) if plastic else 0.0
     for step in range(substeps):
         for i in range(len(velocity)):
             store(velocity, i, add_scaled(row(velocity, i, like), row(acceleration, i, like), h))
@@ -63,9 +68,12 @@ def solve_contacts(
                 store(velocity, a, add_scaled(row(velocity, a, like), push, -inverse_mass[a]))
                 store(velocity, b, add_scaled(row(velocity, b, like), push, inverse_mass[b]))
         last = LAST_RELAX_PASSES if step == substeps - 1 else RELAX_PASSES
-        for turn in range(-LET_GO_PASSES if any_loose and step == 0 else 0, 1 + last):
+        turn = -LET_GO_PASSES if any_loose and step == 0 else 0
+        turn = -SHOCK_PASSES if shock > 0.0 else turn
+        while turn <= last:
             if turn < 0:
                 spread(loose, first, second, inverse_mass, active)
+            largest = 0.0
             bias = pushing if turn == 0 else opening
             for k in range(len(first)):
                 if in_block[k] or (turn < 0 and not active[k]):
@@ -78,6 +86,7 @@ def solve_contacts(
                 if turn == 0 and soft[k]:
                     wanted = mass_scale * wanted + impulse_scale * old
                 new = max(0.0, old - wanted)
+                largest = max(largest, abs(new - old) / mass[k])
                 impulse[k] = new
                 store(velocity, a, add_scaled(v_a, n, (old - new) * inverse_mass[a]))
                 store(velocity, b, add_scaled(v_b, n, (new - old) * inverse_mass[b]))
@@ -101,9 +110,27 @@ def solve_contacts(
                     measure(
                         h, bias_rate, first, second, normal, gap, extent, parting, shift, opening, pushing, soft, like
                     )
+            turn = 0 if turn < 0 and largest < SETTLED * shock else turn + 1
         for k in range(len(first)):
             total[k] += impulse[k]
             worked[k] |= impulse[k] > 0.0
+
+
+@part
+def strike(dt, first, second, normal, gap, extent, velocity, loose, like):
+    """Mark the bodies of contacts that close fast as ``loose``; returns the largest such speed, 0 if there is none.
+
+    A shock has to travel through all that touches before anything is pushed apart: what one pass leaves undone would
+    become overlap, and the push against that a bounce.
+    """
+    largest = 0.0
+    for k in range(len(first)):
+        a, b = first[k], second[k]
+        speed = dot(sub(row(velocity, a, like), row(velocity, b, like)), row(normal, k, like))
+        if speed * dt > SHOCK * extent[k] and speed * dt > gap[k]:
+            largest = max(largest, speed)
+            loose[a] = loose[b] = True
+    return largest
 
 
 @part

@@ -33,7 +33,7 @@ class CandidateLimitError(RuntimeError):
     def __init__(self, count: int, limit: int) -> None:
         super().__init__(
             f"{count} candidate pairs exceed the limit of {limit}: too many objects in one place; "
-            "spread them out, make them smaller or raise the limit"
+            "spread them out or make them smaller"
         )
         self.count = count
         self.limit = limit

@@ -491,3 +491,16 @@ def test_pairs_end_when_their_ids_come_to_mean_others():
                 esper.create_entity(Transform((x, 0.0)), RigidBody(), SphereCollider(0.5, sensor=True))
         world.step()
     assert sorted(told) == ["contact_begin", "contact_begin", "contact_end"]
+
+
+def test_a_record_of_a_contact_cannot_be_written():
+    """The error says what can: the column."""
+    world = make_world()
+    ball(world, 0.0)
+    ball(world, 0.5)
+    world.step()
+    (contact,) = world.contacts
+    for name in ("enabled", "depth"):
+        with pytest.raises(AttributeError, match=rf"{name} cannot be set; write the columns: world.contacts.enabled"):
+            setattr(contact, name, 0.0)
+    world.close()

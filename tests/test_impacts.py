@@ -394,3 +394,15 @@ def test_default_threshold_is_twice_gravitys_share(factor, bounces):
     world.step()
     assert len(world.contacts.impacts) == bounces
     assert (velocity(world, a)[1] > 0) == bounces
+
+
+def test_a_ball_whose_step_ends_in_touch_bounces_all_the_same():
+    """30 steps of 5/60 lead from x = 0 to touching at 2.5 exactly but for rounding: the bounce is the next step's."""
+    world = make_world()
+    box(world, (3.0, 4.0), half=(0.0, 2.0), kind="static", restitution=1.0)
+    for number in range(40):
+        ball(world, (-10.0 * number, 400.0 + number), 0.0)  # others change the rounding, not the answer
+    mover = ball(world, (0.0, 4.0), (5.0, 0.0))
+    run(world, 40)
+    assert velocity(world, mover)[0] == pytest.approx(-5.0, rel=1e-12)
+    assert position(world, mover)[0] == pytest.approx(5.0 - 40 * 5 / 60, rel=1e-12)
