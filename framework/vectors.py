@@ -16,7 +16,8 @@ import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import _Intrinsic, intrinsic
+from numba.core.extending import _Intrinsic
+from numba.extending import intrinsic
 
 from .compilation import inlined
 

@@ -15,7 +15,7 @@ from ..framework.vectors import add_scaled, dot, scale
 STRAIGHT = 1e-12  # sine of the turn at a corner below which it is none
 FULL_TURN = 2.0 * math.pi
 
-plugin = Plugin("convex polygon", version="1.0")
+plugin = Plugin("convex_polygon", version="1.0")
 
 
 def wrong_with(vertices: np.ndarray) -> str | None:

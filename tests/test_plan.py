@@ -59,7 +59,7 @@ pebbles = Plugin("pebbles")
 class PebbleCollider(Collider):
     size = column(positive=True)
 
-    def bounds(shape, dimensions):  # noqa: N805
+    def bounds(shape, dimensions):
         return (shape.size, shape.size) if dimensions == 2 else (shape.size, shape.size, shape.size)
 
 

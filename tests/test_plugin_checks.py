@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 
 import pytest
+
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import Component, Convex, Plugin, PluginError, World, column
@@ -45,7 +46,8 @@ def registered(**members):
 SHAPES = {
     "is no class": (lambda: 7, "a shape is a class derived from Collider, got 7"),
     "is no collider": (
-        lambda: type("Charge", (Component,), {"value": column(0.0)}), "Charge must derive from carom.components.Collider"
+        lambda: type("Charge", (Component,), {"value": column(0.0)}),
+        "Charge must derive from carom.components.Collider",
     ),
     "has no bounds": (lambda: disc_class(bounds=None), r"has no bounds: write bounds\(shape, dimensions\)"),
     "bounds take too few": (
@@ -175,9 +177,9 @@ def test_the_other_things_are_looked_at_too():
         plugin.integrator("jump")(int)
     with pytest.raises(PluginError, match=r"broad phase 'all': register a class with pairs\(lower, upper, moving\)"):
         plugin.broad_phase("all")(int)
-    with pytest.raises(PluginError, match="mixing rule 'first': for 0.25 and 1.0 it returned 0.25, for 1.0 and 0.25"):
+    with pytest.raises(PluginError, match=r"mixing rule 'first': for 0.25 and 1.0 it returned 0.25, for 1.0 and 0.25"):
         plugin.mixing_rule("first")(lambda x, y: x)
-    with pytest.raises(PluginError, match="mixing rule 'minus': .* return a number from 0"):
+    with pytest.raises(PluginError, match=r"mixing rule 'minus': .* return a number from 0"):
         plugin.mixing_rule("minus")(lambda x, y: -1.0)
     with pytest.raises(PluginError, match=r"pair filter <lambda> takes \(\), it must take 3 arguments"):
         plugin.pair_filter(lambda: None)
@@ -200,11 +202,9 @@ def test_names_are_taken_once():
     world = World(Physics(), plugin)
     with pytest.raises(PluginError, match="a plugin named 'discs' is in this world already"):
         world.add_plugin(Plugin("discs"))
-    with pytest.raises(PluginError, match="plugin spheres: the pair of SphereCollider and SphereCollider is registered"):
-        again = Plugin("spheres")
-        again.pair(SphereCollider, SphereCollider)(
-            lambda a, b, d: disc_disc(disc_like(a.radius), disc_like(b.radius), d)
-        )
+    again = Plugin("spheres")
+    again.pair(SphereCollider, SphereCollider)(lambda a, b, d: disc_disc(disc_like(a.radius), disc_like(b.radius), d))
+    with pytest.raises(PluginError, match="plugin spheres: the pair of SphereCollider and SphereCollider is reg"):
         world.add_plugin(again)
     with pytest.raises(TypeError, match="add_plugin takes a plugin, got 3"):
         world.add_plugin(3)

@@ -20,7 +20,9 @@ from carom.framework.compilation import inlined, kernel
 from carom.framework.vectors import row, store
 from carom.plugins import Physics, convex_polygon, tile_grid
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.tile_grid import TileGridCollider, cells_of_text, deepest_contact, first_touch
+from carom.plugins.tile_grid import TileGridCollider, cells_of_text
+from carom.plugins.tile_grid.contact import deepest_contact
+from carom.plugins.tile_grid.sweep import first_touch
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import (
@@ -180,7 +181,7 @@ def test_what_stands_still_never_meets():
     world.create_entity(Transform((0.5, 0)), SphereCollider(1.0))
     world.step()
     alone = world.create_entity(Transform((50, 0)), RigidBody(), lonely(1.0))
-    with pytest.raises(UnhandledPairError, match="LonelyCollider and SphereCollider can meet|SphereCollider and Lonely"):
+    with pytest.raises(UnhandledPairError, match=r"(Lonely|Sphere)Collider and \w+ can meet"):
         world.step()
     world.component_for_entity(alone, lonely).layer = 0
     world.step()
@@ -328,7 +329,7 @@ def test_a_mixing_rule_of_a_plugin():
     world.close()
     with pytest.raises(ValueError, match=r"Settings.restitution_mixing must be one of average, .*, got 'quarter'"):
         World(Physics(), settings=Settings(restitution_mixing="quarter"))
-    with pytest.raises(ValueError, match="Settings.friction_mixing must be one of"):
+    with pytest.raises(ValueError, match=r"Settings.friction_mixing must be one of"):
         World(Physics(), plugin, settings=Settings(friction_mixing="third"))
 
 

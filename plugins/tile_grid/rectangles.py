@@ -1,0 +1,148 @@
+"""Rectangles of cells: columns x0 to x1, rows y0 to y1 (from below), the ends not included.
+
+How many tiles they hold, how far they can grow, and the shapes they make.
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import part
+from .collider import ALL, FLOORS, plugin
+
+WAITING = 64  # blocks of tiles still to be looked at: two for each halving of the map
+SLANT = 1e-9  # radians; a face that leans by less is none but parallel to the tiles
+TIE = 1e-9  # of a tile: which of two contacts is deeper is no matter then
+
+
+@plugin.kernel
+def tiles_in(sums, stride, x0, y0, x1, y1):
+    """How many tiles a rectangle holds."""
+    low, high = 1 + y0 * stride, 1 + y1 * stride
+    return (sums[high + x1, 0] - sums[high + x0, 0]) - (sums[low + x1, 0] - sums[low + x0, 0])
+
+
+@plugin.kernel
+def full(sums, stride, x0, y0, x1, y1):
+    """Whether all its cells are tiles."""
+    return tiles_in(sums, stride, x0, y0, x1, y1) == (x1 - x0) * (y1 - y0)
+
+
+@plugin.kernel
+def moved_side(x0, y0, x1, y1, side, way):
+    """The rectangle with its side (left, right, lower, upper) moved outwards."""
+    if side == 0:
+        return x0 - way, y0, x1, y1
+    if side == 1:
+        return x0, y0, x1 + way, y1
+    if side == 2:
+        return x0, y0 - way, x1, y1
+    return x0, y0, x1, y1 + way
+
+
+@part
+def grown(sums, stride, x0, y0, x1, y1, side, room):
+    """A rectangle full of tiles with one side moved outwards, at most by ``room``, as long as it stays full."""
+    low, high = 0, max(room, 0)
+    step = high  # most often it can grow all the way, or not at all
+    while low < high:
+        u0, v0, u1, v1 = moved_side(x0, y0, x1, y1, side, step)
+        if full(sums, stride, u0, v0, u1, v1):
+            low = step
+        else:
+            high = step - 1
+        step = 1 if low == 0 and step == max(room, 0) else (low + high + 1) // 2
+    return moved_side(x0, y0, x1, y1, side, low)
+
+
+@plugin.kernel
+def cell_at(way, count):
+    """The cell in which a place lies, in tiles from the map's edge; at the edge for one outside of the map, or NaN."""
+    if not way > 0.0:
+        return 0
+    if way >= count:
+        return count - 1
+    return int(way)
+
+
+@plugin.kernel
+def gaps(low, high, first, last, tile):
+    """How far the interval low to high, in metres, is from cells first to last (negative: inside), from both sides."""
+    return low - last * tile, first * tile - high
+
+
+@plugin.kernel
+def tile_support(half, direction):
+    """A corner of a rectangle."""
+    return (half[0] if direction[0] >= 0.0 else -half[0], half[1] if direction[1] >= 0.0 else -half[1])
+
+
+@plugin.kernel
+def sharp(half):
+    return 0.0
+
+
+@plugin.kernel
+def halved(waiting, count, x0, y0, x1, y1, right_first, upper_first):
+    """Put both halves of a rectangle, cut across its longer side, where ``count`` is; the first one goes on top."""
+    cut_x, cut_y = x1, y1  # of the left or lower half
+    if x1 - x0 >= y1 - y0:
+        cut_x = (x0 + x1) // 2
+        second_first = right_first
+    else:
+        cut_y = (y0 + y1) // 2
+        second_first = upper_first
+    for turn in range(2):
+        if (turn == 1) == second_first:
+            waiting[count, 0] = cut_x if cut_x < x1 else x0
+            waiting[count, 1] = cut_y if cut_y < y1 else y0
+            waiting[count, 2], waiting[count, 3] = x1, y1
+        else:
+            waiting[count, 0], waiting[count, 1], waiting[count, 2], waiting[count, 3] = x0, y0, cut_x, cut_y
+        count += 1
+    return count
+
+
+@plugin.kernel
+def box_around(b, support, around):
+    """Left, right, lower and upper end of a shape, from its centre."""
+    left, right = support(b, (-1.0, 0.0))[0] - around, support(b, (1.0, 0.0))[0] + around
+    return left, right, support(b, (0.0, -1.0))[1] - around, support(b, (0.0, 1.0))[1] + around
+
+
+@plugin.kernel
+def rectangle(x0, y0, x1, y1, tile, middle):
+    """Its half extents, and its middle from that of the map."""
+    extent = (0.5 * (x1 - x0) * tile, 0.5 * (y1 - y0) * tile)
+    return extent, (0.5 * (x0 + x1) * tile - middle[0], 0.5 * (y0 + y1) * tile - middle[1])
+
+
+@plugin.kernel
+def faces_like(n, faces):
+    """Whether a contact with that normal is with the faces that count."""
+    return faces == ALL or (abs(n[1]) >= abs(n[0])) == (faces == FLOORS)
+
+
+@plugin.kernel
+def solid(sums, stride, x0, y0, x1, y1):
+    """Whether cells are all tiles; what lies beyond the map is none."""
+    if x0 < 0 or y0 < 0 or x1 >= stride or 1 + (y1 + 1) * stride > len(sums):
+        return False
+    return full(sums, stride, x0, y0, x1, y1)
+
+
+@part
+def hidden(sums, stride, x0, y0, x1, y1, n, column0, row0, column1, row1):
+    """Whether the face, or the corner, at which a shape meets a rectangle borders on other tiles.
+
+    n: the contact's normal; column0 to row1: the cells under the shape's box.
+    """
+    beside = x1 if n[0] > 0.0 else x0 - 1
+    above = y1 if n[1] > 0.0 else y0 - 1
+    if abs(n[0]) > SLANT and abs(n[1]) > SLANT:
+        x, y = x1 - 1 if n[0] > 0.0 else x0, y1 - 1 if n[1] > 0.0 else y0
+        side, top = solid(sums, stride, beside, y, beside + 1, y + 1), solid(sums, stride, x, above, x + 1, above + 1)
+        return side or top
+    if abs(n[0]) > SLANT:
+        first, last = min(max(row0, y0), y1 - 1), min(max(row1, y0), y1 - 1)
+        return solid(sums, stride, beside, first, beside + 1, last + 1)
+    first, last = min(max(column0, x0), x1 - 1), min(max(column1, x0), x1 - 1)
+    return solid(sums, stride, first, above, last + 1, above + 1)
