@@ -135,13 +135,27 @@ def check_pair(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
 
 
 def _try_poses(where: str, function: Any, first: Shape, second: Shape, dimensions: int) -> None:
+    hits = endless = 0
+    deeper: list[str] = []
     for scale in SCALES:
         a, b = parameters_of(first, dimensions, scale), parameters_of(second, dimensions, scale)
         for pose in POSES:
             d = tuple(np.float64(scale * x) for x in pose[:dimensions])
             result = check_contact(where, function, a, b, d)
+            hits, endless = hits + bool(result[0]), endless + (result[1] == -math.inf)
+            if result[1] == -math.inf:
+                continue
             if first.component is second.component and any(d):
                 check_symmetry(where, function, a, b, d, result)
+            if any(d):
+                deeper += [text for text in [_deeper(where, function, a, b, d, result)] if text]
+    if len(deeper) > len(SCALES) * len(POSES) // 2:  # what is not convex may get from one part into the next
+        raise PluginError(deeper[0])
+    if hits and endless:
+        raise PluginError(
+            f"{where}: apart, its depth is minus infinity; return minus the gap, or less than it: times of impact and "
+            f"casts are found from it"
+        )
     big, small = parameters_of(first, dimensions, 1e6), parameters_of(second, dimensions, 1e-6)
     for pose in POSES:
         check_contact(where, function, big, small, tuple(np.float64(1e6 * x) for x in pose[:dimensions]))
@@ -176,6 +190,19 @@ def check_contact(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...])
     if abs(length - 1.0) > UNIT:
         raise PluginError(f"{said}: the normal's length is {length:.6g}, it must be 1: divide it by its length")
     return result
+
+
+def _deeper(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...], result: Any) -> str:
+    """What to say if b, moved a little along the normal, gets deeper into a instead of out; else ""."""
+    depth, normal = result[1:3]
+    way = 0.1 * math.hypot(*d)
+    after = check_contact(where, function, a, b, tuple(x + way * n for x, n in zip(d, normal, strict=True)))
+    if after[1] <= depth + 0.5 * way:
+        return ""
+    return (
+        f"{where}: for d = {plain(d)} depth is {float(depth)!r} and the normal {plain(normal)}, but moving b by "
+        f"{way:.3g} that way makes it {float(after[1])!r}: the normal must point from a to b"
+    )
 
 
 def check_symmetry(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...], result: Any) -> None:

@@ -24,7 +24,7 @@ from .compilation import inlined
 _INDEX = ir.IntType(32)
 
 
-class _Emitted(_Intrinsic):
+class _Emitted(_Intrinsic):  # pyright: ignore[reportGeneralTypeIssues]  # final for type checkers only
     """Python runs the plain function."""
 
     plain: Callable[..., Any]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from numba.core.errors import NumbaError
@@ -35,11 +36,17 @@ class Blame:
             raise PluginError(f"{about} returned a contact that is not finite")
 
     def _uncompiled(self, error: BaseException) -> str:
-        """The pairs whose functions numba's message mentions."""
-        text = str(error)
-        pairs = self._state.world.registry.pairs.values()
-        found = [pair for pair in pairs if f"<function {pair.function.py_func.__qualname__} " in text]
-        names = " or ".join(f"plugin {p.plugin}: pair {p.function.__name__} of {p.names}" for p in found)
+        """The pairs and shapes whose functions numba's message mentions."""
+        text, registry = str(error), self._state.world.registry
+        functions = {
+            f"plugin {pair.plugin}: pair {pair.function.__name__} of {pair.names}": pair.function
+            for pair in registry.pairs.values()
+        }
+        for shape in registry.shapes.values():
+            for name in ("bounds", "turned", "support", "rounding"):
+                functions[f"plugin {shape.plugin}: shape {shape.component.__name__}: {name}"] = getattr(shape, name)
+        found = [what for what, function in functions.items() if function is not None and _mentions(text, function)]
+        names = " or ".join(found)
         cure = "use numbers, tuples, math and carom.framework.vectors"
         if "Untyped global name" in text:
             cure = "functions that it calls need @plugin.kernel"
@@ -59,3 +66,14 @@ class Blame:
                 found[f"plugin {pair.plugin}: pair {pair.function.__name__} of {names}"] = None
         entities = sorted(int(state.table.arrays["entity"][row]) for row in (a, b))
         return f"{' or '.join(found)}, entities {entities[0]} and {entities[1]}"
+
+
+def _mentions(text: str, function: Any) -> bool:
+    """Whether numba's message names the function, or a line of it."""
+    plain = getattr(function, "py_func", function)
+    lines = [line for _, _, line in plain.__code__.co_lines() if line is not None]
+    places = re.findall(r" at (.+) \((\d+)\)", text)
+    own = plain.__code__.co_filename
+    return f"<function {plain.__qualname__} " in text or any(
+        file == own and min(lines) <= int(line) <= max(lines) for file, line in places
+    )

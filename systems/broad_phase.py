@@ -195,11 +195,12 @@ class BroadPhase(System):
     def _box(self, start: int, stop: int, before: np.ndarray) -> None:
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         box_motion = state.kernels.box_motion if len(state.levels) == 1 else box_kernel_with_levels(state.code)
-        box_motion(
-            start, stop, before, arrays["position"], state.levels, state.slots, state.shapes, state.world_shapes,
-            state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
-            state.level_offsets, scratch["size"], scratch["lower"], scratch["upper"], self._frame, state.like,
-        )  # fmt: skip
+        with state.blame:
+            box_motion(
+                start, stop, before, arrays["position"], state.levels, state.slots, state.shapes, state.world_shapes,
+                state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
+                state.level_offsets, scratch["size"], scratch["lower"], scratch["upper"], self._frame, state.like,
+            )  # fmt: skip
 
     @property
     def partitions(self) -> tuple[SpatialTree | FewBoxes, SpatialTree | FewBoxes]:

@@ -196,6 +196,7 @@ def check(carom, tmp_path):
     return run
 
 
+@pytest.mark.slow  # 2D and 3D, worlds and all; of the fast tests test_plugin_package.py checks a good one
 def test_a_good_plugin_passes(check):
     code, said = check()
     assert code == 0, said
@@ -265,7 +266,12 @@ MISTAKES = {  # what passes at registration, and what the check says of it
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+QUICK = ("depth too large", "not the same from both sides", "does not compile", "bounds too small for large ones")
+
+
+@pytest.mark.parametrize(
+    "mistake", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MISTAKES]
+)
 def test_mistakes_that_pass_at_registration_are_found(check, mistake):
     change, expected = MISTAKES[mistake]
     code, said = check(change)
@@ -305,7 +311,10 @@ def ball_sphere_sweep(a, b, d, v):
 """
 
 
-@pytest.mark.parametrize(("factor", "code"), [("1.0", 0), ("1.1", 1), ("0.9", 1)])
+SWEEPS = [("1.1", 1), *(pytest.param(*case, marks=pytest.mark.slow) for case in (("1.0", 0), ("0.9", 1)))]
+
+
+@pytest.mark.parametrize(("factor", "code"), SWEEPS)
 def test_sweeps_are_compared_with_the_depth(carom, tmp_path, factor, code):
     (tmp_path / "sweeping.py").write_text(BALL + SWEEP.replace("FACTOR", factor))
     result = carom("plugins", "check", "sweeping.py")
@@ -347,7 +356,7 @@ plugin = Plugin("failing")
 
 @plugin.system
 class Failing(System):
-    phase = Phase.END
+    phase = Phase.START
     def process(self, dt):
         raise RuntimeError("no idea")
 """
@@ -373,6 +382,7 @@ def test_a_system_that_fails_is_found_by_a_world_with_it(carom, tmp_path):
     assert "no idea" in result.stdout
 
 
+@pytest.mark.slow  # for worlds in 2D and 3D
 def test_several_plugins_of_a_file_and_shapes_of_other_plugins(carom, tmp_path):
     first = BALL[: BALL.index("@plugin.pair(BallCollider, BallCollider)")]
     (tmp_path / "balls_file.py").write_text(first.replace("    radius = ", "    dimensions = (2,)\n    radius = "))
@@ -475,6 +485,7 @@ def test_settings_can_name_what_a_plugin_brings(carom, tmp_path, monkeypatch):
 # -- what ships, checked as everybody's is --------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_built_in_shapes_pass_the_check(carom):
     result = carom("plugins", "check", "carom.plugins.standard_shapes")
     assert result.exit_code == 0, result.stdout

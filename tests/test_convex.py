@@ -140,7 +140,10 @@ def pairs_of_families(d):
     return [pair for pair in itertools.combinations_with_replacement(FAMILIES, 2) if set(pair) != {"point"}]
 
 
-@pytest.mark.parametrize(("d", "first", "second"), [(d, *pair) for d in (2, 3) for pair in pairs_of_families(d)])
+@pytest.mark.parametrize(("d", "first", "second"), [
+    pytest.param(d, *pair, marks=() if pair in (("box", "box"), ("hull", "segment")) else pytest.mark.slow)
+    for d in (2, 3) for pair in pairs_of_families(d)
+])  # fmt: skip
 def test_hulls_meet_as_brute_force_finds(d, first, second):
     rng = np.random.default_rng(1)
     solid = {"box", "plate"}
@@ -310,7 +313,7 @@ def test_the_point_lies_where_the_shapes_overlap(d):
 
 
 @both_dimensions
-@pytest.mark.parametrize("aspect", [1.0, 3.0, 100.0])
+@pytest.mark.parametrize("aspect", [1.0, pytest.param(3.0, marks=pytest.mark.slow), 100.0])
 def test_smooth_cores_meet_within_a_millionth(d, aspect):
     rng = np.random.default_rng(7)
     n = 12

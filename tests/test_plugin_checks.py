@@ -9,7 +9,7 @@ import pytest
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
-from carom.framework import Component, Convex, Plugin, PluginError, World, column
+from carom.framework import Component, Convex, Plugin, PluginError, StepError, World, column
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
 
@@ -234,3 +234,34 @@ def test_a_late_registration_that_clashes_changes_nothing():
     world.step()
     assert len(world.contacts) == 1
     world.close()
+
+
+def test_what_cannot_be_compiled_is_named():
+    """Python can do more than compiled code; what only the compiler finds names plugin, shape and function too."""
+    plugin, disc = registered(bounds=lambda shape, dimensions: (shape.reach,) * dimensions)
+    plugin.pair(disc, disc)(disc_disc)
+    world = World(Physics(), plugin)
+    world.create_entity(Transform((0, 0)), RigidBody(), disc(1.0))
+    with pytest.raises(StepError, match="plugin discs: shape DiscCollider: bounds cannot be compiled; use"):
+        world.step()
+    assert world.step_count == 0
+    world.close()
+
+
+def test_apart_the_depth_is_minus_the_gap():
+    plugin, disc = registered()
+    with pytest.raises(PluginError, match="apart, its depth is minus infinity; return minus the gap"):
+        plugin.pair(disc, disc)(
+            lambda a, b, d: (
+                disc_disc(a, b, d) if disc_disc(a, b, d)[0] else (False, -math.inf, *disc_disc(a, b, d)[2:])
+            )
+        )
+
+
+def test_the_normal_of_two_different_shapes_points_from_the_first_to_the_second():
+    plugin, disc = registered()
+    with pytest.raises(PluginError, match=r"but moving b by .* that way makes it .* must point from a to b"):
+        plugin.pair(disc, SphereCollider)(
+            lambda a, b, d: (*disc_disc(a, disc_like(b.radius), d)[:2],
+                             tuple(-x for x in disc_disc(a, disc_like(b.radius), d)[2]), d)
+        )  # fmt: skip

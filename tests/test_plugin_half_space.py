@@ -17,6 +17,7 @@ from carom.plugins.half_space import HalfSpaceCollider, half_space_convex, two_h
 
 G = 10.0
 both_dimensions = pytest.mark.parametrize("d", [2, 3])
+mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
 HalfSpace = namedtuple("HalfSpace", "normal axes")
 Box = namedtuple("Box", "half_extents radius")  # a rounded one
 convex = next(pair for (_, other), pair in half_space.plugin.pairs.items() if other is not HalfSpaceCollider).function
@@ -58,7 +59,7 @@ def check(normal, axes, half, radius, offsets, tolerance=1e-14):
     return depths, points
 
 
-@both_dimensions
+@mostly_2d
 def test_ten_thousand_random_poses(d):
     rng, n = np.random.default_rng(d), 10_000
     axes = np.ascontiguousarray(np.linalg.qr(rng.normal(size=(n, d, d)))[0])
@@ -68,7 +69,7 @@ def test_ten_thousand_random_poses(d):
     assert 0.3 < (depths > 0).mean() < 0.9
 
 
-@both_dimensions
+@mostly_2d
 def test_extremes(d):
     """Sizes and lengths of normals from 1e-9 to 1e9, coincident centres, 1e12 away, points."""
     poses = [
@@ -81,7 +82,7 @@ def test_extremes(d):
     check(scales[:, None] * ones, axes, halves[:, None] * ones, radii, offsets[:, None] * ones)
 
 
-@both_dimensions
+@mostly_2d
 def test_the_point_is_in_the_middle_of_a_face_that_lies_on_it(d):
     """Of a box on level ground and, whatever the order of rounding, nowhere else."""
     up, half, place = np.eye(d)[[1]], np.full((1, d), 2.0), np.full((1, d), 1.9)
@@ -151,7 +152,7 @@ def test_bounces_at_the_right_height_wherever_it_is(d, away):
     world.close()
 
 
-@both_dimensions
+@mostly_2d
 def test_bodies_rest_on_it_as_on_a_box(d):
     """The same heights as on a box of any size, within a slop; a point has no size, so that its slop on a
     box is that of the box."""
@@ -174,7 +175,7 @@ def test_bodies_rest_on_it_as_on_a_box(d):
     assert np.abs(heights[0] - lows).max() < 0.0025
 
 
-@both_dimensions
+@mostly_2d
 def test_a_slope_made_by_the_transform(d):
     """Frictionless at 30 degrees: v = g sin 30 t; with friction 1 it stays."""
     angle, down = math.pi / 6, np.array((-math.cos(math.pi / 6), -0.5))
@@ -191,7 +192,7 @@ def test_a_slope_made_by_the_transform(d):
         world.close()
 
 
-@both_dimensions
+@mostly_2d
 def test_a_rising_one_lifts_what_is_on_it(d):
     """In one tree with what moves, among few and among many; half-spaces do not meet each other."""
     for count in (3, 300):
@@ -211,8 +212,8 @@ def test_a_rising_one_lifts_what_is_on_it(d):
         world.close()
 
 
-@both_dimensions
-@pytest.mark.parametrize("sizes", ["even", "uneven"])
+@mostly_2d
+@pytest.mark.parametrize("sizes", ["even", pytest.param("uneven", marks=pytest.mark.slow)])
 def test_two_thousand_bodies_fall_on_it(d, sizes):
     """Grid and tree, whose boxes are finite, find all that reach the ground without end; nothing falls through."""
     rng, n = np.random.default_rng(0), 2000
@@ -232,7 +233,7 @@ def test_two_thousand_bodies_fall_on_it(d, sizes):
     world.close()
 
 
-@both_dimensions
+@mostly_2d
 def test_queries_and_casts_find_it_everywhere(d):
     world = make_world(d)
     for where in (0.0, -5e7):
@@ -251,7 +252,7 @@ def test_queries_and_casts_find_it_everywhere(d):
     world.close()
 
 
-@both_dimensions
+@mostly_2d
 def test_snapshots_and_hashes_hold_it(d):
     world = make_world(d)
     world.create_entity(Transform(at(d, 0, 2)), RigidBody(), SphereCollider(0.5, restitution=0.5))

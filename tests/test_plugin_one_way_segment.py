@@ -118,7 +118,7 @@ def test_bounces_at_the_right_height(shape):
     world.close()
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.5, -2.0])
+@pytest.mark.parametrize("angle", [0.0, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (0.5, -2.0))])
 def test_ten_thousand_bodies_from_everywhere(angle):
     """Balls that do not meet each other fly at the segment. Against their free flight, known from a world without it:
     who never was wholly in front flies freely, to the bit; who came down on it from the front never gets behind it."""
@@ -311,6 +311,7 @@ def test_dropping_through_by_the_mask():
     world.close()
 
 
+@pytest.mark.slow  # capsules: all kernels once more
 def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
     world = make_world(with_capsules=True)
     jumpers = [

@@ -205,6 +205,7 @@ def look(python, site, tmp_path):
     return run
 
 
+@pytest.mark.slow  # compiles all four times
 def test_its_kernels_are_kept_until_something_they_call_is_edited(look):
     side = 0.25 / 2**0.5  # m, from the sensor's centre to the line x + y = 1
     first = look()

@@ -160,7 +160,10 @@ def cellwise(low, high, bodies):
     return depth.reshape(n, count)
 
 
-@pytest.mark.parametrize(("size", "tile"), [(0.3, 1.0), (1.0, 1.0), (3.0, 1.0), (1e-3, 1.0), (1e9, 1e9), (1e-9, 3e-9)])
+@pytest.mark.parametrize(("size", "tile"), [
+    (1.0, 1.0), *(pytest.param(*case, marks=pytest.mark.slow)
+                  for case in ((0.3, 1.0), (3.0, 1.0), (1e-3, 1.0), (1e9, 1e9), (1e-9, 3e-9)))
+])  # fmt: skip
 def test_random_polygons_against_every_single_cell(size, tile):
     rng = np.random.default_rng(int(100 * size / tile))
     count = 1000
@@ -310,13 +313,20 @@ SPEEDS = (0.01, 0.3, 2.7, 31.0, 400.0)
 SIZES = (0.07, 0.5, 1.4, 1.9)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("side", ["floor", "ceiling", "left wall", "right wall"])
-@pytest.mark.parametrize("faces", ["all", "two entities"])
+SLIDES = [
+    (shape, side, faces)
+    for shape in SHAPES for side in ("floor", "ceiling", "left wall", "right wall") for faces in ("all", "two entities")
+    if faces == "all" or shape in ("sphere", "box")
+]  # fmt: skip
+QUICK_SLIDES = {("sphere", "floor", "all"), ("box", "left wall", "two entities"), ("polygon", "right wall", "all"),
+                ("capsule", "ceiling", "all")}  # fmt: skip
+
+
+@pytest.mark.parametrize(("shape", "side", "faces"), [
+    pytest.param(*slide, marks=() if slide in QUICK_SLIDES else pytest.mark.slow) for slide in SLIDES
+])  # fmt: skip
 def test_sliding_bodies_feel_no_seams(shape, side, faces):
     """The velocity along tiles of a body that is pressed onto them stays as it is."""
-    if (shape, faces) in (("polygon", "two entities"), ("capsule", "two entities")):
-        faces = "all"
     cells = CHANNEL if side in ("floor", "ceiling") else CHANNEL.T
     down = {"floor": (0, -1), "ceiling": (0, 1), "left wall": (-1, 0), "right wall": (1, 0)}[side]
     down = np.array(down, float)
@@ -366,7 +376,7 @@ def corner_world(faces, shape, size, friction, **body):
 
 
 @pytest.mark.parametrize("shape", ["sphere", "box", "polygon"])
-@pytest.mark.parametrize("size", [0.1, 0.5, 1.7])
+@pytest.mark.parametrize("size", [0.5, *(pytest.param(size, marks=pytest.mark.slow) for size in (0.1, 1.7))])
 def test_pushed_against_a_wall_it_stands_still_on_the_floor(shape, size):
     """With floors and walls two entities: 10 s, pushed by its own weight or walking into the wall."""
     for speed in (None, 5.0):
@@ -388,7 +398,7 @@ def test_pushed_against_a_wall_it_stands_still_on_the_floor(shape, size):
 
 
 @pytest.mark.parametrize("shape", ["sphere", "box"])
-@pytest.mark.parametrize("size", [0.1, 0.5])
+@pytest.mark.parametrize("size", [pytest.param(0.1, marks=pytest.mark.slow), 0.5])
 def test_in_a_corner_of_one_collider_it_stays(shape, size):
     """One contact serves both sides: it gives way by millimetres, and nobody gets through."""
     world, entity = corner_world("all", shape, size, 0.0, constant_force=(10, 0))
@@ -430,7 +440,7 @@ def test_it_bounces_at_the_right_height_wherever_it_meets_the_tiles():
     np.testing.assert_allclose(tops - 0.5, 0.64 * 1.5, rtol=0.01)  # the floor is at y = 0; a step's sampling
 
 
-@pytest.mark.parametrize("faces", ["all", "two entities"])
+@pytest.mark.parametrize("faces", ["all", pytest.param("two entities", marks=pytest.mark.slow)])
 def test_nothing_gets_in_between_the_tiles(faces):
     """A closed cave with a ragged inside, bodies of all sizes thrown about in it for 5 s."""
     rng = np.random.default_rng(8)
