@@ -315,11 +315,11 @@ SWEEPS = [("1.1", 1), *(pytest.param(*case, marks=pytest.mark.slow) for case in 
 
 
 @pytest.mark.parametrize(("factor", "code"), SWEEPS)
-def test_sweeps_are_compared_with_the_depth(carom, tmp_path, factor, code):
-    (tmp_path / "sweeping.py").write_text(BALL + SWEEP.replace("FACTOR", factor))
-    result = carom("plugins", "check", "sweeping.py")
-    assert result.exit_code == code, result.stdout
-    assert ("overlap by" in result.stdout or "do not touch" in result.stdout) is bool(code)
+def test_sweeps_are_compared_with_the_depth(check, factor, code):
+    after = "@plugin.pair(BallCollider, BallCollider)"
+    found, said = check((after, SWEEP.replace("FACTOR", factor) + "\n" + after))
+    assert found == code, said
+    assert ("overlap by" in said or "do not touch" in said) is bool(code)
 
 
 OTHERS = """

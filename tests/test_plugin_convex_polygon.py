@@ -166,13 +166,15 @@ def test_a_triangle_is_no_shape_of_a_3d_world():
         world.step()
 
 
-# -- in a world: polygons, spheres and boxes in every one, so that all share their compiled code -------------------
+# -- in a world ---------------------------------------------------------------------------------------------------
 
 
-def make_world(gravity=(0, -10)):
+def make_world(gravity=(0, -10), others=False):
+    """With polygons alone, or with spheres and boxes in each: few kinds of worlds, so that they share their code."""
     world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)
-    world.create_entity(Transform((0, -500)), SphereCollider(1.0))
-    world.create_entity(Transform((0, -600)), AABBCollider(1.0))
+    if others:
+        world.create_entity(Transform((0, -500)), SphereCollider(1.0))
+        world.create_entity(Transform((0, -600)), AABBCollider(1.0))
     world.create_entity(Transform((0, -700)), ConvexPolygonCollider.box(1.0))
     return world
 
@@ -190,9 +192,11 @@ FALLING = {
 }
 
 
-@pytest.mark.parametrize("shape", FALLING)
+@pytest.mark.parametrize(
+    "shape", ["polygon", "rounded", *(pytest.param(shape, marks=pytest.mark.slow) for shape in ("sphere", "box"))]
+)
 def test_it_bounces_at_the_right_height_and_rests(shape):
-    world = make_world()
+    world = make_world(others=shape in ("sphere", "box"))
     world.create_entity(Transform((0, -1), rotation=math.pi / 2), ConvexPolygonCollider.box((1, 20)))
     bouncing = world.create_entity(Transform((-5, 2)), RigidBody(), FALLING[shape](restitution=0.8))
     resting = world.create_entity(Transform((5, 0.6)), RigidBody(), FALLING[shape]())
@@ -239,8 +243,9 @@ def test_turning_the_transform_turns_the_polygon():
     assert world.query_aabb((0.05, 1), (1, 1.5)) == [stick]
 
 
+@pytest.mark.slow
 def test_rays_and_moving_shapes_meet_it():
-    world = make_world(gravity=(0, 0))
+    world = make_world(gravity=(0, 0), others=True)
     diamond = world.create_entity(Transform((5, 0), rotation=math.pi / 4), ConvexPolygonCollider.box(1.0))
     world.step()
     hit = world.ray_cast((0, 0.5), (1, 0), 20)[0]
@@ -253,9 +258,10 @@ def test_rays_and_moving_shapes_meet_it():
     assert nearest.distance == pytest.approx(3 - math.sqrt(2), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_as_a_second_level_it_decides():
     """A body with a sphere around a triangle: who touches the sphere alone is not touched."""
-    world = make_world(gravity=(0, 0))
+    world = make_world(gravity=(0, 0), others=True)
     triangle = ConvexPolygonCollider(((0, 1), (-0.8, -0.6), (0.8, -0.6)))
     world.create_entity(Transform((0, 0)), SphereCollider(1.0), triangle)
     ball = world.create_entity(Transform((0.9, 0.6)), RigidBody(), SphereCollider(0.3))

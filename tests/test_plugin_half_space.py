@@ -192,7 +192,8 @@ def test_a_slope_made_by_the_transform(d):
         world.close()
 
 
-@mostly_2d
+@pytest.mark.slow
+@both_dimensions
 def test_a_rising_one_lifts_what_is_on_it(d):
     """In one tree with what moves, among few and among many; half-spaces do not meet each other."""
     for count in (3, 300):
