@@ -359,7 +359,7 @@ def test_a_disabled_sensor_is_not_touched():
     world = make_world()
     wall = box(world, 0.75, half=(0.25, 3), kind="static", restitution=1.0)
     sensor = box(world, 0.0, half=(0.5, 3), kind="static", sensor=True)
-    flying = ball(world, 0.2, 12.0, radius=0.1, restitution=1.0)
+    flying = ball(world, 0.25, 12.0, radius=0.1, restitution=1.0)
     off = Disable(entity=sensor)
     world.add_system(off)
     told = listen(world)
