@@ -230,6 +230,7 @@ def test_it_slides_down_a_slope_as_fast_as_physics_says():
     assert world.component_for_entity(box, Transform).position @ up == pytest.approx(1.25, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_turning_the_transform_turns_the_polygon():
     world = make_world(gravity=(0, 0))
     stick = world.create_entity(Transform((0, 0)), ConvexPolygonCollider.box((2, 0.1)))

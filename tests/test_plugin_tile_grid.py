@@ -246,6 +246,7 @@ def test_moving_polygons_touch_when_the_first_cell_says_so():
 # -- queries ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_queries_find_the_tiles():
     rng = np.random.default_rng(2)
     cells = rng.random((20, 30)) < 0.3
@@ -273,6 +274,7 @@ def test_queries_find_the_tiles():
     assert (np.einsum("nk,nk->n", hits.normal, units)[outside] < 0).all()
 
 
+@pytest.mark.slow
 def test_rays_and_shapes_pass_close_by_walls():
     """A way along a wall, a hair from it, ends at the next one."""
     cells = cells_of_text("#" * 40 + "\n" + "." * 39 + "#\n" + "#" * 40)
