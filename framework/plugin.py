@@ -12,6 +12,7 @@ from .compilation import inlined, pasted
 from .component import Component
 from .errors import PluginError
 from .registry import Convex, Pair, Registry, Shape
+from .vectors import dot, scale
 
 if TYPE_CHECKING:
     from .world import World
@@ -72,7 +73,7 @@ class Plugin:
             bounds, support, rounding, turned = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
             shape = Shape(
                 component, float(cost), pasted(bounds), None if turned is None else inlined(turned), self.name,
-                None if support is None else inlined(support),
+                None if support is None else _finite(inlined(support)),
                 inlined(rounding or _no_rounding) if support is not None else None,
             )  # fmt: skip
             self._register(self.shapes, component, shape)
@@ -97,9 +98,9 @@ class Plugin:
 
         def register(function: Any) -> Any:
             checks.check_pair(self, first, second, function)
+            checks.check_corner(self, first, second, corner)
             compiled = None if corner is None else inlined(corner)
-            sweep = self.pairs[first, second].sweep if (first, second) in self.pairs else None
-            pair = Pair(first, second, _compiled(function), self.name, compiled, sweep)
+            pair = Pair(first, second, _compiled(function), self.name, compiled)
             if (second, first) in self.pairs and first is not second:
                 raise PluginError(
                     f"plugin {self.name}: the pair of {pair.names} is registered already, in the other order"
@@ -176,14 +177,29 @@ class Plugin:
         """Register a class of System, ForceSystem or esper processor: each world that takes the plugin gets one."""
         checks.check_system(self, make)
         self.systems.append(make)  # type: ignore[arg-type]
+        for registry in list(self.registries):
+            if registry.world is not None:
+                self._add_systems(registry.world, [make])
         return make
 
     # -- being taken by a world -------------------------------------------------------------------
 
     def install(self, world: World) -> None:
-        """Called by the world after all its plugins are registered."""
-        for make in self.systems:
-            world.add_system(make())
+        """Called by the world after all its plugins are registered; all of it, or an error and nothing."""
+        self._add_systems(world, self.systems)
+
+    def _add_systems(self, world: World, factories: list[Any]) -> None:
+        added: list[Any] = []
+        try:
+            for make in factories:
+                system = make()
+                world.add_system(system)
+                added.append(system)
+        except Exception as error:
+            for system in added:
+                world.remove_system(system)
+            error.add_note(f"plugin {self.name}")
+            raise
 
     def adds(self) -> dict[str, list[str]]:
         """What it brings, by kind, as names; for ``carom plugins``."""
@@ -235,6 +251,20 @@ def _function(component: type[Component], name: str) -> Any:
 def _compiled(function: Any) -> Any:
     """A helper is compiled already."""
     return function if hasattr(function, "py_func") else inlined(function)
+
+
+def _finite(support: Any) -> Any:
+    """The support function, whose answers are looked at: what is made of a wrong one need not look wrong."""
+
+    @inlined
+    def finite_support(shape, direction):
+        point = support(shape, direction)
+        if dot(point, scale(point, 0.0)) != 0.0 and dot(direction, scale(direction, 0.0)) == 0.0:
+            raise ValueError("support returned a point that is not finite")
+        return point
+
+    finite_support.author = support  # for messages
+    return finite_support
 
 
 def _no_rounding(shape):

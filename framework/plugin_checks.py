@@ -10,6 +10,7 @@ import collections
 import inspect
 import math
 import numbers
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,8 +53,8 @@ def check_shape(plugin: Plugin, component: Any, cost: float) -> None:
         raise PluginError(f"{where} must derive from carom.components.Collider, which brings friction, layer and mask")
     if isinstance(cost, bool) or not isinstance(cost, numbers.Real) or not (math.isfinite(cost) and cost > 0):
         raise PluginError(f"{where}: cost must be a number above 0, the sphere's being 1, got {cost!r}")
-    allowed = tuple(getattr(component, "dimensions", (2, 3)))
-    if not allowed or not set(allowed) <= {2, 3}:
+    allowed = getattr(component, "dimensions", (2, 3))
+    if not isinstance(allowed, tuple) or not allowed or not set(allowed) <= {2, 3}:
         raise PluginError(f"{where}: dimensions must be (2,), (3,) or (2, 3), got {allowed!r}")
     for name, arguments in SHAPE_FUNCTIONS.items():
         function = inspect.getattr_static(component, name, None)
@@ -231,6 +232,39 @@ def check_sweep(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
         raise PluginError(f"{where}: register a plain function; carom compiles it itself")
     convex = (first is Convex) + (second is Convex)
     _check_arity(where, function, ("a", "b", "d", "v", *HELPERS[convex]))
+    for a, b, d in () if convex else _samples(first, second):
+        v = tuple(-2.0 * x for x in d)
+        at = f"a = {shown(a)}, b = {shown(b)}, d = {plain(d)}, v = {plain(v)}"
+        result = _call(f"{where}: {at}", function, (a, b, d, v), a)
+        said = f"{where}: for {at} it returned {plain(result)!r}"
+        if not (isinstance(result, tuple) and len(result) == 2 and isinstance(result[0], (bool, np.bool_))):
+            raise PluginError(f"{said}: return (hit, time), whether they touch on that way and after which part of it")
+        if not _is_number(result[1]) or (result[0] and not 0 <= result[1] <= 1):
+            raise PluginError(f"{said}: the time of a hit is the part of v after which they touch, from 0 to 1")
+
+
+def check_corner(plugin: Plugin, first: Any, second: Any, corner: Any) -> None:
+    """PluginError unless it is None or can tell corners."""
+    if corner is None:
+        return
+    name = getattr(corner, "__name__", repr(corner))
+    where = f"plugin {plugin.name}: corner {name} of {_name(first)} and {_name(second)}"
+    if not inspect.isfunction(plain_function(corner)):
+        raise PluginError(f"{where}: corner= takes a function of (a, b, d, slop)")
+    _check_arity(where, plain_function(corner), ("a", "b", "d", "slop"))
+    for a, b, d in () if Convex in (first, second) else _samples(first, second):
+        result = _call(where, corner, (a, b, d, np.float64(0.01)), a)
+        if not isinstance(result, (bool, np.bool_)):
+            raise PluginError(f"{where}: for d = {plain(d)} it returned {plain(result)!r}: return True or False")
+
+
+def _samples(first: Any, second: Any) -> Iterator[tuple[Any, Any, Any]]:
+    """(a, b, d) of two samples in some poses, in every dimension both can be in."""
+    one, two = Shape(first, 1.0, None, None, ""), Shape(second, 1.0, None, None, "")
+    for dimensions in sorted(set(_dimensions(first)) & set(_dimensions(second))):
+        a, b = parameters_of(one, dimensions, 1.0), parameters_of(two, dimensions, 1.0)
+        for pose in POSES:
+            yield a, b, tuple(np.float64(x) for x in pose[:dimensions])
 
 
 # -- other things ---------------------------------------------------------------------------------
@@ -246,6 +280,10 @@ def check_integrator(plugin: Plugin, name: str, integrator: Any) -> None:
             + (f"; {getattr(integrator, '__name__', integrator)} has no {', '.join(missing)}" if missing else "")
         )
     _check_arity(f"{where}: advance", integrator.advance, ("self", "motion", "dt"))
+    for part, least, most in (("order", 1, 99), ("evaluations", 1, 99), ("path", 1, 3)):
+        value = getattr(integrator, part)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise PluginError(f"{where}: {part} must be a whole number from {least} to {most}, got {value!r}")
 
 
 def check_broad_phase(plugin: Plugin, name: str, broad_phase: Any) -> None:

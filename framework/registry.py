@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from .component import Component
 from .errors import PluginError, UnhandledPairError
+from .settings import AUTOMATIC, MIXING_RULES
 
 if TYPE_CHECKING:
     from .plugin import Plugin
+    from .world import World
 
 
 class Convex:
@@ -87,6 +89,7 @@ class Registry:
     """Everything the plugins of one world have registered; ``version`` changes whenever they register more."""
 
     plugins: list[Plugin] = field(default_factory=list)
+    world: World | None = None  # once its plugins are installed
     version: int = 0
     shapes: dict[type[Component], Shape] = field(default_factory=dict)
     pairs: dict[tuple[type[Any], type[Any]], Pair] = field(default_factory=dict)
@@ -104,6 +107,12 @@ class Registry:
             self.plugins.remove(plugin)
             raise
         plugin.registries.add(self)
+
+    def drop(self, plugin: Plugin) -> None:
+        """Forget a plugin again."""
+        plugin.registries.discard(self)
+        self.plugins.remove(plugin)
+        self.refresh()
 
     def refresh(self) -> None:
         """Gather everything anew; PluginError if two plugins want the same, and then nothing changes."""
@@ -126,6 +135,14 @@ class Registry:
                             f"plugin {plugin.name}: {kind} {name} is registered already, by plugin {owners[kind, key]}"
                         )
                     owners[kind, key] = plugin.name
+                    twin = next((other for other in known if kind == "shape" and other.prefix == key.prefix), None)
+                    if twin is not None:
+                        raise PluginError(
+                            f"plugin {plugin.name}: shape {name} goes by the name of another class, of plugin "
+                            f"{owners[kind, twin]}: columns are named after the class, so give it another name"
+                        )
+                    if key in (*MIXING_RULES, AUTOMATIC):
+                        raise PluginError(f"plugin {plugin.name}: {kind} {name} is one of carom's own names")
                 known.update(fresh)
             for (first, second), pair in plugin.pairs.items():
                 other = pairs.get((first, second)) or pairs.get((second, first))

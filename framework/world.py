@@ -80,6 +80,7 @@ class World(EntityVerbs, QueryVerbs):
                 plugin.install(self)
             if self.physics is not None:
                 self.physics.check_settings(self._settings)
+            self.registry.world = self
         except BaseException:
             self._give_back()
             raise
@@ -142,8 +143,12 @@ class World(EntityVerbs, QueryVerbs):
         if any(plugin.name == other.name for other in self.plugins):
             raise PluginError(f"a plugin named {plugin.name!r} is in this world already")
         self.registry.add(plugin)
+        try:
+            plugin.install(self)
+        except BaseException:
+            self.registry.drop(plugin)
+            raise
         self.plugins = (*self.plugins, plugin)
-        plugin.install(self)
 
     # -- settings and physics ---------------------------------------------------------------------
 

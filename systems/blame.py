@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numba.core.errors import NumbaError
 
 from ..framework.errors import PluginError
-from .shape_code import ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B
+from .shape_code import ALONE, ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B
 
 if TYPE_CHECKING:
     from .state import PhysicsState
+
+
+BUILT_IN = "standard shapes"  # the plugin of carom's own shapes
 
 
 class Blame:
@@ -32,8 +36,11 @@ class Blame:
                 error.add_note(about)
         elif trace[UNSOUND]:
             trace[UNSOUND] = 0
-            about = self._describe(int(trace[UNSOUND_A]), int(trace[UNSOUND_B]))
-            raise PluginError(f"{about} returned a contact that is not finite")
+            a, b = int(trace[UNSOUND_A]), int(trace[UNSOUND_B])
+            if b != ALONE:
+                raise PluginError(f"{self._describe(a, b)} returned a contact that is not finite")
+            if np.isfinite(self._state.table.arrays["rotation"][a]).all():
+                raise PluginError(f"{self._describe(a, b)} are not numbers from 0")
 
     def _uncompiled(self, error: BaseException) -> str:
         """The pairs and shapes whose functions numba's message mentions."""
@@ -58,19 +65,27 @@ class Blame:
         if state.code is None or max(a, b) >= state.table.count:
             return ""
         found: dict[str, None] = {}
+        if b == ALONE:
+            shape = state.code.shapes[int(state.levels[-1][a])]
+            entity = state.table.arrays["entity"][a]
+            return f"plugin {shape.plugin}: bounds of {shape.component.__name__}, entity {entity}"
+        a, b = sorted((a, b), key=lambda row: int(state.table.arrays["entity"][row]))
         for level in reversed(state.levels):
             shapes = [state.code.shapes[int(level[row])].component for row in (a, b)]
             pair = state.world.registry.pair(shapes[0], shapes[1])
             if pair is not None:
                 names = f"{shapes[0].__name__} and {shapes[1].__name__}"
-                found[f"plugin {pair.plugin}: pair {pair.function.__name__} of {names}"] = None
-        entities = sorted(int(state.table.arrays["entity"][row]) for row in (a, b))
+                helped = {state.world.registry.shapes[shape].plugin: None for shape in shapes if pair.helpers}
+                others = [plugin for plugin in helped if plugin not in (pair.plugin, BUILT_IN)]
+                of = f" (support by plugin {' and '.join(others)})" if others else ""
+                found[f"plugin {pair.plugin}: pair {pair.function.__name__} of {names}{of}"] = None
+        entities = [int(state.table.arrays["entity"][row]) for row in (a, b)]
         return f"{' or '.join(found)}, entities {entities[0]} and {entities[1]}"
 
 
 def _mentions(text: str, function: Any) -> bool:
     """Whether numba's message names the function, or a line of it."""
-    plain = getattr(function, "py_func", function)
+    plain = getattr(getattr(function, "author", function), "py_func", function)
     lines = [line for _, _, line in plain.__code__.co_lines() if line is not None]
     places = re.findall(r" at (.+) \((\d+)\)", text)
     own = plain.__code__.co_filename

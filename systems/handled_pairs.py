@@ -19,7 +19,7 @@ def check_pairs(state: PhysicsState) -> None:
     Two bodies can meet if one of them moves and each one's layer is in the other's mask. Levels of geometry meet level
     by level. Costs nothing in a scene whose shapes all have pairs.
     """
-    if state.code is None or not state.code.unhandled:
+    if state.code is None or not state.code.unhandled or state.preparing:
         return
     for i, j in state.code.unhandled:
         for level in state.levels:

@@ -57,7 +57,11 @@ class Integration(System):
             motion = self._motion
             if not self._drifts(integrator) or not drift(motion.position, motion.velocity, motion.damping, dt):
                 motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
-                integrator.advance(motion, dt)
+                try:
+                    integrator.advance(motion, dt)
+                except Exception as error:
+                    error.add_note(f"integrator {self.world.settings.integrator!r}")
+                    raise
             if state.limits_speed:
                 limit_speeds(state)
                 limit_distance(motion.position, motion.start_position, arrays["max_linear_speed"][:dynamic], dt)

@@ -51,7 +51,12 @@ def mixing(rules: tuple[Any, ...]) -> Any:
 def _with_rule(others: Any, number: int, function: Any) -> Any:
     @inlined
     def mix(rule, a, b):
-        return float(function(a, b)) if rule == number else others(rule, a, b)
+        if rule != number:
+            return others(rule, a, b)
+        mixed = float(function(a, b))
+        if not 0.0 <= mixed < np.inf:
+            raise ValueError("a mixing rule of a plugin returned no number from 0")
+        return mixed
 
     return mix
 

@@ -37,7 +37,7 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
     table, registry = state.table, state.world.registry
     wanted = {c for c in components if issubclass(c, Collider)}
     wanted.update(c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[: table.count].any())
-    registry.require_pairs(sorted(wanted | state.prepared, key=lambda c: c.__name__))
+    in_order(registry, wanted)
     for component in sorted(wanted, key=lambda c: c.__name__):
         table.check_component_type(component)
         table.add_component_type(component)
@@ -47,6 +47,7 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
     with_levels = SphereCollider in colliders and bool(fine)
     for crowd, layered in ((0, False), (FEW + 8, False), (0, True))[: 3 if with_levels else 2]:
         small = World(*state.world.plugins, settings=state.world.settings)
+        small.physics.preparing = True  # type: ignore[union-attr]
         try:
             if crowd:
                 small.add_system(_NoForce())

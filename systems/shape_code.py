@@ -29,6 +29,7 @@ from .mixing import mixing
 # Places in the trace.
 ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B = range(5)
 TRACE_SIZE = 5
+ALONE = -1  # in place of a second row: the bounds of the first
 
 
 @inlined
@@ -94,7 +95,7 @@ def _make(
     scope: dict[str, Any] = {
         "row": row, "negative": negative, "sub": sub, "array_at": array_at, "axes_at": axes_at, "finite": math.isfinite,
         "APART": -math.inf, "sound": sound, "dot": dot, "ROW_A": ROW_A, "ROW_B": ROW_B, "UNSOUND": UNSOUND,
-        "UNSOUND_A": UNSOUND_A, "UNSOUND_B": UNSOUND_B,
+        "UNSOUND_A": UNSOUND_A, "UNSOUND_B": UNSOUND_B, "ALONE": ALONE,
     }  # fmt: skip
     source = [f'"""Shapes: {", ".join(shape.component.__name__ for shape in shapes)}, {dimensions}D."""', ""]
     for index, shape in enumerate(shapes):
@@ -103,7 +104,7 @@ def _make(
         scope[f"turned{index}"] = shape.turned
     source += _evaluate_source(shapes, pairs, scope)
     source += _corner_source(shapes, pairs, scope)
-    source += _bounds_source(shapes, dimensions)
+    source += _bounds_source(shapes, dimensions, traced=True)
     source += _world_source(shapes)
     module = source_module("\n".join(source) + "\n", scope)
     return ShapeCode(
@@ -244,13 +245,21 @@ def _corner_source(
     return [*lines, "    return False", ""]
 
 
-def _bounds_source(shapes: tuple[Shape, ...], dimensions: int) -> list[str]:
-    lines = ["def shape_bounds(shape, at, shapes, like):"]
-    for index in range(len(shapes) - 1):
-        lines.append(f"    if shape == {index}:")
-        lines.append(f"        return bounds{index}({parameters_source(shapes, index, 'at')}, {dimensions})")
-    last = len(shapes) - 1
-    return [*lines, f"    return bounds{last}({parameters_source(shapes, last, 'at')}, {dimensions})", ""]
+def _bounds_source(shapes: tuple[Shape, ...], dimensions: int, traced: bool = False) -> list[str]:
+    """``traced``: the trace keeps the row looked at last, and one whose bounds are no numbers."""
+    trace, lines = f"shapes[{len(shapes)}]", ["def shape_bounds(shape, at, shapes, like):"]
+    if traced:
+        lines.append(f"    {trace}[ROW_A], {trace}[ROW_B] = at, ALONE")
+    for index in range(len(shapes)):
+        last = index == len(shapes) - 1
+        branch = "else:" if last else f"{'el' if index else ''}if shape == {index}:"
+        lines.append(f"    {'if True:' if len(shapes) == 1 else branch}")
+        lines.append(f"        half = bounds{index}({parameters_source(shapes, index, 'at')}, {dimensions})")
+    if traced:
+        wrong = " or ".join(f"not half[{k}] >= 0.0" for k in range(dimensions))
+        lines.append(f"    if {wrong}:")
+        lines.append(f"        {trace}[UNSOUND], {trace}[UNSOUND_A], {trace}[UNSOUND_B] = 1, at, ALONE")
+    return [*lines, "    return half", ""]
 
 
 def _world_source(shapes: tuple[Shape, ...]) -> list[str]:

@@ -70,6 +70,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         PairBuffers.__init__(self, dimensions)
         self.pair_counters.update(dict.fromkeys(COUNTERS, 0))
         self._integrators: dict[type[Integrator], Integrator] = {}
+        self.preparing = False  # a small world in which all shapes are together, see preparation
         self.prepared: set[type[Any]] = set()  # colliders whose kernels are kept ready
         self.structure: Any = None
         self.structures = 0  # how often refresh_structure has made everything anew

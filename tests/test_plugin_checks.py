@@ -265,3 +265,60 @@ def test_the_normal_of_two_different_shapes_points_from_the_first_to_the_second(
             lambda a, b, d: (*disc_disc(a, disc_like(b.radius), d)[:2],
                              tuple(-x for x in disc_disc(a, disc_like(b.radius), d)[2]), d)
         )  # fmt: skip
+
+
+SWEEPS = {
+    "one value": (lambda a, b, d, v: (True,), r"return \(hit, time\)"),
+    "NaN": (lambda a, b, d, v: (True, math.nan), "from 0 to 1"),
+    "before the start": (lambda a, b, d, v: (True, -5.0), "from 0 to 1"),
+    "raises": (lambda a, b, d, v: [][1], "it raised IndexError"),
+}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_a_sweep_that_cannot_be_one(name):
+    function, message = SWEEPS[name]
+    plugin, disc = registered()
+    plugin.pair(disc, disc)(disc_disc)
+    with pytest.raises(PluginError, match=f"plugin discs: sweep <lambda> of DiscCollider and DiscCollider.*{message}"):
+        plugin.sweep(disc, disc)(function)
+
+
+@pytest.mark.parametrize(
+    ("corner", "message"),
+    [(3, "takes a function"), (lambda a: True, "it must take 4 arguments"), (lambda a, b, d, slop: 1, "True or False")],
+)
+def test_a_corner_that_cannot_be_one(corner, message):
+    plugin, disc = registered()
+    with pytest.raises(PluginError, match=f"plugin discs: corner .* of DiscCollider and DiscCollider.*{message}"):
+        plugin.pair(disc, disc, corner=corner)(disc_disc)
+
+
+def test_a_pair_registered_again_has_no_sweep_of_the_former():
+    plugin, disc = registered()
+    plugin.pair(disc, disc)(disc_disc)
+    plugin.sweep(disc, disc)(lambda a, b, d, v: (False, 1.0))
+    plugin.pair(disc, disc)(disc_disc)
+    assert plugin.pairs[disc, disc].sweep is None
+
+
+def test_two_classes_of_one_name():
+    plugin, _ = registered()
+    other = Plugin("others")
+    other.shape(cost=2)(disc_class(extra=column(1.0)))
+    with pytest.raises(PluginError, match="plugin others: shape DiscCollider goes by the name of another class"):
+        World(Physics(), plugin, other)
+
+
+def test_names_of_caroms_own():
+    plugin = Plugin("rules")
+    plugin.mixing_rule("max")(lambda x, y: 0.0)
+    with pytest.raises(PluginError, match="plugin rules: mixing rule max is one of carom's own names"):
+        World(Physics(), plugin)
+
+
+@pytest.mark.parametrize(("part", "value"), [("order", "a"), ("evaluations", -1), ("path", "zigzag")])
+def test_what_an_integrator_says_of_itself(part, value):
+    members = {"advance": lambda self, motion, dt: None, "order": 1, "evaluations": 1, "path": 1, part: value}
+    with pytest.raises(PluginError, match=f"plugin steps: integrator 'still': {part} must be a whole number"):
+        Plugin("steps").integrator("still")(type("Still", (), members))

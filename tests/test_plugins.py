@@ -546,3 +546,94 @@ def test_queries_know_shapes_with_arrays():
     (hit,) = world.shape_cast(CloudCollider([(0.0, 0.0), (1.0, 0.0)]), (-9, 9), (20, 0), exclude=cloud)
     assert hit.distance == pytest.approx(7.0)
     world.close()
+
+
+# -- what goes wrong elsewhere at run time --------------------------------------------------------
+
+
+def odd_plugin(what):
+    """A round shape that is wrong at a size which the checks do not try."""
+    plugin = Plugin("odd")
+
+    def bounds(shape, dimensions):
+        reach = math.nan if what == "bounds" and shape.reach == 0.75 else shape.reach
+        return (reach, reach) if dimensions == 2 else (reach, reach, reach)
+
+    def support(shape, direction):
+        return scale(direction, math.nan if what == "support" and shape.reach == 0.75 else 0.0)
+
+    members = {"reach": column(positive=True), "bounds": bounds, "support": support}
+    members["rounding"] = lambda shape: shape.reach
+    return plugin, plugin.shape(cost=2)(type("OddCollider", (Collider,), members))
+
+
+@pytest.mark.parametrize(
+    ("what", "message"),
+    [
+        ("bounds", "plugin odd: bounds of OddCollider, entity 1 are not numbers from 0"),
+        ("support", r"of OddCollider and SphereCollider \(support by plugin odd\), entities 1 and 2: .*not finite"),
+    ],
+)
+@pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_other_functions_of_a_shape_that_fail(what, message, d):
+    plugin, odd = odd_plugin(what)
+    world = World(Physics(dimensions=d), plugin)
+    world.create_entity(Transform(np.zeros(d)), RigidBody(), odd(0.75))
+    world.create_entity(Transform(0.5 * np.eye(d)[0]), RigidBody(), SphereCollider(0.5))
+    with pytest.raises(StepError, match=message):
+        world.step()
+    assert world.step_count == 0
+    world.close()
+
+
+def test_a_mixing_rule_that_fails_in_a_step():
+    plugin = Plugin("rules")
+    plugin.mixing_rule("odd")(lambda x, y: math.nan if x == 0.7 else x * y)
+    world = World(Physics(), plugin, settings=Settings(restitution_mixing="odd"))
+    for x, speed in ((0.0, 1.0), (1.9, -1.0)):
+        world.create_entity(
+            Transform((x, 0)), RigidBody(linear_velocity=(speed, 0)), SphereCollider(1.0, restitution=0.7)
+        )
+    with pytest.raises(StepError, match="a mixing rule of a plugin returned no number from 0"):
+        world.step()
+    assert np.isfinite(world.bodies.position).all()
+    world.close()
+
+
+def test_a_plugin_joins_whole_or_not_at_all():
+    plugin = Plugin("half")
+
+    @plugin.system
+    class Good(System):
+        def process(self, dt):
+            pass
+
+    @plugin.system
+    def broken():
+        raise RuntimeError("no display")
+
+    world = World(Physics())
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="no display") as caught:
+            world.add_plugin(plugin)
+        assert caught.value.__notes__ == ["plugin half"]
+    assert not any(isinstance(system, Good) for system in world.systems)
+    assert plugin not in world.plugins
+    world.step()
+    world.close()
+
+
+def test_a_system_registered_late_joins_the_worlds_that_run():
+    plugin = Plugin("late")
+    world = World(Physics(), plugin)
+    world.step()
+    steps = []
+
+    @plugin.system
+    class Late(System):
+        def process(self, dt):
+            steps.append(dt)
+
+    world.step()
+    assert len(steps) == 1
+    world.close()
