@@ -114,7 +114,15 @@ def namespace(monkeypatch, tmp_path):
         esper.delete_world(left)
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if python_blocks(page)], ids=name_of)
+# Each compiles for a quarter of a minute or more where the cache is empty.
+SLOW = ("write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md")
+RUN = [
+    pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())
+    for page in PAGES if python_blocks(page)
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("page", RUN, ids=name_of)
 def test_the_python_blocks_run(page, namespace):
     run(python_blocks(page), page, namespace)
 
