@@ -45,6 +45,7 @@ class Collider(Component, abstract=True):
 
     rotates: ClassVar[bool] = False  # whether its functions need the body's axes in the world, as ``shape.axes``
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # of the worlds it can be in
+    convex: ClassVar[bool] = True  # without dents: the straight line between any two points of it is inside
 
     @classmethod
     def sample(cls, **common: Any) -> Self:

@@ -40,6 +40,9 @@ class RigidBody(Component, flat=True):
         static: does not move
     max_linear_speed
         m/s, or None
+    ccd
+        continuous collision detection: in a discrete world, this body and what it meets are swept as in a continuous
+        one, so that it never jumps through anything
     """
 
     __slots__ = ()
@@ -51,6 +54,7 @@ class RigidBody(Component, flat=True):
     linear_damping = column(0.0, minimum=0.0)
     kind = dataclasses.replace(column("dynamic", choices=KINDS), on_write=_kind_written)
     max_linear_speed = column(None, optional=True, minimum=0.0)
+    ccd = column(False, dtype=bool)
     applied_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # until the window's end
     applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False)  # that applied_force was set in
     step_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # for one step
@@ -65,6 +69,7 @@ class RigidBody(Component, flat=True):
         linear_damping: float = 0.0,
         kind: Kind = "dynamic",
         max_linear_speed: float | None = None,
+        ccd: bool = False,
     ) -> None:
         self._fill(
             {
@@ -75,6 +80,7 @@ class RigidBody(Component, flat=True):
                 "linear_damping": linear_damping,
                 "kind": kind,
                 "max_linear_speed": max_linear_speed,
+                "ccd": ccd,
             }
         )
 

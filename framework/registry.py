@@ -47,6 +47,11 @@ class Shape:
         return bool(getattr(self.component, "rotates", False))
 
     @property
+    def convex(self) -> bool:
+        """Whether a plane parts it from whatever convex thing it does not touch."""
+        return bool(getattr(self.component, "convex", True))
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns the pair functions see: the shape's own, without those every collider has."""
         shared = getattr(self.component, "stacked_columns", ())

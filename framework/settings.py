@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
-COLLISION_MODES = ("discrete",)
+COLLISION_MODES = ("discrete", "continuous", "event_driven")
 GEOMETRY_MODES = ("precise", "bounds")
 AUTOMATIC = "automatic"  # the broad phase that suits the scene
 
@@ -26,7 +26,9 @@ class Settings:
     integrator
         explicit_euler, semi_implicit_euler, velocity_verlet, rk4, yoshida4, or one that a plugin brings
     collision
-        discrete: contacts are found from the overlap at the end of the step
+        discrete: contacts are found from the overlap at the end of the step, but for bodies with ``ccd``; continuous:
+        what is fast for its size is swept along its path and bounces where it first touches; event_driven: all impacts
+        are taken at their true time and in the order of time
     geometry
         precise: the last level of a body's colliders decides; bounds: the first
     restitution_threshold

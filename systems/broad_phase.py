@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -19,6 +20,7 @@ from .few_boxes import FEW, FewBoxes, pairs_between
 from .foreign_broad_phase import ForeignBroadPhase
 from .spatial_tree import SpatialTree
 from .still_grid import StillGrid
+from .sweeps import find_rooms, places_at, widen
 
 if TYPE_CHECKING:
     from .shape_code import ShapeCode
@@ -137,8 +139,41 @@ class BroadPhase(System):
         if state.collides:
             state.queries.forget()  # these boxes hold whole motions
             self.box_all()
+            if state.sweeping and state.moved:
+                before, after = table.arrays["previous_position"], table.arrays["position"]
+                self._rooms(0.0, dt, before, state.motion(before))
+                self._widen(before, after)
             first, second = self._pairs(table.stops[1], table.count)
         state.set_candidates(first, second)
+
+    def pairs_on_the_way(self, now: float, dt: float) -> tuple[Pairs, float]:
+        """Candidates for what is left of the step on the paths as they are now, and until when they are all there are;
+        ``now``: seconds since its start."""
+        state, table = self._state, self._state.table
+        moving, motion = table.stops[1], state.motion(state.scratch["origin"])
+        before, after = np.empty((moving, state.dimensions)), np.empty((moving, state.dimensions))
+        places_at(now, moving, motion, before, state.like)
+        crossing = self._rooms(now, dt, before, motion)
+        until = now + crossing if now + crossing < dt else math.inf
+        places_at(min(until, dt), moving, motion, after, state.like)
+        self._box(0, moving, before, after)
+        self._widen(before, after)
+        return self._pairs(moving, table.count), until
+
+    def _rooms(self, now: float, dt: float, before: np.ndarray, motion: tuple[Any, ...]) -> float:
+        """See :func:`~carom.systems.sweeps.find_rooms`."""
+        state, scratch = self._state, self._state.scratch
+        return find_rooms(
+            now, dt - now, state.table.stops[1], scratch["size"], state.table.arrays["inverse_mass"], before, motion,
+            state.sweep_of, scratch["room"], state.like,
+        )  # fmt: skip
+
+    def _widen(self, before: np.ndarray, after: np.ndarray) -> None:
+        scratch = self._state.scratch
+        widen(
+            self._state.table.stops[1], before, after, scratch["room"], scratch["size"], scratch["lower"],
+            scratch["upper"], scratch["roam_lower"], scratch["roam_upper"], self._frame, self._state.like,
+        )  # fmt: skip
 
     def _pairs(self, moving: int, count: int) -> Pairs:
         """Rows of overlapping boxes, at least one of each pair below ``moving``."""
@@ -186,18 +221,18 @@ class BroadPhase(System):
         seen = (table.static_version, state.structures, state.turned)
         if seen != self._static_seen or fixed != self._static_positions:
             before[moving:count] = position[moving:count]
-            self._box(moving, count, position)
+            self._box(moving, count, position, position)
             self._static = self._still = None
             self._static_seen, self._static_positions = seen, fixed
             self._static_rows = np.arange(moving, count, dtype=np.int32)
-        self._box(0, moving, before if state.moved else position)
+        self._box(0, moving, before if state.moved else position, position)
 
-    def _box(self, start: int, stop: int, before: np.ndarray) -> None:
-        state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
+    def _box(self, start: int, stop: int, before: np.ndarray, after: np.ndarray) -> None:
+        state, scratch = self._state, self._state.scratch
         box_motion = state.kernels.box_motion if len(state.levels) == 1 else box_kernel_with_levels(state.code)
         with state.blame:
             box_motion(
-                start, stop, before, arrays["position"], state.levels, state.slots, state.shapes, state.world_shapes,
+                start, stop, before, after, state.levels, state.slots, state.shapes, state.world_shapes,
                 state.turned and state.code.turns, state.turned, state.axes, state.table.stacks["collider.offset"],
                 state.level_offsets, scratch["size"], scratch["lower"], scratch["upper"], self._frame, state.like,
             )  # fmt: skip
@@ -252,6 +287,9 @@ class BroadPhase(System):
         if not state.collides:
             return
         yield PlannedKernel("box_motion", "boxes around the motion of what moves; of the rest when it changes")
+        if state.sweeping:
+            yield PlannedKernel("find_rooms", "how far blows may send a body that is swept")
+            yield PlannedKernel("widen", "boxes around that")
         if state.world.settings.broad_phase == AUTOMATIC:
             yield from planned_pairs(table.stops[1], table.count - table.stops[1], self._grids_now())
 

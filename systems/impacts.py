@@ -3,6 +3,9 @@
 A body's path within the step is x(t) = origin + p1 t + p2 t^2 + p3 t^3. An impact at time t changes the velocity by
 dv; the path becomes the one of a body that has travelled with dv all along and stood at origin - dv t at the start, so
 one polynomial always describes what is left of the step.
+
+The loop comes in two variants. The plain one takes pairs that overlap at the end of their motion. The other one sweeps:
+pairs that are fast for their size, or all of them, are taken where they first touch on their way, see ``sweeps``.
 """
 
 from __future__ import annotations
@@ -10,73 +13,38 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..framework.compilation import inlined, kernel, part
+from ..framework.compilation import inlined, kernel
 from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, row, scale, store, sub
+from .event_heap import heap_pop, heap_push
+from .first_touch import APART, AT_CORNER
 from .mixing import mix_friction
+from .paths import ROUNDING, along, along_rate, is_straight, relative_path, travel_of
+from .sizes import slop_of, smaller
+from .sweeps import EVENT_DRIVEN, FAST, is_swept, leaves_at
 
 TIME_ITERATIONS = 80
-ROUNDING = 4e-16  # of the distance between the centres: a separation smaller than that is none
+MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
+STOPPED = 1 << 40  # added to a body's impacts: it is not to move any more in this step
 
-# places in ``counts``: events made, events waiting, impacts logged, impacts cut off by the cap, the event now, its pair
-EVENTS, WAITING, LOGGED, CAPPED, CURRENT, LAST = range(6)
-
-
-@inlined
-def along(t, x0, x1, x2, x3):
-    """x0 + x1 t + x2 t^2 + x3 t^3."""
-    return add_scaled(x0, add_scaled(x1, add_scaled(x2, x3, t), t), t)
-
-
-@inlined
-def along_rate(t, x1, x2, x3):
-    """The derivative of :func:`along`."""
-    return add_scaled(x1, add_scaled(scale(x2, 2.0), x3, 3.0 * t), t)
-
-
-@inlined
-def earlier(i, j, times, keys):
-    """Order of events: time, then the pair's place in the canonical order."""
-    return times[i] < times[j] or (times[i] == times[j] and keys[i] < keys[j])
-
-
-@part
-def heap_push(heap, size, event, times, keys):
-    """Add an event to the binary heap; returns the new size."""
-    heap[size] = event
-    child = size
-    while child > 0:
-        parent = (child - 1) // 2
-        if not earlier(heap[child], heap[parent], times, keys):
-            break
-        heap[child], heap[parent] = heap[parent], heap[child]
-        child = parent
-    return size + 1
-
-
-@part
-def heap_pop(heap, size, times, keys):
-    """Take the earliest event off the top (it is heap[size - 1] afterwards); returns the new size."""
-    size -= 1
-    heap[0], heap[size] = heap[size], heap[0]
-    parent = 0
-    while True:
-        child = 2 * parent + 1
-        if child >= size:
-            return size
-        if child + 1 < size and earlier(heap[child + 1], heap[child], times, keys):
-            child += 1
-        if not earlier(heap[child], heap[parent], times, keys):
-            return size
-        heap[child], heap[parent] = heap[parent], heap[child]
-        parent = child
+# What the kernel returns: all is done; there is no room for events or the log; a body leaves the space in which its
+# neighbours are known, at clock[UNTIL].
+DONE, FULL, LEFT = range(3)
+# places in ``counts``: events waiting, impacts logged, impacts cut off by the cap, pairs that crossed, the pair of the
+# event now, or who is to be looked at instead
+WAITING, LOGGED, CAPPED, CROSSED, LAST = range(5)
+HITS, ALL, NOBODY = -1, -2, -3
+NOW, UNTIL = range(2)  # places in ``clock``
+# kinds of events: an impact, one that no cap counts, one beyond the cap, a crossing of what does not push
+BOUNCE, FREE, STOP, CROSS = range(4)
 
 
 @inlined
 def bounce(
-    event, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, origin, path, struck, pair_impulse,
+    event, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion, struck, spent, pair_impulse,
     pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
 ):  # fmt: skip
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
+    origin, path = motion[0], motion[1]
     c = events[event, 0]
     a, b = pair_a[c], pair_b[c]
     now = event_values[event, 0]
@@ -93,6 +61,7 @@ def bounce(
         dv = scale(change, (-mass if side == 0 else mass) * inverse_mass[i])
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             struck[i] += 1
+            spent[i] += 1 if events[event, 3] == BOUNCE else 0
             store(start_velocity, i, add(row(start_velocity, i, like), dv))
             store(origin, i, add_scaled(row(origin, i, like), dv, -now))
             store(path, i, add(row(path, i, like), dv))
@@ -106,6 +75,25 @@ def bounce(
         log_value[logged, k] = event_values[event, k]
     log_value[logged, 1] = impulse
     counts[LOGGED] += 1
+
+
+@inlined
+def stop(i, now, position, velocity, motion, struck, spent, like):
+    """Beyond the cap a fast body stays where it is until the step ends, and keeps its velocity."""
+    origin, path, second, third, degree = motion
+    x2, x3 = like, like
+    if degree > 1:
+        x2, x3 = row(second, i, like), row(third, i, like)
+    at = along(now, row(origin, i, like), row(path, i, like), x2, x3)
+    store(velocity, i, along_rate(now, row(path, i, like), x2, x3))
+    store(position, i, at)
+    store(origin, i, at)
+    store(path, i, like)
+    if degree > 1:
+        store(second, i, like)
+        store(third, i, like)
+    struck[i] += STOPPED
+    spent[i] += STOPPED
 
 
 @inlined
@@ -123,37 +111,23 @@ def link_pairs(pair_a, pair_b, pairs, heads, links):
             heads[i] = 2 * c + side
 
 
-def make_impact_kernel(evaluate: Any, corner: Any, mix: Any) -> Callable[..., Any]:
-    """The event loop over the shapes of a scene."""
+def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = None) -> Callable[..., Any]:
+    """The event loop over the shapes of a scene; with ``first_touch`` the variant that sweeps."""
+    sweeps = first_touch is not None
 
     @inlined
-    def consider(
-        c, since, dt, pair_a, pair_b, rank, size, shape_of, offset, shapes, velocity, start_velocity, motion,
-        restitution, friction, rules, material, limits, share, struck, pair_impulse, events, event_times, event_keys,
-        event_values, heap, counts, like,
+    def overlap_at_end(
+        shape_a, a, shape_b, b, x0, x1, x2, x3, since, dt, slop, shapes, like,
     ):  # fmt: skip
-        """Put the pair's next impact into the queue, if it has one: e > 0, overlap at the end, a fast approach.
+        """(whether they overlap at the end of their motion; time, normal, point, from a's centre to b's of their first
+        touch; the normal at the end).
 
-        The time is when the pair begins to touch, ``since`` if it does then already. It is found between a time
-        apart and one in touch by Newton's method on the separation, whose rate is the speed along the normal; where
-        that leads out of the bracket, and every eighth time, the bracket is halved instead.
+        The time is ``since`` if they touch then already. It is found between a time apart and one in touch by Newton's
+        method on the separation, whose rate is the speed along the normal; where that leads out of the bracket, and
+        every eighth time, the bracket is halved instead.
         """
-        origin, path, second, third, degree = motion
-        a, b = pair_a[c], pair_b[c]
-        shape_a, shape_b = shape_of[a], shape_of[b]
-        e = mix(rules[0], restitution[material[a], a], restitution[material[b], b])
-        if e <= 0.0:
-            return
         low, high, guess = since, dt, dt
-        # b's path as a sees it
-        x0, x1 = sub(row(origin, b, like), row(origin, a, like)), sub(row(path, b, like), row(path, a, like))
-        x0 = add(x0, sub(row(offset, b, like), row(offset, a, like)))
-        x2, x3 = like, like
-        if degree > 1:
-            x2, x3 = sub(row(second, b, like), row(second, a, like)), sub(row(third, b, like), row(third, a, like))
-        t, normal, point, apart, end_normal = dt, like, like, like, like
-        fixed_threshold, fixed_slop, cap = limits
-        slop = slop_of(a, b, size, fixed_slop)
+        met, t, normal, point, apart, end_normal = False, dt, like, like, like, like
         for look in range(TIME_ITERATIONS):  # one place that calls evaluate: it is what takes time to compile
             middle = dt if look == 0 else since
             if look > 1:
@@ -167,41 +141,95 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any) -> Callable[..., An
             if look == 0 and hit:
                 end_normal = n
                 if corner(shape_a, a, shape_b, b, d, slop, shapes, like):
-                    return
+                    break
             if hit or near:
-                t, normal, point, apart = middle, n, p, d
+                met, t, normal, point, apart = True, middle, n, p, d
                 if near:
                     break
                 high = middle
                 if look == 1:
                     break
             elif look == 0:
-                return
+                break
             else:
                 low = middle
+        return met, t, normal, point, apart, end_normal
+
+    @inlined
+    def consider(
+        c, since, dt, pair_a, pair_b, passive, rank, size, shape_of, offset, shapes, velocity, start_velocity,
+        inverse_mass, motion, restitution, friction, rules, material, limits, share, struck, spent, sweep_of, crossed,
+        pair_impulse, events, event_times, event_keys, event_values, heap, counts, like,
+    ):  # fmt: skip
+        """Put the pair's next impact into the queue, if it has one: a touch, and a fast approach.
+
+        Swept pairs touch anywhere on their way, others overlap at the end of it and have a restitution above 0. A
+        ``passive`` pair only has its crossing noted, if it is swept.
+        """
+        a, b = pair_a[c], pair_b[c]
+        shape_a, shape_b = shape_of[a], shape_of[b]
+        e = mix(rules[0], restitution[material[a], a], restitution[material[b], b])
+        fixed_threshold, fixed_slop, cap = limits
+        slop = slop_of(a, b, size, fixed_slop)
+        x0, x1, x2, x3 = relative_path(a, b, motion, offset, like)
+        swept, met = False, False
+        t, normal, point, apart, end_normal = dt, like, like, like, like
+        if sweeps:
+            swept = is_swept(a, b, travel_of(x1, x2, x3, dt), size, sweep_of)
+            if passive and (not swept or crossed[c]):
+                return
+            if swept:
+                straight = is_straight(a, b, x2, x3, dt, motion, like)
+                found, t, normal, point, apart = first_touch(
+                    shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, dt, slop, shapes, like
+                )
+                if found == APART:
+                    return
+                met = found != AT_CORNER
+        if not met:
+            if e <= 0.0 and not swept:
+                return
+            met, t, normal, point, apart, end_normal = overlap_at_end(
+                shape_a, a, shape_b, b, x0, x1, x2, x3, since, dt, slop, shapes, like
+            )
+            if not met:
+                return
+            swept = False
         w = along_rate(t, x1, x2, x3)
         if dot(apart, apart) == 0.0 and length(apart) == 0.0 and length(w) > 0.0:
             if pair_impulse[c] > 0.0:  # it has parted already
                 return
             normal = divided(negative(w), length(w))  # no direction between the centres: they part the way they came
-        elif corner(shape_a, a, shape_b, b, apart, slop, shapes, like):
+        elif not swept and corner(shape_a, a, shape_b, b, apart, slop, shapes, like):
             normal = end_normal  # it slides from one thing onto the next: the edges are in nobody's way
         speed = dot(w, normal)
         threshold = fixed_threshold
         if threshold < 0.0:
             threshold = 2.0 * max(share[a], share[b])
-        if not speed < -threshold:
+        if sweeps:  # else a plastic impact would be one again, by a rounding error
+            threshold += ROUNDING * (length(row(motion[1], a, like)) + length(row(motion[1], b, like)))
+        if not speed < -threshold and not passive:
             return
-        if degree == 1 and e != 1.0:
+        if motion[4] == 1 and e != 1.0:
             # A straight path has the flight's velocity in its middle only. With that of another time a bounce gains
             # or loses, and a ball that always meets the floor at the same phase of a step hops for ever. Elastic
             # pairs do reflect the path: their flight then runs backwards exactly, and nothing drifts.
             bend_a = sub(row(velocity, a, like), row(start_velocity, a, like))
             bend_b = sub(row(velocity, b, like), row(start_velocity, b, like))
             speed = min(0.0, speed + dot(sub(bend_b, bend_a), normal) * (t / dt - 0.5))
-        if struck[a] >= cap or struck[b] >= cap:
-            counts[CAPPED] += 1
-            return
+        kind = BOUNCE
+        if passive:
+            kind = CROSS
+        elif spent[a] >= cap or spent[b] >= cap or struck[a] >= MOST_IMPACTS or struck[b] >= MOST_IMPACTS:
+            if not sweeps or not travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size):
+                counts[CAPPED] += 1
+                return
+            kind = STOP
+        elif sweeps and sweep_of[0] == EVENT_DRIVEN and e == 1.0:
+            driven = (inverse_mass[a] == 0.0 and length(row(motion[1], a, like)) > 0.0) or (
+                inverse_mass[b] == 0.0 and length(row(motion[1], b, like)) > 0.0
+            )
+            kind = BOUNCE if driven else FREE
         pull = scale(like, 0.0)
         mu = mix_friction(mix, rules[1], friction[material[a], a], friction[material[b], b])
         if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
@@ -209,45 +237,45 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any) -> Callable[..., An
             fast = length(sliding)
             if fast > 0.0:
                 pull = scale(sliding, -min(1.0, -mu * (1.0 + e) * speed / fast))
-        centre = add(add_scaled(row(origin, a, like), row(path, a, like), t), row(offset, a, like))
-        if degree > 1:
-            centre = add_scaled(centre, add_scaled(row(second, a, like), row(third, a, like), t), t * t)
+        centre = add(add_scaled(row(motion[0], a, like), row(motion[1], a, like), t), row(offset, a, like))
+        if motion[4] > 1:
+            centre = add_scaled(centre, add_scaled(row(motion[2], a, like), row(motion[3], a, like), t), t * t)
         point = add(centre, point)
-        event = counts[EVENTS]
-        events[event, 0], events[event, 1], events[event, 2] = c, struck[a], struck[b]
+        event = heap[counts[WAITING]]
+        events[event, 0], events[event, 1], events[event, 2], events[event, 3] = c, struck[a], struck[b], kind
         event_times[event], event_keys[event] = t, rank[a] * len(rank) + rank[b]
         event_values[event, 0], event_values[event, 1] = t, -(1.0 + e) * speed
         for k in range(len(like)):
             event_values[event, 2 + k] = item(normal, k)
             event_values[event, 2 + len(like) + k] = item(point, k)
             event_values[event, 2 + 2 * len(like) + k] = item(pull, k)
-        counts[WAITING] = heap_push(heap, counts[WAITING], event, event_times, event_keys)
-        counts[EVENTS] += 1
+        counts[WAITING] = heap_push(heap, counts[WAITING], event_times, event_keys)
 
     @kernel
     def resolve_impacts(
         dt, pair_a, pair_b, pairs, responds, hits, supported, heads, links, looks, rank, size, shape_of, offset, shapes,
         position, velocity, start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits, share,
-        struck, pair_impulse, pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values,
-        heap, log_pair, log_value, counts, like,
+        struck, spent, sweep_of, roam_lower, roam_upper, crossed, pair_impulse, pair_normal, pair_point, pair_depth,
+        events, event_times, event_keys, event_values, heap, log_pair, log_value, counts, clock, like,
     ):  # fmt: skip
-        """Bounce every pair that overlaps at the end of its motion and approaches faster than the threshold.
+        """Bounce every pair that touches in its motion and approaches faster than the threshold.
 
         hits: pairs that may have met; so may every pair of a body that is ``supported`` (n,). heads (n,), links
         (2 pairs,), looks (pairs + 1,): room, see link_pairs.
         restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the
         threshold and the slop (below 0: from the bodies), the most impacts of a body.
-        share (n,): see reach. struck (n,): impacts per dynamic body. pair_*: per pair, the impulse summed and
-        the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact. counts: see
-        EVENTS.
-        Returns False if the queue or the log may not suffice: call again with larger ones to go on.
+        share (n,): see reach. struck, spent (n,): impacts per dynamic body, and those that the cap counts. sweep_of,
+        roam_lower, roam_upper: see ``sweeps``. crossed (pairs,): passive pairs that met. pair_*: per pair, the impulse
+        summed and the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact.
+        counts, clock: see WAITING, NOW.
+        Returns DONE; FULL: call again with more room to go on; or LEFT.
         """
         linked = False
         while True:
             # What is looked at: at first what may have met, later the pairs of the two bodies just struck.
             c = counts[LAST]
             wanted = 0
-            if c < 0:
+            if c == HITS:
                 for p in range(pairs):
                     if supported[pair_a[p]] or supported[pair_b[p]]:
                         looks[wanted] = p
@@ -256,7 +284,11 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any) -> Callable[..., An
                     if not (supported[pair_a[hits[h]]] or supported[pair_b[hits[h]]]):
                         looks[wanted] = hits[h]
                         wanted += 1
-            else:
+            elif c == ALL:
+                for p in range(pairs):
+                    looks[p] = p
+                wanted = pairs
+            elif c >= 0:
                 if not linked:
                     link_pairs(pair_a, pair_b, pairs, heads, links)
                     linked = True
@@ -267,57 +299,51 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any) -> Callable[..., An
                         looks[wanted] = entry // 2
                         wanted += 1
                         entry = links[entry]
-            if counts[EVENTS] + wanted > len(heap) or counts[LOGGED] == len(log_pair):
-                return False
+            if counts[WAITING] + wanted > len(heap) or counts[LOGGED] == len(log_pair):
+                return FULL
             for q in range(wanted):
                 p = looks[q]
-                if responds[p]:
-                    since = event_times[counts[CURRENT]] if c >= 0 else 0.0
+                if responds[p] or sweeps:
                     consider(
-                        p, since, dt, pair_a, pair_b, rank, size, shape_of, offset, shapes, velocity, start_velocity,
-                        motion, restitution, friction, rules, material, limits, share, struck, pair_impulse, events,
-                        event_times, event_keys, event_values, heap, counts, like,
+                        p, clock[NOW], dt, pair_a, pair_b, not responds[p], rank, size, shape_of, offset, shapes,
+                        velocity, start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits,
+                        share, struck, spent, sweep_of, crossed, pair_impulse, events, event_times, event_keys,
+                        event_values, heap, counts, like,
                     )  # fmt: skip
             chosen = -1
             while counts[WAITING] > 0 and chosen < 0:
-                counts[WAITING] = heap_pop(heap, counts[WAITING], event_times, event_keys)
-                event = heap[counts[WAITING]]
+                event = heap[0]
+                if sweeps and event_times[event] > clock[UNTIL]:
+                    break
                 p = events[event, 0]
                 if events[event, 1] == struck[pair_a[p]] and events[event, 2] == struck[pair_b[p]]:
                     chosen = event
+                counts[WAITING] = heap_pop(heap, counts[WAITING], event_times, event_keys)
             if chosen < 0:
-                return True
-            counts[CURRENT], counts[LAST] = chosen, events[chosen, 0]
-            bounce(
-                chosen, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion[0], motion[1],
-                struck, pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair,
-                log_value, counts, like,
-            )  # fmt: skip
+                return DONE if not sweeps or clock[UNTIL] >= dt else LEFT
+            c = events[chosen, 0]
+            counts[LAST], clock[NOW] = c, event_times[chosen]
+            if sweeps and events[chosen, 3] == CROSS:
+                crossed[c] = True
+                counts[CROSSED] += 1
+                counts[LAST] = NOBODY
+                continue
+            if sweeps and events[chosen, 3] == STOP:
+                counts[CAPPED] += 1
+                pair_depth[c] = 0.0
+            else:
+                bounce(
+                    chosen, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion, struck, spent,
+                    pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value,
+                    counts, like,
+                )  # fmt: skip
+            for side in range(2 if sweeps else 0):
+                i = pair_a[c] if side == 0 else pair_b[c]
+                if inverse_mass[i] > 0.0:
+                    if events[chosen, 3] == STOP:
+                        stop(i, clock[NOW], position, velocity, motion, struck, spent, like)
+                    else:
+                        time = leaves_at(i, clock[NOW], dt, size, motion, sweep_of, roam_lower, roam_upper, like)
+                        clock[UNTIL] = min(clock[UNTIL], time)
 
     return resolve_impacts
-
-
-SLOP = 0.005  # of the size of the smaller body
-MARGIN_STEPS = 2.0
-
-
-@inlined
-def smaller(a, b, size):
-    """The size of the smaller body; a point takes that of the other."""
-    one, other = size[a], size[b]
-    return min(one, other) if one > 0.0 and other > 0.0 else max(one, other)
-
-
-@inlined
-def slop_of(a, b, size, fixed):
-    """Metres that are nothing to this pair: as the settings say, or from the sizes."""
-    return fixed if fixed >= 0.0 else SLOP * smaller(a, b, size)
-
-
-@inlined
-def reach(dt, a, b, share, size, fixed_slop):
-    """How near a pair is held before it touches: the slop, and twice the way that forces make in a step from rest.
-
-    share (n,): what forces change of a body's speed in a step.
-    """
-    return slop_of(a, b, size, fixed_slop) + MARGIN_STEPS * max(share[a], share[b]) * dt

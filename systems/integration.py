@@ -10,6 +10,7 @@ import numpy as np
 
 from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
+from .flight import Flight
 from .integrators import CUBIC, LINE, PARABOLA, STANDARD_INTEGRATORS, Integrator, drift
 from .motion import Motion, limit_distance, limit_speeds
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .state import PhysicsState
 
 
-STANDARD = frozenset(STANDARD_INTEGRATORS.values())
+STANDARD = frozenset((*STANDARD_INTEGRATORS.values(), Flight))
 
 
 class Integration(System):
@@ -53,21 +54,26 @@ class Integration(System):
         # Impacts change the start velocity of a body.
         table.keep("linear_velocity", None if state.collides else start_velocity)
         integrator = state.integrator()
+        state.path_degree = integrator.path
         if dynamic:
             motion = self._motion
-            if not self._drifts(integrator) or not drift(motion.position, motion.velocity, motion.damping, dt):
-                motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
+            if self._drifts(integrator) and drift(motion.position, motion.velocity, motion.damping, dt):
+                state.path_degree = LINE
+            else:
+                motion.evaluator = motion.steady = None
+                if self.world.force_systems:
+                    motion.evaluator = self._evaluator(motion.force)
+                    motion.steady = state.forces.steady(motion.force) if isinstance(integrator, Flight) else None
                 try:
                     integrator.advance(motion, dt)
                 except Exception as error:
-                    error.add_note(f"integrator {self.world.settings.integrator!r}")
+                    error.add_note(f"integrator {state.integrator_name!r}")
                     raise
             if state.limits_speed:
                 limit_speeds(state)
                 limit_distance(motion.position, motion.start_position, arrays["max_linear_speed"][:dynamic], dt)
         if moving > dynamic:
             arrays["position"][dynamic:moving] += dt * arrays["linear_velocity"][dynamic:moving]
-        state.path_degree = integrator.path
         self._keep_path(integrator, dt, dynamic, moving)
         if state.pushed or table.everything_kept:
             table.keep("step_force")
@@ -120,7 +126,15 @@ class Integration(System):
         state.allocate_curves(degree)
         second, third = state.scratch["path_second"], state.scratch["path_third"]
         travel = end[:dynamic] - start[:dynamic]
-        if degree == PARABOLA:
+        if isinstance(integrator, Flight):
+            self._path[:dynamic], second[:dynamic] = integrator.velocity, integrator.second
+            third[:dynamic] = 0.0
+            if state.limits_speed:  # whom that may have held back goes straight
+                limit = state.table.arrays["max_linear_speed"][:dynamic]
+                speed, bend = (np.linalg.norm(array, axis=1) for array in (integrator.velocity, integrator.second))
+                held = speed + 2 * dt * bend > limit
+                self._path[:dynamic][held], second[:dynamic][held] = travel[held] / dt, 0.0
+        elif degree == PARABOLA:
             second[:dynamic] = (travel - dt * v0[:dynamic]) / (dt * dt)
             third[:dynamic] = 0.0
         elif degree == CUBIC:  # Hermite: both ends and both velocities
@@ -149,6 +163,10 @@ class Integration(System):
                 yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")
 
     def reason(self) -> str:
-        name = self.world.settings.integrator
-        integrator = self._state.integrator()
+        integrator, name = self._state.integrator(), self._state.integrator_name
+        if isinstance(integrator, Flight):
+            return (
+                "exact flight between impacts, whatever Settings.integrator: gravity and constant forces bend the "
+                "path, force systems and damping kick at both ends of the step, order 2"
+            )
         return f"{name}, order {integrator.order}, {integrator.evaluations} force evaluations a step"

@@ -6,19 +6,24 @@ from functools import lru_cache
 from typing import Any
 
 from .broad_phase import make_box_kernel
+from .first_touch import make_first_touch
 from .impacts import make_impact_kernel
 from .narrow_phase import make_narrow_kernel
 from .resting import make_resting_kernels
 from .shape_code import ShapeCode
+from .sweeps import make_sweep_kernel
 
 
 class SceneKernels:
-    """What the collision phases call."""
+    """What the collision phases call; ``sweeping_impacts`` in place of ``resolve_impacts`` where bodies are swept."""
 
     def __init__(self, code: ShapeCode) -> None:
         self.box_motion: Any = make_box_kernel(code.shape_bounds, code.write_world)
         self.find_contacts: Any = make_narrow_kernel(code.evaluate)
         self.resolve_impacts: Any = make_impact_kernel(code.evaluate, code.corner, code.mix)
+        first_touch = make_first_touch(code.evaluate, code.corner, code.swept, code.convex)
+        self.find_swept: Any = make_sweep_kernel(first_touch)
+        self.sweeping_impacts: Any = make_impact_kernel(code.evaluate, code.corner, code.mix, first_touch)
         self.find_resting: Any
         self.linearise: Any
         self.find_touching: Any

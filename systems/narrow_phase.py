@@ -12,9 +12,9 @@ from ..framework.compilation import inlined, kernel
 from ..framework.plan import PlannedKernel
 from ..framework.schedule import Phase, System
 from ..framework.vectors import add, length, row, store, sub
-from .impacts import reach
 from .levels import COUNTERS
 from .pair_filters import filtered
+from .sizes import reach
 
 if TYPE_CHECKING:
     from .shape_code import ShapeCode
@@ -153,7 +153,21 @@ class NarrowPhase(System):
         if len(state.levels) > 1:
             for name, count in zip(COUNTERS, counts, strict=True):
                 state.pair_counters[name] += count
+        if state.sweeping and state.moved and kept:
+            found = self._sweep(dt, kept)
         state.set_pairs(kept, found)
+
+    def _sweep(self, dt: float, kept: int) -> int:
+        """Add the pairs that touch on their way only; returns how many contacts there are."""
+        state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
+        slop = state.world.settings.slop
+        with state.blame:
+            return state.kernels.find_swept(
+                dt, state.pair_a, state.pair_b, kept, state.involved, arrays["entity"], scratch["size"],
+                scratch["shape"], scratch["offset"], state.world_shapes, state.motion(arrays["previous_position"]),
+                -1.0 if slop is None else slop, state.sweep_of, state.pair_depth, state.pair_normal, state.pair_point,
+                state.hits, state.hit_a, state.hit_b, state.like,
+            )  # fmt: skip
 
     def _find(self, dt: float, first: np.ndarray, second: np.ndarray, *out: np.ndarray) -> tuple[int, ...]:
         """Call the kernel; ``out``: what it fills."""
@@ -173,6 +187,8 @@ class NarrowPhase(System):
         if self._state.collides:
             yield PlannedKernel("sort_pairs", "canonical order of the candidates, by entity id")
             yield PlannedKernel("find_contacts", "layers and masks, then the shapes' functions")
+        if self._state.sweeping:
+            yield PlannedKernel("find_swept", "which pairs touch on their way", "pairs are near each other")
 
     def reason(self) -> str:
         if not self._state.collides:

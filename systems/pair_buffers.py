@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 Columns = dict[str, np.ndarray]
 NONE = np.empty(0, np.int64)
+PER_PAIR = {  # what is known of a pair, and what of one that is found late: no more than that it is near
+    "responds": True, "involved": False, "pair_depth": -np.inf, "pair_impulse": 0.0, "pair_parts": 0,
+    "pair_normal": 0.0, "pair_point": 0.0,
+}  # fmt: skip
 
 
 class LateColumns(Columns):
@@ -54,6 +58,7 @@ class PairBuffers:
     table: Table
     contacts: Contacts
     rank: np.ndarray
+    scratch: dict[str, np.ndarray]
     dimensions: int
     world: Any
 
@@ -67,7 +72,7 @@ class PairBuffers:
         self.step_impacts: Columns | None = None
         self._no_contacts = empty_columns(dimensions, enabled=True)
         self.contact_columns = self._no_contacts
-        names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "resting_contacts")
+        names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "rounds", "resting_contacts")
         self.pair_counters = dict.fromkeys(names, 0)
         self._allocate(0)
 
@@ -112,6 +117,29 @@ class PairBuffers:
         self.pairs, self.found = pairs, found
         self.contacts_ready = True
         self.pair_counters["pairs"] += pairs
+
+    def replace_pairs(self, pair_a: np.ndarray, pair_b: np.ndarray, source: np.ndarray) -> None:
+        """Other pairs (m,) from now on; source (m,): their places until now, -1 for new ones.
+
+        The contacts found, ``hits``, have to be given their new places.
+        """
+        count, known = len(pair_a), source >= 0
+        kept = {name: getattr(self, name)[source[known]] for name in PER_PAIR}
+        contacts = {name: getattr(self, name) for name in ("hits", "hit_a", "hit_b")}
+        if count > len(self.pair_a):
+            self._allocate(2 * count)
+            for name, old in contacts.items():
+                getattr(self, name)[: self.found] = old[: self.found]
+        self.pairs = count
+        self.pair_a[:count], self.pair_b[:count] = pair_a, pair_b
+        for name, fresh in PER_PAIR.items():
+            getattr(self, name)[:count] = fresh
+            getattr(self, name)[:count][known] = kept[name]
+        rows_a, rows_b = pair_a[~known], pair_b[~known]
+        slots, sensors = self.scratch["material"], self.table.stacks["collider.sensor"]
+        inverse_mass = self.table.arrays["inverse_mass"]
+        passive = sensors[slots[rows_a], rows_a] | sensors[slots[rows_b], rows_b]
+        self.responds[:count][~known] = ~passive & (inverse_mass[rows_a] + inverse_mass[rows_b] > 0.0)
 
     def take_enabled(self) -> np.ndarray:
         """Pairs whose contact a system has disabled push no more in this step; returns which they are."""

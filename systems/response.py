@@ -13,10 +13,15 @@ from ..framework.schedule import Phase, System
 from ..framework.settings import Settings
 from .contact_solver import ContactSolver
 from .event_queue import EventQueue
+from .impacts import DONE, FULL
 from .mixing import rule_number
+from .rounds import Rounds
 
 if TYPE_CHECKING:
     from .state import PhysicsState
+
+
+NOTHING = np.empty(0, bool)
 
 
 class Response(System):
@@ -33,6 +38,8 @@ class Response(System):
         self._state = state
         self._settings: Settings | None = None
         self._bounces = False
+        self._rounds = Rounds(state)
+        self._crossed = NOTHING  # pairs of which one does not push, and that met on their way
         state.contact_solver = self._solver = ContactSolver(state)
 
     @cached_property
@@ -42,6 +49,7 @@ class Response(System):
 
     def process(self, dt: float) -> None:
         state = self._state
+        self._crossed = NOTHING
         if not state.contacts_ready:
             state.narrow_phase.process(dt)
         near = state.found if state.moved else state.pairs  # in a step, who is near at its end is among those found
@@ -52,7 +60,7 @@ class Response(System):
         self._start_paths()
         self._solver.predict(dt, disabled)
         with state.blame:
-            struck = self._impacts(dt)
+            struck, disabled = self._impacts(dt, disabled)
             resting = self._resting(dt, struck)
             self._solver.solve(dt, resting)
             self._publish(disabled)
@@ -81,32 +89,40 @@ class Response(System):
             np.copyto(scratch["start_velocity"][:count], arrays["linear_velocity"][:count])
             state.path_degree = 1
 
-    def _impacts(self, dt: float) -> np.ndarray:
-        """Bounce what bounces; returns how often each row was struck."""
+    def _impacts(self, dt: float, disabled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bounce what bounces; returns how often each row was struck, and the disabled pairs as they count then."""
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         count, stacks = state.table.count, state.table.stacks
         struck = np.zeros(count, np.int64)
-        restitution = stacks["collider.restitution"]
         if not state.found and not self._solver.any_support:
-            return struck
-        if not self._may_bounce():
-            return struck
-        queue = self._queue
+            return struck, disabled
+        sweeping = state.sweeping and state.moved
+        if not sweeping and not self._may_bounce():
+            return struck, disabled
+        queue, spent = self._queue, np.zeros(count, np.int64) if sweeping else struck
         queue.begin(count, state.pairs)
-        curves = (scratch["path_second"], scratch["path_third"])
-        motion = (scratch["origin"], scratch["path_velocity"], *curves, state.path_degree)
+        self._crossed = np.zeros(state.pairs if sweeping else 0, bool)
+        resolve = state.kernels.sweeping_impacts if sweeping else state.kernels.resolve_impacts
         rules, limits = (self._restitution_rule, self._friction_rule), (self._threshold, self._slop, self._cap)
-        while not state.kernels.resolve_impacts(
-            dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.hits[: state.found],
-            self._solver.supported, queue.heads, queue.links, queue.looks, state.rank, scratch["size"],
-            scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
-            scratch["start_velocity"], arrays["inverse_mass"], motion, restitution, stacks["collider.friction"], rules,
-            scratch["material"], limits, scratch["gravity_share"], struck, state.pair_impulse, state.pair_normal,
-            state.pair_point, state.pair_depth, *queue.arrays, state.like,
-        ):  # fmt: skip
-            queue.grow(state.found)
+        while True:
+            outcome = resolve(
+                dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.hits[: state.found],
+                self._solver.supported, queue.heads, queue.links, queue.looks, state.rank, scratch["size"],
+                scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
+                scratch["start_velocity"], arrays["inverse_mass"], state.motion(scratch["origin"]),
+                stacks["collider.restitution"], stacks["collider.friction"], rules, scratch["material"], limits,
+                scratch["gravity_share"], struck, spent, state.sweep_of, scratch["roam_lower"], scratch["roam_upper"],
+                self._crossed, state.pair_impulse, state.pair_normal, state.pair_point, state.pair_depth,
+                *queue.arrays, state.like,
+            )  # fmt: skip
+            if outcome == DONE:
+                break
+            if outcome == FULL:
+                queue.grow(state.pairs)
+                continue
+            disabled, self._crossed = self._rounds.begin(dt, queue, disabled, self._crossed)
         state.log_impacts(queue.log_pair, queue.log_value, queue.counts)
-        return struck
+        return struck, disabled
 
     def _may_bounce(self) -> bool:
         """Whether a collider has a restitution; once one has had it this is not asked again: the kernel is there."""
@@ -141,8 +157,8 @@ class Response(System):
         count = state.kernels.find_touching(
             state.pair_a, state.pair_b, state.pairs, state.responds, state.involved, state.resting,
             state.impact_pairs, scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"],
-            scratch["size"], state.pair_impulse, state.pair_depth, state.pair_normal, state.pair_point, touching,
-            state.like,
+            scratch["size"], self._crossed, state.pair_impulse, state.pair_depth, state.pair_normal,
+            state.pair_point, touching, state.like,
         )  # fmt: skip
         state.publish_final(touching[:count], disabled)
 
@@ -150,7 +166,12 @@ class Response(System):
         if not self._state.collides:
             return
         near = "bodies are near each other"
-        if self._may_bounce():
+        if self._state.sweeping:
+            yield PlannedKernel("resolve_impacts", "bodies are swept along their paths", near)
+            rare = "a blow has sent a body farther than its neighbours were known"
+            for name in ("places_at", "find_rooms", "widen", "merge_pairs"):
+                yield PlannedKernel(name, "who is near the bodies on their new paths", rare)
+        elif self._may_bounce():
             yield PlannedKernel("resolve_impacts", "some collider has a restitution", near)
         yield PlannedKernel("find_resting", "which pairs neither bounce nor are apart", near)
         yield from self._solver.kernels()

@@ -7,8 +7,9 @@ from typing import Any
 
 from ..framework.compilation import inlined, kernel, part
 from ..framework.vectors import add, add_scaled, dot, row, store, sub
-from .impacts import reach, slop_of, smaller
+from .impacts import STOPPED
 from .mixing import mix_friction
+from .sizes import reach, slop_of, smaller
 
 ENTRY_ITERATIONS = 24
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
@@ -79,6 +80,8 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
             if not responds[c]:
                 continue
             a, b = pair_a[c], pair_b[c]
+            if struck[a] >= STOPPED or struck[b] >= STOPPED:
+                continue  # time stands still for them
             hit = struck[a] > 0 or struck[b] > 0
             carried = supported[a] or supported[b]
             if not involved[c] and not hit and not carried:
@@ -158,11 +161,12 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
     @kernel
     def find_touching(
         pair_a, pair_b, pairs, responds, involved, resting, struck, shape_of, offset, shapes, position, size,
-        pair_impulse, pair_depth, pair_normal, pair_point, result, like,
+        crossed, pair_impulse, pair_depth, pair_normal, pair_point, result, like,
     ):  # fmt: skip
-        """Pairs that touch now that all is done, or pushed each other in the step; returns how many.
+        """Pairs that touch now that all is done, or pushed each other in the step or crossed; returns how many.
 
-        Those that may are the ``involved`` (m,), the resting and struck ones, and those that push nobody.
+        Those that may are the ``involved`` (m,), the resting and struck ones, and those that push nobody. crossed (m,),
+        or (0,) if nothing did.
         """
         for r in range(len(resting)):
             involved[resting[r]] = True
@@ -177,7 +181,7 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
             pushed = pair_impulse[c] > 0.0
             if responds[c] and depth >= -SAME_PLACE * smaller(a, b, size):
                 hit = True
-            if not hit and not pushed:
+            if not hit and not pushed and not (len(crossed) > 0 and crossed[c]):
                 continue
             pair_depth[c] = max(0.0, depth)
             if not pushed:

@@ -14,7 +14,7 @@ import math
 import sys
 import types
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,9 @@ class ShapeCode:
         rows a and b, d = centre of b - centre of a; normal from a to b, point relative to a's centre;
         depth is negative while the two are apart. Two shapes that no plugin has a pair for never hit
     corner(shape_a, a, shape_b, b, d, slop, shapes, like) -> whether the two touch at a corner only, which is no contact
+    swept(shape_a, a, shape_b, b, d, v, shapes, like) -> (known, hit, time)
+        b moving by v relative to a: whether the pair has a sweep of its own, and what that says
+    convex(shape_a, shape_b) -> whether both are
     shape_bounds(shape, row, shapes, like) -> half extents
     write_world(shape, row, shapes, world, turn, axes, like); writes the parameters as turned into ``world``
     mix(rule, a, b) -> the contact's restitution or friction, see :mod:`mixing`
@@ -60,6 +63,8 @@ class ShapeCode:
     shapes: tuple[Shape, ...]
     evaluate: Any
     corner: Any
+    swept: Any
+    convex: Any
     shape_bounds: Any
     write_world: Any
     mix: Any
@@ -104,6 +109,8 @@ def _make(
         scope[f"turned{index}"] = shape.turned
     source += _evaluate_source(shapes, pairs, scope)
     source += _corner_source(shapes, pairs, scope)
+    source += _swept_source(shapes, pairs, scope)
+    source += _convex_source(shapes)
     source += _bounds_source(shapes, dimensions, traced=True)
     source += _world_source(shapes)
     module = source_module("\n".join(source) + "\n", scope)
@@ -111,6 +118,8 @@ def _make(
         shapes,
         inlined(module.evaluate),
         inlined(module.corner),
+        inlined(module.swept),
+        inlined(module.convex),
         inlined(module.shape_bounds),
         inlined(module.write_world),
         mixing(rules),
@@ -243,6 +252,34 @@ def _corner_source(
             lines += [f"    if shape_a == {j} and shape_b == {i}:"]
             lines += [f"        return corner{i}_{j}({first}, {second}, negative(d), slop)"]
     return [*lines, "    return False", ""]
+
+
+def _swept_source(
+    shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], scope: dict[str, Any]
+) -> list[str]:
+    """Only of the pairs that have a sweep."""
+    lines = ["def swept(shape_a, a, shape_b, b, d, v, shapes, like):"]
+    for (one, two), pair in pairs.items():
+        if pair is None or pair.sweep is None:
+            continue
+        i, j = (one, two) if pair.first is shapes[one].component else (two, one)
+        moving = replace(pair, function=pair.sweep)
+        for first, second in ((i, j), (j, i)) if i != j else ((i, j),):
+            turned = (first, second) != (i, j)
+            one_row, two_row = ("b", "a") if turned else ("a", "b")
+            call = pair_call(
+                moving, f"sweep{i}_{j}", scope, parameters_source(shapes, i, one_row),
+                parameters_source(shapes, j, two_row), "negative(d), negative(v)" if turned else "d, v",
+            )  # fmt: skip
+            lines += [f"    if shape_a == {first} and shape_b == {second}:", f"        hit, time = {call}"]
+            lines += ["        return True, hit, time"]
+    return [*lines, "    return False, False, 0.0", ""]
+
+
+def _convex_source(shapes: tuple[Shape, ...]) -> list[str]:
+    dented = [str(index) for index, shape in enumerate(shapes) if not shape.convex]
+    tests = [f"shape_a != {index} and shape_b != {index}" for index in dented]
+    return ["def convex(shape_a, shape_b):", f"    return {' and '.join(tests) or 'True'}", ""]
 
 
 def _bounds_source(shapes: tuple[Shape, ...], dimensions: int, traced: bool = False) -> list[str]:

@@ -21,6 +21,7 @@ from . import preparation
 from .blame import Blame
 from .energy import kinetic_energy, momentum, potential_energy
 from .flat_columns import all_finite, any_turned, invert_masses
+from .flight import Flight
 from .handled_pairs import check_pairs
 from .integrators import Integrator
 from .kernels import SceneKernels, kernels_for
@@ -30,6 +31,7 @@ from .planned_columns import planned_columns
 from .queries import Queries
 from .rotation import axes_of
 from .shape_code import TRACE_SIZE, ShapeCode, parameter_columns, shape_code
+from .sweeps import DISCRETE, MODES
 
 if TYPE_CHECKING:
     from ..framework.world import World
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 class PhysicsState(PairBuffers, PhysicsServices):
     """What the systems share."""
 
-    # Per row: for every body that moves, where anything has a collider, and on curved paths.
+    # Per row: for every body that moves, where anything has a collider, on curved paths, and where bodies are swept.
     FLIGHT = (("start_velocity", "vector", float),)
     COLLISIONS = (
         ("path_velocity", "vector", float), ("origin", "vector", float), ("size", "scalar", float),
@@ -46,6 +48,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         ("upper", "vector", float),
     )  # fmt: skip
     CURVES = (("path_second", "vector", float), ("path_third", "vector", float))
+    SWEEPS = (("room", "scalar", float), ("roam_lower", "vector", float), ("roam_upper", "vector", float))
 
     def __init__(self, world: World, dimensions: int, gravity: Any) -> None:
         self.world = world
@@ -89,6 +92,8 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.limits_speed = False
         self.pushed = True  # whether applied_force or step_force may hold something that has to be cleared
         self.unforced = False  # whether nothing acts on any body in this step, unless a system of the game adds it yet
+        self.sweeping = False  # whether some bodies are swept in this step
+        self.sweep_of: tuple[int, Any] = (DISCRETE, self.table.arrays["ccd"])
         self.moved = False  # whether the columns hold a motion from previous_position to position
         self.path_degree = 1
         self.motion_stamp = 0
@@ -115,6 +120,10 @@ class PhysicsState(PairBuffers, PhysicsServices):
         masks = [table.has_mask(component)[:count] for component in present]
         levels = arrange(np.array(masks).reshape(len(present), count))
         slots = np.array([table.slot_of(component) for component in present], np.int64)
+        for group in (self.FLIGHT, self.COLLISIONS, self.CURVES):  # what does not move may be where something did
+            for key, item, _ in group:
+                if item == "vector" and len(self.scratch[key]):
+                    self.scratch[key][table.stops[1] : count] = 0.0
         if present:
             self.scratch["material"][:count] = slots[levels[-1]]
         if self.world.settings.geometry == "bounds" and len(levels) > 1:  # shapes that are never tested cost nothing
@@ -186,20 +195,47 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def _allocate_scratch(self, colliders: bool) -> None:
         """Room for every row the table can hold, in what is needed with colliders or without."""
         capacity = self.table.capacity
-        for group, rows in ((self.FLIGHT, capacity), (self.COLLISIONS, capacity if colliders else 0), (self.CURVES, 0)):
+        with_colliders = (self.COLLISIONS, capacity if colliders else 0)
+        for group, rows in ((self.FLIGHT, capacity), with_colliders, (self.CURVES, 0), (self.SWEEPS, 0)):
             for key, item, dtype in group:
                 if key not in self.scratch or (rows and len(self.scratch[key]) != rows):
                     self.scratch[key] = np.zeros((rows, self.dimensions) if item == "vector" else rows, dtype)
 
     def allocate_curves(self, degree: int) -> None:
         """Room for the path's second and third coefficient, once an integrator needs it."""
-        if degree > 1 and len(self.scratch["path_second"]) != self.table.capacity:
-            for key, _, dtype in self.CURVES:
-                self.scratch[key] = np.zeros((self.table.capacity, self.dimensions), dtype)
+        if degree > 1:
+            self._allocate_late(self.CURVES)
+
+    def _allocate_late(self, group: tuple[tuple[str, str, type], ...]) -> None:
+        capacity = self.table.capacity
+        if len(self.scratch[group[0][0]]) != capacity:
+            for key, item, dtype in group:
+                self.scratch[key] = np.zeros((capacity, self.dimensions) if item == "vector" else capacity, dtype)
+
+    def begin_sweeps(self) -> None:
+        """Whether bodies are swept in this step, and room for what that needs."""
+        mode, ccd = MODES[self.world.settings.collision], self.table.arrays["ccd"]
+        self.sweeping = self.collides and bool(mode != DISCRETE or ccd[: self.table.stops[1]].any())
+        self.sweep_of = mode, ccd
+        if self.sweeping:
+            self._allocate_late(self.SWEEPS)
+
+    def motion(self, origin: np.ndarray) -> tuple[Any, ...]:
+        """The paths of the bodies within the step, as kernels take them; origin (n, d): where they begin."""
+        scratch = self.scratch
+        curves = scratch["path_second"], scratch["path_third"]
+        return origin, scratch["path_velocity"], *curves, self.path_degree
+
+    @property
+    def integrator_name(self) -> str:
+        """As the settings say, unless another one goes with the kind of collision."""
+        settings = self.world.settings
+        return "flight" if settings.collision == "event_driven" else settings.integrator
 
     def integrator(self) -> Integrator:
-        name = self.world.settings.integrator
-        make = self.world.registry.integrators[name]  # another one may be registered under the name at any time
+        make: Any = Flight
+        if self.world.settings.collision != "event_driven":  # another one may be registered under the name at any time
+            make = self.world.registry.integrators[self.world.settings.integrator]
         if make not in self._integrators:
             self._integrators[make] = make()
         return self._integrators[make]
@@ -239,6 +275,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         check_sensors(self)
         check_pairs(self)
         self.refresh_rotation()
+        self.begin_sweeps()
         self.pushed = True
         self.unforced = False
         self.moved = False

@@ -39,6 +39,7 @@ class TileGridCollider(Collider):
     __slots__ = ()
 
     dimensions: ClassVar[tuple[int, ...]] = (2,)
+    convex: ClassVar[bool] = False
 
     sums = array_column(1, rows=(5, 2**31), check=wrong_with, lengths=False)
     tile_size = column(positive=True)

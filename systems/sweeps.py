@@ -1,0 +1,192 @@
+"""Which bodies are swept along their paths, and how far they may go before their neighbours are asked for again.
+
+Whether a pair is swept: always if all is driven by events; else if it is fast, so that within the step it travels more
+than a part of the smaller body's size. A slower one that overlaps anywhere on its way still does so at the end of it,
+but for grazes: on a way s two spheres of diameter D that meet nowhere at the step's end overlap by s^2 / 8 D at most,
+which for FAST is the slop.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..framework.compilation import inlined, kernel
+from ..framework.vectors import add, add_scaled, item, length, replace, row, scale, store
+from .first_touch import APART
+from .paths import along, along_rate, bend_of, is_straight, relative_path, travel_of
+from .sizes import slop_of, smaller
+
+DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
+MODES = {"discrete": DISCRETE, "continuous": CONTINUOUS, "event_driven": EVENT_DRIVEN}
+FAST = 0.2  # of the smaller body's size
+SPREAD = 3.0  # times the speed at which a body has its share of the energy: few are ever faster after a blow
+CROWD = 2.0  # neighbours that the room of a body may hold, on average
+GIVE = 0.05  # of the size: that much farther than its room a body may go
+
+
+@inlined
+def is_swept(a, b, travel, size, sweep_of):
+    """Whether a pair is swept that travels so far within the step; sweep_of: the mode, and who has ccd (n,)."""
+    mode, ccd = sweep_of
+    if mode == EVENT_DRIVEN:
+        return True
+    return (mode == CONTINUOUS or ccd[a] or ccd[b]) and travel > FAST * smaller(a, b, size)
+
+
+@inlined
+def roams(i, speed, span, size, sweep_of):
+    """Whether a body has to stay where its neighbours are known."""
+    mode, ccd = sweep_of
+    return mode == EVENT_DRIVEN or ((mode == CONTINUOUS or ccd[i]) and speed * span > FAST * size[i])
+
+
+@inlined
+def leaves_at(i, now, dt, size, motion, sweep_of, roam_lower, roam_upper, like):
+    """The time at which a body that goes on from here may leave its space; infinity: not in this step."""
+    origin, path, second, third, degree = motion
+    x1, x2, x3, span = row(path, i, like), like, like, dt - now
+    if degree > 1:
+        x2, x3 = row(second, i, like), row(third, i, like)
+    at, v = along(now, row(origin, i, like), x1, x2, x3), along_rate(now, x1, x2, x3)
+    bend = bend_of(add_scaled(x2, x3, 3.0 * now), x3, span)
+    if not roams(i, length(v), span, size, sweep_of):
+        return math.inf
+    left = math.inf
+    for k in range(len(like)):
+        speed = item(v, k)
+        room = (roam_upper[i, k] - item(at, k) if speed > 0.0 else item(at, k) - roam_lower[i, k]) - bend
+        if not room >= abs(speed) * span:
+            left = min(left, max(0.0, room / abs(speed)))
+    return now + left
+
+
+@inlined
+def _speed(i, now, motion, like):
+    path, second, third, degree = motion[1], motion[2], motion[3], motion[4]
+    v = row(path, i, like)
+    if degree > 1:
+        v = along_rate(now, v, row(second, i, like), row(third, i, like))
+    return length(v)
+
+
+@kernel
+def find_rooms(now, span, moving, size, inverse_mass, before, motion, sweep_of, room, like):
+    """How far from its foreseen motion each body may go, so that blows seldom send it farther; but where all are fast,
+    no farther than that a room holds CROWD bodies. Returns in what time rooms are crossed then, else infinity.
+
+    now: seconds since the start of the step; before (n, d): where they are then. A body that a blow gives its share of
+    the energy has the speed sqrt(2 E / m) (equipartition); twice or thrice that is rare.
+    """
+    second, third, degree = motion[2], motion[3], motion[4]
+    energy, weighed, shaped = 0.0, 0, 0
+    lowest, highest = scale(like, 0.0), scale(like, 0.0)
+    for i in range(moving):
+        if not size[i] >= 0.0:
+            continue
+        x = row(before, i, like)
+        for k in range(len(like)):
+            if shaped == 0 or item(x, k) < item(lowest, k):
+                lowest = replace(lowest, k, item(x, k))
+            if shaped == 0 or item(x, k) > item(highest, k):
+                highest = replace(highest, k, item(x, k))
+        shaped += 1
+        if inverse_mass[i] > 0.0:
+            speed = _speed(i, now, motion, like)
+            energy += 0.5 * speed * speed / inverse_mass[i]
+            weighed += 1
+    energy = energy / max(1, weighed)
+    volume = 1.0
+    for k in range(len(like)):
+        volume *= item(highest, k) - item(lowest, k)
+    cell = (volume / max(1, shaped)) ** (1.0 / len(like))
+    crowd, wide, typical = 0.0, 0, 0.0
+    for i in range(moving):
+        room[i] = 0.0
+        if not size[i] >= 0.0:
+            continue
+        bend = 0.0
+        if degree > 1:
+            bend = bend_of(row(second, i, like), row(third, i, like), span)
+        speed = _speed(i, now, motion, like)
+        if inverse_mass[i] > 0.0 and roams(i, speed, span, size, sweep_of):
+            speed = max(speed, SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
+            room[i] = speed * span
+            crowd += min(2.0 * room[i] / cell, 1e100) ** len(like) if cell > 0.0 else 0.0
+            if 2.0 * room[i] > cell:
+                wide += 1
+                typical += speed
+        room[i] += 2.0 * bend
+    if not crowd > CROWD * shaped:
+        return math.inf
+    largest = 0.5 * cell * (CROWD * shaped / max(1, wide)) ** (1.0 / len(like))
+    for i in range(moving):
+        room[i] = min(room[i], largest)
+    return SPREAD * largest * wide / typical
+
+
+@kernel
+def places_at(time, moving, motion, places, like):
+    """Where the moving bodies are then on their paths."""
+    origin, path, second, third, degree = motion
+    for i in range(moving):
+        x2, x3 = like, like
+        if degree > 1:
+            x2, x3 = row(second, i, like), row(third, i, like)
+        store(places, i, along(time, row(origin, i, like), row(path, i, like), x2, x3))
+
+
+@kernel
+def widen(moving, before, after, room, size, lower, upper, roam_lower, roam_upper, frame, like):
+    """Let the boxes of moving bodies hold their rooms, and note where their centres may be; frame: see even_grid."""
+    d = len(like)
+    for i in range(moving):
+        for k in range(d):
+            lower[i, k] -= room[i]
+            upper[i, k] += room[i]
+            give = room[i] + GIVE * size[i]
+            roam_lower[i, k] = min(before[i, k], after[i, k]) - give
+            roam_upper[i, k] = max(before[i, k], after[i, k]) + give
+            if lower[i, k] < frame[k]:
+                frame[k] = lower[i, k]
+            if upper[i, k] > frame[3 + k]:
+                frame[3 + k] = upper[i, k]
+            if upper[i, k] - lower[i, k] > frame[6]:
+                frame[6] = upper[i, k] - lower[i, k]
+
+
+def make_sweep_kernel(first_touch):
+    """The kernel that looks for touches on the way, over the shapes of a scene."""
+
+    @kernel
+    def find_swept(
+        dt, pair_a, pair_b, pairs, involved, entity, size, shape_of, offset, shapes, motion, fixed_slop, sweep_of,
+        pair_depth, pair_normal, pair_point, hits, hit_a, hit_b, like,
+    ):  # fmt: skip
+        """The contacts: pairs that touch at the end or nearly do, which are ``involved`` (m,), and those that are swept
+        and touch on their way; returns how many. Their indices and entities go to hits, hit_a, hit_b."""
+        found = 0
+        for c in range(pairs):
+            a, b = pair_a[c], pair_b[c]
+            if not involved[c]:
+                x0, x1, x2, x3 = relative_path(a, b, motion, offset, like)
+                if not is_swept(a, b, travel_of(x1, x2, x3, dt), size, sweep_of):
+                    continue
+                straight = is_straight(a, b, x2, x3, dt, motion, like)
+                touch, t, normal, point, _ = first_touch(
+                    shape_of[a], a, shape_of[b], b, x0, x1, x2, x3, straight, 0.0, dt,
+                    slop_of(a, b, size, fixed_slop), shapes, like,
+                )  # fmt: skip
+                if touch == APART:
+                    continue
+                origin, path, second, third, degree = motion
+                centre = add(add_scaled(row(origin, a, like), row(path, a, like), t), row(offset, a, like))
+                if degree > 1:
+                    centre = add_scaled(centre, add_scaled(row(second, a, like), row(third, a, like), t), t * t)
+                store(pair_normal, c, normal)
+                store(pair_point, c, add(centre, point))
+                pair_depth[c] = 0.0
+            hits[found], hit_a[found], hit_b[found] = c, entity[a], entity[b]
+            found += 1
+        return found
+
+    return find_swept
