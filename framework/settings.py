@@ -12,6 +12,8 @@ from typing import Any, Self
 MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
 COLLISION_MODES = ("discrete", "continuous", "event_driven")
 GEOMETRY_MODES = ("precise", "bounds")
+DISCRETE_CAP = 8  # impacts of a body in a step: where many overlap at its end, more cost much and change little
+SWEPT_CAP = 64  # a fast body may well cross a narrow gap so often
 AUTOMATIC = "automatic"  # the broad phase that suits the scene
 
 
@@ -39,7 +41,9 @@ class Settings:
     max_steps_per_advance
         what one ``advance`` takes at most; the time beyond it is dropped and counted
     max_impacts_per_step
-        of one body in one step; beyond it the solver for contacts at rest takes over, and it is counted
+        of one body in one step, of those that gain or lose energy if all is driven by events; beyond it the solver for
+        contacts at rest takes over, or a fast body stops until the step ends, and it is counted; None: 8 in discrete
+        worlds, 64 in others
     restitution_mixing, friction_mixing
         how the values of the two bodies become the contact's: average, geometric_mean, max, min, multiply, or one that
         a plugin brings
@@ -57,7 +61,7 @@ class Settings:
     restitution_threshold: float | None = None
     slop: float | None = None
     max_steps_per_advance: int = 8
-    max_impacts_per_step: int = 8
+    max_impacts_per_step: int | None = None
     restitution_mixing: str = "max"
     friction_mixing: str = "geometric_mean"
     broad_phase: str = "automatic"
@@ -70,6 +74,8 @@ class Settings:
                 self._number(name, least=0.0)
         for name in ("substeps", "max_steps_per_advance", "max_impacts_per_step"):
             value = getattr(self, name)
+            if value is None and name == "max_impacts_per_step":
+                continue
             if isinstance(value, bool) or not isinstance(value, int) or value < 1:
                 raise ValueError(f"Settings.{name} must be a whole number from 1, got {value!r}")
         for name in ("integrator", "restitution_mixing", "friction_mixing", "broad_phase"):  # a plugin may bring it
@@ -83,6 +89,12 @@ class Settings:
         ):
             if getattr(self, name) not in known:
                 raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
+
+    @property
+    def impact_cap(self) -> int:
+        """``max_impacts_per_step`` as it counts."""
+        cap = DISCRETE_CAP if self.collision == "discrete" else SWEPT_CAP
+        return cap if self.max_impacts_per_step is None else self.max_impacts_per_step
 
     def _number(self, name: str, above: float | None = None, least: float | None = None) -> None:
         value: Any = getattr(self, name)

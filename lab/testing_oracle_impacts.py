@@ -64,7 +64,7 @@ def foresee(pair: Pair, since: float, settings: Settings) -> Impact | None:
     """The pair's next impact: restitution, overlap at the end of the step, an approach above the threshold."""
     a, b, dt = pair.a, pair.b, settings.dt
     e, slop = pair.restitution(settings), pair.slop(settings)
-    if e <= 0.0 or max(a.struck, b.struck) >= settings.max_impacts_per_step:
+    if e <= 0.0 or max(a.struck, b.struck) >= settings.impact_cap:
         return None
     apart = pair.between(a.at(dt), b.at(dt))
     last = touch(a, b, apart)

@@ -10,6 +10,7 @@ own default. The same protocol holds for a file given to ``carom run FILE.py``.
 from . import (
     asteroids,
     billiards,
+    bullets,
     conveyor,
     cradle,
     fastgas,
@@ -42,6 +43,7 @@ _SCENES: dict[str, Scene] = {
         gas3d.SCENE,
         mixed2d.SCENE,
         fastgas.SCENE,
+        bullets.SCENE,
         player.SCENE,
         player_query.SCENE,
         maze.SCENE,

@@ -140,39 +140,38 @@ class BroadPhase(System):
             state.queries.forget()  # these boxes hold whole motions
             self.box_all()
             if state.sweeping and state.moved:
-                before, after = table.arrays["previous_position"], table.arrays["position"]
-                self._rooms(0.0, dt, before, state.motion(before))
-                self._widen(before, after)
+                self._box_ways(0.0, dt, state.motion(table.arrays["previous_position"]))
             first, second = self._pairs(table.stops[1], table.count)
         state.set_candidates(first, second)
 
-    def pairs_on_the_way(self, now: float, dt: float) -> tuple[Pairs, float]:
-        """Candidates for what is left of the step on the paths as they are now, and until when they are all there are;
-        ``now``: seconds since its start."""
+    def pairs_on_the_way(self, now: float, dt: float) -> Pairs:
+        """Candidates for what is left of the step on the paths as they are now; ``now``: seconds since its start."""
         state, table = self._state, self._state.table
-        moving, motion = table.stops[1], state.motion(state.scratch["origin"])
-        before, after = np.empty((moving, state.dimensions)), np.empty((moving, state.dimensions))
-        places_at(now, moving, motion, before, state.like)
-        crossing = self._rooms(now, dt, before, motion)
-        until = now + crossing if now + crossing < dt else math.inf
-        places_at(min(until, dt), moving, motion, after, state.like)
-        self._box(0, moving, before, after)
-        self._widen(before, after)
-        return self._pairs(moving, table.count), until
+        self._box_ways(now, dt, state.motion(state.scratch["origin"]))
+        return self._pairs(table.stops[1], table.count)
 
-    def _rooms(self, now: float, dt: float, before: np.ndarray, motion: tuple[Any, ...]) -> float:
-        """See :func:`~carom.systems.sweeps.find_rooms`."""
-        state, scratch = self._state, self._state.scratch
-        return find_rooms(
-            now, dt - now, state.table.stops[1], scratch["size"], state.table.arrays["inverse_mass"], before, motion,
-            state.sweep_of, scratch["room"], state.like,
+    def _box_ways(self, now: float, dt: float, motion: tuple[Any, ...]) -> None:
+        """Boxes around the ways of what moves, with room for what blows make of these; or, where that would be too many
+        candidates, around the next part of the ways. ``state.known_until`` tells until when all neighbours are known.
+        """
+        state, table, scratch = self._state, self._state.table, self._state.scratch
+        moving, inverse_mass = table.stops[1], table.arrays["inverse_mass"]
+        before, after = motion[0][:moving], table.arrays["position"][:moving]
+        if now > 0.0:
+            before = np.empty((moving, state.dimensions))
+            places_at(now, now, moving, scratch["size"], motion, before, state.like)
+        crossing = find_rooms(
+            now, dt - now, moving, scratch["size"], inverse_mass, before, motion, state.sweep_of, scratch["room"],
+            state.like,
         )  # fmt: skip
-
-    def _widen(self, before: np.ndarray, after: np.ndarray) -> None:
-        scratch = self._state.scratch
+        state.known_until = now + crossing if now + crossing < dt else math.inf
+        if now > 0.0 or state.known_until < dt:
+            after = np.empty((moving, state.dimensions))
+            places_at(min(state.known_until, dt), dt, moving, scratch["size"], motion, after, state.like)
+            self._box(0, moving, before, after)
         widen(
-            self._state.table.stops[1], before, after, scratch["room"], scratch["size"], scratch["lower"],
-            scratch["upper"], scratch["roam_lower"], scratch["roam_upper"], self._frame, self._state.like,
+            moving, before, after, scratch["room"], scratch["size"], scratch["lower"], scratch["upper"],
+            scratch["roam_lower"], scratch["roam_upper"], self._frame, state.like,
         )  # fmt: skip
 
     def _pairs(self, moving: int, count: int) -> Pairs:

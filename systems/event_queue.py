@@ -33,14 +33,14 @@ class EventQueue:
         queue = (self.events, self.times, self.keys, self.values, self.heap)
         return *queue, self.log_pair, self.log_value, self.counts, self.clock
 
-    def begin(self, bodies: int, pairs: int) -> None:
-        """A new step: what may have met is looked at first."""
+    def begin(self, bodies: int, pairs: int, until: float) -> None:
+        """A new step: what may have met is looked at first; pairs are known until then."""
         if len(self.heads) != bodies:
             self.heads = np.empty(bodies, np.int32)
         self._fit(pairs)
         self.counts[:] = 0
         self.counts[LAST] = HITS
-        self.clock[NOW], self.clock[UNTIL] = 0.0, np.inf
+        self.clock[NOW], self.clock[UNTIL] = 0.0, until
 
     def begin_round(self, now: float, until: float, pairs: int) -> None:
         """All pairs are looked at anew, from then on."""

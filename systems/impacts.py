@@ -168,7 +168,6 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         """
         a, b = pair_a[c], pair_b[c]
         shape_a, shape_b = shape_of[a], shape_of[b]
-        e = mix(rules[0], restitution[material[a], a], restitution[material[b], b])
         fixed_threshold, fixed_slop, cap = limits
         slop = slop_of(a, b, size, fixed_slop)
         x0, x1, x2, x3 = relative_path(a, b, motion, offset, like)
@@ -186,6 +185,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 if found == APART:
                     return
                 met = found != AT_CORNER
+        e = mix(rules[0], restitution[material[a], a], restitution[material[b], b])
         if not met:
             if e <= 0.0 and not swept:
                 return

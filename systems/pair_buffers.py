@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 
 Columns = dict[str, np.ndarray]
 NONE = np.empty(0, np.int64)
-PER_PAIR = {  # what is known of a pair, and what of one that is found late: no more than that it is near
-    "responds": True, "involved": False, "pair_depth": -np.inf, "pair_impulse": 0.0, "pair_parts": 0,
-    "pair_normal": 0.0, "pair_point": 0.0,
-}  # fmt: skip
+PER_PAIR = (
+    "pair_a", "pair_b", "responds", "involved", "pair_depth", "pair_impulse", "pair_parts", "pair_normal", "pair_point"
+)  # fmt: skip
 
 
 class LateColumns(Columns):
@@ -58,7 +57,6 @@ class PairBuffers:
     table: Table
     contacts: Contacts
     rank: np.ndarray
-    scratch: dict[str, np.ndarray]
     dimensions: int
     world: Any
 
@@ -74,6 +72,7 @@ class PairBuffers:
         self.contact_columns = self._no_contacts
         names = ("candidates", "pairs", "contacts", "impacts", "capped_impacts", "rounds", "resting_contacts")
         self.pair_counters = dict.fromkeys(names, 0)
+        self._others: tuple[np.ndarray, ...] = ()
         self._allocate(0)
 
     def _allocate(self, size: int) -> None:
@@ -118,36 +117,32 @@ class PairBuffers:
         self.contacts_ready = True
         self.pair_counters["pairs"] += pairs
 
-    def replace_pairs(self, pair_a: np.ndarray, pair_b: np.ndarray, source: np.ndarray) -> None:
-        """Other pairs (m,) from now on; source (m,): their places until now, -1 for new ones.
+    def other_pairs(self, room: int) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+        """The arrays of the pairs, and as many to make others in, with room for so many."""
+        if room > len(self.pair_a):
+            before = {name: getattr(self, name) for name in (*PER_PAIR, "hits", "hit_a", "hit_b")}
+            self._allocate(2 * room)
+            for name, array in before.items():
+                getattr(self, name)[: len(array)] = array
+        arrays = tuple(getattr(self, name) for name in PER_PAIR)
+        if len(self._others) != len(PER_PAIR) or len(self._others[0]) != len(self.pair_a):
+            self._others = tuple(np.empty_like(array) for array in arrays)
+        return arrays, self._others
 
-        The contacts found, ``hits``, have to be given their new places.
-        """
-        count, known = len(pair_a), source >= 0
-        kept = {name: getattr(self, name)[source[known]] for name in PER_PAIR}
-        contacts = {name: getattr(self, name) for name in ("hits", "hit_a", "hit_b")}
-        if count > len(self.pair_a):
-            self._allocate(2 * count)
-            for name, old in contacts.items():
-                getattr(self, name)[: self.found] = old[: self.found]
+    def take_others(self, count: int) -> None:
+        """The pairs made there are the pairs from now on."""
+        others, self._others = self._others, tuple(getattr(self, name) for name in PER_PAIR)
+        for name, array in zip(PER_PAIR, others, strict=True):
+            setattr(self, name, array)
         self.pairs = count
-        self.pair_a[:count], self.pair_b[:count] = pair_a, pair_b
-        for name, fresh in PER_PAIR.items():
-            getattr(self, name)[:count] = fresh
-            getattr(self, name)[:count][known] = kept[name]
-        rows_a, rows_b = pair_a[~known], pair_b[~known]
-        slots, sensors = self.scratch["material"], self.table.stacks["collider.sensor"]
-        inverse_mass = self.table.arrays["inverse_mass"]
-        passive = sensors[slots[rows_a], rows_a] | sensors[slots[rows_b], rows_b]
-        self.responds[:count][~known] = ~passive & (inverse_mass[rows_a] + inverse_mass[rows_b] > 0.0)
 
     def take_enabled(self) -> np.ndarray:
         """Pairs whose contact a system has disabled push no more in this step; returns which they are."""
         if "enabled" not in self.contact_columns:  # nobody has looked at the contacts
-            return self.no_pairs
+            return NONE
         enabled = self.contact_columns["enabled"]
         if enabled.all():
-            return self.no_pairs
+            return NONE
         disabled = self.hits[: self.found][~enabled]
         self.responds[disabled] = False
         return disabled
@@ -206,7 +201,7 @@ class PairBuffers:
         self.pair_counters["impacts"] += logged
         self.pair_counters["capped_impacts"] += capped
         if capped:
-            limit = self.world.settings.max_impacts_per_step
+            limit = self.world.settings.impact_cap
             self.world.report_fault(
                 f"step {self.world.step_count}: {capped} impacts beyond {limit} of a body in one step"
             )

@@ -53,6 +53,8 @@ class Response(System):
         if not state.contacts_ready:
             state.narrow_phase.process(dt)
         near = state.found if state.moved else state.pairs  # in a step, who is near at its end is among those found
+        if state.sweeping and state.moved and state.known_until < dt:
+            near = 1  # who is, is not known yet
         if not near and not self._solver.memory.count:
             return
         self._read_settings(state.world.settings)
@@ -60,7 +62,7 @@ class Response(System):
         self._start_paths()
         self._solver.predict(dt, disabled)
         with state.blame:
-            struck, disabled = self._impacts(dt, disabled)
+            struck = self._impacts(dt, disabled)
             resting = self._resting(dt, struck)
             self._solver.solve(dt, resting)
             self._publish(disabled)
@@ -74,7 +76,7 @@ class Response(System):
         self._friction_rule = rule_number(self.world.registry, settings.friction_mixing)
         self._threshold = -1.0 if settings.restitution_threshold is None else float(settings.restitution_threshold)
         self._slop = -1.0 if settings.slop is None else float(settings.slop)
-        self._cap = settings.max_impacts_per_step
+        self._cap = settings.impact_cap
 
     def _start_paths(self) -> None:
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
@@ -89,18 +91,18 @@ class Response(System):
             np.copyto(scratch["start_velocity"][:count], arrays["linear_velocity"][:count])
             state.path_degree = 1
 
-    def _impacts(self, dt: float, disabled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Bounce what bounces; returns how often each row was struck, and the disabled pairs as they count then."""
+    def _impacts(self, dt: float, disabled: np.ndarray) -> np.ndarray:
+        """Bounce what bounces; returns how often each row was struck. The ``disabled`` pairs may get new places."""
         state, arrays, scratch = self._state, self._state.table.arrays, self._state.scratch
         count, stacks = state.table.count, state.table.stacks
         struck = np.zeros(count, np.int64)
-        if not state.found and not self._solver.any_support:
-            return struck, disabled
         sweeping = state.sweeping and state.moved
+        if not state.found and not self._solver.any_support and not (sweeping and state.known_until < dt):
+            return struck
         if not sweeping and not self._may_bounce():
-            return struck, disabled
-        queue, spent = self._queue, np.zeros(count, np.int64) if sweeping else struck
-        queue.begin(count, state.pairs)
+            return struck
+        queue, spent = self._queue, np.zeros(count, np.int64)
+        queue.begin(count, state.pairs, state.known_until if sweeping else np.inf)
         self._crossed = np.zeros(state.pairs if sweeping else 0, bool)
         resolve = state.kernels.sweeping_impacts if sweeping else state.kernels.resolve_impacts
         rules, limits = (self._restitution_rule, self._friction_rule), (self._threshold, self._slop, self._cap)
@@ -120,9 +122,9 @@ class Response(System):
             if outcome == FULL:
                 queue.grow(state.pairs)
                 continue
-            disabled, self._crossed = self._rounds.begin(dt, queue, disabled, self._crossed)
+            self._crossed = self._rounds.begin(dt, queue, disabled, self._crossed)
         state.log_impacts(queue.log_pair, queue.log_value, queue.counts)
-        return struck, disabled
+        return struck
 
     def _may_bounce(self) -> bool:
         """Whether a collider has a restitution; once one has had it this is not asked again: the kernel is there."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..framework.compilation import kernel
+from ..framework.vectors import row, store
 from .impacts import LOGGED, UNTIL
 from .pair_filters import filtered
 from .pair_order import sort_pairs
@@ -23,16 +24,21 @@ if TYPE_CHECKING:
 
 @kernel
 def merge_pairs(
-    new_a, new_b, count, old_a, old_b, pairs, needed, rank, material, layers, masks, merged_a, merged_b, source, place
+    new_a, new_b, count, old, pairs, crossed, rank, material, layers, masks, sensors, inverse_mass, merged, now_crossed,
+    place, hits, disabled, log_pair, like,
 ):  # fmt: skip
-    """Join two lists in canonical order: new candidates whose layers meet, and the pairs that are still ``needed``.
+    """Join two lists in canonical order: new candidates whose layers meet, and the pairs that something has come of.
 
-    source (m,): the old place of each pair, or -1; place (pairs,): the new place of each old one, or -1. Returns how
-    many.
+    old, merged: the arrays of the pairs (pairs,) until now and from now on; crossed, now_crossed: see ``impacts``.
+    What names pairs by their place, hits, disabled, log_pair, gets the new ones; place (pairs,): room. Returns how many.
     """
+    old_a, old_b, responds, involved, depth, impulse, parts, normal, point = old
+    a, b, now_responds, now_involved, now_depth, now_impulse, now_parts, now_normal, now_point = merged
     n, found, i, j = len(rank), 0, 0, 0
     for c in range(pairs):
-        place[c] = -1
+        place[c] = 0 if crossed[c] or impulse[c] > 0.0 else -1
+    for h in range(len(hits)):
+        place[hits[h]] = 0
     while i < count or j < pairs:
         new_key, old_key = n * n, n * n
         if i < count:
@@ -40,18 +46,32 @@ def merge_pairs(
         if j < pairs:
             old_key = rank[old_a[j]] * n + rank[old_b[j]]
         if old_key <= new_key:
-            if needed[j] or old_key == new_key:
-                merged_a[found], merged_b[found], source[found], place[j] = old_a[j], old_b[j], j, found
+            if place[j] >= 0:
+                a[found], b[found], place[j] = old_a[j], old_b[j], found
+                now_responds[found], now_involved[found], now_crossed[found] = responds[j], involved[j], crossed[j]
+                now_depth[found], now_impulse[found], now_parts[found] = depth[j], impulse[j], parts[j]
+                store(now_normal, found, row(normal, j, like))
+                store(now_point, found, row(point, j, like))
                 found += 1
-            i += 1 if old_key == new_key else 0
+                i += 1 if old_key == new_key else 0
             j += 1
             continue
-        a, b = new_a[i], new_b[i]
+        p, q = new_a[i], new_b[i]
         i += 1
-        slot_a, slot_b = material[a], material[b]
-        if layers[slot_a, a] & masks[slot_b, b] != 0 and layers[slot_b, b] & masks[slot_a, a] != 0:
-            merged_a[found], merged_b[found], source[found] = a, b, -1
+        slot_p, slot_q = material[p], material[q]
+        if layers[slot_p, p] & masks[slot_q, q] != 0 and layers[slot_q, q] & masks[slot_p, p] != 0:
+            a[found], b[found] = p, q
+            passive = sensors[slot_p, p] or sensors[slot_q, q]
+            now_responds[found] = not passive and inverse_mass[p] + inverse_mass[q] > 0.0
+            now_involved[found], now_crossed[found] = False, False
+            now_depth[found], now_impulse[found] = -np.inf, 0.0
             found += 1
+    for h in range(len(hits)):
+        hits[h] = place[hits[h]]
+    for h in range(len(disabled)):
+        disabled[h] = place[disabled[h]]
+    for h in range(len(log_pair)):
+        log_pair[h] = place[log_pair[h]]
     return found
 
 
@@ -61,25 +81,26 @@ class Rounds:
     def __init__(self, state: PhysicsState) -> None:
         self._state = state
 
-    def begin(
-        self, dt: float, queue: EventQueue, disabled: np.ndarray, crossed: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Make pairs for the rest of the step; returns ``disabled`` and ``crossed`` as they count then."""
-        state = self._state
+    def begin(self, dt: float, queue: EventQueue, disabled: np.ndarray, crossed: np.ndarray) -> np.ndarray:
+        """Make pairs for the rest of the step; ``disabled`` is changed, and who ``crossed`` is returned."""
+        state, table = self._state, self._state.table
         now = float(queue.clock[UNTIL])
-        (first, second), until = state.broad_phase.pairs_on_the_way(now, dt)
+        first, second = state.broad_phase.pairs_on_the_way(now, dt)
         state.pair_counters["candidates"] += len(first)
         state.pair_counters["rounds"] += 1
         first, second = filtered(state, *self._sorted(first, second))
-        source, place = self._merge(first, second, crossed)
-        logged = queue.counts[LOGGED]
-        queue.log_pair[:logged] = place[queue.log_pair[:logged]]
-        state.hits[: state.found] = place[state.hits[: state.found]]
-        known = source >= 0
-        now_crossed = np.zeros(len(source), bool)
-        now_crossed[known] = crossed[source[known]]
-        queue.begin_round(now, until, len(source))
-        return place[disabled], now_crossed
+        old, merged = state.other_pairs(state.pairs + len(first))
+        now_crossed = np.empty(state.pairs + len(first), bool)
+        stacks = table.stacks
+        count = merge_pairs(
+            first, second, len(first), old, state.pairs, crossed, state.rank, state.scratch["material"],
+            stacks["collider.layer"], stacks["collider.mask"], stacks["collider.sensor"], table.arrays["inverse_mass"],
+            merged, now_crossed, np.empty(state.pairs, np.int64), state.hits[: state.found], disabled,
+            queue.log_pair[: queue.counts[LOGGED]], state.like,
+        )  # fmt: skip
+        state.take_others(count)
+        queue.begin_round(now, state.known_until, count)
+        return now_crossed
 
     def _sorted(self, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """In canonical order."""
@@ -88,19 +109,3 @@ class Rounds:
         half_a, half_b, sorted_a, sorted_b = (np.empty(count, np.int64) for _ in range(4))
         sort_pairs(first, second, rank, starts, half_a, half_b, sorted_a, sorted_b)
         return sorted_a, sorted_b
-
-    def _merge(self, first: np.ndarray, second: np.ndarray, crossed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Put these in place of the pairs that nothing has come of; returns (source, place), see merge_pairs."""
-        state, stacks = self._state, self._state.table.stacks
-        pairs, room = state.pairs, state.pairs + len(first)
-        needed = crossed | (state.pair_impulse[:pairs] > 0.0)
-        needed[state.hits[: state.found]] = True
-        merged_a, merged_b, source = (np.empty(room, np.int64) for _ in range(3))
-        place = np.empty(pairs, np.int64)
-        count = merge_pairs(
-            first, second, len(first), state.pair_a, state.pair_b, pairs, needed, state.rank,
-            state.scratch["material"], stacks["collider.layer"], stacks["collider.mask"], merged_a, merged_b, source,
-            place,
-        )  # fmt: skip
-        state.replace_pairs(merged_a[:count], merged_b[:count], source[:count])
-        return source[:count], place

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -94,6 +95,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
         self.unforced = False  # whether nothing acts on any body in this step, unless a system of the game adds it yet
         self.sweeping = False  # whether some bodies are swept in this step
         self.sweep_of: tuple[int, Any] = (DISCRETE, self.table.arrays["ccd"])
+        self.known_until = math.inf  # s since the start of the step, up to which all pairs that may meet are known
         self.moved = False  # whether the columns hold a motion from previous_position to position
         self.path_degree = 1
         self.motion_stamp = 0

@@ -19,8 +19,8 @@ from .sizes import slop_of, smaller
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
 MODES = {"discrete": DISCRETE, "continuous": CONTINUOUS, "event_driven": EVENT_DRIVEN}
 FAST = 0.2  # of the smaller body's size
-SPREAD = 3.0  # times the speed at which a body has its share of the energy: few are ever faster after a blow
-CROWD = 2.0  # neighbours that the room of a body may hold, on average
+SPREAD = 2.0  # times the speed at which a body has its share of the energy: few are ever faster after a blow
+CROWD = 0.5  # neighbours that the room of a body may hold, on average
 GIVE = 0.05  # of the size: that much farther than its room a body may go
 
 
@@ -107,9 +107,8 @@ def find_rooms(now, span, moving, size, inverse_mass, before, motion, sweep_of, 
         bend = 0.0
         if degree > 1:
             bend = bend_of(row(second, i, like), row(third, i, like), span)
-        speed = _speed(i, now, motion, like)
+        speed = max(_speed(i, now, motion, like), SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
         if inverse_mass[i] > 0.0 and roams(i, speed, span, size, sweep_of):
-            speed = max(speed, SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
             room[i] = speed * span
             crowd += min(2.0 * room[i] / cell, 1e100) ** len(like) if cell > 0.0 else 0.0
             if 2.0 * room[i] > cell:
@@ -125,14 +124,15 @@ def find_rooms(now, span, moving, size, inverse_mass, before, motion, sweep_of, 
 
 
 @kernel
-def places_at(time, moving, motion, places, like):
-    """Where the moving bodies are then on their paths."""
+def places_at(time, end, moving, size, motion, places, like):
+    """Where the moving bodies are then on their paths; slow ones, whose ways are short, at the ``end`` of the step."""
     origin, path, second, third, degree = motion
     for i in range(moving):
-        x2, x3 = like, like
+        x1, x2, x3 = row(path, i, like), like, like
         if degree > 1:
             x2, x3 = row(second, i, like), row(third, i, like)
-        store(places, i, along(time, row(origin, i, like), row(path, i, like), x2, x3))
+        slow = travel_of(x1, x2, x3, end) <= FAST * size[i]
+        store(places, i, along(end if slow else time, row(origin, i, like), x1, x2, x3))
 
 
 @kernel
