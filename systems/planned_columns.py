@@ -25,6 +25,7 @@ MASKS = "which components it has"
 FLIGHT = "velocity at the start of the step, for the path and for going back"
 COLLISIONS = "some body has a collider: boxes, sizes, the path in the step"
 CURVES = "the integrator's paths are curved"
+SWEPT = "bodies are swept along their paths: how far blows may send them"
 TURNED = "some body is turned, or a shape asks for its axes: these, and shapes as they are in the world"
 LEVELS = "which shapes a body has, which it is asked for whether it has one or not"
 SHAPED = "some body has a collider: its offset in the world, and the order of ids"
@@ -106,10 +107,12 @@ def _table(state: PhysicsState) -> Iterator[PlannedColumn]:
 def _scratch(state: PhysicsState) -> Iterator[PlannedColumn]:
     capacity, scratch = state.table.capacity, state.scratch
     groups = (("the step", state.FLIGHT, FLIGHT), ("collisions", state.COLLISIONS, COLLISIONS))
-    for group, specs, reason in (*groups, ("curved paths", state.CURVES, CURVES)):
+    late = (("curved paths", state.CURVES, CURVES), ("swept bodies", state.SWEEPS, SWEPT))
+    for group, specs, reason in (*groups, *late):
         for key, _, _ in specs:
             yield from _column(key, "body", group, scratch[key], capacity, reason)
-    known = {key for key, _, _ in (*state.FLIGHT, *state.COLLISIONS, *state.CURVES)} | {"shape", "offset"}
+    known = {key for key, _, _ in (*state.FLIGHT, *state.COLLISIONS, *state.CURVES, *state.SWEEPS)}
+    known |= {"shape", "offset"}
     for key in sorted(scratch.keys() - known):
         yield from _column(f"{key}, turned", "body", "rotation", scratch[key], capacity, TURNED)
     yield from _column("axes", "body", "rotation", state.axes, capacity, TURNED)

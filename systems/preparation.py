@@ -44,6 +44,7 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
     state.keep_ready(wanted)
     colliders = sorted(state.prepared, key=lambda c: c.__name__)
     fine = [c for c in colliders if c is not SphereCollider and in_order(registry, (c, SphereCollider))[1] is c]
+    ccd = bool(table.arrays["ccd"][: table.stops[1]].any())
     with_levels = SphereCollider in colliders and bool(fine)
     for crowd, layered in ((0, False), (FEW + 8, False), (0, True))[: 3 if with_levels else 2]:
         small = World(*state.world.plugins, settings=state.world.settings)
@@ -51,7 +52,7 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
         try:
             if crowd:
                 small.add_system(_NoForce())
-            _strike_and_rest(small, colliders)
+            _strike_and_rest(small, colliders, ccd)
             if colliders:
                 _crowd(small, colliders[0], crowd)
             for collider in fine if layered else ():
@@ -74,9 +75,9 @@ class _NoForce(ForceSystem):
         pass
 
 
-def _strike_and_rest(world: World, colliders: list[type[Collider]]) -> None:
+def _strike_and_rest(world: World, colliders: list[type[Collider]], ccd: bool) -> None:
     """Pairs of all shapes that meet within a step or overlap from the start: struck and bouncing, or pressed and held
-    by friction; against all kinds of body."""
+    by friction; against all kinds of body. Where bodies are swept one is sent far, too, by a kinematic one."""
     d, speed = world.dimensions, 0.25 / world.settings.dt
     lane = 0
     for collider in colliders or [None]:
@@ -90,11 +91,19 @@ def _strike_and_rest(world: World, colliders: list[type[Collider]]) -> None:
                     towards = -np.eye(d)[0]
                     body = RigidBody(
                         linear_velocity=restitution * speed * towards, constant_force=10.0 * towards,
-                        linear_damping=0.1, max_linear_speed=2.0 * speed,
+                        linear_damping=0.1, max_linear_speed=2.0 * speed, ccd=ccd,
                     )  # fmt: skip
                     for transform, mover in ((Transform(here), RigidBody(kind=kind)), (Transform(there), body)):
                         shape = [collider.sample(restitution=restitution, friction=0.5)] if collider else []
                         world.create_entity(transform, mover, *shape)
+    for collider in colliders if ccd or world.settings.collision != "discrete" else ():
+        lane += 1
+        here, there = np.zeros(d), np.zeros(d)
+        here[1] = there[1] = LANE * lane
+        there[0] = 2.0
+        racket = RigidBody(kind="kinematic", linear_velocity=100.0 * speed * np.eye(d)[0])
+        for transform, body in ((Transform(here), racket), (Transform(there), RigidBody(ccd=ccd))):
+            world.create_entity(transform, body, collider.sample(restitution=1.0))
 
 
 def _crowd(world: World, collider: type[Collider], count: int) -> None:

@@ -183,6 +183,13 @@ class Response(System):
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
+        mode = self.world.settings.collision
+        if mode == "event_driven":
+            return "all impacts at their true time, in order, then contacts at rest"
+        if mode == "continuous":
+            return "impacts at their time on the path, what is fast where it first touches, then contacts at rest"
+        if self._state.sweeping:
+            return "impacts at their time on the path, bodies with ccd where they first touch, then contacts at rest"
         if not self._may_bounce():
             return "contacts at rest; nothing bounces: every restitution is 0"
         return "impacts at their time on the path, then contacts at rest"

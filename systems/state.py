@@ -323,6 +323,7 @@ class PhysicsState(PairBuffers, PhysicsServices):
     def look_ahead(self, others_write: bool) -> None:
         self.refresh_structure()
         self.refresh_rotation()
+        self.begin_sweeps()
         self.table.everything_kept = others_write
         limits = self.table.arrays["max_linear_speed"][: self.table.stops[0]]
         self.limits_speed = not np.isnan(limits).all()
