@@ -161,8 +161,8 @@ class BroadPhase(System):
             before = np.empty((moving, state.dimensions))
             places_at(now, now, moving, scratch["size"], motion, before, state.like)
         crossing = find_rooms(
-            now, dt - now, moving, scratch["size"], inverse_mass, before, motion, state.sweep_of, scratch["room"],
-            state.like,
+            now, dt - now, moving, scratch["shape"], scratch["size"], inverse_mass, before, motion, state.sweep_of,
+            scratch["room"], state.like,
         )  # fmt: skip
         state.known_until = now + crossing if now + crossing < dt else math.inf
         if now > 0.0 or state.known_until < dt:

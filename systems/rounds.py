@@ -30,7 +30,8 @@ def merge_pairs(
     """Join two lists in canonical order: new candidates whose layers meet, and the pairs that something has come of.
 
     old, merged: the arrays of the pairs (pairs,) until now and from now on; crossed, now_crossed: see ``impacts``.
-    What names pairs by their place, hits, disabled, log_pair, gets the new ones; place (pairs,): room. Returns how many.
+    What names pairs by their place, hits, disabled and log_pair, gets the new ones; place (pairs,): room. Returns how
+    many there are.
     """
     old_a, old_b, responds, involved, depth, impulse, parts, normal, point = old
     a, b, now_responds, now_involved, now_depth, now_impulse, now_parts, now_normal, now_point = merged

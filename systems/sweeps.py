@@ -21,6 +21,7 @@ MODES = {"discrete": DISCRETE, "continuous": CONTINUOUS, "event_driven": EVENT_D
 FAST = 0.2  # of the smaller body's size
 SPREAD = 2.0  # times the speed at which a body has its share of the energy: few are ever faster after a blow
 CROWD = 0.5  # neighbours that the room of a body may hold, on average
+ALL_PAIRS = 32  # bodies: so few may all be each other's neighbours
 GIVE = 0.05  # of the size: that much farther than its room a body may go
 
 
@@ -61,6 +62,15 @@ def leaves_at(i, now, dt, size, motion, sweep_of, roam_lower, roam_upper, like):
 
 
 @inlined
+def volume_of(edge, like):
+    """edge to the power of the dimension."""
+    volume = edge
+    for _ in range(1, len(like)):
+        volume *= edge
+    return volume
+
+
+@inlined
 def _speed(i, now, motion, like):
     path, second, third, degree = motion[1], motion[2], motion[3], motion[4]
     v = row(path, i, like)
@@ -70,57 +80,54 @@ def _speed(i, now, motion, like):
 
 
 @kernel
-def find_rooms(now, span, moving, size, inverse_mass, before, motion, sweep_of, room, like):
+def find_rooms(now, span, moving, shape, size, inverse_mass, before, motion, sweep_of, room, like):
     """How far from its foreseen motion each body may go, so that blows seldom send it farther; but where all are fast,
     no farther than that a room holds CROWD bodies. Returns in what time rooms are crossed then, else infinity.
 
-    now: seconds since the start of the step; before (n, d): where they are then. A body that a blow gives its share of
+    now: seconds since the start of the step; shape (n,): -1 for none; before (n, d): where they are then. A body that a blow gives its share of
     the energy has the speed sqrt(2 E / m) (equipartition); twice or thrice that is rare.
     """
     second, third, degree = motion[2], motion[3], motion[4]
     energy, weighed, shaped = 0.0, 0, 0
     lowest, highest = scale(like, 0.0), scale(like, 0.0)
+    for k in range(len(like)):
+        lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
     for i in range(moving):
-        if not size[i] >= 0.0:
-            continue
-        x = row(before, i, like)
+        x, known = row(before, i, like), shape[i] >= 0
         for k in range(len(like)):
-            if shaped == 0 or item(x, k) < item(lowest, k):
-                lowest = replace(lowest, k, item(x, k))
-            if shaped == 0 or item(x, k) > item(highest, k):
-                highest = replace(highest, k, item(x, k))
-        shaped += 1
-        if inverse_mass[i] > 0.0:
-            speed = _speed(i, now, motion, like)
-            energy += 0.5 * speed * speed / inverse_mass[i]
+            lowest = replace(lowest, k, min(item(lowest, k), item(x, k) if known else math.inf))
+            highest = replace(highest, k, max(item(highest, k), item(x, k) if known else -math.inf))
+        shaped += known
+        room[i] = _speed(i, now, motion, like)
+        if inverse_mass[i] > 0.0 and known:
+            energy += 0.5 * room[i] * room[i] / inverse_mass[i]
             weighed += 1
     energy = energy / max(1, weighed)
     volume = 1.0
     for k in range(len(like)):
         volume *= item(highest, k) - item(lowest, k)
     cell = (volume / max(1, shaped)) ** (1.0 / len(like))
-    crowd, wide, typical = 0.0, 0, 0.0
+    crowd, wide = 0.0, 0
     for i in range(moving):
+        speed = max(room[i], SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
         room[i] = 0.0
-        if not size[i] >= 0.0:
-            continue
-        bend = 0.0
-        if degree > 1:
-            bend = bend_of(row(second, i, like), row(third, i, like), span)
-        speed = max(_speed(i, now, motion, like), SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
-        if inverse_mass[i] > 0.0 and roams(i, speed, span, size, sweep_of):
+        if inverse_mass[i] > 0.0 and shape[i] >= 0 and roams(i, speed, span, size, sweep_of):
             room[i] = speed * span
-            crowd += min(2.0 * room[i] / cell, 1e100) ** len(like) if cell > 0.0 else 0.0
-            if 2.0 * room[i] > cell:
-                wide += 1
-                typical += speed
-        room[i] += 2.0 * bend
-    if not crowd > CROWD * shaped:
+            crowd += volume_of(min(2.0 * room[i] / cell, 1e100), like) if cell > 0.0 else 0.0
+            wide += 2.0 * room[i] > cell
+        if degree > 1:
+            room[i] += 2.0 * bend_of(row(second, i, like), row(third, i, like), span)
+    if shaped <= ALL_PAIRS or not crowd > CROWD * shaped:
         return math.inf
     largest = 0.5 * cell * (CROWD * shaped / max(1, wide)) ** (1.0 / len(like))
+    speeds, fast = 0.0, 0
     for i in range(moving):
         room[i] = min(room[i], largest)
-    return SPREAD * largest * wide / typical
+        speed = _speed(i, now, motion, like)
+        if shape[i] >= 0 and speed * span > largest:
+            speeds += speed
+            fast += 1
+    return SPREAD * largest * fast / speeds if fast > 0 else math.inf
 
 
 @kernel

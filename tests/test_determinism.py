@@ -386,7 +386,7 @@ def test_the_hash_notices_the_smallest_change_of_any_value():
             elif isinstance(value, float):
                 new = np.nextafter(value, np.inf)
             else:
-                new = {"kind": "kinematic", "sensor": True}.get(name, 0.25 if value is None else value)
+                new = {"kind": "kinematic", "sensor": True, "ccd": True}.get(name, 0.25 if value is None else value)
                 new = value + 1 if field.dtype is np.int64 else new
             setattr(handle, name, new)
             digest = world.state_hash()

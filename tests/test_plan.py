@@ -292,12 +292,13 @@ COLLISIONS |= {"boxes", "rows"}
 SOLVER = {"supported", "held", "change", "place", "used", "body_rows", "last", "velocity", "moved", "acceleration"}
 SOLVER |= {"inverse_mass"}
 CURVES = {"path_second", "path_third"}
+SWEPT = {"room", "roam_lower", "roam_upper"}
 ROTATION = {"axes", "aabb_collider.half_extents, turned"}
 FREE = RigidBody.many(mass=1.0)
 BALLS = SphereCollider.many(radius=0.5)
 CRATES = AABBCollider.many(half_extents=(0.5, 0.5))
 GROUPS = (
-    "the step", "collisions", "shapes", "curved paths", "rotation", "contacts at rest", "broad phase, pairwise",
+    "the step", "collisions", "shapes", "curved paths", "swept bodies", "rotation", "contacts at rest", "broad phase, pairwise",
     "broad phase, grid",
 )  # fmt: skip
 COLUMNS = {
@@ -306,7 +307,9 @@ COLUMNS = {
     "spheres apart": (lambda: many(make_world(), FREE, BALLS), COLLISIONS),
     "spheres that touch": (lambda: near(make_world(), FREE, BALLS), COLLISIONS | SOLVER),
     "spheres that touch, 3D": (lambda: near(make_world(3), FREE, BALLS), COLLISIONS | SOLVER),
-    "curved paths": (lambda: many(make_world(integrator="rk4"), FREE, BALLS), COLLISIONS | CURVES),
+    "curved paths": (lambda: many(make_world(integrator="rk4", gravity=9.81), FREE, BALLS), COLLISIONS | CURVES),
+    "straight paths": (lambda: many(make_world(integrator="rk4"), FREE, BALLS), COLLISIONS),
+    "swept": (lambda: many(make_world(collision="continuous"), FREE, BALLS), COLLISIONS | SWEPT),
     "boxes": (lambda: many(make_world(), FREE, CRATES), COLLISIONS),
     "turned boxes": (lambda: many(_turning(), FREE, CRATES), COLLISIONS | ROTATION),
     "levels": (
