@@ -37,7 +37,7 @@ def lattice(n: int, dimensions: int) -> NDArray[np.float64]:
     """The centres of the first ``n`` cells of a lattice that fills the box, (n, dimensions)."""
     a_side = ceil_root(n, dimensions)
     index = np.arange(n)[:, None] // a_side ** np.arange(dimensions)
-    return (index % a_side + 0.5) * (SIDE / a_side)
+    return np.asarray((index % a_side + 0.5) * (SIDE / a_side), np.float64)
 
 
 def directions(n: int, dimensions: int, seed: int) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ def build(
     """``n`` bullets in a square or a cube. The walls come first, then the pillars, then the bullets."""
     settings = settings or Settings.balanced().replace(collision="continuous")
     world = World(Physics(dimensions=dimensions, gravity=np.zeros(dimensions)), settings=settings)
-    enclose(world, np.zeros(dimensions), np.full(dimensions, SIDE), thickness=WALL, restitution=1.0)
+    enclose(world, [0.0] * dimensions, [SIDE] * dimensions, thickness=WALL, restitution=1.0)
     feet = lattice(PILLARS, 2)
     if dimensions == 2:
         world.create_entities(

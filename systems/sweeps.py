@@ -84,8 +84,8 @@ def find_rooms(now, span, moving, shape, size, inverse_mass, before, motion, swe
     """How far from its foreseen motion each body may go, so that blows seldom send it farther; but where all are fast,
     no farther than that a room holds CROWD bodies. Returns in what time rooms are crossed then, else infinity.
 
-    now: seconds since the start of the step; shape (n,): -1 for none; before (n, d): where they are then. A body that a blow gives its share of
-    the energy has the speed sqrt(2 E / m) (equipartition); twice or thrice that is rare.
+    now: seconds since the start of the step; shape (n,): -1 for none; before (n, d): where they are then. A body that
+    a blow gives its share of the energy has the speed sqrt(2 E / m) (equipartition); twice or thrice that is rare.
     """
     second, third, degree = motion[2], motion[3], motion[4]
     energy, weighed, shaped = 0.0, 0, 0
