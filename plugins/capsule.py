@@ -12,6 +12,7 @@ from typing import Any
 from ..components import ALL_LAYERS, Collider, SphereCollider
 from ..framework import Plugin, column
 from ..framework.vectors import add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from .standard_sweeps import LATER, ball, down_at
 
 plugin = Plugin("capsule", version="1.0")
 
@@ -108,6 +109,28 @@ def capsule_sphere(a, b, d):
     depth = a.radius + b.radius - distance
     normal = divided(apart, distance) if distance > 0.0 else across(axis)
     return depth >= 0.0, depth, normal, add_scaled(nearest, normal, a.radius - 0.5 * depth)
+
+
+@plugin.sweep(CapsuleCollider, SphereCollider)
+def capsule_sphere_sweep(a, b, d, v):
+    """The sphere's centre against a rounded segment: an end, the sides and the other end in turn, until it touches."""
+    axis, half, reach = a.axes[1], a.half_height, a.radius + b.radius
+    along, rate = dot(axis, d), dot(axis, v)
+    place, speed = (along if rate < 0.0 else -along), abs(rate)  # turned so that it goes down the segment
+    enter, leave, time = down_at(place - half, speed), down_at(place + half, speed), 0.0
+    for _ in range(3):
+        beside = enter <= time < leave
+        change = enter if time < enter else (leave if beside else LATER)
+        centre = add_scaled(d, v, time)
+        apart = sub(centre, scale(axis, nearest_along(axis, half, centre)))
+        pace = add_scaled(v, axis, -rate) if beside else v
+        hit, more = ball(apart, pace, reach)
+        if hit and time + more <= min(change, 1.0):
+            return True, time + more
+        if not (change < 1.0 and dot(apart, pace) < 0.0):
+            break
+        time = change
+    return False, 0.0
 
 
 @plugin.kernel

@@ -75,13 +75,18 @@ def outwards(shape):
     return divided(turned, length(turned))
 
 
+@plugin.kernel
+def depth_below(b, d, down, support, rounding):
+    """How far the other's lowest point is below the plane."""
+    return rounding(b) + dot(add(d, support(b, down)), down)
+
+
 @plugin.pair(HalfSpaceCollider, Convex)
 def half_space_convex(a, b, d, support, rounding):
-    """How far the other's lowest point is below the plane. Whatever is inside leaves upwards, however deep it is."""
+    """Whatever is inside leaves upwards, however deep it is."""
     normal = outwards(a)
     down = negative(normal)
-    radius = rounding(b)
-    depth = radius + dot(add(d, support(b, down)), down)
+    depth = depth_below(b, d, down, support, rounding)
     # The point is in the middle of what touches: looks a little to either side find opposite ends of a face.
     tilt = scale(d, 0.0)
     for k in range(len(d)):
@@ -89,6 +94,16 @@ def half_space_convex(a, b, d, support, rounding):
     point = add(support(b, add(down, tilt)), support(b, sub(down, tilt)))
     point = add_scaled(d, point, 0.5)
     return depth >= 0.0, depth, normal, add_scaled(point, normal, -dot(point, normal) - 0.5 * depth)
+
+
+@plugin.sweep(HalfSpaceCollider, Convex)
+def half_space_convex_sweep(a, b, d, v, support, rounding):
+    """The height of the lowest point over the speed at which it comes down."""
+    down = negative(outwards(a))
+    height, speed = -depth_below(b, d, down, support, rounding), dot(v, down)
+    if height <= 0.0:
+        return True, 0.0
+    return (True, height / speed) if height <= speed else (False, 0.0)
 
 
 @plugin.pair(HalfSpaceCollider, HalfSpaceCollider)

@@ -14,6 +14,7 @@ from ..framework.compilation import inlined
 from ..framework.plugin import Convex, Plugin
 from ..framework.vectors import divided, item, length, replace, scale
 from ..systems.convex import convex_convex
+from .standard_sweeps import box_box_sweep, sphere_box_sweep, sphere_sphere_sweep
 
 standard_shapes = Plugin("standard shapes")
 
@@ -98,3 +99,7 @@ def box_box(a, b, d):
 
 
 standard_shapes.pair(Convex, Convex)(convex_convex)
+
+standard_shapes.sweep(SphereCollider, SphereCollider)(sphere_sphere_sweep)
+standard_shapes.sweep(SphereCollider, AABBCollider)(sphere_box_sweep)
+standard_shapes.sweep(AABBCollider, AABBCollider)(box_box_sweep)

@@ -13,6 +13,7 @@ next slice begins first is looked at first, and once that is beyond the nearest 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +31,8 @@ LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
 SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all looked at, in whatever order
 SLICE = 3.0  # cells; measured: 2 is as good, 6 is worse
 ENDLESS = 1e300  # instead of infinity, which times zero is no number
+FARTHEST = 1e200  # on the way past bodies without end
+MUCH = 1e6  # a way for sweeps may be so many times longer than needed
 
 
 @inlined
@@ -40,6 +43,12 @@ def inverse_of(direction):
         along = item(direction, k)
         result = replace(result, k, 1.0 / along if abs(along) > 1.0 / ENDLESS else ENDLESS)
     return result
+
+
+@inlined
+def power_above(length):
+    """A power of two that is larger. With ways of such lengths a sweep finds the same digits, however long they are."""
+    return math.ldexp(1.0, math.frexp(length)[1])
 
 
 def make_cast_kernel(against: Any, swept: Any, half_extents: Any) -> Callable[..., int]:
@@ -59,7 +68,7 @@ def make_cast_kernel(against: Any, swept: Any, half_extents: Any) -> Callable[..
         ends in its limit.
         """
         top = int(frame[LEVELS])
-        used = 0
+        used, span = 0, 0.0
         for level in range(top + 1):
             if table[level, END] > table[level, BEGIN]:
                 walk[0, used] = level
@@ -121,21 +130,29 @@ def make_cast_kernel(against: Any, swept: Any, half_extents: Any) -> Callable[..
                             continue
                         away = sub(add(row(position, i, like), row(offset, i, like)), start)
                         distance, touches, normal, point = 0.0, False, like, like
-                        way = scale(direction, leave)
+                        if not leave <= span < MUCH * leave:
+                            span = power_above(min(leave, FARTHEST))
+                        way = scale(direction, span)
                         known, met, part_of_way = swept(query, q, shape_of[i], i, away, way, shapes, like)
                         if known:
                             if not met:
                                 continue
-                            distance = part_of_way * leave
+                            distance = part_of_way * span
+                        before = 0.0
                         for look in range(LOOKS):
-                            d = add_scaled(away, direction, -distance)
-                            hit, depth, n, point = against(query, q, shape_of[i], i, d, shapes, like)
+                            d = add_scaled(away, direction, before - distance)
+                            hit, depth, n, spot = against(query, q, shape_of[i], i, d, shapes, like)
                             rate = dot(direction, n)
                             if look == 0 or rate > 0.0:  # a step too far by a rounding error may turn the normal round
                                 normal = n
+                            if before == 0.0:
+                                point = spot
                             if known:
                                 touches = True
-                                break
+                                if rate > 0.0 or look > 0 or distance == 0.0:
+                                    break
+                                before = min(distance, LAST_STEP * length(away))  # just before, the normal is plain
+                                continue
                             near = abs(depth) <= ROUNDING * length(d)
                             touches = hit or (near and (look > 0 or rate > 0.0))
                             further = distance - depth / rate
