@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ..framework.compilation import part
+from ..framework.compilation import inlined, part
 from ..framework.vectors import dot, length, sub
 from .paths import ROUNDING, along, along_rate, first_root
 
@@ -24,23 +24,35 @@ APART, TOUCHES, AT_CORNER = range(3)
 
 def make_first_touch(evaluate: Any, corner: Any, swept: Any, convex: Any) -> Callable[..., Any]:
     """The swept test over the shapes of a scene."""
+    advance = make_advance(evaluate, corner, convex)
 
-    @part
+    @inlined
     def first_touch(shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, until, slop, shapes, like):
         """(APART, TOUCHES or AT_CORNER, time, normal, point, from a's centre to b's) of the first touch on b's path
         as a sees it, between two times; touching at ``since`` and parting is none unless the path leads back.
 
         AT_CORNER: they touch at a corner only, still do a slop further on, and what becomes of it is not looked at.
         """
-        t, normal, point, at = since, like, like, like
-        known, met, share = False, False, 0.0
+        t, known, met, share = since, False, False, 0.0
         if straight:
             start = along(since, x0, x1, x2, x3)
             way = sub(along(until, x0, x1, x2, x3), start)
             known, met, share = swept(shape_a, a, shape_b, b, start, way, shapes, like)
-            if known and not met:
-                return APART, t, normal, point, at
             t += share * (until - since)
+        if known and not met:  # most pairs: they cost no call
+            return APART, t, like, like, like
+        return advance(shape_a, a, shape_b, b, x0, x1, x2, x3, straight, known, t, until, slop, shapes, like)
+
+    return first_touch
+
+
+def make_advance(evaluate: Any, corner: Any, convex: Any) -> Callable[..., Any]:
+    """Conservative advancement over the shapes of a scene."""
+
+    @part
+    def advance(shape_a, a, shape_b, b, x0, x1, x2, x3, straight, known, t, until, slop, shapes, like):
+        """The same from ``t`` on; known: that they first touch then."""
+        normal, point, at = like, like, like
         found, cornered, time = False, False, t
         fastest = length(x1) + (2.0 * length(x2) + 3.0 * length(x3) * until) * until
         for look in range(LOOKS):
@@ -78,4 +90,4 @@ def make_first_touch(evaluate: Any, corner: Any, swept: Any, convex: Any) -> Cal
             t = further
         return TOUCHES, time, normal, point, at
 
-    return first_touch
+    return advance
