@@ -9,7 +9,7 @@ import numpy as np
 from numba.core.errors import NumbaError
 
 from ..framework.errors import PluginError
-from .shape_code import ALONE, ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B
+from .shape_code import ALONE, OUT_OF_TIME, ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B
 
 if TYPE_CHECKING:
     from .state import PhysicsState
@@ -35,8 +35,10 @@ class Blame:
             if isinstance(error, Exception) and about:
                 error.add_note(about)
         elif trace[UNSOUND]:
-            trace[UNSOUND] = 0
+            late, trace[UNSOUND] = trace[UNSOUND] == OUT_OF_TIME, 0
             a, b = int(trace[UNSOUND_A]), int(trace[UNSOUND_B])
+            if late:
+                raise PluginError(f"{self._describe(a, b)}: its sweep returned a time that is not from 0 to 1")
             if b != ALONE:
                 raise PluginError(f"{self._describe(a, b)} returned a contact that is not finite")
             if np.isfinite(self._state.table.arrays["rotation"][a]).all():

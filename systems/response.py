@@ -61,8 +61,8 @@ class Response(System):
         disabled = state.take_enabled()
         self._start_paths()
         self._solver.predict(dt, disabled)
+        struck = self._impacts(dt, disabled)
         with state.blame:
-            struck = self._impacts(dt, disabled)
             resting = self._resting(dt, struck)
             self._solver.solve(dt, resting)
             self._publish(disabled)
@@ -107,16 +107,17 @@ class Response(System):
         resolve = state.kernels.sweeping_impacts if sweeping else state.kernels.resolve_impacts
         rules, limits = (self._restitution_rule, self._friction_rule), (self._threshold, self._slop, self._cap)
         while True:
-            outcome = resolve(
-                dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.hits[: state.found],
-                self._solver.supported, queue.heads, queue.links, queue.looks, state.rank, scratch["size"],
-                scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"], arrays["linear_velocity"],
-                scratch["start_velocity"], arrays["inverse_mass"], state.motion(scratch["origin"]),
-                stacks["collider.restitution"], stacks["collider.friction"], rules, scratch["material"], limits,
-                scratch["gravity_share"], struck, spent, state.sweep_of, scratch["roam_lower"], scratch["roam_upper"],
-                self._crossed, state.pair_impulse, state.pair_normal, state.pair_point, state.pair_depth,
-                *queue.arrays, state.like,
-            )  # fmt: skip
+            with state.blame:
+                outcome = resolve(
+                    dt, state.pair_a, state.pair_b, state.pairs, state.responds, state.hits[: state.found],
+                    self._solver.supported, queue.heads, queue.links, queue.looks, state.rank, scratch["size"],
+                    scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"],
+                    arrays["linear_velocity"], scratch["start_velocity"], arrays["inverse_mass"],
+                    state.motion(scratch["origin"]), stacks["collider.restitution"], stacks["collider.friction"], rules,
+                    scratch["material"], limits, scratch["gravity_share"], struck, spent, state.sweep_of,
+                    scratch["roam_lower"], scratch["roam_upper"], self._crossed, state.pair_impulse, state.pair_normal,
+                    state.pair_point, state.pair_depth, *queue.arrays, state.like,
+                )  # fmt: skip
             if outcome == DONE:
                 break
             if outcome == FULL:

@@ -29,6 +29,7 @@ from .mixing import mixing
 # Places in the trace.
 ROW_A, ROW_B, UNSOUND, UNSOUND_A, UNSOUND_B = range(5)
 TRACE_SIZE = 5
+OUT_OF_TIME = 2  # in place of 1: it is a sweep that was wrong
 ALONE = -1  # in place of a second row: the bounds of the first
 
 
@@ -100,7 +101,7 @@ def _make(
     scope: dict[str, Any] = {
         "row": row, "negative": negative, "sub": sub, "array_at": array_at, "axes_at": axes_at, "finite": math.isfinite,
         "APART": -math.inf, "sound": sound, "dot": dot, "ROW_A": ROW_A, "ROW_B": ROW_B, "UNSOUND": UNSOUND,
-        "UNSOUND_A": UNSOUND_A, "UNSOUND_B": UNSOUND_B, "ALONE": ALONE,
+        "UNSOUND_A": UNSOUND_A, "UNSOUND_B": UNSOUND_B, "ALONE": ALONE, "OUT_OF_TIME": OUT_OF_TIME,
     }  # fmt: skip
     source = [f'"""Shapes: {", ".join(shape.component.__name__ for shape in shapes)}, {dimensions}D."""', ""]
     for index, shape in enumerate(shapes):
@@ -257,8 +258,9 @@ def _corner_source(
 def _swept_source(
     shapes: tuple[Shape, ...], pairs: dict[tuple[int, int], Pair | None], scope: dict[str, Any]
 ) -> list[str]:
-    """Only of the pairs that have a sweep."""
-    lines = ["def swept(shape_a, a, shape_b, b, d, v, shapes, like):"]
+    """Only of the pairs that have a sweep; one whose time is out of its bounds counts as a miss, and is kept in the
+    trace."""
+    trace, lines = f"shapes[{len(shapes)}]", ["def swept(shape_a, a, shape_b, b, d, v, shapes, like):"]
     for (one, two), pair in pairs.items():
         if pair is None or pair.sweep is None:
             continue
@@ -271,8 +273,15 @@ def _swept_source(
                 moving, f"sweep{i}_{j}", scope, parameters_source(shapes, i, one_row),
                 parameters_source(shapes, j, two_row), "negative(d), negative(v)" if turned else "d, v",
             )  # fmt: skip
-            lines += [f"    if shape_a == {first} and shape_b == {second}:", f"        hit, time = {call}"]
-            lines += ["        return True, hit, time"]
+            lines += [
+                f"    if shape_a == {first} and shape_b == {second}:",
+                f"        {trace}[ROW_A], {trace}[ROW_B] = a, b",
+                f"        hit, time = {call}",
+                "        if hit and not 0.0 <= time <= 1.0:",
+                f"            {trace}[UNSOUND], {trace}[UNSOUND_A], {trace}[UNSOUND_B] = OUT_OF_TIME, a, b",
+                "            return True, False, 0.0",
+                "        return True, hit, time",
+            ]
     return [*lines, "    return False, False, 0.0", ""]
 
 

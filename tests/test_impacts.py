@@ -406,3 +406,16 @@ def test_a_ball_whose_step_ends_in_touch_bounces_all_the_same():
     run(world, 40)
     assert velocity(world, mover)[0] == pytest.approx(-5.0, rel=1e-12)
     assert position(world, mover)[0] == pytest.approx(5.0 - 40 * 5 / 60, rel=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
+def test_what_stands_still_does_not_inherit_the_motion_of_who_is_gone(integrator):
+    """A body is deleted and a static one gets its row: an elastic ball still bounces off that with all its speed."""
+    world = make_world(integrator=integrator)
+    mover = ball(world, 0.0, 1.0, restitution=1.0)
+    gone = ball(world, (0.0, 50.0), (-100.0, 0.0), restitution=1.0)
+    ball(world, 1.03, kind="static", restitution=1.0)
+    world.step()
+    world.delete_entity(gone)
+    world.step()
+    assert velocity(world, mover)[0] == pytest.approx(-1.0, rel=1e-12)

@@ -307,6 +307,25 @@ def test_a_pair_that_fails_names_itself_and_the_step_is_undone(size, message):
     world.close()
 
 
+def test_a_sweep_that_fails_names_itself():
+    """It works on everything the checks try, but for one size its time is no part of the way."""
+    plugin, fragile = lonely_plugin()
+    plugin.pair(fragile, fragile)(lonely_lonely)
+
+    @plugin.sweep(fragile, fragile)
+    def late(a, b, d, v):
+        return (True, 2.0) if 5.0 < max(a.reach, b.reach) < 6.0 else (False, 0.0)
+
+    world = World(Physics(), plugin, settings=Settings(collision="continuous"))
+    first = world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(2000, 0)), fragile(1.0))
+    second = world.create_entity(Transform((20, 0)), RigidBody(), fragile(5.5))
+    state = world.state_hash()
+    with pytest.raises(StepError, match=f"entities {first} and {second}: its sweep returned a time that is not from"):
+        world.step()
+    assert world.state_hash() == state
+    world.close()
+
+
 # -- rules, filters, broad phases, systems --------------------------------------------------------
 
 
