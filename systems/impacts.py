@@ -339,7 +339,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 )  # fmt: skip
             for side in range(2 if sweeps else 0):
                 i = pair_a[c] if side == 0 else pair_b[c]
-                if inverse_mass[i] > 0.0:
+                if inverse_mass[i] > 0.0 and struck[i] < STOPPED:
                     if events[chosen, 3] == STOP:
                         stop(i, clock[NOW], position, velocity, motion, struck, spent, like)
                     else:
