@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .. import scenes
-from ..framework import World
+from ..framework import Settings, World
 from ..framework.compilation import log
 from .bench_bodies import moving_and_fixed
 from .bench_clock import Spread, no_garbage_collection, timed
@@ -86,10 +86,11 @@ class Case:
         self.milliseconds.setdefault(window, {}).setdefault(engine, []).append(milliseconds)
         self.quality.setdefault(window, {}).setdefault(engine, []).append(figures)
 
-    def build(self, seed: int) -> World:
-        """The scene's world; scenes take more keywords than their protocol promises."""
-        function: Any = scenes.get(self.subject.scene).build
-        return function(None, seed, **self.subject.build_options(self.size))
+    def build(self, seed: int, settings: Settings | None = None) -> World:
+        """The scene's world, with the subject's settings if none are given."""
+        function: Any = scenes.get(self.subject.scene).build  # scenes take more keywords than their protocol promises
+        settings = settings or Settings(**self.subject.settings)
+        return function(settings, seed, **self.subject.build_options(self.size))
 
     def effort(self) -> float:
         """In steps of one body of the gas, of one engine."""
@@ -114,7 +115,7 @@ def bench(
             _run(case, repeat, peer, progress)
     settings = {CAROM: {}, **({"pymunk": {}} if peer else {})}
     if cases:
-        with contextlib.closing(cases[0].build(0)) as world:
+        with contextlib.closing(cases[0].build(0, Settings())) as world:
             settings[CAROM] = plain_settings(world)
             if peer:
                 settings["pymunk"] = PymunkSpace(world).settings()
@@ -217,6 +218,7 @@ def _rows(case: Case) -> list[Row]:
         row = Row(
             subject.scene, subject.variant, case.bodies, window, unit, case.timed[window],
             subject.target(window, case.size), subject.energy, Spread.of(own), compile_seconds=case.compile_seconds,
+            settings=dict(subject.settings),
         )  # fmt: skip
         row.quality[CAROM] = _together(case.quality[window][CAROM])
         if case.peer is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from . import bench_ladder, bench_pairs, bench_report, bench_scaling, bench_startup
+from . import bench_ladder, bench_modes, bench_pairs, bench_report, bench_scaling, bench_startup
 from .bench import bench
 from .bench_output import Output
 from .bench_progress import Bar
@@ -159,6 +159,21 @@ def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, 
     with Bar(Console(stderr=True)) as bar:
         result = bench_ladder.ladder(bodies, repeats, bar)
     output.show(result, [bench_ladder.table(result)], [])
+
+
+@bench_command.command("modes", short_help="What each kind of collision costs, and what it buys.")
+@click.option(
+    "--steps", type=click.IntRange(min=1), default=bench_modes.STEPS, show_default=True,
+    help="Steps timed of each scene; of bullets a sixth.",
+)  # fmt: skip
+@_repeats(bench_modes.REPEATS)
+@_shown
+def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time the same bodies with discrete, continuous and event-driven collisions."""
+    output = Output.checked("carom bench modes", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_modes.modes(steps, repeats, bar)
+    output.show(result, bench_modes.tables(result), bench_modes.remarks(result))
 
 
 def _sizes(text: str) -> tuple[int, ...]:

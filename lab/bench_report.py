@@ -40,7 +40,7 @@ def times(rows: list[Row], repeats: int) -> TextTable:
             row.peer_index or NOTHING,
             digits(row.ratio.median) if row.ratio else NOTHING,
             span(row.ratio) if row.ratio else NOTHING,
-            f"{row.target:g}" if row.target else NOTHING,
+            f"{row.target:.3g}" if row.target else NOTHING,
         )
         for row in rows
     ]
@@ -99,12 +99,23 @@ def remarks(result: Result) -> list[str]:
         values = result.settings.get(engine)
         if values:
             lines.append(f"{engine}: {', '.join(f'{name} {_value(values[name])}' for name in names)}")
+            if engine == "carom":
+                lines[-1] += "".join(f"; {name}: {what}" for name, what in _other_settings(result.rows).items())
     if "pymunk" in result.settings:
         lines[-1] += (
             "; moments infinite; index: its tree of boxes or its spatial hash (cells of two"
             " diameters), whichever was faster in the first repeat"
         )
     return lines
+
+
+def _other_settings(rows: list[Row]) -> dict[str, str]:
+    """What was not the default, by the name of the scene."""
+    return {
+        row.name: ", ".join(f"{name} {_value(value)}" for name, value in row.settings.items())
+        for row in rows
+        if row.settings
+    }
 
 
 def energy(kind: str, of: list[dict[str, float]]) -> str:

@@ -20,6 +20,7 @@ class Row:
 
     ``unit`` says what the milliseconds are per. ``ratio`` is pymunk's time over carom's, within each repeat.
     ``peer_index`` is the one of pymunk's indexes that was faster in the first repeat, whose times these are.
+    ``settings`` holds those of carom's that are not the default ones.
     ``quality`` holds figures by engine and name, see :meth:`carom.lab.bench_quality.Quality.figures`.
     """
 
@@ -36,6 +37,7 @@ class Row:
     ratio: Spread | None = None
     peer_index: str | None = None
     compile_seconds: float = 0.0
+    settings: dict[str, Any] = field(default_factory=dict)
     quality: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property

@@ -37,6 +37,8 @@ class Subject:
 
     ``variant``
         tells two subjects of one scene apart; ``options`` go to the scene's build
+    ``settings``
+        fields of carom's settings that are not the default ones
     ``windows``
         the steps timed; none where questions are timed instead
     ``sizes``
@@ -54,6 +56,7 @@ class Subject:
     energy: str = "kept"
     variant: str = ""
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     sizes: tuple[int, ...] | None = None
     size_option: str = "n"
     targets: Mapping[tuple[str, int], float] = field(default_factory=lambda: MappingProxyType({}))
@@ -73,6 +76,11 @@ class Subject:
 
 
 AFTER_START = (Window("", 10, 600),)
+
+
+def _fastgas(collision: str, **more: Any) -> Subject:
+    settings = {} if collision == "discrete" else {"collision": collision}
+    return Subject("fastgas", AFTER_START, variant=collision, settings=settings, sizes=(1000,), **more)
 
 
 def _pyramid(friction: float) -> Subject:
@@ -102,7 +110,8 @@ SUITE: tuple[Subject, ...] = (
     _pyramid(0.6),
     _pyramid(0.0),
     Subject("static_world", AFTER_START, sizes=(1000,), targets={("", 0): 1.5}),
-    Subject("fastgas", AFTER_START, sizes=(1000,)),
+    _fastgas("continuous", targets={("", 0): 1 / 3}, effort=12.0),
+    _fastgas("discrete"),
     Subject("freefall", (Window("", 10, 300),), energy="", sizes=(LARGE,), targets={("", 0): 5.0}, effort=0.1),
     Subject("player_query", (), energy="", targets={("", 0): 5.0}, effort=0.2),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import types
 import typing
 from collections.abc import Iterable
@@ -47,6 +48,20 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
             raise Problem(f"--set gives {name} twice")
         values[name] = _parse(name, text, hints[name])
     return values
+
+
+def parse_view(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """``"0,0,4,3"`` as the lower and the upper corner; Problem for anything else."""
+    try:
+        numbers = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        numbers = ()
+    half = len(numbers) // 2
+    lower, upper = numbers[:half], numbers[half:]
+    good = len(numbers) in (4, 6) and all(map(math.isfinite, numbers))
+    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+        raise Problem(f"--view takes the lower and the upper corner, as in 0,0,4,3, not {text!r}")
+    return lower, upper
 
 
 def apply(settings: Settings, values: dict[str, Any]) -> Settings:

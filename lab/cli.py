@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import os
@@ -14,7 +15,7 @@ from rich.table import Table
 
 from .. import __version__, scenes
 from .bench_command import bench_command
-from .choices import parse_assignments, preset
+from .choices import parse_assignments, parse_view, preset
 from .commands import Commands
 from .installed_plugins import plugin_named
 from .loading import Loaded, load, stdout_kept_clean
@@ -54,8 +55,9 @@ def cli(context: click.Context) -> None:
     type=click.Path(path_type=Path),
     default=Path("out"),
     show_default=True,
-    help="Where pictures go.",
+    help="The folder where pictures go, or a file for that of the paths: NAME.png.",
 )
+@click.option("--view", "view_text", metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."
 )
@@ -71,6 +73,7 @@ def run_command(
     seed: str,
     plugins: tuple[str, ...],
     out: Path,
+    view_text: str | None,
     as_json: bool,
     no_pictures: bool,
     profile: bool,
@@ -87,6 +90,8 @@ def run_command(
     number = seed_number(seed)
     added = [plugin_named(name) for name in plugins]
     loaded = load(target)
+    if view_text is not None:
+        loaded = dataclasses.replace(loaded, view=parse_view(view_text))
     draw = _drawing(no_pictures, out)
     screen = Console(stderr=True)
 
@@ -134,18 +139,19 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
     if no_pictures:
         return None
     try:
-        from .pictures import draw_run
+        from .pictures import draw_run, is_file
     except ImportError:
         click.echo(
             "carom: no pictures, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'",
             err=True,
         )
         return None
+    folder = out.parent if is_file(out) else out
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise Problem(f"--out {out}: {error.strerror or error}") from error
-    if not os.access(out, os.W_OK | os.X_OK):
+    if not os.access(folder, os.W_OK | os.X_OK):
         raise Problem(f"--out {out}: no permission to write there")
     return draw_run
 

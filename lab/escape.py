@@ -15,6 +15,7 @@ from ..framework import World
 from .shapes import Floats, Shapes, dimensions_of, shapes_of
 
 COVERED = 0.5
+ROUNDING = 1e-9  # of the coordinates: faces of walls of different sizes, that stand side by side, differ by less
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class Enclosure:
                     inner = sign * walls.centre[:, axis] - walls.half[:, axis]
                     outer = sign * walls.centre[:, axis] + walls.half[:, axis]
                     beyond = inner >= (sign * bodies.centre[:, axis]).max()
-                    if _covered(bodies, walls.where(beyond & (outer >= outer.max())), axis) >= COVERED:
+                    outermost = outer >= outer.max() - ROUNDING * np.abs(outer).max()
+                    if _covered(bodies, walls.where(beyond & outermost), axis) >= COVERED:
                         bounds[axis] = sign * outer.max()
         return cls(lower, upper)
 

@@ -20,7 +20,7 @@ SMALLEST_LEGIBLE = 5.0  # points: below this typical diameter a second panel mag
 MAGNIFIED_DIAMETER = 20.0  # points
 CROWD_3D = 500  # untraced bodies that would hide the paths behind them
 SOME = 60  # bodies whose beginnings are shown
-FEW = 3  # bodies whose shapes are repeated along their path
+FEW = 3  # bodies whose shapes are repeated along their path, however long
 GHOSTS = 14  # times that they are
 DRAWABLE = 1e30  # farther out there is no picture
 UNTRACED = "#1b2431"
@@ -57,7 +57,10 @@ class Still:
 
 @QUIET
 def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
-    """Draw ``run`` into the folder ``out``; returns the files. ``view``: two corners, None to find them."""
+    """Draw ``run`` into the folder ``out``; returns the files. ``view``: two corners, None to find them.
+
+    An ``out`` that ends in .png is a file for the paths alone.
+    """
     still = Still.of(run)
     ends = find_view(still, run.traces) if view is None else view
     projection = Projection.of(*(np.asarray(end, float) for end in ends))
@@ -66,12 +69,20 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
         if view is not None or projection.flat
         else _tight_frame(still, run.traces, projection)
     )
+    if is_file(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        return [draw_traces(run, still, projection, frame).save(out)]
     stem = Path(run.report.scene).stem
     out.mkdir(parents=True, exist_ok=True)
     return [
         draw_final(run, still, projection, frame).save(out / f"{stem}-final.png"),
         draw_traces(run, still, projection, frame).save(out / f"{stem}-traces.png"),
     ]
+
+
+def is_file(out: Path) -> bool:
+    """Whether it is the name of one picture, not that of a folder."""
+    return out.suffix.lower() == ".png"
 
 
 def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
@@ -160,6 +171,8 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     traces, shapes, report = run.traces, still.shapes, run.report
     count, moved = len(traces.entities), traces.moved
     over = f"{report.simulated_seconds:.4g} s"
+    if traces.blows is not None:
+        over = f"{_counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
     if not report.bodies["total"] and not count:
         subtitle = "no bodies"
     elif not count:
@@ -169,6 +182,8 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     else:
         subtitle = f"{'path' if count == 1 else 'paths'} of {_that_moved(count)}, over {over}"
     subtitle += ", fading into the past" if count else ""
+    if traces.blows is not None:
+        subtitle += f"   ·   {report.settings['collision']}"
     sheet = Sheet.new(report.scene, subtitle, [frame], numbered=projection.flat)
     panel = sheet.panels[0]
     draw_walls(panel, shapes.where(shapes.static), projection)
@@ -181,13 +196,17 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     palette = to_rgba_array(canvas.BODY_COLOURS)
     colours = palette[np.arange(count) * 5 % len(palette)]  # neighbours by id get different ones
     if count and len(traces.samples) > 1:
-        draw_paths(panel, traces.positions, colours, projection)
+        draw_paths(panel, traces.corners, colours, projection)
     own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
     if 0 < count <= SOME:
         _draw_starts(panel, traces, followed, own, projection)
-    if 0 < count <= FEW:
+    if 0 < count <= FEW or (count and traces.blows is not None):
         _draw_ghosts(panel, traces, followed, own, projection)
     draw_bodies(panel, followed, own, projection)
+    if traces.blows:
+        points, normals = (np.array([getattr(blow, name) for blow in traces.blows]) for name in ("point", "normal"))
+        draw_contacts(panel, points, normals, followed.typical_diameter, projection)
+        sheet.legend([("o", canvas.CONTACT, "impact")])
     return sheet
 
 

@@ -18,6 +18,7 @@ from ..components import AABBCollider, SphereCollider
 from ..framework import World
 from ..framework.compilation import log
 from ..framework.statistics import Stats, Totals
+from .blows import Blow, blows_of, with_corners
 from .escape import Enclosure
 from .profiling import profile_of
 from .shapes import dimensions_of, sensor_entities
@@ -26,6 +27,7 @@ TRACED_BODIES = 200  # in a picture
 CANDIDATES = 12_000  # bodies that are followed, to choose from
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported, not warned about
 SAMPLES = 600  # of the energy, at most; of a path if there are many
+FEW_STEPS, FEW_BODIES = 12, 60  # a run of no more is shown step by step, with all its impacts
 PATH_POINTS = 80_000  # of all paths; as long as they do, paths are sampled in every step, so that corners stay
 
 
@@ -85,11 +87,15 @@ class RunReport:
 
 @dataclass
 class Traces:
-    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending."""
+    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending.
+
+    ``blows``: the impacts on the way, if all the steps are shown, else None.
+    """
 
     entities: NDArray[np.int64]
     samples: list[NDArray[np.float32]] = field(default_factory=list)
     moved: int = 0  # how many bodies did, these among them
+    blows: list[Blow] | None = None
 
     @property
     def places(self) -> NDArray[np.float64]:
@@ -101,28 +107,37 @@ class Traces:
     def positions(self) -> NDArray[np.float64]:
         return np.array(self.samples, np.float64)
 
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """The positions, with those at the impacts between them."""
+        return with_corners(self.entities, self.positions, self.blows or [])
+
     @QUIET
     def farthest(self, count: int) -> Traces:
         """The ``count`` bodies that travelled farthest, of those that moved; ``moved`` stays what it is."""
         travelled = np.zeros(len(self.entities))
-        for before, after in itertools.pairwise(self.samples):
+        for before, after in itertools.pairwise(self.corners if self.blows else self.samples):
             travelled += np.nan_to_num(np.linalg.norm(after - before, axis=1))
         moved = int((travelled > 0).sum())
         chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
-        return Traces(self.entities[chosen], [sample[chosen] for sample in self.samples], moved)
+        samples = [sample[chosen] for sample in self.samples]
+        return Traces(self.entities[chosen], samples, moved, self.blows)
 
 
 class Recorder:
     """Follows what moves, those created on the way too, up to CANDIDATES bodies."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, step_by_step: bool = False) -> None:
         self.world = world
+        self.blows: list[Blow] | None = [] if step_by_step else None
         self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they were met
         self.samples: list[NDArray[np.float32]] = []  # of those known then
 
     @QUIET
     def record(self) -> None:
         """Add a sample."""
+        if self.blows is not None and self.samples:
+            self.blows += blows_of(self.world, len(self.samples))
         bodies = self.world.bodies
         ids = np.asarray(bodies.entity)
         moving = np.concatenate([bodies.dynamic.entity, bodies.kinematic.entity])
@@ -147,7 +162,7 @@ class Recorder:
             whole = np.full((len(self.entities), sample.shape[1]), np.nan, np.float32)
             whole[: len(sample)] = sample
             filled.append(whole[order])
-        return Traces(self.entities[order], filled)
+        return Traces(self.entities[order], filled, blows=self.blows)
 
 
 @dataclass
@@ -162,9 +177,9 @@ class Run:
 class Meter:
     """Looks at a world between its steps; nothing here is inside the measured time of a step."""
 
-    def __init__(self, world: World, every: int, path_every: int) -> None:
+    def __init__(self, world: World, every: int, path_every: int, step_by_step: bool) -> None:
         self.world, self.every, self.path_every = world, every, path_every
-        self.recorder = Recorder(world)
+        self.recorder = Recorder(world, step_by_step)
         self.came_or_went = False
         self._entities = np.sort(np.asarray(world.bodies.entity))
         self.enclosure = Enclosure.around(world)
@@ -335,7 +350,8 @@ def run(
     started = time.perf_counter()
     every = max(1, math.ceil(steps / SAMPLES))
     moving = len(world.bodies.dynamic) + len(world.bodies.kinematic)
-    meter = Meter(world, every, max(1, min(every, math.ceil(steps * max(moving, 1) / PATH_POINTS))))
+    path_every = max(1, min(every, math.ceil(steps * max(moving, 1) / PATH_POINTS)))
+    meter = Meter(world, every, path_every, steps <= FEW_STEPS and moving <= FEW_BODIES)
     with world.profile() if profile else contextlib.nullcontext():
         for done in range(1, steps + 1):
             meter.step()

@@ -28,6 +28,7 @@ from . import (
     player,
     player_query,
     pyramid,
+    shots,
     stack,
     static_world,
 )
@@ -44,6 +45,7 @@ _SCENES: dict[str, Scene] = {
         mixed2d.SCENE,
         fastgas.SCENE,
         bullets.SCENE,
+        shots.SCENE,
         player.SCENE,
         player_query.SCENE,
         maze.SCENE,

@@ -95,6 +95,21 @@ def test_tables_have_all_their_cells(result):
         assert len({line.count("|") for line in lines}) == 1
 
 
+def test_settings_of_a_subject_are_used_kept_and_named():
+    """Swept, no disc leaves the box that some leave without; the settings of all others stay the default ones."""
+    window = (Window("", 0, 40),)
+    swept = Subject("fastgas", window, variant="swept", settings={"collision": "continuous"}, sizes=(100,))
+    plain = Subject("fastgas", window, variant="plain", sizes=(100,), targets={("", 0): 1 / 3})
+    found = bench([swept, plain], (1000,), repeats=1, peer=False)
+    assert [row.settings for row in found.rows] == [{"collision": "continuous"}, {}]
+    one, other = (row.quality["carom"]["escaped"] for row in found.rows)
+    assert one == 0 < other
+    assert found.settings["carom"]["collision"] == "discrete"
+    assert "collision discrete, substeps 4; fastgas, swept: collision continuous" in bench_report.remarks(found)[2]
+    assert [row[-1] for row in bench_report.tables(found)[0].rows] == ["-", "0.333"]
+    assert bench_results.Result.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+
+
 def test_carom_alone(no_pymunk):
     alone = bench([SHORT_GAS], (30,), repeats=1, peer=False)
     assert [row.ratio for row in alone.rows] == [None, None]
@@ -154,6 +169,10 @@ def test_the_suite_names_scenes_and_many_bodies_have_fewer_steps():
         assert subject.windows[0].shortened(1000) == subject.windows[0]
         assert [subject.target("", n) for n in (1000, 10_000, LARGE, 7)] == [2, 5, 8, None]
     assert next(iter(subjects(["pyramid"]))).target("", 50) == 3
+    swept, plain = subjects(["fastgas"])
+    assert swept.settings == {"collision": "continuous"}
+    assert not plain.settings
+    assert swept.target("", 1000) == pytest.approx(1 / 3)
 
 
 def test_spread_is_the_median_and_the_ends():

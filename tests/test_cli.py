@@ -12,11 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 from carom import __version__, scenes
-from carom.components import RigidBody, Transform
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.lab.choices import parse_assignments
 from carom.lab.cli import cli
-from carom.lab.run import Traces, run
+from carom.lab.run import FEW_BODIES, FEW_STEPS, Traces, run
 from carom.plugins import Physics
 
 FALLING_BALL = """
@@ -93,6 +93,30 @@ def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):
         assert str(Path("pictures") / name) in result.stdout
         assert picture.read_bytes().startswith(b"\x89PNG")
         assert picture.stat().st_size > 10_000
+
+
+def test_the_picture_of_the_paths_alone_and_a_part_of_it(carom, tmp_path):
+    whole = report_of(carom("run", "shots", "--out", "new/whole.png", "--json"))
+    part = report_of(carom("run", "shots", "--out", "part.png", "--view", "-1,-1.2,16,2.2", "--json"))
+    assert whole["state_hash"] == part["state_hash"]
+    assert [whole["pictures"], part["pictures"]] == [[str(Path("new") / "whole.png")], ["part.png"]]
+    assert {path.name for path in tmp_path.rglob("*.*")} == {"whole.png", "part.png"}
+    shapes = []
+    for name in ("new/whole.png", "part.png"):
+        header = (tmp_path / name).read_bytes()[:24]
+        assert header.startswith(b"\x89PNG")
+        shapes.append((int.from_bytes(header[16:20]), int.from_bytes(header[20:24])))
+    assert shapes[0][1] > 0.8 * shapes[0][0]
+    assert shapes[1][1] < 0.4 * shapes[1][0]  # as wide and flat as the part is
+
+
+@pytest.mark.parametrize("view", ["0,0,4", "0,0,4,x", "0,0,4,inf", "4,3,0,0", "0,0,4,0", "0,0,0,4,4", ""])
+def test_a_view_that_is_none_is_refused(carom, view):
+    assert "--view takes the lower and the upper corner" in refusal(carom("run", "jump", "--view", view))
+
+
+def test_a_view_of_another_dimension_is_refused(carom):
+    assert "view has 3 dimensions, the world 2" in refusal(carom("run", "jump", "--view", "0,0,0,4,4,4"))
 
 
 def test_3d_is_drawn_too(carom, tmp_path, ball):
@@ -481,6 +505,39 @@ def test_bodies_created_on_the_way_and_kinematic_ones_are_traced():
     assert traces.entities.tolist() == sorted([lift, *created])
     assert traces.moved == 2
     world.close()
+
+
+def test_a_short_run_keeps_the_corners_of_its_paths():
+    """A ball to and fro between two walls, a box against a wall: where the ball turned, and the paths through it."""
+    settings = Settings(collision="continuous")
+    with World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings) as world:
+        for x in (-1.75, 1.75):
+            world.create_entity(Transform((x, 0)), AABBCollider((0.5, 5), restitution=1.0))
+        ball = world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(120, 0)), SphereCollider(0.25))
+        box = world.create_entity(Transform((0, 3)), RigidBody(linear_velocity=(75, 0)), AABBCollider((0.25, 0.25)))
+        traces = run(world, 2).traces
+    world.close()
+    blows = traces.blows or []
+    # The ball, which goes 2 in a step, turns 1 to the right, then 1 to the left; the box to the right, a little later.
+    assert [(blow.after, len(blow.centres)) for blow in blows] == [(1, 1), (1, 0), (2, 1)]
+    struck = [(blow.centres[ball][0], blow.after) for blow in blows if ball in blow.centres]
+    np.testing.assert_allclose(struck, [(1, 1), (-1, 2)], rtol=0, atol=1e-12)
+    assert not any(box in blow.centres for blow in blows)
+    assert traces.entities.tolist() == [ball, box]  # moved, though it is back where it was at the end of each step
+    np.testing.assert_allclose(traces.positions[:, 0, 0], [0, 0, 0], rtol=0, atol=1e-6)
+    path = traces.corners[:, 0, 0]
+    np.testing.assert_allclose(path[np.abs(np.diff(path, append=9)) > 1e-6], [0, 1, 0, -1, 0], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("bodies", "steps"), [(FEW_BODIES + 1, 2), (1, FEW_STEPS + 1)])
+def test_longer_runs_and_larger_worlds_are_not_followed_step_by_step(bodies, steps):
+    with World(Physics(dimensions=2, gravity=(0.0, 0.0))) as world:
+        places = [(2.0 * k, 0.0) for k in range(bodies)]
+        world.create_entities(bodies, Transform.many(places), RigidBody.many(linear_velocity=(1.0, 0.0)))
+        traces = run(world, steps).traces
+    world.close()
+    assert traces.blows is None
+    np.testing.assert_array_equal(traces.corners, traces.positions)
 
 
 def test_the_rows_of_the_step_add_up(carom):

@@ -160,6 +160,24 @@ def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
     assert json.loads(result.stdout)["steps"] == 4 * 120
 
 
+def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_path):
+    from carom.lab.cli import cli
+
+    page = ROOT / "docs" / "which-collision.md"
+    blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
+    commands = [block.text.split() for block in blocks if block.info == ["sh"]]
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
+        assert command[0] == "carom"
+        result = CliRunner().invoke(cli, command[1:])
+        assert result.exit_code == 0, result.output
+    drawn = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.png")}
+    shown = {f"docs/{target}" for _, target in links(page) if target.endswith(".png")}
+    assert drawn == shown
+    assert len(commands) == len(drawn)
+    assert all((ROOT / picture).stat().st_size < 60_000 for picture in shown)
+
+
 def test_the_scene_file_page_has_every_option():
     from carom.lab.cli import cli
 
