@@ -206,8 +206,10 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         threshold = fixed_threshold
         if threshold < 0.0:
             threshold = 2.0 * max(share[a], share[b])
+        nothing = 0.0
         if sweeps:  # else a plastic impact would be one again, by a rounding error
-            threshold += ROUNDING * (length(row(motion[1], a, like)) + length(row(motion[1], b, like)))
+            nothing = ROUNDING * (length(row(motion[1], a, like)) + length(row(motion[1], b, like)))
+            threshold += nothing
         if not speed < -threshold and not passive:
             return
         if motion[4] == 1 and e != 1.0:
@@ -217,6 +219,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             bend_a = sub(row(velocity, a, like), row(start_velocity, a, like))
             bend_b = sub(row(velocity, b, like), row(start_velocity, b, like))
             speed = min(0.0, speed + dot(sub(bend_b, bend_a), normal) * (t / dt - 0.5))
+            if sweeps and not passive and not speed < -nothing:  # not in the flight
+                return
         kind = BOUNCE
         if passive:
             kind = CROSS
