@@ -10,6 +10,7 @@ pairs that are fast for their size, or all of them, are taken where they first t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -19,12 +20,12 @@ from .event_heap import heap_pop, heap_push
 from .first_touch import APART, AT_CORNER
 from .mixing import mix_friction
 from .paths import ROUNDING, along, along_rate, is_straight, relative_path, travel_of
-from .sizes import slop_of, smaller
+from .sizes import reach, slop_of, smaller
 from .sweeps import EVENT_DRIVEN, FAST, is_swept, leaves_at
 
 TIME_ITERATIONS = 80
 MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
-STOPPED = 1 << 40  # added to a body's impacts: it is not to move any more in this step
+ASIDE = 1 << 40  # added to a body's impacts: the solver for contacts at rest is to leave it alone in this step
 
 # What the kernel returns: all is done; there is no room for events or the log; a body leaves the space in which its
 # neighbours are known, at clock[UNTIL].
@@ -40,10 +41,13 @@ BOUNCE, FREE, STOP, CROSS = range(4)
 
 @inlined
 def bounce(
-    event, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion, struck, spent, pair_impulse,
-    pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
+    event, dt, kick, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, damping, motion, struck, spent,
+    pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
 ):  # fmt: skip
-    """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
+    """One impact: both bodies get their impulse now, and the rest of the step with the new velocities.
+
+    kick: whether damping acts at the end of the step, as half a kick, and not all the time.
+    """
     origin, path = motion[0], motion[1]
     c = events[event, 0]
     a, b = pair_a[c], pair_b[c]
@@ -66,7 +70,8 @@ def bounce(
             store(origin, i, add_scaled(row(origin, i, like), dv, -now))
             store(path, i, add(row(path, i, like), dv))
             store(position, i, add_scaled(row(position, i, like), dv, dt - now))
-            store(velocity, i, add(row(velocity, i, like), dv))
+            fading = damping[i] * (0.5 * dt if kick else dt - now)
+            store(velocity, i, add_scaled(row(velocity, i, like), dv, math.exp(-fading) if fading > 0.0 else 1.0))
     pair_impulse[c] += impulse
     pair_depth[c] = 0.0
     logged = counts[LOGGED]
@@ -75,6 +80,16 @@ def bounce(
         log_value[logged, k] = event_values[event, k]
     log_value[logged, 1] = impulse
     counts[LOGGED] += 1
+
+
+@inlined
+def is_thrown(i, start, size, origin, like):
+    """Whether blows have changed a body's way so much that it seems to come from far off its start.
+
+    The solver for contacts at rest moves bodies from there, and knows their contacts where they are.
+    """
+    away = sub(row(origin, i, like), row(start, i, like))
+    return length(away) > FAST * size[i]
 
 
 @inlined
@@ -92,8 +107,8 @@ def stop(i, now, position, velocity, motion, struck, spent, like):
     if degree > 1:
         store(second, i, like)
         store(third, i, like)
-    struck[i] += STOPPED
-    spent[i] += STOPPED
+    struck[i] += ASIDE
+    spent[i] += ASIDE
 
 
 @inlined
@@ -158,8 +173,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
     @inlined
     def consider(
         c, since, dt, pair_a, pair_b, passive, rank, size, shape_of, offset, shapes, velocity, start_velocity,
-        inverse_mass, motion, restitution, friction, rules, material, limits, share, struck, spent, sweep_of, crossed,
-        pair_impulse, events, event_times, event_keys, event_values, heap, counts, like,
+        inverse_mass, start, motion, restitution, friction, rules, material, limits, share, struck, spent, sweep_of,
+        crossed, pair_impulse, events, event_times, event_keys, event_values, heap, counts, like,
     ):  # fmt: skip
         """Put the pair's next impact into the queue, if it has one: a touch, and a fast approach.
 
@@ -179,8 +194,9 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 return
             if swept:
                 straight = is_straight(a, b, x2, x3, dt, motion, like)
+                edge = reach(dt, a, b, share, size, fixed_slop)  # what slides may have sunk in by so much
                 found, t, normal, point, apart = first_touch(
-                    shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, dt, slop, shapes, like
+                    shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, dt, edge, shapes, like
                 )
                 if found == APART:
                     return
@@ -210,8 +226,15 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         if sweeps:  # else a plastic impact would be one again, by a rounding error
             nothing = ROUNDING * (length(row(motion[1], a, like)) + length(row(motion[1], b, like)))
             threshold += nothing
+        gain = 0.0
         if not speed < -threshold and not passive:
-            return
+            # Too slow to bounce: a contact at rest, unless what is fast would be far past the surface by the end of the
+            # step. That is stopped there, or, on a path that leads back in, sent up so that it is there at the end.
+            left, curve = dt - t, dot(add_scaled(x2, x3, 3.0 * t), normal)
+            fast = swept and travel_of(x1, x2, x3, left) > FAST * smaller(a, b, size)
+            if not (fast and -(speed + curve * left) * left > slop):
+                return
+            e, gain = 0.0, max(0.0, -curve * left)
         if motion[4] == 1 and e != 1.0:
             # A straight path has the flight's velocity in its middle only. With that of another time a bounce gains
             # or loses, and a ball that always meets the floor at the same phase of a step hops for ever. Elastic
@@ -225,7 +248,11 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         if passive:
             kind = CROSS
         elif spent[a] >= cap or spent[b] >= cap or struck[a] >= MOST_IMPACTS or struck[b] >= MOST_IMPACTS:
-            if not sweeps or not travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size):
+            if not sweeps or not (
+                travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size)
+                or is_thrown(a, start, size, motion[0], like)
+                or is_thrown(b, start, size, motion[0], like)
+            ):
                 counts[CAPPED] += 1
                 return
             kind = STOP
@@ -248,7 +275,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         event = heap[counts[WAITING]]
         events[event, 0], events[event, 1], events[event, 2], events[event, 3] = c, struck[a], struck[b], kind
         event_times[event], event_keys[event] = t, rank[a] * len(rank) + rank[b]
-        event_values[event, 0], event_values[event, 1] = t, -(1.0 + e) * speed
+        event_values[event, 0], event_values[event, 1] = t, gain - (1.0 + e) * speed
         for k in range(len(like)):
             event_values[event, 2 + k] = item(normal, k)
             event_values[event, 2 + len(like) + k] = item(point, k)
@@ -258,9 +285,10 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
     @kernel
     def resolve_impacts(
         dt, pair_a, pair_b, pairs, responds, hits, supported, heads, links, looks, rank, size, shape_of, offset, shapes,
-        position, velocity, start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits, share,
-        struck, spent, sweep_of, roam_lower, roam_upper, crossed, pair_impulse, pair_normal, pair_point, pair_depth,
-        events, event_times, event_keys, event_values, heap, log_pair, log_value, counts, clock, like,
+        position, velocity, start_velocity, inverse_mass, damping, start, motion, restitution, friction, rules,
+        material, limits, share, struck, spent, sweep_of, roam_lower, roam_upper, crossed, pair_impulse, pair_normal,
+        pair_point, pair_depth, events, event_times, event_keys, event_values, heap, log_pair, log_value, counts, clock,
+        like,
     ):  # fmt: skip
         """Bounce every pair that touches in its motion and approaches faster than the threshold.
 
@@ -268,10 +296,10 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         (2 pairs,), looks (pairs + 1,): room, see link_pairs.
         restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the
         threshold and the slop (below 0: from the bodies), the most impacts of a body.
-        share (n,): see reach. struck, spent (n,): impacts per dynamic body, and those that the cap counts. sweep_of,
-        roam_lower, roam_upper: see ``sweeps``. crossed (pairs,): passive pairs that met. pair_*: per pair, the impulse
-        summed and the last impact's geometry and time. log_*: pair; time, impulse, normal, point of every impact.
-        counts, clock: see WAITING, NOW.
+        start (n, d): where the step started. share (n,): see reach. struck, spent (n,): impacts per dynamic body, and
+        those that the cap counts. sweep_of, roam_lower, roam_upper: see ``sweeps``. crossed (pairs,): passive pairs
+        that met. pair_*: per pair, the impulse summed and the last impact's geometry and time. log_*: pair; time,
+        impulse, normal, point of every impact. counts, clock: see WAITING, NOW.
         Returns DONE; FULL: call again with more room to go on; or LEFT.
         """
         linked = False
@@ -310,8 +338,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 if responds[p] or sweeps:
                     consider(
                         p, clock[NOW], dt, pair_a, pair_b, not responds[p], rank, size, shape_of, offset, shapes,
-                        velocity, start_velocity, inverse_mass, motion, restitution, friction, rules, material, limits,
-                        share, struck, spent, sweep_of, crossed, pair_impulse, events, event_times, event_keys,
+                        velocity, start_velocity, inverse_mass, start, motion, restitution, friction, rules, material,
+                        limits, share, struck, spent, sweep_of, crossed, pair_impulse, events, event_times, event_keys,
                         event_values, heap, counts, like,
                     )  # fmt: skip
             chosen = -1
@@ -323,8 +351,13 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 if events[event, 1] == struck[pair_a[p]] and events[event, 2] == struck[pair_b[p]]:
                     chosen = event
                 counts[WAITING] = heap_pop(heap, counts[WAITING], event_times, event_keys)
+            if chosen < 0 and sweeps and clock[UNTIL] < dt:
+                return LEFT
             if chosen < 0:
-                return DONE if not sweeps or clock[UNTIL] >= dt else LEFT
+                for i in range(len(struck) if sweeps else 0):
+                    if 0 < struck[i] < ASIDE and is_thrown(i, start, size, motion[0], like):
+                        struck[i] += ASIDE
+                return DONE
             c = events[chosen, 0]
             counts[LAST], clock[NOW] = c, event_times[chosen]
             if sweeps and events[chosen, 3] == CROSS:
@@ -337,13 +370,13 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 pair_depth[c] = 0.0
             else:
                 bounce(
-                    chosen, dt, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, motion, struck, spent,
-                    pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value,
-                    counts, like,
+                    chosen, dt, sweeps and sweep_of[0] == EVENT_DRIVEN, pair_a, pair_b, position, velocity,
+                    start_velocity, inverse_mass, damping, motion, struck, spent, pair_impulse, pair_normal, pair_point,
+                    pair_depth, events, event_values, log_pair, log_value, counts, like,
                 )  # fmt: skip
             for side in range(2 if sweeps else 0):
                 i = pair_a[c] if side == 0 else pair_b[c]
-                if inverse_mass[i] > 0.0 and struck[i] < STOPPED:
+                if inverse_mass[i] > 0.0 and struck[i] < ASIDE:
                     if events[chosen, 3] == STOP:
                         stop(i, clock[NOW], position, velocity, motion, struck, spent, like)
                     else:

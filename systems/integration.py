@@ -126,7 +126,7 @@ class Integration(System):
         state.allocate_curves(degree)
         second, third = state.scratch["path_second"], state.scratch["path_third"]
         travel = end[:dynamic] - start[:dynamic]
-        if isinstance(integrator, Flight):
+        if isinstance(integrator, Flight) and dynamic:
             self._path[:dynamic], second[:dynamic] = integrator.velocity, integrator.second
             third[:dynamic] = 0.0
             if state.limits_speed:  # whom that may have held back goes straight

@@ -163,10 +163,10 @@ class NarrowPhase(System):
         slop = state.world.settings.slop
         with state.blame:
             return state.kernels.find_swept(
-                dt, state.pair_a, state.pair_b, kept, state.involved, arrays["entity"], scratch["size"],
-                scratch["shape"], scratch["offset"], state.world_shapes, state.motion(arrays["previous_position"]),
-                -1.0 if slop is None else slop, state.sweep_of, state.pair_depth, state.pair_normal, state.pair_point,
-                state.hits, state.hit_a, state.hit_b, state.like,
+                dt, state.pair_a, state.pair_b, kept, state.involved, arrays["entity"], scratch["gravity_share"],
+                scratch["size"], scratch["shape"], scratch["offset"], state.world_shapes,
+                state.motion(arrays["previous_position"]), -1.0 if slop is None else slop, state.sweep_of,
+                state.pair_depth, state.pair_normal, state.pair_point, state.hits, state.hit_a, state.hit_b, state.like,
             )  # fmt: skip
 
     def _find(self, dt: float, first: np.ndarray, second: np.ndarray, *out: np.ndarray) -> tuple[int, ...]:

@@ -113,10 +113,11 @@ class Response(System):
                     self._solver.supported, queue.heads, queue.links, queue.looks, state.rank, scratch["size"],
                     scratch["shape"], scratch["offset"], state.world_shapes, arrays["position"],
                     arrays["linear_velocity"], scratch["start_velocity"], arrays["inverse_mass"],
-                    state.motion(scratch["origin"]), stacks["collider.restitution"], stacks["collider.friction"], rules,
-                    scratch["material"], limits, scratch["gravity_share"], struck, spent, state.sweep_of,
-                    scratch["roam_lower"], scratch["roam_upper"], self._crossed, state.pair_impulse, state.pair_normal,
-                    state.pair_point, state.pair_depth, *queue.arrays, state.like,
+                    arrays["linear_damping"], state.start_positions, state.motion(scratch["origin"]),
+                    stacks["collider.restitution"], stacks["collider.friction"], rules, scratch["material"], limits,
+                    scratch["gravity_share"], struck, spent, state.sweep_of, scratch["roam_lower"],
+                    scratch["roam_upper"], self._crossed, state.pair_impulse, state.pair_normal, state.pair_point,
+                    state.pair_depth, *queue.arrays, state.like,
                 )  # fmt: skip
             if outcome == DONE:
                 break

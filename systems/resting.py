@@ -7,7 +7,7 @@ from typing import Any
 
 from ..framework.compilation import inlined, kernel, part
 from ..framework.vectors import add, add_scaled, dot, row, store, sub
-from .impacts import STOPPED
+from .impacts import ASIDE
 from .mixing import mix_friction
 from .sizes import reach, slop_of, smaller
 
@@ -80,8 +80,8 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
             if not responds[c]:
                 continue
             a, b = pair_a[c], pair_b[c]
-            if struck[a] >= STOPPED or struck[b] >= STOPPED:
-                continue  # time stands still for them
+            if struck[a] >= ASIDE or struck[b] >= ASIDE:
+                continue  # stopped, or thrown from afar
             hit = struck[a] > 0 or struck[b] > 0
             carried = supported[a] or supported[b]
             if not involved[c] and not hit and not carried:

@@ -14,7 +14,7 @@ from ..framework.compilation import inlined, kernel
 from ..framework.vectors import add, add_scaled, item, length, replace, row, scale, store
 from .first_touch import APART
 from .paths import along, along_rate, bend_of, is_straight, relative_path, travel_of
-from .sizes import slop_of, smaller
+from .sizes import reach, smaller
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
 MODES = {"discrete": DISCRETE, "continuous": CONTINUOUS, "event_driven": EVENT_DRIVEN}
@@ -166,8 +166,8 @@ def make_sweep_kernel(first_touch):
 
     @kernel
     def find_swept(
-        dt, pair_a, pair_b, pairs, involved, entity, size, shape_of, offset, shapes, motion, fixed_slop, sweep_of,
-        pair_depth, pair_normal, pair_point, hits, hit_a, hit_b, like,
+        dt, pair_a, pair_b, pairs, involved, entity, share, size, shape_of, offset, shapes, motion, fixed_slop,
+        sweep_of, pair_depth, pair_normal, pair_point, hits, hit_a, hit_b, like,
     ):  # fmt: skip
         """The contacts: pairs that touch at the end or nearly do, which are ``involved`` (m,), and those that are swept
         and touch on their way; returns how many. Their indices and entities go to hits, hit_a, hit_b."""
@@ -181,7 +181,7 @@ def make_sweep_kernel(first_touch):
                 straight = is_straight(a, b, x2, x3, dt, motion, like)
                 touch, t, normal, point, _ = first_touch(
                     shape_of[a], a, shape_of[b], b, x0, x1, x2, x3, straight, 0.0, dt,
-                    slop_of(a, b, size, fixed_slop), shapes, like,
+                    reach(dt, a, b, share, size, fixed_slop), shapes, like,
                 )  # fmt: skip
                 if touch == APART:
                     continue
