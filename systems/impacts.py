@@ -248,7 +248,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         if passive:
             kind = CROSS
         elif spent[a] >= cap or spent[b] >= cap or struck[a] >= MOST_IMPACTS or struck[b] >= MOST_IMPACTS:
-            if not sweeps or not (
+            still = (struck[a] >= ASIDE or inverse_mass[a] == 0.0) and (struck[b] >= ASIDE or inverse_mass[b] == 0.0)
+            if not sweeps or still or not (
                 travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size)
                 or is_thrown(a, start, size, motion[0], like)
                 or is_thrown(b, start, size, motion[0], like)

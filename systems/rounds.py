@@ -64,8 +64,8 @@ def merge_pairs(
             a[found], b[found] = p, q
             passive = sensors[slot_p, p] or sensors[slot_q, q]
             now_responds[found] = not passive and inverse_mass[p] + inverse_mass[q] > 0.0
-            now_involved[found], now_crossed[found] = False, False
-            now_depth[found], now_impulse[found] = -np.inf, 0.0
+            now_involved[found], now_crossed[found] = True, False  # how they stand at the end is not known yet
+            now_depth[found], now_impulse[found] = 0.0, 0.0
             found += 1
     for h in range(len(hits)):
         hits[h] = place[hits[h]]
