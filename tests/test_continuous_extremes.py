@@ -1,0 +1,297 @@
+"""Section C of the accuracy list in the continuous and the event-driven mode: sizes, places, steps and units at the
+ends of their range, contacts that only just are, and equal ids, equal bits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_modes import (
+    along,
+    both_dimensions,
+    bullet,
+    each_mode,
+    each_sweep,
+    mode_world,
+    positions,
+    rows_of,
+    strikes,
+    velocities,
+)
+from worlds import EPS, Conserved, ball, box, floor, make_world, position, run, velocity
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.lab.testing import create_in_order
+
+DT, G = 1 / 60, 9.81
+
+
+# -- sizes, places, steps --------------------------------------------------------------------------
+
+
+@both_dimensions
+@each_sweep
+def test_c4_sizes_from_1e_minus_9_to_1e9(mode, d):
+    """A speck of 1e-9 falls 2000 m onto a moon of 1e9 within a step, and two specks meet far from it: time and
+    exchange to 1e-9. Places near the moon's surface are known to an ulp of 1e9, 1.2e-7 m of 2000."""
+    world = mode_world(mode, d)
+    moon = bullet(world, along(d, 0.0, -1e9), 0.0, radius=1e9, mass=1e27, restitution=1.0)
+    speck = bullet(world, along(d, 0.0, 2000.0), along(d, 0.0, -2.4e5), radius=1e-9, mass=1e-27)
+    hits = strikes(world, 1)
+    assert (hits.entity_a.tolist(), hits.entity_b.tolist()) == ([moon], [speck])
+    assert hits.time[0] == pytest.approx(2000 / 2.4e5, rel=1e-9)
+    assert velocity(world, speck)[1] == pytest.approx(2.4e5, rel=1e-9)
+    assert abs(velocity(world, moon)[1]) < 1e-40
+    assert position(world, speck)[1] == pytest.approx(2000.0, rel=1e-9)
+
+    world = mode_world(mode, d)
+    ball(world, along(d, 0.0, -2e9), radius=1e9, kind="static")
+    a = bullet(world, 0.0, 1e-6, radius=1e-9, mass=2.0, restitution=1.0)
+    b = bullet(world, 1e-8, -1e-6, radius=1e-9, mass=1.0)
+    hits = strikes(world, 1)
+    assert hits.time[0] == pytest.approx(8e-9 / 2e-6, rel=1e-9)
+    np.testing.assert_allclose(velocities(world, [a, b])[:, 0], [-1e-6 / 3, 5e-6 / 3], rtol=1e-9)
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("offset", [0.0, 1e5, 1e7, 1e9, 1e12, 1e15])
+def test_c6_head_on_far_from_the_origin(mode, d, offset):
+    """64 m/s and dt of 1/64: a metre a step, which an ulp of 1e15 (0.125) can tell. Exchange exact everywhere; where,
+    to an ulp of the place for each of the steps and the impact."""
+    world = mode_world(mode, d, dt=1 / 64)
+    place = np.full(d, offset)
+    a = ball(world, place - along(d, 3.5), 64.0, restitution=1.0)
+    b = ball(world, place + along(d, 3.5), -64.0, restitution=1.0)
+    hits = strikes(world, 8)
+    assert len(hits) == 1
+    np.testing.assert_array_equal(velocities(world, [a, b]), [along(d, -64.0), along(d, 64.0)])
+    ulp = np.spacing(offset + 10.0)
+    assert hits.time[0] == pytest.approx(3 / 64, abs=4 * ulp / 64)
+    expected = place[0] + np.array((-3.5 + 3 - 5, 3.5 - 3 + 5))
+    np.testing.assert_allclose(positions(world, [a, b])[:, 0], expected, rtol=0, atol=10 * ulp)
+
+
+@each_mode
+def test_c6_where_a_metre_is_lost(mode):
+    """At 1e16 an ulp is 2 m. Whatever is found there is finite, and neither lost nor faster."""
+    world = mode_world(mode, dt=1 / 64)
+    a, b = (ball(world, (1e16 + x, 0.0), v, restitution=1.0) for x, v in ((-8.0, 64.0), (8.0, -64.0)))
+    kept = Conserved(world)
+    run(world, 20)
+    kept.check()
+    assert position(world, b)[0] > position(world, a)[0]
+
+
+@each_mode
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "rk4"])
+@pytest.mark.parametrize(("dt", "steps"), [(1e-9, 100), (1e-6, 100), (0.25, 80), (1.0, 20), (10.0, 2)])
+def test_c7_steps_from_1e_minus_9_to_10(mode, integrator, dt, steps):
+    """B1 with a floor, e = 1, threshold 0: the arc, folded at the floor by its period 2 u / g, at any step.
+
+    Ten impacts in a step at dt = 10; rounding of the time of each by eps of the step times u.
+    """
+    world = mode_world(mode, gravity=G, dt=dt, integrator=integrator, restitution_threshold=0.0)
+    floor(world)
+    thrown = ball(world, (0.0, 0.1 + 3.0), (1.0, 4.0), radius=0.1, restitution=1.0)
+    run(world, steps)
+    u = math.sqrt(4.0**2 + 2 * G * 3.0)
+    since = (4.0 + u) / G  # from the throw to the first impact
+    late = (steps * dt + (2 * u / G - since)) % (2 * u / G)  # as if it had started from the floor
+    assert velocity(world, thrown)[1] == pytest.approx(u - G * late, abs=1e-10)
+    assert position(world, thrown)[1] - 0.1 == pytest.approx(u * late - G * late**2 / 2, abs=1e-10)
+    assert position(world, thrown)[0] == pytest.approx(steps * dt, rel=1e-13)
+
+
+# -- only just -------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("first", [ball, box])
+@pytest.mark.parametrize("second", [ball, box])
+@pytest.mark.parametrize("speed", [1.0, 1000.0])
+@pytest.mark.parametrize(("sign", "impacts"), [(0.0, 0), (1.0, 0), (-1.0, 1)])
+def test_c14_touching_exactly(mode, d, first, second, speed, sign, impacts):
+    """At rest or separating no impulse, approaching one impact at the start of the step, and no repeat of it."""
+    world = mode_world(mode, d)
+    a = first(world, 0.0, restitution=1.0)
+    b = second(world, 1.0, sign * speed, restitution=1.0)
+    kept = Conserved(world)
+    hits = strikes(world, 10)
+    assert hits.time.tolist() == [0.0] * impacts
+    assert velocity(world, b)[0] - velocity(world, a)[0] == abs(sign * speed)
+    assert (world.contacts.normal_impulse == 0).all()
+    kept.check()
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("beside", [-1e-6, -1e-9, -1e-12, -1e-16, 1e-16, 1e-12, 1e-9])
+def test_c15_grazing(mode, d, beside):
+    """b = sigma (1 + beside): the deflection is 2 acos(b / sigma), 2.8e-6 at 1e-12; a miss does nothing.
+
+    Rounding of the squares is some eps, so of acos some eps / |beside| / 2. What is nearer than 1e-12 may be found or
+    missed, but where it is found it must touch: 1e-9. Here |v.n| = 1.4e-6 |v|, the last that counts.
+    """
+    world = mode_world(mode, d)
+    ball(world, along(d), kind="static", restitution=1.0)
+    impact_parameter = 1.0 + beside
+    mover = bullet(world, along(d, -3.0, impact_parameter), 300.0, radius=0.5, restitution=1.0)
+    hits = strikes(world, 1)
+    v = velocity(world, mover)
+    assert np.hypot(*v[:2]) == pytest.approx(300.0, rel=4 * EPS)
+    turn = math.atan2(v[1], v[0])
+    expected = 2 * math.acos(min(impact_parameter, 1.0))
+    if beside <= -1e-12:
+        assert len(hits) == 1
+        assert turn == pytest.approx(expected, rel=1e-12 + 20 * EPS / abs(beside))
+    else:
+        assert abs(turn) < 2e-6 if abs(beside) < 1e-9 else turn == 0
+    if len(hits):
+        centre = np.array(along(d, -3.0 + 300 * hits.time[0], impact_parameter))
+        assert np.linalg.norm(centre) == pytest.approx(1.0, abs=1e-9)
+
+
+# -- symmetries ------------------------------------------------------------------------------------
+
+
+def brawl(mode, *, turn=lambda v: v, length=1.0, time=1.0, mass=1.0, order=None, d=2, steps=40):
+    """40 balls and boxes, slow ones and bullets, several e and masses, over a floor under gravity and between walls as
+    thin as a bullet; positions and velocities after 40 steps, impacts.
+
+    turn: a symmetry of the plane; length, time, mass: units; order: in which the bodies got their components.
+    """
+    world = mode_world(mode, d, turn(np.array(along(d, 0.0, -G))) * length / time**2, dt=DT * time)
+    walls = [((0.1, -0.5, 0.0), (50.0, 0.5, 50.0), 0.2)]
+    walls += [((x, 5.0, 0.0), (0.05, 50.0, 50.0), 0.9) for x in (-9.0, 9.0)]
+    walls += [((0.1, 5.0, z), (50.0, 50.0, 0.05), 0.9) for z in (-2.0, 2.0)][: 2 * (d - 2)]
+    for centre, half, e in walls:
+        size = np.abs(turn(np.array(half[:d]))) * length
+        world.create_entity(Transform(turn(np.array(centre[:d])) * length), AABBCollider(size, restitution=e))
+    rng, parts = np.random.default_rng(9), []
+    for k in range(40):
+        place, speed = np.array(along(d, rng.uniform(-6, 6), 0.6 + 0.5 * k)), rng.normal(size=d)
+        speed *= 200.0 if k % 4 == 0 else 1.0
+        weight, e, size = rng.uniform(0.5, 2), (0.0, 0.5, 1.0)[k % 3], rng.uniform(0.1, 0.4, d)
+        if k % 2:
+            collider = SphereCollider(size[0] * length, restitution=e)
+        else:
+            collider = AABBCollider(np.abs(turn(size)) * length, restitution=e)
+        body = RigidBody(weight * mass, turn(speed) * length / time)
+        parts.append((Transform(turn(place) * length), body, collider))
+    entities = create_in_order(world, parts, range(40) if order is None else order)
+    hits = strikes(world, steps)
+    rows = rows_of(world, entities)
+    return world.bodies.position[rows].copy(), world.bodies.linear_velocity[rows].copy(), hits
+
+
+@both_dimensions
+@each_mode
+def test_c22_repeated_and_permuted(mode, d):
+    """The same bits when run again, and when the same ids came about in another order; impacts included."""
+    x, v, hits = brawl(mode, d=d)
+    assert len(hits) > 80
+    for order in (None, np.random.default_rng(0).permutation(40).tolist(), list(range(39, -1, -1))):
+        again = brawl(mode, d=d, order=order)
+        np.testing.assert_array_equal(again[0], x)
+        np.testing.assert_array_equal(again[1], v)
+        for name in ("time", "entity_a", "entity_b", "point", "normal", "impulse"):
+            np.testing.assert_array_equal(getattr(again[2], name), getattr(hits, name))
+
+
+@each_mode
+@pytest.mark.parametrize(
+    "turn",
+    [lambda v: v[::-1].copy(), lambda v: v * [-1, 1], lambda v: v * [1, -1]],
+    ids=["swap", "mirror x", "mirror y"],
+)
+def test_c22_mirrored(mode, turn):
+    """2D axes swapped or mirrored: the same bits, mirrored."""
+    x, v, *_ = brawl(mode)
+    found = brawl(mode, turn=turn)
+    np.testing.assert_array_equal(found[0], np.array([turn(row) for row in x]))
+    np.testing.assert_array_equal(found[1], np.array([turn(row) for row in v]))
+
+
+@each_mode
+@pytest.mark.parametrize(
+    ("length", "time", "mass"),
+    [(2.0**20, 1, 1), (2.0**-20, 1, 1), (1, 2.0**-9, 1), (1, 1, 2.0**40), (2.0**-30, 2.0**7, 2.0**-50)],
+)
+def test_c24_other_units(mode, length, time, mass):
+    """Lengths, times and masses in powers of two: bitwise the scaled state and impacts: no tolerance is absolute."""
+    x, v, hits = brawl(mode)
+    found = brawl(mode, length=length, time=time, mass=mass)
+    np.testing.assert_array_equal(found[0], x * length)
+    np.testing.assert_array_equal(found[1], v * length / time)
+    np.testing.assert_array_equal(found[2].time, hits.time * time)
+    np.testing.assert_array_equal(found[2].impulse, hits.impulse * mass * length / time)
+
+
+@both_dimensions
+@each_mode
+def test_c23_galilean(mode, d):
+    """A velocity added to all: relative motion the same to 1e-9, some impacts for each later. Rounding of 700 m, 1e-13,
+    which every impact amplifies by 2 r / sigma, r the way between two: about ten."""
+
+    def cluster(drift):
+        world = mode_world(mode, d)
+        rng = np.random.default_rng(9)
+        for k in range(36):
+            place = np.array(along(d, 1.6 * (k % 6), 1.6 * (k // 6))) + rng.uniform(-0.1, 0.1, d)
+            speed = 50 * (rng.normal(size=d) - 0.6 * (place - along(d, 4.0, 4.0)))
+            (box, ball)[k % 2](world, place, speed + drift, restitution=1.0, mass=rng.uniform(0.5, 2.0))
+        hits = strikes(world, 3)
+        assert len(hits) > 36
+        return positions(world, world.bodies.entity) - drift * 3 * DT, velocities(world, world.bodies.entity) - drift
+
+    for still, drifting in zip(cluster(np.zeros(d)), cluster(np.array(along(d, 1e3, -7e2, 5e2))), strict=True):
+        np.testing.assert_allclose(drifting, still, rtol=0, atol=1e-9)
+
+
+# -- snapshots -------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@each_sweep
+def test_a_restored_snapshot_goes_on_with_the_same_bits(mode, d):
+    """In the middle of impacts, rest and flight: state, impacts and hash of every later step."""
+    world = mode_world(mode, d, G)
+    floor(world, 0.5)
+    rng = np.random.default_rng(2)
+    for k in range(24):
+        shape = {"radius": 0.4} if k % 2 else {"half": 0.4}
+        place = along(d, 0.95 * (k % 6), 0.6 + 0.95 * (k // 6))
+        bullet(world, place, rng.normal(size=d) * (200.0 if k % 5 == 0 else 1.0), restitution=0.1 * (k % 11), **shape)
+    run(world, 15)
+    snapshot, digest = world.snapshot(), world.state_hash()
+
+    def go_on():
+        states = []
+        for _ in range(25):
+            hits = strikes(world, 1)
+            states.append((world.state_hash(), hits.time.tobytes(), hits.entity_b.tobytes(), hits.impulse.tobytes()))
+        return states
+
+    first = go_on()
+    assert sum(len(state[1]) for state in first) > 8 * 10
+    world.restore(snapshot)
+    assert world.state_hash() == digest
+    assert go_on() == first
+
+
+@each_mode
+def test_empty_and_lonely_worlds(mode):
+    """C25: no bodies, none that is moved by impacts, one, and one without a collider."""
+    world = make_world(gravity=G, collision=mode)
+    run(world, 3)
+    cart = ball(world, (0.0, 50.0), 600.0, kind="kinematic")
+    run(world, 3)
+    assert position(world, cart)[0] == pytest.approx(30.0, rel=1e-14)
+    one = ball(world, (0.0, 5.0))
+    bare = world.create_entity(Transform((0.0, 5.0)), RigidBody())
+    run(world, 3)
+    assert velocity(world, one)[1] == velocity(world, bare)[1] == pytest.approx(-G * 3 / 60)
+    assert len(world.contacts) == len(world.contacts.impacts) == 0

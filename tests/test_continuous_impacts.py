@@ -1,0 +1,348 @@
+"""Impacts at their true time, with the step completed: A9, A10, B9, B10, C9 of the accuracy list, kinematic walls and
+the threshold, in the continuous and the event-driven mode."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from helpers_modes import along, both_dimensions, bullet, each_mode, mode_world, positions, strikes, velocities
+from worlds import EPS, ball, box, floor, make_world, position, run, velocity
+
+DT, G = 1 / 60, 9.81
+RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]
+makers = pytest.mark.parametrize("maker", [ball, box])
+# Where the path is the parabola: Verlet; the event-driven flight, whatever the integrator.
+exact = pytest.mark.parametrize(
+    ("mode", "integrator"), [("continuous", "velocity_verlet"), ("event_driven", "semi_implicit_euler")]
+)
+
+
+# -- A9: Jolt's unit tests, with the step completed -------------------------------------------------
+
+
+@exact
+def test_a9_elastic_drop_that_ends_at_the_floor(mode, integrator):
+    """It meets the floor after 1 s but for rounding, and is back where it was after another."""
+    world = mode_world(mode, gravity=G, integrator=integrator)
+    floor(world, 1.0)
+    sphere = ball(world, (0.0, 0.5 + G / 2), restitution=1.0)
+    run(world, 61)
+    assert velocity(world, sphere)[1] == pytest.approx(G - G * DT, abs=1e-12)
+    run(world, 59)
+    assert position(world, sphere)[1] == pytest.approx(0.5 + G / 2, abs=1e-12)
+    assert velocity(world, sphere)[1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a9_elastic_drop_with_semi_implicit_euler():
+    """It touches after 60 steps (sum of 1 to 60 shares g dt^2) and is turned round at the end of that step or at the
+    start of the next, with 60 or 61 shares of speed. The apex is that of 59 or of 61: off by u dt, no more."""
+    world = mode_world("continuous", gravity=G)
+    floor(world, 1.0)
+    share = G * DT
+    start = 0.5 + 1830 * share * DT
+    sphere = ball(world, (0.0, start), restitution=1.0)
+    run(world, 61)
+    assert velocity(world, sphere)[1] / share == pytest.approx(60, abs=1 + 1e-9)
+    run(world, 59)
+    assert position(world, sphere)[1] == pytest.approx(start, abs=61 * share * DT)
+
+
+@both_dimensions
+@each_mode
+def test_a9_spheres_meet_while_they_fall(mode, d):
+    """Radius 1, at -+2 with 5 and -10: the velocities are exchanged along x, y is free fall."""
+    world = mode_world(mode, d, G, restitution_threshold=0.0)
+    a = ball(world, -2.0, 5.0, radius=1.0, restitution=1.0)
+    b = ball(world, 2.0, -10.0, radius=1.0, restitution=1.0)
+    run(world, 60)
+    np.testing.assert_allclose(velocities(world, [a, b]), [along(d, -10, -G), along(d, 5, -G)], atol=1e-12)
+    toi = 2 / 15
+    x = [-2 + 5 * toi - 10 * (1 - toi), 2 - 10 * toi + 5 * (1 - toi)]
+    np.testing.assert_allclose(positions(world, [a, b])[:, 0], x, atol=1e-12)
+
+
+@both_dimensions
+@pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+def test_a9_boxes_at_120_metres_a_second(mode, d):
+    """Half 0.5, at -+1, towards each other: they meet after dt / 4. Discrete they have changed places."""
+    for e in (1.0, 0.0):
+        world = make_world(d, collision=mode)
+        pair = [box(world, -1.0, 120.0, restitution=e), box(world, 1.0, -120.0, restitution=e)]
+        world.step()
+        if mode == "discrete":
+            places, speeds = [1.0, -1.0], [120.0, -120.0]
+        else:
+            places, speeds = ([-2.0, 2.0], [-120.0, 120.0]) if e else ([-0.5, 0.5], [0.0, 0.0])
+        for _ in range(10):
+            np.testing.assert_allclose(velocities(world, pair)[:, 0], speeds, atol=1e-12)
+            np.testing.assert_allclose(positions(world, pair)[:, 0], places, atol=1e-12)
+            assert (positions(world, pair)[:, 1:] == 0).all()
+            world.step()
+            places = [x + v * DT for x, v in zip(places, speeds, strict=True)]
+
+
+# -- A10: Rapier's ---------------------------------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("e", [0.0, 1.0])
+def test_a10_thin_wall(mode, d, e):
+    """Half-width 0.05, a box of half 0.1 from -3 with 200 m/s: it meets the wall after 2.85 / 200 s."""
+    world = mode_world(mode, d)
+    box(world, 0.0, half=along(d, 0.05, 5.0, 5.0), kind="static")
+    mover = box(world, -3.0, 200.0, half=0.1, restitution=e)
+    world.step()
+    left = DT - 2.85 / 200
+    assert velocity(world, mover)[0] == pytest.approx(-200 * e, abs=1e-12)
+    assert position(world, mover)[0] == pytest.approx(-0.15 - 200 * e * left, abs=1e-13)
+    run(world, 10)
+    assert position(world, mover)[0] == pytest.approx(-0.15 - 200 * e * (left + 10 * DT), abs=1e-12)
+
+
+@each_mode
+def test_a10_stack_on_wide_ground(mode):
+    """Three unit boxes on grounds up to 2e6 wide stay where they are: no drift, overlap below the slop."""
+    for half_width in (10.0, 1e3, 1e6):
+        world = mode_world(mode, gravity=G)
+        box(world, (0.0, -0.5), half=(half_width, 0.5), kind="static")
+        stack = [box(world, (0.0, 0.5 + k)) for k in range(3)]
+        run(world, 120)
+        assert (positions(world, stack)[:, 0] == 0).all()
+        overlap = 1.0 - np.diff(positions(world, stack)[:, 1], prepend=-0.5)
+        assert overlap.max() < 0.005
+        assert overlap.min() > -1e-9
+        assert np.abs(velocities(world, stack)).max() < 1e-6
+
+
+# -- B9: two bodies on a line ----------------------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+@makers
+def test_b9_two_bodies(mode, d, maker):
+    """v1' = v1 - (1+e) m2/(m1+m2) w, v2' = v2 + (1+e) m1/(m1+m2) w: 4 eps of the speeds, of the momentum for it.
+
+    Each pair on a lane of its own; they meet after 2/150 s, and complete this step and two more.
+    """
+    world = mode_world(mode, d)
+    v1, v2, toi, end = 100.0, -50.0, 2 / 150, 3 * DT
+    pairs = []
+    for lane, (e, ratio) in enumerate(itertools.product((0.0, 0.5, 1.0, 1.5), RATIOS)):
+        a = maker(world, along(d, -1.5, 4.0 * lane), v1, restitution=e)
+        pairs.append((a, maker(world, along(d, 1.5, 4.0 * lane), v2, mass=ratio, restitution=e), e, ratio))
+    run(world, 3)
+    for a, b, e, ratio in pairs:
+        m1, m2, w = Fraction(1), Fraction(ratio), Fraction(v1) - Fraction(v2)
+        share = (1 + Fraction(e)) * w / (m1 + m2)
+        expected = Fraction(v1) - share * m2, Fraction(v2) + share * m1
+        for entity, start, before, after in ((a, -1.5, v1, expected[0]), (b, 1.5, v2, expected[1])):
+            assert abs(Fraction(velocity(world, entity)[0]) - after) <= 4 * EPS * (abs(v1) + abs(v2)), (e, ratio)
+            assert (velocity(world, entity)[1:] == 0).all()
+            place = start + before * toi + float(after) * (end - toi)
+            assert position(world, entity)[0] == pytest.approx(place, abs=1e-13)  # eps of ten metres, and then some
+        total = Fraction(velocity(world, a)[0]) + m2 * Fraction(velocity(world, b)[0])
+        assert abs(total - (Fraction(v1) + m2 * Fraction(v2))) <= 4 * EPS * (abs(v1) + ratio * abs(v2))
+
+
+@both_dimensions
+@each_mode
+@makers
+@pytest.mark.parametrize(("kind", "speed"), [("static", 0.0), ("kinematic", 0.0), ("kinematic", -50.0)])
+def test_b9_infinite_ratio(mode, d, maker, kind, speed):
+    """v1' = v2 - e (v1 - v2); the wall keeps its course to the bit."""
+    world = mode_world(mode, d)
+    pairs = []
+    for lane, e in enumerate((0.0, 0.5, 1.0, 1.5)):
+        a = maker(world, along(d, -1.5, 4.0 * lane), 100.0, restitution=e)
+        pairs.append((a, maker(world, along(d, 0.5, 4.0 * lane), speed, kind=kind), e))
+    run(world, 2)
+    toi = 1 / (100 - speed)
+    for a, wall, e in pairs:
+        after = speed - e * (100 - speed)
+        assert velocity(world, a)[0] == pytest.approx(after, abs=4 * EPS * 150)
+        assert position(world, a)[0] == pytest.approx(-1.5 + 100 * toi + after * (2 * DT - toi), abs=1e-13)
+        assert velocity(world, wall)[0] == speed
+        assert position(world, wall)[0] == pytest.approx(0.5 + 2 * DT * speed, abs=1e-15)
+
+
+# -- B10: off the centre line ----------------------------------------------------------------------
+
+# p1, toi, normal, then (e, m2, v1', v2'): rational answers, the other body at rest at the origin, radii sum to 1
+OBLIQUE = {
+    2: ((-3, 0.6), 2.2, (0.8, -0.6), ((1.0, 1, (0.36, 0.48), (0.64, -0.48)), (0.5, 3, (0.28, 0.54), (0.24, -0.18)))),
+    3: (
+        (-3, 3 / 7, 6 / 7), 3 - 2 / 7, (2 / 7, -3 / 7, -6 / 7),
+        ((1.0, 1, (45 / 49, 6 / 49, 12 / 49), (4 / 49, -6 / 49, -12 / 49)),),
+    ),
+}  # fmt: skip
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 3, 1.0, 5.0])
+@pytest.mark.parametrize("radius", [0.5, 0.2])
+def test_b10_oblique_impact(mode, d, dt, radius):
+    """Over 16 phases of the step, which may hold the whole scene: time, normal, point and state after to rounding of
+    lanes up to 600 m away (1e-13)."""
+    start, toi, normal, cases = OBLIQUE[d]
+    for e, m2, v1, v2 in cases:
+        world = mode_world(mode, d, dt=dt)
+        lanes = 40.0 * np.arange(16)[:, None] * np.eye(d)[1]
+        shifts = np.arange(16) / 16 * dt
+        first = [
+            bullet(world, np.subtract(start, along(d, shift)) + lane, 1.0, radius=radius, restitution=e)
+            for shift, lane in zip(shifts, lanes, strict=True)
+        ]
+        second = [ball(world, lane, radius=1 - radius, mass=m2) for lane in lanes]
+        steps = math.ceil(toi / dt) + 2
+        hits = strikes(world, steps)
+        order = np.argsort(hits.entity_a)
+        assert hits.entity_a[order].tolist() == first
+        assert hits.entity_b[order].tolist() == second
+        where = np.array(start) + along(d, toi)
+        np.testing.assert_allclose(hits.time[order], toi + shifts, atol=1e-12)
+        np.testing.assert_allclose(hits.normal[order], np.tile(normal, (16, 1)), atol=1e-12)
+        touch = np.tile(where + radius * np.array(normal), (16, 1))
+        np.testing.assert_allclose(hits.point[order] - lanes, touch, atol=1e-12)
+        after = (steps * dt - toi - shifts)[:, None]
+        for entities, origin, new in ((first, where, v1), (second, np.zeros(d), v2)):
+            np.testing.assert_allclose(velocities(world, entities), np.tile(new, (16, 1)), atol=1e-12)
+            np.testing.assert_allclose(positions(world, entities), lanes + origin + np.array(new) * after, atol=5e-12)
+
+
+@each_mode
+@pytest.mark.parametrize("steps", [1, 3, 180])
+def test_b10_state_at_three_seconds(mode, steps):
+    """(-0.512, 0.984) and (0.512, -0.384), in one step or in many."""
+    world = mode_world(mode, dt=3 / steps)
+    a, b = ball(world, (-3, 0.6), 1.0, restitution=1.0), ball(world, 0.0, restitution=1.0)
+    run(world, steps)
+    np.testing.assert_allclose(positions(world, [a, b]), [(-0.512, 0.984), (0.512, -0.384)], atol=1e-12)
+
+
+# -- kinematic walls, threshold, e above 1 ---------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+@makers
+def test_a_piston_drives_a_ball(mode, d, maker):
+    """Between a wall and a piston at 5 m/s, speeds go 100, 110, 120...: each impact turns v into 2 V - v.
+
+    Reference: the impacts one by one; 20 of them, several in one step; rounding of 1e-15 each and of the times.
+    """
+    world = mode_world(mode, d, max_impacts_per_step=50)
+    size = {"radius": 0.1} if maker is ball else {"half": 0.1}
+    mover = maker(world, 1.0, 100.0, restitution=1.0, **size)
+    box(world, -1.0, half=along(d, 1.0, 9.0, 9.0), kind="static")
+    box(world, 3.1, -5.0, half=along(d, 1.0, 9.0, 9.0), kind="kinematic")
+    x, v, t, times, end = 1.0, 100.0, 0.0, [], 16 * DT
+    while True:
+        wait = (2.0 - 5 * t - x) / (v + 5) if v > 0 else (x - 0.1) / -v
+        if t + wait > end:
+            break
+        x, t = x + v * wait, t + wait
+        v = -10 - v if v > 0 else -v
+        times.append(t)
+    hits = strikes(world, 16)
+    assert len(hits) == len(times) > 20
+    np.testing.assert_allclose(hits.time, times, rtol=1e-12)
+    assert velocity(world, mover)[0] == pytest.approx(v, rel=1e-13)
+    assert position(world, mover)[0] == pytest.approx(x + v * (end - t), abs=1e-10)
+    assert world.stats().counters["capped_impacts"] == 0
+
+
+@exact
+def test_a_lift_throws_a_ball(mode, integrator):
+    """A lift goes up at 2 m/s and takes the balls on its way: in its frame each bounce is e times the last."""
+    world = mode_world(mode, gravity=G, integrator=integrator)
+    box(world, (0.0, -0.5), (0.0, 2.0), half=(50.0, 0.5), kind="kinematic")
+    e = np.array([0.5, 0.8, 1.0])
+    balls = [ball(world, (2.0 * k, 3.1), radius=0.1, restitution=r) for k, r in enumerate(e)]
+    run(world, 60)
+    # Relative to the lift: height 3, falling at 2 at first. It strikes with u, flies off with e u.
+    u = math.sqrt(2**2 + 2 * G * 3.0)
+    left = 1.0 - (u - 2) / G
+    np.testing.assert_allclose(velocities(world, balls)[:, 1], 2 + e * u - G * left, rtol=1e-12)
+    heights = 0.1 + 2.0 + e * u * left - G * left**2 / 2
+    np.testing.assert_allclose(positions(world, balls)[:, 1], heights, rtol=1e-12)
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize(("speed", "bounces"), [(99.0, False), (101.0, True)])
+def test_threshold_of_what_is_fast(mode, d, speed, bounces):
+    """Above the threshold the full restitution; below it the body stops at the wall and does not tunnel."""
+    world = mode_world(mode, d, restitution_threshold=100.0)
+    box(world, 0.0, half=along(d, 0.05, 5.0, 5.0), kind="static")
+    mover = ball(world, -1.0, speed, radius=0.1, restitution=0.8)
+    run(world, 2)
+    left = 2 * DT - 0.85 / speed
+    assert velocity(world, mover)[0] == pytest.approx(-0.8 * speed if bounces else 0.0, abs=1e-12)
+    place = -0.15 - 0.8 * speed * left if bounces else -0.15
+    assert position(world, mover)[0] == pytest.approx(place, abs=1e-12 if bounces else 0.005 * 0.2)
+
+
+@each_mode
+def test_what_is_slow_but_tiny_does_not_tunnel(mode):
+    """Its approach of 0.16 m/s is below the default threshold of 2 g dt, but its way of 3 mm a step is 13 times its
+    size, and the sheet is thinner still: no bounce, it stays on top."""
+    world = mode_world(mode, gravity=G, integrator="velocity_verlet")
+    box(world, (0.0, -5e-5), half=(1.0, 5e-5), kind="static")
+    speck = ball(world, (0.0, 1.2e-3), (0.0, -0.05), radius=1e-4, restitution=0.5)
+    run(world, 60)
+    assert position(world, speck)[1] == pytest.approx(1e-4, abs=0.02 * 2e-4)
+    assert velocity(world, speck)[1] == pytest.approx(0.0, abs=1e-9)
+
+
+@exact
+@pytest.mark.parametrize(("factor", "bounces"), [(1.9, False), (2.1, True)])
+def test_default_threshold_is_twice_gravitys_share(mode, integrator, factor, bounces):
+    """Thrown down from close by, so that it strikes within the step, with just less or more than 2 g dt."""
+    world = mode_world(mode, gravity=G, integrator=integrator)
+    floor(world)
+    gap = G * DT**2 / 2
+    down = math.sqrt((factor * G * DT) ** 2 - 2 * G * gap)
+    mover = ball(world, (0.0, 0.1 + gap), (0.0, -down), radius=0.1, restitution=1.0)
+    fastest = -math.inf
+    for _ in range(12):
+        world.step()
+        fastest = max(fastest, velocity(world, mover)[1])
+    assert (fastest > G * DT) == bounces
+    assert fastest > -1e-9
+    if not bounces:
+        assert fastest < 1e-9
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("e", [0.0, 1.0, 1.5])
+def test_c9_restitution_at_and_above_its_ends(mode, d, e):
+    """Off a wall at 300 m/s: -e v; e = 1.5 multiplies the energy by 2.25."""
+    world = mode_world(mode, d)
+    box(world, 0.0, half=along(d, 0.05, 5.0, 5.0), kind="static")
+    mover = ball(world, -1.0, 300.0, radius=0.1, restitution=e)
+    world.step()
+    assert velocity(world, mover)[0] == pytest.approx(-300 * e, abs=4 * EPS * 300)
+
+
+@each_mode
+def test_c9_gain_between_walls_is_capped(mode):
+    """e = 1.5 between two walls: impacts would go on without end in a finite time. Capped, said, finite, inside."""
+    world = mode_world(mode, max_impacts_per_step=8)
+    for x in (-1.0, 2.0):
+        box(world, x, half=(1.0, 9.0), kind="static")
+    mover = ball(world, 0.5, 60.0, radius=0.1, restitution=1.5)
+    for _ in range(30):
+        world.step()
+        assert 0.1 - 1e-9 <= position(world, mover)[0] <= 0.9 + 1e-9
+        assert np.isfinite(velocity(world, mover)).all()
+        assert len(world.contacts.impacts) <= 8
+    assert world.stats().counters["capped_impacts"] > 0
+    assert any("impacts beyond" in fault for fault in world.faults)

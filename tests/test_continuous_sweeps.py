@@ -1,0 +1,385 @@
+"""Nothing jumps through anything: B13, B15 and C5 of the accuracy list as worlds, bullets against bullets, and against
+what stands, filters or lets pass. Continuous, event-driven, and bodies with ``ccd`` in a discrete world."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_modes import (
+    Impacts,
+    along,
+    both_dimensions,
+    bullet,
+    each_mode,
+    each_sweep,
+    mode_world,
+    positions,
+    strikes,
+    velocities,
+)  # fmt: skip
+from worlds import ball, box, make_world, position, run, velocity
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Phase, Plugin, Settings, System, World
+from carom.plugins import Physics
+
+DT = 1 / 60
+
+
+# -- B13: a sphere swept against a box -------------------------------------------------------------
+
+# (y, z), time and normal (sphere to box), in units in which the box is [-1, 1]^3, the sphere has radius 1, starts at
+# x = -5 and comes with 2 along x. What |v.n| = 4.5e-5 of |v| does to rounding of y is 1e-16 / 4.5e-5 of a length.
+GRAZE = math.sqrt(2e-9)
+SWEEPS = [
+    ((0.0, 0.0), 1.5, (1, 0, 0)),
+    ((1.6, 0.0), 1.6, (0.8, -0.6, 0)),
+    ((1 + 3 / 7, 1 + 6 / 7), 13 / 7, (2 / 7, -3 / 7, -6 / 7)),
+    ((2 - 1e-9, 0.0), (4 - GRAZE) / 2, (GRAZE, -1 + 1e-9, 0)),
+    ((2 + 1e-9, 0.0), None, None),
+]
+
+
+@each_sweep
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e4])
+@pytest.mark.parametrize("drift", [0.0, 0.75])
+@pytest.mark.parametrize("case", range(len(SWEEPS)))
+def test_b13_sphere_against_box(mode, unit, drift, case):
+    """All within one step of 3 s: |dt| <= 1e-12 |p| / |v|, the reflected velocity, the rest of the way. Also with both
+    carried along, so that the box moves too; and in 2D where the case is flat."""
+    (y, z), toi, normal = SWEEPS[case]
+    for d in (3,) if z else (2, 3):
+        world = mode_world(mode, d, dt=3.0)
+        wind = unit * np.array(along(d, drift, drift / 2, -drift))
+        target = box(world, along(d), wind, half=unit, kind="kinematic" if drift else "static")
+        start, speed = unit * np.array(along(d, -5.0, y, z)), unit * np.array(along(d, 2.0))
+        mover = bullet(world, start, speed + wind, radius=unit, restitution=1.0)
+        hits = strikes(world, 1)
+        if toi is None:
+            assert len(hits) == 0
+            np.testing.assert_allclose(velocity(world, mover), speed + wind, rtol=1e-15)
+            continue
+        assert hits.entity_a.tolist() == [target]
+        assert hits.entity_b.tolist() == [mover]
+        loose = 1.0 if case != 3 else 1 / GRAZE
+        assert hits.time[0] == pytest.approx(toi, abs=1e-12 * 2.5 if case != 3 else 2e-16 * 5 * loose)
+        n = np.array(along(d, *normal))
+        np.testing.assert_allclose(hits.normal[0], -n, atol=2e-15 * loose)
+        at = start + speed * toi
+        np.testing.assert_allclose(hits.point[0] / unit, (at + wind * toi) / unit + n, atol=5e-15 * loose)
+        after = speed - 2 * (speed @ n) * n
+        np.testing.assert_allclose(velocity(world, mover) / unit, (after + wind) / unit, atol=5e-15 * loose)
+        place = at + after * (3 - toi) + 3 * wind
+        np.testing.assert_allclose(position(world, mover) / unit, place / unit, atol=2e-14 * loose)
+
+
+@both_dimensions
+@each_sweep
+def test_b13_tangent_point_and_overlap(mode, d):
+    """A tangent touches without impulse; a point is a ray; who overlaps is dealt with at t = 0, if it approaches.
+
+    Rounding of the squares leaves the tangent a cosine of sqrt(eps) at most: 3e-8 of the speed, taken twice, and more.
+    """
+    world = mode_world(mode, d, dt=3.0)
+    box(world, along(d), half=1.0, kind="static")
+    tangent = bullet(world, along(d, -5.0, 2.0), 2.0, radius=1.0, restitution=1.0)
+    run(world, 1)
+    np.testing.assert_allclose(velocity(world, tangent), along(d, 2.0), atol=2 * 1e-7 * 2)
+    np.testing.assert_allclose(position(world, tangent), along(d, 1.0, 2.0), atol=2 * 1e-7 * 3)
+
+    world = mode_world(mode, d, dt=3.0)
+    box(world, along(d), half=1.0, kind="static")
+    point = bullet(world, -5.0, 2.0, radius=0.0, restitution=1.0)
+    assert strikes(world, 1).time.tolist() == pytest.approx([2.0], abs=1e-12)
+    assert position(world, point)[0] == pytest.approx(-3.0, abs=1e-12)
+
+    for speed in (60.0, -60.0):
+        world = mode_world(mode, d)
+        box(world, along(d), half=1.0, kind="static")
+        inside = bullet(world, -1.75, along(d, speed, 30.0), radius=1.0, restitution=1.0)
+        hits = strikes(world, 1)
+        assert hits.time.tolist() == ([0.0] if speed > 0 else [])
+        np.testing.assert_allclose(velocity(world, inside), along(d, -60.0, 30.0), atol=1e-12)
+
+
+# -- C5: a thin wall at any speed ------------------------------------------------------------------
+
+
+@both_dimensions
+@each_sweep
+def test_c5_thin_wall(mode, d):
+    """R = 0.1, wall 0.1 thick, 1 to 1e6 m/s, e = 1 and 0, eight phases of the step: all bounce or stop, where and when
+    they should (eps of the way, which is up to 2e4 m a step)."""
+    world = mode_world(mode, d)
+    box(world, 0.05, half=along(d, 0.05, 1e3, 1e3), kind="static")
+    shots = []
+    for k, (v, e, phase) in enumerate(
+        (v, e, phase) for v in (1, 5, 10, 20, 50, 100, 1e3, 1e6) for e in (1.0, 0.0) for phase in range(8)
+    ):
+        gap = (phase / 4 + 0.1) * v * DT
+        shots.append((bullet(world, along(d, -0.1 - gap, 2.0 * k - 128), v, restitution=e), v, e, gap / v))
+    run(world, 3)
+    assert velocity(world, shots[0][0])[0] == -1
+    for entity, v, e, toi in shots:
+        assert velocity(world, entity)[0] == pytest.approx(-e * v, abs=1e-12 * v), (v, e)
+        place = -0.1 - e * v * (3 * DT - toi)
+        assert position(world, entity)[0] == pytest.approx(place, abs=1e-15 * v + (1e-12 if e else 0.005 * 0.2)), (v, e)
+    run(world, 30)
+    assert (positions(world, [shot[0] for shot in shots])[:, 0] < -0.099).all()
+
+
+def test_c5_without_it_bullets_pass():
+    """The same wall discrete: at 100 m/s a step of 1.7 m leads through it. What is tested here can fail."""
+    world = make_world()
+    box(world, 0.05, half=(0.05, 1e3), kind="static")
+    bullets = [ball(world, (-0.1 - 0.3 * k, 2.0 * k), 100.0, radius=0.1, restitution=1.0) for k in range(8)]
+    run(world, 4)
+    assert (positions(world, bullets)[:, 0] > 0).any()
+
+
+# -- B15: many passes in one step ------------------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+def test_b15_a_thousand_passes(mode, d, radius):
+    """Between walls with room for 1 m, 1000 m/s: after 60 steps 1000 impacts, and where it started, to rounding."""
+    world = mode_world(mode, d, max_impacts_per_step=100)
+    for side in (-1, 1):
+        box(world, side * (0.5 + radius + 0.5), half=along(d, 0.5, 5.0, 5.0), kind="static")
+    mover = bullet(world, 0.0, 1000.0, radius=radius, restitution=1.0)
+    hits = strikes(world, 60)
+    np.testing.assert_allclose(hits.time, (np.arange(1000) + 0.5) / 1000, rtol=1e-12)
+    assert (np.diff(hits.time) > 0).all()
+    assert position(world, mover)[0] == pytest.approx(0.0, abs=1e-11)
+    assert velocity(world, mover)[0] == 1000.0
+    assert world.stats().counters["capped_impacts"] == 0
+
+
+@both_dimensions
+@pytest.mark.parametrize(("mode", "e"), [("continuous", 1.0), ("continuous", 0.9), ("event_driven", 0.9)])
+def test_b15_beyond_the_cap(mode, e, d):
+    """Sixteen passes a step and a cap of eight: it is said, and the ball stays between the walls, at speed."""
+    world = mode_world(mode, d, max_impacts_per_step=8)
+    for side in (-1, 1):
+        box(world, side * 1.1, half=along(d, 0.5, 5.0, 5.0), kind="static")
+    mover = bullet(world, 0.0, 1000.0, radius=0.1, restitution=e)
+    capped, speed = 0, 1000.0
+    for _ in range(60 if e == 1 else 2):
+        world.step()
+        now = abs(velocity(world, mover)[0])
+        assert abs(position(world, mover)[0]) <= 0.5 + 1e-9
+        assert len(world.contacts.impacts) <= 8
+        assert now == pytest.approx(speed * e ** len(world.contacts.impacts), rel=1e-12)
+        capped, speed = capped + world.stats().counters["capped_impacts"], now
+    assert capped > 0
+    assert any("impacts beyond 8 of a body in one step" in fault for fault in world.faults)
+
+
+@pytest.mark.parametrize(("mode", "e"), [("continuous", 1.0), ("event_driven", 0.999), ("ccd", 1.0)])
+def test_b15_beyond_the_default_cap(mode, e):
+    """Hundreds of passes a step with no cap given: said as well, and inside for as long as it goes on."""
+    world = mode_world(mode)
+    for side in (-1, 1):
+        box(world, side * 1.1, half=(0.5, 5.0), kind="static")
+    mover = bullet(world, 0.0, 1e5, radius=0.1, restitution=e)
+    for _ in range(10):
+        world.step()
+        assert abs(position(world, mover)[0]) <= 0.5 + 1e-9
+        assert abs(velocity(world, mover)[0]) <= 1e5
+        assert world.stats().counters["capped_impacts"] > 0
+    assert any("of a body in one step" in fault for fault in world.faults)
+
+
+def test_b15_elastic_impacts_are_not_capped_when_event_driven():
+    world = mode_world("event_driven", max_impacts_per_step=1)
+    for side in (-1, 1):
+        box(world, side * 1.0, half=(0.5, 5.0), kind="static")
+    mover = ball(world, 0.0, 1000.0, radius=0.0, restitution=1.0)
+    assert len(strikes(world, 60)) == 1000
+    assert position(world, mover)[0] == pytest.approx(0.0, abs=1e-11)
+    assert world.stats().counters["capped_impacts"] == 0
+
+
+# -- bullets against bullets -----------------------------------------------------------------------
+
+
+def meet(rng, d, shapes):
+    """Where b is relative to a when they touch, and the normal from a to b. Balls of 0.1, boxes of half 0.1."""
+    normal = rng.normal(size=d)
+    normal /= np.linalg.norm(normal)
+    if shapes == "ball, ball":
+        return 0.2 * normal, normal
+    axis, side = rng.integers(d), rng.choice([-1.0, 1.0])
+    face = side * np.eye(d)[axis]
+    slide = rng.uniform(-0.08, 0.08, d) * (np.arange(d) != axis)
+    if shapes == "box, box":
+        return 0.2 * face + 2 * slide, face
+    if shapes == "box, ball: face":
+        return 0.2 * face + slide, face
+    signs, normal = rng.choice([-1.0, 1.0], d), rng.uniform(0.3, 1.0, d)
+    normal *= signs / np.linalg.norm(normal)
+    return 0.1 * signs + 0.1 * normal, normal
+
+
+@both_dimensions
+@each_sweep
+@pytest.mark.parametrize("shapes", ["ball, ball", "box, box", "box, ball: face", "box, ball: corner"])
+def test_two_bullets_meet(mode, d, shapes):
+    """40 pairs, traced back from where they touch within the step: time, normal, velocities and places after.
+
+    At 1e3 to 1e5 m/s they come from up to 3 km away and overlap for less than 1e-4 of the step. The tangential planes
+    part them before, for both are convex. Rounding: eps of the way, divided by the size for the normal of what is
+    curved, by the cosine of 0.3 at least for the time.
+    """
+    rng = np.random.default_rng(d)
+    world = mode_world(mode, d)
+    make = {"ball": {"radius": 0.1}, "box": {"half": 0.1}}
+    first, second = (make[name.split(":")[0]] for name in shapes.split(", "))
+    expected = []
+    for lane in range(40):
+        offset, normal = meet(rng, d, shapes)
+        toi, speed = rng.uniform(0, DT), 10 ** rng.uniform(3, 5)
+        e, mass = rng.choice([1.0, 0.5]), 10 ** rng.uniform(-1, 1)
+        across = rng.normal(size=d)
+        across -= (across @ normal) * normal
+        cosine = rng.uniform(0.3, 1.0)
+        w = speed * (math.sqrt(1 - cosine**2) * across / np.linalg.norm(across) - cosine * normal)  # of b seen from a
+        wind = rng.normal(size=d) * 10
+        va, vb = wind - w / 2, wind + w / 2
+        where = along(d, 0.0, 1e4 * lane)
+        a = bullet(world, where - va * toi, va, restitution=e, **first)
+        b = bullet(world, where + offset - vb * toi, vb, mass=mass, restitution=e, **second)
+        impulse = -(1 + e) * (w @ normal) / (1 + 1 / mass)
+        after = va - impulse * normal, vb + impulse / mass * normal
+        places = where + after[0] * (DT - toi), where + offset + after[1] * (DT - toi)
+        expected.append((a, b, toi, normal, impulse, after, places, speed))
+    hits = strikes(world, 1)
+    assert len(hits) == 40
+    for a, b, toi, normal, impulse, after, places, speed in expected:
+        (k,) = np.flatnonzero(hits.entity_a == a)
+        rounding = 1e-15 * (4e5 + speed * DT)  # of the places, lanes being up to 4e5 m away
+        assert hits.entity_b[k] == b
+        assert hits.time[k] == pytest.approx(toi, abs=10 * rounding / speed)
+        np.testing.assert_allclose(hits.normal[k], normal, atol=100 * rounding)
+        assert hits.impulse[k] == pytest.approx(impulse, rel=200 * rounding)
+        for entity, v, x in zip((a, b), after, places, strict=True):
+            np.testing.assert_allclose(velocity(world, entity), v, atol=200 * rounding * speed)
+            np.testing.assert_allclose(position(world, entity), x, atol=200 * rounding * (1 + speed * DT))
+
+
+# -- bullets among others --------------------------------------------------------------------------
+
+
+def field(with_bullets):
+    """A discrete world: slow balls and boxes that bounce about, thin plates further on, two bullets at the plates."""
+    world = make_world()
+    rng = np.random.default_rng(3)
+    slow = []
+    for k in range(40):
+        place = 1.1 * np.array([k % 8, k // 8]) + rng.uniform(-0.05, 0.05, 2)
+        make, size = ((ball, "radius"), (box, "half"))[k % 2]
+        slow.append(make(world, place, rng.normal(size=2) * 3, **{size: 0.3}, restitution=1.0))
+    plates = [box(world, (100.0 + 5 * k, 50.0), half=(0.01, 1.0), mass=3.0) for k in range(3)]
+    bullets = []
+    if with_bullets:
+        for y, fast in ((50.0, True), (50.5, False)):
+            body = RigidBody(1.0, (1000.0, 0.0), ccd=fast)
+            bullets.append(world.create_entity(Transform((90.0, y)), body, SphereCollider(0.05, restitution=1.0)))
+    run(world, 20)
+    return world, slow, plates, bullets
+
+
+def test_one_bullet_in_a_discrete_world():
+    """It strikes the first plate after 9.94 ms: 1 kg on 3 kg, e = 1: -500 and 500; that plate drives the second, e = 0.
+    The bullet without ccd passes all of them. Slow bodies elsewhere: the same bits as without bullets."""
+    world, slow, plates, bullets = field(True)
+    without, same, *_ = field(False)
+    np.testing.assert_array_equal(positions(world, slow), positions(without, same))
+    np.testing.assert_array_equal(velocities(world, slow), velocities(without, same))
+    assert velocity(world, bullets[0])[0] == pytest.approx(-500.0, rel=1e-12)
+    struck = 9.94 / 1000
+    assert position(world, bullets[0])[0] == pytest.approx(99.94 - 500 * (20 * DT - struck), rel=1e-12)
+    assert velocity(world, bullets[1])[0] == 1000.0
+    assert velocity(world, plates[0])[0] > 0
+    assert world.momentum()[0] == pytest.approx(without.momentum()[0] + 2000.0, rel=1e-12)
+
+
+@each_sweep
+def test_a_bullet_and_its_partners_partners(mode):
+    """A bullet strikes a ball that had nothing near it, which then flies into another far away, all in one step."""
+    world = mode_world(mode)
+    chain = [bullet(world, -10.0, 6000.0, restitution=1.0)]
+    chain += [bullet(world, 20.0 * k, 0.0, restitution=1.0) for k in range(4)]
+    box(world, 80.0, half=(0.01, 5.0), kind="static")
+    hits = strikes(world, 1)
+    order = [(chain[k], chain[k + 1]) for k in range(4)]
+    assert list(zip(hits.entity_a.tolist(), hits.entity_b.tolist(), strict=True))[:4] == order
+    # 9.8 m, three times 19.8, 19.89 to the wall, and the rest of the 100 m of the step back.
+    back = 100 - 9.8 - 3 * 19.8 - 19.89
+    assert hits.time[4] == pytest.approx((100 - back) / 6000, rel=1e-12)
+    assert position(world, chain[4])[0] == pytest.approx(79.89 - back, rel=1e-12)
+    assert velocities(world, chain)[:, 0].tolist() == pytest.approx([0, 0, 0, 0, -6000], abs=1e-9)
+
+
+# -- who is not meant ------------------------------------------------------------------------------
+
+
+class Disable(System):
+    """Clears ``enabled`` of every contact, between NARROW and RESPONSE."""
+
+    phase = Phase.NARROW
+
+    def process(self, dt):
+        self.world.contacts.enabled[:] = False
+
+
+strangers = Plugin("strangers")
+
+
+@strangers.pair_filter
+def not_next_to_each_other(bodies, a, b):
+    return bodies.entity[b] - bodies.entity[a] != 1
+
+
+def shot(mode, *, disable=False, plugins=(), wall_is=None, **bullet_is) -> tuple[np.ndarray, np.ndarray, Impacts]:
+    settings = Settings(collision="discrete" if mode == "ccd" else mode)
+    world = World(Physics(dimensions=2), *plugins, settings=settings)
+    if disable:
+        world.add_system(Disable())
+    wall = AABBCollider((0.05, 5.0), **(wall_is or {}))
+    world.create_entity(Transform((0.0, 0.0)), wall)
+    mover = bullet(world, (-20.0, 0.0), (1000.0, 3.0), restitution=1.0, **bullet_is)
+    hits = strikes(world, 5)
+    return position(world, mover), velocity(world, mover), hits
+
+
+@each_sweep
+@pytest.mark.parametrize(
+    "why",
+    [
+        {"disable": True},
+        {"plugins": (strangers,)},
+        {"mask": 2},
+        {"wall_is": {"mask": 2}},
+        {"sensor": True},
+        {"wall_is": {"sensor": True}},
+    ],
+    ids=["disabled", "filtered", "bullet's mask", "wall's mask", "sensor bullet", "sensor wall"],
+)
+def test_bullets_pass_what_they_do_not_meet(mode, why):
+    """The same bits as without a wall in the way; with it and nothing else, the bullet comes back."""
+    x, v, hits = shot(mode)
+    assert len(hits) == 1
+    assert v.tolist() == [-1000.0, 3.0]
+    assert x[0] < -20
+    free = mode_world(mode)
+    mover = bullet(free, (-20.0, 0.0), (1000.0, 3.0))
+    run(free, 5)
+    x, v, hits = shot(mode, **why)
+    assert len(hits) == 0
+    np.testing.assert_array_equal(x, position(free, mover))
+    np.testing.assert_array_equal(v, velocity(free, mover))

@@ -1,0 +1,300 @@
+"""``Settings(collision="event_driven")``: all impacts of a step in the order of time. B16 and B17 of the accuracy list,
+sequences without end, piles, simultaneous impacts; flight exact under gravity, of second order under other forces."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from helpers_modes import along, both_dimensions, bullet, each_mode, mode_world, positions, strikes, velocities
+from worlds import Conserved, ball, box, floor, make_world, position, run, velocity
+
+from carom.components import RigidBody, Transform
+from carom.framework import ForceSystem, Settings
+from carom.scenes import galperin, pile2d
+
+DT, G = 1 / 60, 9.81
+makers = pytest.mark.parametrize("maker", [ball, box])
+
+
+# -- B16: Newton's cradle --------------------------------------------------------------------------
+
+
+@each_mode
+@makers
+@pytest.mark.parametrize("speed", [1.0, 120.0])
+@pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
+@pytest.mark.parametrize("arriving", [1, 2, 3, 4])
+def test_b16_cradle(mode, maker, speed, gap, arriving):
+    """k arrive, k leave, one impact after the other at any gap; also at 2 m a step, when all is over within one.
+
+    Equal bodies exchange velocities: but for their widths they pass through each other, so places at any time are the
+    sorted free flights plus the widths.
+    """
+    world = mode_world(mode, max_impacts_per_step=20)
+    start = np.arange(5) * (1 + gap)
+    start[:arriving] -= 0.3 + np.arange(arriving)[::-1] * gap
+    speeds = np.where(np.arange(5) < arriving, speed, 0.0)
+    row = [maker(world, x, v, restitution=1.0) for x, v in zip(start, speeds, strict=True)]
+    kept, seen = Conserved(world), 0
+    for step in range(1, 61):
+        seen += np.count_nonzero(strikes(world, 1).impulse > 1e-12 * speed)  # what rounding leaves may touch again
+        if step in (1, 15, 20, 60):
+            flown = np.sort(start - np.arange(5) + speeds * step * DT) + np.arange(5)
+            np.testing.assert_allclose(positions(world, row)[:, 0], flown, rtol=1e-13, atol=1e-12)
+    np.testing.assert_allclose(velocities(world, row)[:, 0], np.sort(speeds), atol=1e-12 * speed)
+    assert seen == arriving * (5 - arriving)
+    kept.check()
+
+
+# -- B17: Galperin's blocks ------------------------------------------------------------------------
+
+
+def check_galperin(settings, digits, seconds):
+    """Count ceil(pi / atan(sqrt(m/M))) - 1; impact j at 2 - 1 / (sqrt(M) tan(j atan(sqrt(m/M)))), which is where the
+    straight line of the unfolded wedge crosses the j-th copy of its side; energy 1e-9."""
+    world = galperin.build(settings, digits=digits)
+    energy = world.kinetic_energy()
+    hits = strikes(world, round(seconds / settings.dt))
+    ratio = 10.0**digits
+    count = math.ceil(math.pi / math.atan(1 / ratio)) - 1
+    assert len(hits) == count == galperin.impacts(digits)
+    assert world.kinetic_energy() == pytest.approx(energy, rel=1e-9)
+    assert world.stats().counters["capped_impacts"] == 0
+    j = np.arange(1, count + 1)
+    np.testing.assert_allclose(hits.time, 2 - 1 / (ratio * np.tan(j * math.atan(1 / ratio))), atol=1e-8)
+    assert (hits.entity_a == np.where(j % 2, 2, 1)).all()  # blocks, wall, blocks, wall...
+    return hits
+
+
+@each_mode
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 60, 1.0])
+@pytest.mark.parametrize("digits", [0, 1, 2, 3])
+def test_b17_galperin(mode, dt, digits):
+    """Several impacts of one pair in a step: at dt = 1 all but the first and the last few fall into one."""
+    settings = Settings(collision=mode, dt=dt, max_impacts_per_step=10_000)
+    hits = check_galperin(settings, digits, 9.0)
+    if dt == 1.0 and digits >= 2:
+        assert np.count_nonzero((hits.time > 1) & (hits.time < 3) & (hits.entity_a == 1)) > 100
+
+
+@each_mode
+def test_b17_galperin_31415(mode):
+    check_galperin(Settings(collision=mode, max_impacts_per_step=100_000), 4, 4.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("digits", [5, 6])
+def test_b17_galperin_3141592(digits):
+    check_galperin(Settings(collision="event_driven"), digits, 6.0)
+
+
+# -- order of time ---------------------------------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+def test_impacts_are_told_in_the_order_of_time(mode, d):
+    """A crowd of fast balls and boxes in a closed room: within each step ordered by (time, a, b), impulses positive,
+    normals of length 1, times within the step."""
+    world = mode_world(mode, d, max_impacts_per_step=1000)
+    for axis in range(d):
+        for side in (-1, 1):
+            half = np.full(d, 7.0)
+            half[axis] = 1.0
+            box(world, side * 6.0 * np.eye(d)[axis], half=half, kind="static", restitution=1.0)
+    rng = np.random.default_rng(1)
+    cells = np.stack(np.meshgrid(*[np.arange(-2, 3) * 2.0] * d), axis=-1).reshape(-1, d)[:50]
+    for k, place in enumerate(cells):
+        size = {"radius": 0.5} if k % 3 else {"half": 0.5}
+        bullet(world, place, rng.normal(size=d) * 100, mass=rng.uniform(1, 3), restitution=1.0, **size)
+    kept, most, pairs = Conserved(world), 0, 0
+    for _ in range(30):
+        world.step()
+        rows = world.contacts.impacts
+        order = np.lexsort((rows.entity_b, rows.entity_a, rows.time_of_impact))
+        assert (order == np.arange(len(rows))).all()
+        assert (rows.time_of_impact >= 0).all()
+        assert (rows.time_of_impact <= DT).all()
+        assert (rows.normal_impulse > 0).all()
+        np.testing.assert_allclose(np.linalg.norm(rows.normal, axis=1), 1, rtol=1e-14)
+        most = max(most, len(rows))
+        pairs += len(rows) - len(set(zip(rows.entity_a.tolist(), rows.entity_b.tolist(), strict=True)))
+    assert most > 50
+    assert pairs > 0  # several of one pair in one step
+    kept.check(momentum=False)
+    assert world.kinetic_energy() == pytest.approx(kept.energy, rel=1e-12)
+
+
+@each_mode
+@pytest.mark.parametrize("upper_first", [False, True])
+def test_simultaneous_impacts_are_taken_one_after_the_other(mode, upper_first):
+    """A ball strikes two at the same moment, mirror images: the pair of smaller ids first, as if it came alone; then
+    the other with what is left. n1.n2 = 1/2: the impulses are v cos 30 and half of it."""
+    world = mode_world(mode)
+    cue = bullet(world, -3.0, 300.0, radius=0.5, restitution=1.0)
+    up, down = (math.cos(math.pi / 6), 0.5), (math.cos(math.pi / 6), -0.5)
+    order = (up, down) if upper_first else (down, up)
+    pair = [bullet(world, np.multiply(n, 1.0), 0.0, radius=0.5, restitution=1.0) for n in order]
+    hits = strikes(world, 1)
+    assert hits.entity_b.tolist() == pair
+    assert hits.time.tolist() == pytest.approx([0.01, 0.01], rel=1e-12)
+    c = 300 * math.cos(math.pi / 6)
+    expected = [np.array((300.0, 0.0)) - c * np.array(order[0]) - c / 2 * np.array(order[1])]
+    expected += [c * np.array(order[0]), c / 2 * np.array(order[1])]
+    np.testing.assert_allclose(velocities(world, [cue, *pair]), expected, atol=1e-9)
+
+
+# -- sequences without end -------------------------------------------------------------------------
+
+
+@each_mode
+@pytest.mark.parametrize("speed", [1.0, 100.0])
+def test_inelastic_collapse_ends(mode, speed):
+    """A line of 20 with e = 0.3 that closes on itself: infinitely many impacts in a finite time. Bounded work in every
+    step, nobody through anybody, momentum kept, energy never raised, and in the end nobody approaches.
+
+    A row that is pressed together overlaps for a moment, the deeper the faster, and is thrown apart a little, as in the
+    discrete mode: a limit of the solver for contacts at rest. Nobody gets past another.
+    """
+    world = mode_world(mode)
+    start = 1.2 * np.arange(20)
+    line = [bullet(world, x, speed * (1 - x / 11.4), radius=0.5, restitution=0.3) for x in start]
+    kept, energy, most = Conserved(world), world.kinetic_energy(), 0
+    for _ in range(240):
+        world.step()
+        most = max(most, len(world.contacts.impacts))
+        now = world.kinetic_energy()
+        assert now <= energy + 0.1 * kept.energy
+        energy = now
+        assert (np.diff(positions(world, line)[:, 0]) > (0.98 if speed == 1.0 else 0.0)).all()
+    assert most <= 20 * 64 / 2 + 20
+    assert energy < 0.1 * kept.energy
+    kept.check()
+
+
+@each_mode
+@pytest.mark.parametrize(("count", "speed"), [(10, 60.0), (10, 600.0), (4, 1000.0)])
+@pytest.mark.parametrize("e", [0.0, 0.3])
+def test_a_row_collapses_against_a_wall(mode, e, count, speed):
+    """Balls thrown at a wall one behind the other: most of the energy is gone, nobody gets past another or the wall,
+    whose middle is at 20.5: at most half a ball is in it for a moment."""
+    world = mode_world(mode)
+    box(world, 20.5, half=(0.5, 5.0), kind="static")
+    line = [bullet(world, 1.1 * k, speed, radius=0.5, restitution=e) for k in range(count)]
+    energy = world.kinetic_energy()
+    for _ in range(120):
+        world.step()
+        x = positions(world, line)[:, 0]
+        assert (np.diff(x) > 0).all()
+        assert x[-1] < 20.0
+    assert world.kinetic_energy() < 0.09 * energy
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_pile_comes_to_rest(e):
+    """60 discs fall into a bin: at rest after 8 s, nobody outside, overlap below 2 % of a size."""
+    world = pile2d.build(Settings(collision="event_driven"), n=60)
+    world.bodies.sphere_collider.restitution[:] = e
+    run(world, 480)
+    moving = world.bodies.dynamic
+    assert np.abs(moving.linear_velocity).max() < 1e-3
+    assert world.contacts.depth.max() < 0.02
+    assert (moving.position > 0.45).all()
+    assert len(moving) == 60
+
+
+@each_mode
+@both_dimensions
+@makers
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_a_stack_stands(mode, d, maker, e):
+    """Five above each other, dropped from a hand's breadth each: still after 4 s, no drift, within the slop."""
+    world = mode_world(mode, d, G)
+    floor(world)
+    stack = [maker(world, along(d, 0.0, 0.5 + 1.05 * (k + 1)), restitution=e) for k in range(5)]
+    run(world, 240)
+    assert np.abs(velocities(world, stack)).max() < 1e-6
+    places = positions(world, stack)
+    assert (places[:, 0] == 0).all()
+    np.testing.assert_allclose(places[:, 1], np.arange(5) + 0.5, atol=5 * 0.005)
+
+
+# -- flight ----------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 7, 1.0, 5.0])
+def test_flight_is_the_exact_parabola(d, dt):
+    """Gravity, its scale, constant forces, forces applied for a step: rounding at any dt, same bits whatever the
+    integrator is called."""
+    found = []
+    for integrator in ("semi_implicit_euler", "rk4"):
+        world = make_world(d, G, dt=dt, collision="event_driven", integrator=integrator)
+        force, push = np.array(along(d, 3.0, 1.0, -2.0)), np.array(along(d, 0.5, 4.0, 1.0))
+        body = RigidBody(2.0, along(d, 1.0, 10.0, -3.0), constant_force=force, gravity_scale=0.5)
+        flier = world.create_entity(Transform(along(d, 0.0, 3.0)), body)
+        run(world, 3)
+        world.component_for_entity(flier, RigidBody).apply_force(push)
+        run(world, 4)
+        a, b = np.array(along(d, 0.0, -0.5 * G)) + force / 2, push / 2
+        v3, x3 = along(d, 1.0, 10.0, -3.0) + a * 3 * dt, along(d, 0.0, 3.0) + np.array(
+            along(d, 1.0, 10.0, -3.0)) * 3 * dt + a * (3 * dt) ** 2 / 2
+        v4, x4 = v3 + (a + b) * dt, x3 + v3 * dt + (a + b) * dt**2 / 2
+        v7, x7 = v4 + a * 3 * dt, x4 + v4 * 3 * dt + a * (3 * dt) ** 2 / 2
+        np.testing.assert_allclose(velocity(world, flier), v7, rtol=1e-14)
+        np.testing.assert_allclose(position(world, flier), x7, rtol=1e-14)
+        found.append((velocity(world, flier).tolist(), position(world, flier).tolist()))
+    assert found[0] == found[1]
+
+
+class Anchor(ForceSystem):
+    """A spring of 4 N/m to the origin."""
+
+    def add_forces(self, bodies, time):
+        bodies.force[:] -= 4.0 * bodies.position
+
+
+def deviation(n, exact, *systems, gravity=0.0, **body):
+    """From the exact (position, velocity) after 1 s in n steps, of a body of 1 kg from (1, 0) with (0.5, 2)."""
+    world = make_world(gravity=gravity, dt=1 / n, collision="event_driven")
+    for system in systems:
+        world.add_system(system())
+    flier = world.create_entity(Transform((1.0, 0.0)), RigidBody(1.0, (0.5, 2.0), **body))
+    run(world, n)
+    return np.abs(np.concatenate((position(world, flier) - exact[0], velocity(world, flier) - exact[1]))).max()
+
+
+def test_other_forces_are_of_second_order():
+    """Spring: half a kick at both ends of the step. Under gravity too, and with damping: half the step, a quarter of
+    the error, within 5 %; without gravity the damped velocity is exact."""
+    x, v = np.array((1.0, 0.0)), np.array((0.5, 2.0))
+    sag = np.array((0.0, -G / 4))
+    spring = [
+        sag + (x - sag) * math.cos(2.0) + v / 2 * math.sin(2.0), v * math.cos(2.0) - 2 * (x - sag) * math.sin(2.0)
+    ]  # fmt: skip
+    coarse, fine = (deviation(n, spring, Anchor, gravity=G) for n in (50, 100))
+    assert coarse / fine == pytest.approx(4, rel=0.05)
+    assert coarse < (2 / 50) ** 2 * 3 * 2  # z^2 of the amplitude of 3 m, 6 m/s
+
+    c, g = 1.5, np.array((0.0, -G))
+    fade = math.exp(-c)
+    damped = [x + g / c + (v - g / c) * (1 - fade) / c, v * fade + g * (1 - fade) / c]
+    coarse, fine = (deviation(n, damped, gravity=G, linear_damping=c) for n in (50, 100))
+    assert coarse / fine == pytest.approx(4, rel=0.05) or coarse < 1e-12
+    world = make_world(collision="event_driven")
+    flier = world.create_entity(Transform((0.0, 0.0)), RigidBody(1.0, (3.0, 0.0), linear_damping=c))
+    run(world, 60)
+    assert velocity(world, flier)[0] == pytest.approx(3.0 * fade, rel=1e-13)
+
+
+@pytest.mark.parametrize(("n", "mass"), list(itertools.product((1, 2, 5), (1.0, 8.0))))
+def test_free_bodies_keep_their_course(n, mass):
+    """Nothing acts: n bodies pass far from each other at any dt, to the rounding of one product."""
+    world = make_world(dt=0.3, collision="event_driven")
+    bodies = [ball(world, (0.0, 5.0 * k), (7.0, 0.0), mass=mass, restitution=1.0) for k in range(n)]
+    run(world, 10)
+    np.testing.assert_allclose(positions(world, bodies)[:, 0], 21.0, rtol=1e-14)
+    assert (velocities(world, bodies) == (7.0, 0.0)).all()
