@@ -10,6 +10,7 @@ import numpy as np
 from ..framework.plan import PlannedKernel
 from .contact_bodies import COLOURS, gather, put_back, squeeze
 from .contact_memory import ContactMemory, recall, remember
+from .impacts import STOPPED
 from .mixing import rule_number
 from .soft_step import solve_contacts
 from .support import drop_support, predict_support
@@ -120,8 +121,11 @@ class ContactSolver:
 
     # -- after the impacts ------------------------------------------------------------------------
 
-    def solve(self, dt: float, resting: np.ndarray) -> None:
-        """Hold the contacts ``resting`` (pairs, canonical order) and advance their bodies again from the start."""
+    def solve(self, dt: float, resting: np.ndarray, struck: np.ndarray) -> None:
+        """Hold the contacts ``resting`` (pairs, canonical order) and advance their bodies again from the start.
+
+        struck (n,): see ``impacts``.
+        """
         state, arrays = self._state, self._state.table.arrays
         state.resting = resting
         if not len(resting) and not self.memory.count:
@@ -130,8 +134,8 @@ class ContactSolver:
         self._solve(dt, resting)
         if self.any_support:
             drop_support(
-                dt, self.travels, state.table.stops[1], self.supported, self._held, arrays["position"],
-                arrays["linear_velocity"], self.change, state.like,
+                dt, self.travels, state.table.stops[1], self.supported, self._held, struck >= STOPPED,
+                arrays["position"], arrays["linear_velocity"], self.change, state.like,
             )  # fmt: skip
 
     def _solve(self, dt: float, resting: np.ndarray) -> None:

@@ -21,11 +21,12 @@ from .first_touch import APART, AT_CORNER
 from .mixing import mix_friction
 from .paths import ROUNDING, along, along_rate, is_straight, relative_path, travel_of
 from .sizes import reach, slop_of, smaller
-from .sweeps import EVENT_DRIVEN, FAST, is_swept, leaves_at
+from .sweeps import DISCRETE, EVENT_DRIVEN, FAST, is_swept, leaves_at
 
 TIME_ITERATIONS = 80
 MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
-ASIDE = 1 << 40  # added to a body's impacts: the solver for contacts at rest is to leave it alone in this step
+# Added to a body's impacts: the solver for contacts at rest is to leave it alone in this step; it moves no more in it.
+ASIDE, STOPPED = 1 << 40, 1 << 41
 
 # What the kernel returns: all is done; there is no room for events or the log; a body leaves the space in which its
 # neighbours are known, at clock[UNTIL].
@@ -107,8 +108,8 @@ def stop(i, now, position, velocity, motion, struck, spent, like):
     if degree > 1:
         store(second, i, like)
         store(third, i, like)
-    struck[i] += ASIDE
-    spent[i] += ASIDE
+    struck[i] += STOPPED
+    spent[i] += STOPPED
 
 
 @inlined
@@ -248,8 +249,10 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         if passive:
             kind = CROSS
         elif spent[a] >= cap or spent[b] >= cap or struck[a] >= MOST_IMPACTS or struck[b] >= MOST_IMPACTS:
-            still = (struck[a] >= ASIDE or inverse_mass[a] == 0.0) and (struck[b] >= ASIDE or inverse_mass[b] == 0.0)
-            if not sweeps or still or not (
+            still = (struck[a] >= STOPPED or inverse_mass[a] == 0.0) and (
+                struck[b] >= STOPPED or inverse_mass[b] == 0.0
+            )
+            if not sweeps or still or not (swept or sweep_of[0] != DISCRETE) or not (
                 travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size)
                 or is_thrown(a, start, size, motion[0], like)
                 or is_thrown(b, start, size, motion[0], like)
@@ -298,9 +301,9 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the
         threshold and the slop (below 0: from the bodies), the most impacts of a body.
         start (n, d): where the step started. share (n,): see reach. struck, spent (n,): impacts per dynamic body, and
-        those that the cap counts. sweep_of, roam_lower, roam_upper: see ``sweeps``. crossed (pairs,): passive pairs
-        that met. pair_*: per pair, the impulse summed and the last impact's geometry and time. log_*: pair; time,
-        impulse, normal, point of every impact. counts, clock: see WAITING, NOW.
+        those that the cap counts. sweep_of, roam_lower, roam_upper: see ``sweeps``. crossed (pairs,): pairs that met
+        and do not push, or were stopped. pair_*: per pair, the impulse summed and the last impact's geometry and time.
+        log_*: pair; time, impulse, normal, point of every impact. counts, clock: see WAITING, NOW.
         Returns DONE; FULL: call again with more room to go on; or LEFT.
         """
         linked = False
@@ -329,8 +332,9 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                     i = pair_a[c] if side == 0 else pair_b[c]
                     entry = heads[i] if inverse_mass[i] > 0.0 else -1
                     while entry >= 0:
-                        looks[wanted] = entry // 2
-                        wanted += 1
+                        if side == 0 or entry // 2 != c or inverse_mass[pair_a[c]] == 0.0:  # once is enough
+                            looks[wanted] = entry // 2
+                            wanted += 1
                         entry = links[entry]
             if counts[WAITING] + wanted > len(heap) or counts[LOGGED] == len(log_pair):
                 return FULL
@@ -369,6 +373,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             if sweeps and events[chosen, 3] == STOP:
                 counts[CAPPED] += 1
                 pair_depth[c] = 0.0
+                crossed[c] = True
             else:
                 bounce(
                     chosen, dt, sweeps and sweep_of[0] == EVENT_DRIVEN, pair_a, pair_b, position, velocity,
@@ -377,7 +382,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 )  # fmt: skip
             for side in range(2 if sweeps else 0):
                 i = pair_a[c] if side == 0 else pair_b[c]
-                if inverse_mass[i] > 0.0 and struck[i] < ASIDE:
+                if inverse_mass[i] > 0.0 and struck[i] < STOPPED:
                     if events[chosen, 3] == STOP:
                         stop(i, clock[NOW], position, velocity, motion, struck, spent, like)
                     else:

@@ -64,7 +64,7 @@ class Response(System):
         struck = self._impacts(dt, disabled)
         with state.blame:
             resting = self._resting(dt, struck)
-            self._solver.solve(dt, resting)
+            self._solver.solve(dt, resting, struck)
             self._publish(disabled)
 
     def _read_settings(self, settings: Settings) -> None:

@@ -174,7 +174,7 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
             involved[struck[r]] = True
         count = 0
         for c in range(pairs):
-            if responds[c] and not involved[c]:
+            if responds[c] and not involved[c] and not (len(crossed) > 0 and crossed[c]):
                 continue
             a, b = pair_a[c], pair_b[c]
             hit, depth, normal, point = touch(a, b, between(a, b, position, offset, like), shape_of, shapes, like)

@@ -58,10 +58,12 @@ def predict_support(
 
 
 @kernel
-def drop_support(dt, travels, moving, supported, held, position, velocity, change, like):
-    """Bodies whose supports have not pushed after all (``held`` (n,) False) fly as the integrator said."""
+def drop_support(dt, travels, moving, supported, held, stopped, position, velocity, change, like):
+    """Bodies whose supports have not pushed after all (``held`` (n,) False) fly as the integrator said; those that are
+    ``stopped`` (n,) stay where they are."""
     for i in range(moving):
         if supported[i] and not held[i]:
             dv = row(change, i, like)
-            store(position, i, add_scaled(row(position, i, like), dv, -travels * dt))
+            if not stopped[i]:
+                store(position, i, add_scaled(row(position, i, like), dv, -travels * dt))
             store(velocity, i, sub(row(velocity, i, like), dv))

@@ -36,9 +36,8 @@ def is_swept(a, b, travel, size, sweep_of):
 
 @inlined
 def roams(i, speed, span, size, sweep_of):
-    """Whether a body has to stay where its neighbours are known."""
-    mode, ccd = sweep_of
-    return mode == EVENT_DRIVEN or ((mode == CONTINUOUS or ccd[i]) and speed * span > FAST * size[i])
+    """Whether a body has to stay where its neighbours are known: also one that only others are swept for."""
+    return sweep_of[0] == EVENT_DRIVEN or speed * span > FAST * size[i]
 
 
 @inlined
