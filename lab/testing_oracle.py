@@ -7,8 +7,12 @@ docs/collisions.md describes::
     free flight -> pairs whose motions come near -> what touches there -> supports keep pushing in the prediction
     -> impacts in order of time -> contacts at rest, solved in substeps -> the contacts as they are then
 
+Where bodies are swept along their paths (``Settings.collision``, ``RigidBody.ccd``) every pair is looked at, all the
+way, and again after each impact of one of its bodies.
+
 It knows spheres and boxes in 2D and 3D, turned or with an offset, one collider per body; gravity, constant forces and
-damping; explicit and semi-implicit Euler and velocity Verlet; restitution, friction, kinematic bodies, sensors, layers.
+damping; explicit and semi-implicit Euler and velocity Verlet, and the flight between events; restitution, friction,
+kinematic bodies, sensors, layers.
 It knows no force systems, no systems of the game, no other shapes.
 """
 
@@ -23,11 +27,12 @@ import numpy as np
 from ..framework import Settings, World
 from .shapes import Floats
 from .testing_oracle_bodies import Body, Pair, Touch, bodies_of, touch
-from .testing_oracle_impacts import Impact, bounce_all
-from .testing_oracle_rest import ROUNDING, Kept, find_resting, solve
+from .testing_oracle_impacts import Impact, Impacts
+from .testing_oracle_rest import ROUNDING, Kept, find_resting
+from .testing_oracle_solver import solve
 
 INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet")
-TRAVELS: dict[str, float] = dict(zip(INTEGRATORS, (0.0, 1.0, 0.5), strict=True))  # by a constant force, over dt dv
+CURVED = ("velocity_verlet", "flight")  # paths that are parabolas where something acts
 NEIGHBOURS = 0.1  # of the smallest half extent: how much wider the boxes around the motion are
 SAME_PLACE = 1e-9  # of the size: a gap that is none
 
@@ -50,7 +55,8 @@ class Oracle:
 
     def __init__(self, world: World) -> None:
         self.settings: Settings = world.settings
-        if self.settings.integrator not in INTEGRATORS:
+        self._method = "flight" if self.settings.collision == "event_driven" else self.settings.integrator
+        if self._method not in (*INTEGRATORS, "flight"):
             raise ValueError(f"the oracle knows {', '.join(INTEGRATORS)}, got {self.settings.integrator!r}")
         foreign = [system.name for system in world.systems if not type(system).__module__.startswith("carom.systems.")]
         foreign += [system.name for system in world.force_systems]
@@ -60,7 +66,8 @@ class Oracle:
         self.bodies = bodies_of(world)
         self.step_count = world.step_count
         self.contacts: dict[tuple[int, int], OracleContact] = {}
-        self.impacts: list[Impact] = []
+        self.impacts: list[Impact] = []  # of the last step, in order; with pair, time, normal, impulse
+        self.capped_impacts = 0  # of the last step
         self.doubts: list[tuple[int, int]] = []  # pairs about which rounding decided in the last step
         self._by_entity = {body.entity: body for body in self.bodies}
         self._memory = _memory_of(world, set(self._by_entity))
@@ -81,32 +88,44 @@ class Oracle:
     def step(self) -> None:
         """One step of ``settings.dt``."""
         settings, dt = self.settings, self.settings.dt
-        travels = TRAVELS[settings.integrator]
+        moving = [body for body in self.bodies if body.kind != "static"]
+        sweeping = settings.collision != "discrete" or any(body.ccd for body in moving)
+        curved = self._method in CURVED and self._something_acts()
+        # what a constant force displaces, over dt dv
+        travels = 0.5 if curved else 0.0 if self._method == "explicit_euler" else 1.0
         for body in self.bodies:
             body.begin()
-            body.fly(dt, self.gravity, settings.integrator)
-        pairs = self._pairs_that_may_meet()
+            body.fly(dt, self.gravity, self._method, curved)
+        pairs = self._pairs_that_may_meet(sweeping)
         for pair in pairs:
             pair.depth = _touch_now(pair).depth
             pair.near = pair.depth >= (-pair.margin(settings) if pair.pushes else 0.0)
-        self._expect_support(travels)
-        self.impacts = bounce_all(pairs, settings)
+        self._expect_support(travels, curved)
+        impacts = Impacts(pairs, settings, curved, sweeping)
+        impacts.run()
+        self.impacts, self.capped_impacts = impacts.done, impacts.capped
         self._hold_what_rests(pairs, travels)
         self.contacts = dict(sorted(_contacts(pairs).items()))
         self.step_count += 1
 
-    def _pairs_that_may_meet(self) -> list[Pair]:
-        """Layers that meet, not both static, and the boxes around their motions overlap."""
+    def _something_acts(self) -> bool:
+        freely = [body for body in self.bodies if body.kind == "dynamic"]
+        return bool(self.gravity.any() or any(body.damping or body.constant_force.any() for body in freely))
+
+    def _pairs_that_may_meet(self, sweeping: bool) -> list[Pair]:
+        """Layers that meet, not both static; where nobody is swept the boxes around their motions overlap, too."""
         pairs = []
         for index, a in enumerate(self.bodies):
             for b in self.bodies[index + 1 :]:
                 layers_meet = a.layer & b.mask and b.layer & a.mask
-                if layers_meet and not a.kind == b.kind == "static" and _motions_come_near(a, b):
+                if not layers_meet or a.kind == b.kind == "static":
+                    continue
+                if sweeping or _motions_come_near(a, b):
                     movable = a.inverse_mass + b.inverse_mass > 0.0
                     pairs.append(Pair(a, b, pushes=movable and not (a.sensor or b.sensor)))
         return pairs
 
-    def _expect_support(self, travels: float) -> None:
+    def _expect_support(self, travels: float, curved: bool) -> None:
         """Bodies at rest do not fall: the last step's impulses act again, relaxed once, and never pull."""
         dt = self.settings.dt
         free = {body: body.velocity for body in self.bodies}
@@ -123,7 +142,7 @@ class Oracle:
             dv = body.support = body.velocity - free[body]
             body.position = body.position + travels * dt * dv
             line, curve = body.path
-            if self.settings.integrator == "velocity_verlet":
+            if curved:
                 body.path = line, curve + travels / dt * dv
             else:
                 body.path = line + travels * dv, curve
@@ -133,6 +152,7 @@ class Oracle:
         contacts = find_resting(pairs, travels, self.settings)
         in_order = pairwise(self.impacts)
         self.doubts = [two.pair.key for one, two in in_order if two.time - one.time <= ROUNDING * two.time]
+        self.doubts += [pair.key for pair in pairs if pair.doubtful]
         solved = solve(contacts, self._memory, self.settings, not self.impacts) if contacts else {}
         self.doubts += [contact.pair.key for contact in contacts if contact.doubtful]
         held = {body for body, moving in solved.items() if moving.held and body.inverse_mass > 0.0}
@@ -140,7 +160,8 @@ class Oracle:
             if body in held:
                 body.position, body.velocity = body.start + solved[body].shift, solved[body].velocity
             elif body.support is not None:
-                body.position = body.position - travels * self.settings.dt * body.support
+                if not body.stopped:
+                    body.position = body.position - travels * self.settings.dt * body.support
                 body.velocity = body.velocity - body.support
         self._memory = {
             contact.pair.key: Kept(contact.normal, contact.impulse, contact.tangent, contact.total)
@@ -182,57 +203,61 @@ def _kick(pair: Pair, impulse: Floats) -> None:
 
 
 def _contacts(pairs: Sequence[Pair]) -> dict[tuple[int, int], OracleContact]:
-    """What touches at the end, or pushed; a gap of rounding is none between those that push each other."""
+    """What touches at the end, pushed or crossed; a gap of rounding is none between those that push each other."""
     found = {}
     for pair in pairs:
         if pair.pushes and not (pair.near or pair.involved):
             continue
         now, pushed = _touch_now(pair), pair.impulse > 0.0
-        if pushed or now.depth >= (-SAME_PLACE * pair.size if pair.pushes else 0.0):
+        if pushed or pair.crossed or now.depth >= (-SAME_PLACE * pair.size if pair.pushes else 0.0):
             normal = pair.normal if pushed and pair.normal is not None else now.normal
             found[pair.key] = OracleContact(max(0.0, now.depth), normal, pair.impulse)
     return found
 
 
 def assert_agrees(world: World, oracle: Oracle, tolerance: float = 1e-9) -> None:
-    """The world and its oracle are in the same state; AssertionError names the first difference.
+    """The world and its oracle are in the same state, after the same impacts in the last step; AssertionError names the
+    first difference.
 
     tolerance
-        of the scene's own scales: the largest coordinate, speed and impulse among what moves
+        of the scene's own scales: the step, the largest coordinate, speed and impulse among what moves
     """
     steps = world.step_count, oracle.step_count
     assert steps[0] == steps[1], f"the world is at step {steps[0]}, its oracle at {steps[1]}"
-    at = f"step {world.step_count}"
+    at, dt = f"step {world.step_count}", oracle.settings.dt
     bodies = world.bodies
     moving = [body for body in oracle.bodies if body.kind != "static"]
     speed_scale = max([*(float(np.abs(b.velocity).max()) + b.gained for b in moving), 1e-300])
-    place_scale = max([*(float(np.abs(b.position).max()) + b.size for b in moving), speed_scale * oracle.settings.dt])
-    for body in moving:
-        row = bodies.row_of(body.entity)
-        for name, expected, scale in (
-            ("position", body.position, place_scale),
-            ("linear_velocity", body.velocity, speed_scale),
-        ):
-            got = np.asarray(getattr(bodies, name)[row])
-            off = float(np.abs(got - expected).max())
-            assert off <= tolerance * scale, (
-                f"entity {body.entity}, {at}: {name} is {got.tolist()}, the oracle says {expected.tolist()}: "
-                f"{off:.3g} apart, limit {tolerance * scale:.3g}"
-            )
-    rows = world.contacts
-    pairs = list(zip(rows.entity_a.tolist(), rows.entity_b.tolist(), strict=True))
-    assert pairs == list(oracle.contacts), f"{at}: contacts are {pairs}, the oracle says {list(oracle.contacts)}"
+    place_scale = max([*(float(np.abs(b.position).max()) + b.size for b in moving), speed_scale * dt])
     heaviest = max([*(body.mass for body in moving if body.kind == "dynamic"), 1e-300])
     impulse_scale = max([*(c.normal_impulse for c in oracle.contacts.values()), heaviest * speed_scale])
-    for index, (pair, contact) in enumerate(oracle.contacts.items()):
-        for name, expected, scale in (
-            ("depth", contact.depth, place_scale),
-            ("normal", contact.normal, 1.0),
-            ("normal_impulse", contact.normal_impulse, impulse_scale),
-        ):
-            got = np.asarray(getattr(rows, name)[index])
-            off = float(np.abs(got - expected).max())
-            assert off <= tolerance * scale, (
-                f"contact of {pair[0]} and {pair[1]}, {at}: {name} is {got.tolist()}, the oracle says "
-                f"{np.asarray(expected).tolist()}: {off:.3g} apart, limit {tolerance * scale:.3g}"
-            )
+
+    def check(what: str, name: str, got: object, expected: object, scale: float) -> None:
+        off = float(np.abs(np.asarray(got) - np.asarray(expected)).max())
+        assert off <= tolerance * scale, (
+            f"{what}, {at}: {name} is {np.asarray(got).tolist()}, the oracle says {np.asarray(expected).tolist()}: "
+            f"{off:.3g} apart, limit {tolerance * scale:.3g}"
+        )
+
+    struck = world.contacts.impacts
+    rows = [index for index, step in enumerate(struck.step.tolist()) if step == steps[0] - 1]
+    pairs = [(int(struck.entity_a[row]), int(struck.entity_b[row])) for row in rows]
+    expected = [impact.pair.key for impact in oracle.impacts]
+    assert pairs == expected, f"{at}: impacts are {pairs}, the oracle says {expected}"
+    for row, impact in zip(rows, oracle.impacts, strict=True):
+        what = f"impact of {impact.pair.a.entity} and {impact.pair.b.entity}"
+        check(what, "time_of_impact", struck.time_of_impact[row], impact.time, dt)
+        check(what, "normal", struck.normal[row], impact.normal, 1.0)
+        check(what, "normal_impulse", struck.normal_impulse[row], impact.impulse, impulse_scale)
+    for body in moving:
+        row = bodies.row_of(body.entity)
+        check(f"entity {body.entity}", "position", bodies.position[row], body.position, place_scale)
+        check(f"entity {body.entity}", "linear_velocity", bodies.linear_velocity[row], body.velocity, speed_scale)
+    now = world.contacts
+    pairs = list(zip(now.entity_a.tolist(), now.entity_b.tolist(), strict=True))
+    assert pairs == list(oracle.contacts), f"{at}: contacts are {pairs}, the oracle says {list(oracle.contacts)}"
+    for row, (pair, contact) in enumerate(oracle.contacts.items()):
+        what = f"contact of {pair[0]} and {pair[1]}"
+        check(what, "depth", now.depth[row], contact.depth, place_scale)
+        check(what, "normal", now.normal[row], contact.normal, 1.0)
+        check(what, "normal_impulse", now.normal_impulse[row], contact.normal_impulse, impulse_scale)

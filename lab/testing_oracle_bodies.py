@@ -35,6 +35,7 @@ class Body:
     sensor: bool
     layer: int
     mask: int
+    ccd: bool
 
     start: Floats = field(init=False)  # where the step began
     seems_from: Floats = field(init=False)  # where its motion since the last blow leads back to
@@ -43,6 +44,9 @@ class Body:
     gained: float = field(init=False, default=0.0)  # speed that forces gave it in free flight
     support: Floats | None = field(init=False, default=None)  # velocity that those below it are expected to give
     struck: int = field(init=False, default=0)
+    spent: int = field(init=False, default=0)  # of these, the impacts that the cap counts
+    stopped: bool = field(init=False, default=False)  # beyond the cap: it stands still until the step ends
+    aside: bool = field(init=False, default=False)  # stopped, or thrown from afar: no contact at rest holds it
 
     @property
     def inverse_mass(self) -> float:
@@ -64,10 +68,11 @@ class Body:
         """A new step."""
         self.start = self.seems_from = self.position
         self.first_velocity = self.velocity
-        self.support, self.struck = None, 0
+        self.support, self.struck, self.spent = None, 0, 0
+        self.stopped = self.aside = False
 
-    def fly(self, dt: float, gravity: Floats, integrator: str) -> None:
-        """The free flight of one step."""
+    def fly(self, dt: float, gravity: Floats, method: str, curved: bool) -> None:
+        """The free flight of one step; ``curved``: whether paths are parabolas."""
         at_rest = np.zeros_like(self.position)
         if self.kind != "dynamic":
             self.path = self.velocity, at_rest
@@ -80,11 +85,17 @@ class Body:
             decay, gain = math.exp(-c * dt), -math.expm1(-c * dt) / c
             second = (dt - gain) / c
         before, after = self.velocity, decay * self.velocity + gain * acceleration
-        if integrator == "velocity_verlet":
+        if method == "flight":  # damping acts at once, half of it before the flight and half of it after
+            half = math.exp(-0.5 * c * dt)
+            self.path = half * before, 0.5 * acceleration
+            travel = self.path[0] * dt + self.path[1] * dt * dt
+            after = half * self.velocity_at(dt)
+        elif method == "velocity_verlet":
             travel = gain * before + second * acceleration
-            self.path = before, (travel - dt * before) / (dt * dt)
+            bend = (travel - dt * before) / (dt * dt) if curved else at_rest
+            self.path = before, bend
         else:
-            speed = before if integrator == "explicit_euler" else after
+            speed = before if method == "explicit_euler" else after
             travel, self.path = dt * speed, (speed, at_rest)
         self.position, self.velocity = self.position + travel, after
         self.gained = float(np.linalg.norm(after - before))
@@ -102,6 +113,8 @@ class Pair:
     involved: bool = False  # bounced or rests
     impulse: float = 0.0  # N s, of this step
     normal: Floats | None = None
+    crossed: bool = False  # met on the way, but does not push
+    doubtful: bool = False  # a number of rounding's size has decided whether they meet
 
     @property
     def bodies(self) -> tuple[Body, Body]:
@@ -253,5 +266,5 @@ def _body(world: World, entity: int) -> Body:
         entity, rigid.kind, vector(transform.position), velocity, float(rigid.mass), float(rigid.gravity_scale),
         vector(rigid.constant_force), float(rigid.linear_damping), radius, half, isinstance(collider, SphereCollider),
         turned @ vector(collider.offset), float(collider.restitution), collider.friction, bool(collider.sensor),
-        int(collider.layer), int(collider.mask),
+        int(collider.layer), int(collider.mask), bool(rigid.ccd),
     )  # fmt: skip
