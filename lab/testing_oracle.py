@@ -206,8 +206,6 @@ def _contacts(pairs: Sequence[Pair]) -> dict[tuple[int, int], OracleContact]:
     """What touches at the end, pushed or crossed; a gap of rounding is none between those that push each other."""
     found = {}
     for pair in pairs:
-        if pair.pushes and not (pair.near or pair.involved):
-            continue
         now, pushed = _touch_now(pair), pair.impulse > 0.0
         if pushed or pair.crossed or now.depth >= (-SAME_PLACE * pair.size if pair.pushes else 0.0):
             normal = pair.normal if pushed and pair.normal is not None else now.normal

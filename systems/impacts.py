@@ -21,7 +21,7 @@ from .first_touch import APART, AT_CORNER
 from .mixing import mix_friction
 from .paths import ROUNDING, along, along_rate, is_straight, relative_path, travel_of
 from .sizes import reach, slop_of, smaller
-from .sweeps import DISCRETE, EVENT_DRIVEN, FAST, is_swept, leaves_at
+from .sweeps import EVENT_DRIVEN, FAST, is_swept, leaves_at
 
 TIME_ITERATIONS = 80
 MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
@@ -252,7 +252,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             still = (struck[a] >= STOPPED or inverse_mass[a] == 0.0) and (
                 struck[b] >= STOPPED or inverse_mass[b] == 0.0
             )
-            if not sweeps or still or not (swept or sweep_of[0] != DISCRETE) or not (
+            if not sweeps or still or not (
                 travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size)
                 or is_thrown(a, start, size, motion[0], like)
                 or is_thrown(b, start, size, motion[0], like)

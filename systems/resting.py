@@ -72,8 +72,8 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
         """Pairs whose gap is below the margin after the impacts and that are not bouncing; returns how many.
 
         pair_depth (m,) is that of the free flight, and still holds for bodies neither struck nor supported; only who is
-        ``involved`` (m,) may be near then. supported (n,), change (n, d): see ``support``; travelled: the displacement
-        by the latter, over it.
+        ``involved`` (m,) may be near then, and who overlaps now is so from now on. supported (n,), change (n, d): see
+        ``support``; travelled: the displacement by the latter, over it.
         """
         count = 0
         for c in range(pairs):
@@ -105,6 +105,7 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
                 _, depth, normal, _ = touch_seldom(a, b, free, shape_of, shapes, like)
                 if depth < -margin:
                     continue
+            involved[c] |= depth >= 0.0
             pair_parts[c] = STAYS
             e = mix(rule, restitution[material[a], a], restitution[material[b], b])
             if e > 0.0:
