@@ -92,20 +92,6 @@ class ForceAccumulation(System):
         for system in self.world.force_systems:
             self._add(system, state.bodies.dynamic, time)
 
-    def steady(self, force: np.ndarray) -> np.ndarray:
-        """The part of ``force`` (n, d), the dynamic bodies' sum, that holds throughout the step: all but what force
-        systems add."""
-        state, arrays, dynamic = self._state, self._state.table.arrays, self._state.table.stops[0]
-        result = np.empty_like(arrays["force"])
-        sum_constant_forces(
-            dynamic, result, arrays["mass"], state.gravity_numbers, arrays["gravity_scale"],
-            arrays["constant_force"], arrays["applied_force"], arrays["step_force"],
-        )  # fmt: skip
-        result = result[:dynamic]
-        if self.summed is not None:  # what systems of the game have added since acts throughout the step
-            result += force - self.summed
-        return result
-
     def _find_nothing(self, dynamic: int) -> bool:
         """Look for forces of single bodies; whether there is nothing to sum. The column is zero then."""
         state, arrays = self._state, self._state.table.arrays

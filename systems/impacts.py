@@ -42,12 +42,13 @@ BOUNCE, FREE, STOP, CROSS = range(4)
 
 @inlined
 def bounce(
-    event, dt, kick, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, damping, motion, struck, spent,
+    event, dt, half_kick, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, damping, motion, struck, spent,
     pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
 ):  # fmt: skip
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities.
 
-    kick: whether damping acts at the end of the step, as half a kick, and not all the time.
+    half_kick: whether damping acts at the end of the step, for half of it. Else it acts all the time, and the velocity
+    of a straight path is that of the end already.
     """
     origin, path = motion[0], motion[1]
     c = events[event, 0]
@@ -71,7 +72,7 @@ def bounce(
             store(origin, i, add_scaled(row(origin, i, like), dv, -now))
             store(path, i, add(row(path, i, like), dv))
             store(position, i, add_scaled(row(position, i, like), dv, dt - now))
-            fading = damping[i] * (0.5 * dt if kick else dt - now)
+            fading = damping[i] * (0.5 * dt if half_kick else (dt - now if motion[4] > 1 else 0.0))
             store(velocity, i, add_scaled(row(velocity, i, like), dv, math.exp(-fading) if fading > 0.0 else 1.0))
     pair_impulse[c] += impulse
     pair_depth[c] = 0.0
@@ -187,17 +188,22 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         fixed_threshold, fixed_slop, cap = limits
         slop = slop_of(a, b, size, fixed_slop)
         x0, x1, x2, x3 = relative_path(a, b, motion, offset, like)
+        threshold = fixed_threshold
+        if threshold < 0.0:
+            threshold = 2.0 * max(share[a], share[b])
         swept, met = False, False
         t, normal, point, apart, end_normal = dt, like, like, like, like
         if sweeps:
-            swept = is_swept(a, b, travel_of(x1, x2, x3, dt), size, sweep_of)
+            travel = travel_of(x1, x2, x3, dt)
+            swept = is_swept(a, b, travel, size, sweep_of)
             if passive and (not swept or crossed[c]):
                 return
             if swept:
                 straight = is_straight(a, b, x2, x3, dt, motion, like)
                 edge = reach(dt, a, b, share, size, fixed_slop)  # what slides may have sunk in by so much
                 found, t, normal, point, apart = first_touch(
-                    shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, dt, edge, shapes, like
+                    shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, dt, edge,
+                    FAST * smaller(a, b, size) / travel * dt, threshold, shapes, like,
                 )
                 if found == APART:
                     return
@@ -220,9 +226,6 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         elif not swept and corner(shape_a, a, shape_b, b, apart, slop, shapes, like):
             normal = end_normal  # it slides from one thing onto the next: the edges are in nobody's way
         speed = dot(w, normal)
-        threshold = fixed_threshold
-        if threshold < 0.0:
-            threshold = 2.0 * max(share[a], share[b])
         nothing = 0.0
         if sweeps:  # else a plastic impact would be one again, by a rounding error
             nothing = ROUNDING * (length(row(motion[1], a, like)) + length(row(motion[1], b, like)))

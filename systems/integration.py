@@ -60,10 +60,7 @@ class Integration(System):
             if self._drifts(integrator) and drift(motion.position, motion.velocity, motion.damping, dt):
                 state.path_degree = LINE
             else:
-                motion.evaluator = motion.steady = None
-                if self.world.force_systems:
-                    motion.evaluator = self._evaluator(motion.force)
-                    motion.steady = state.forces.steady(motion.force) if isinstance(integrator, Flight) else None
+                motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
                 try:
                     integrator.advance(motion, dt)
                 except Exception as error:
@@ -166,7 +163,6 @@ class Integration(System):
         integrator, name = self._state.integrator(), self._state.integrator_name
         if isinstance(integrator, Flight):
             return (
-                "exact flight between impacts, whatever Settings.integrator: gravity and constant forces bend the "
-                "path, force systems and damping kick at both ends of the step, order 2"
+                "exact flight between impacts, whatever Settings.integrator; order 2 in force systems and damping"
             )
         return f"{name}, order {integrator.order}, {integrator.evaluations} force evaluations a step"

@@ -21,7 +21,7 @@ class SceneKernels:
         self.box_motion: Any = make_box_kernel(code.shape_bounds, code.write_world)
         self.find_contacts: Any = make_narrow_kernel(code.evaluate)
         self.resolve_impacts: Any = make_impact_kernel(code.evaluate, code.corner, code.mix)
-        first_touch = make_first_touch(code.evaluate, code.corner, code.swept, code.convex)
+        first_touch = make_first_touch(code.evaluate, code.corner, code.swept, code.convex, code.dented)
         self.find_swept: Any = make_sweep_kernel(first_touch)
         self.sweeping_impacts: Any = make_impact_kernel(code.evaluate, code.corner, code.mix, first_touch)
         self.find_resting: Any

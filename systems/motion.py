@@ -30,7 +30,6 @@ class Motion:
     start_position: np.ndarray
     start_velocity: np.ndarray
     evaluator: Callable[[float], None] | None  # None: no force depends on the state
-    steady: np.ndarray | None = None  # of the forces those that hold throughout the step; None: all
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:

@@ -73,6 +73,11 @@ class ShapeCode:
     unhandled: tuple[tuple[int, int], ...]
 
     @property
+    def dented(self) -> bool:
+        """Whether some shape is not convex."""
+        return not all(shape.convex for shape in self.shapes)
+
+    @property
     def rotates(self) -> bool:
         """Whether some shape needs the bodies' axes."""
         return any(shape.rotates for shape in self.shapes)

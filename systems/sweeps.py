@@ -175,12 +175,14 @@ def make_sweep_kernel(first_touch):
             a, b = pair_a[c], pair_b[c]
             if not involved[c]:
                 x0, x1, x2, x3 = relative_path(a, b, motion, offset, like)
-                if not is_swept(a, b, travel_of(x1, x2, x3, dt), size, sweep_of):
+                travel = travel_of(x1, x2, x3, dt)
+                if not is_swept(a, b, travel, size, sweep_of):
                     continue
                 straight = is_straight(a, b, x2, x3, dt, motion, like)
                 touch, t, normal, point, _ = first_touch(
                     shape_of[a], a, shape_of[b], b, x0, x1, x2, x3, straight, 0.0, dt,
-                    reach(dt, a, b, share, size, fixed_slop), shapes, like,
+                    reach(dt, a, b, share, size, fixed_slop), FAST * smaller(a, b, size) / travel * dt, 0.0, shapes,
+                    like,
                 )  # fmt: skip
                 if touch == APART:
                     continue
