@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..framework.plan import PlannedKernel
+from .blows import STOPPED
 from .contact_bodies import COLOURS, gather, put_back, squeeze
 from .contact_memory import ContactMemory, recall, remember
-from .impacts import STOPPED
 from .mixing import rule_number
 from .soft_step import solve_contacts
 from .support import drop_support, predict_support

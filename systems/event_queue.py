@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .impacts import ALL, HITS, LAST, NOW, UNTIL, WAITING
+from .blows import LAST, NOW, UNTIL, WAITING
+from .impacts import ALL, HITS
 
 
 class EventQueue:
@@ -12,12 +13,12 @@ class EventQueue:
     keys.
 
     values (m, 2 + 3 d): time, change of the speed along the normal, normal, point, change along the surface. heap (m,):
-    indices of events. log_pair (k,), log_value (k, 2 + 2 d): time, impulse, normal, point. counts (5,), clock (2,).
+    indices of events. log_pair (k,), log_value (k, 2 + 2 d): time, impulse, normal, point. counts (6,), clock (2,).
     heads, links, looks: whose pairs are looked at, see ``impacts``.
     """
 
     def __init__(self, dimensions: int) -> None:
-        self.counts, self.clock = np.zeros(5, np.int64), np.zeros(2)
+        self.counts, self.clock = np.zeros(6, np.int64), np.zeros(2)
         self.events = np.empty((0, 4), np.int64)
         self.times, self.keys = np.empty(0), np.empty(0, np.int64)
         self.values = np.empty((0, 2 + 3 * dimensions))
@@ -50,8 +51,8 @@ class EventQueue:
         self.clock[NOW], self.clock[UNTIL] = now, until
 
     def _fit(self, pairs: int) -> None:
-        if len(self.looks) <= pairs:
-            self.links, self.looks = np.empty(4 * pairs, np.int32), np.empty(2 * pairs + 1, np.int32)
+        if len(self.looks) <= 2 * pairs:  # of a cluster's pairs some are looked at twice
+            self.links, self.looks = np.empty(4 * pairs, np.int32), np.empty(4 * pairs + 1, np.int32)
 
     def grow(self, least: int) -> None:
         """At least double everything, keeping what is there."""

@@ -41,11 +41,8 @@ def make_first_touch(evaluate: Any, corner: Any, swept: Any, convex: Any, dented
         AT_CORNER: they touch at a corner only, still do a slop further on, and what becomes of it is not looked at.
         stride: seconds between looks at shapes with dents, of which approaches slower than ``threshold`` are none.
         """
-        if dented:
-            if not convex(shape_a, shape_b):
-                return march(
-                    shape_a, a, shape_b, b, x0, x1, x2, x3, since, until, stride, threshold, shapes, like
-                )
+        if dented and not convex(shape_a, shape_b):
+            return march(shape_a, a, shape_b, b, x0, x1, x2, x3, since, until, stride, threshold, shapes, like)
         t, known, met, share = since, False, False, 0.0
         if straight:
             start = along(since, x0, x1, x2, x3)

@@ -1,21 +1,37 @@
 """Impacts: bounces at their time on the path, in order of time, each followed by a new look at both bodies.
 
-A body's path within the step is x(t) = origin + p1 t + p2 t^2 + p3 t^3. An impact at time t changes the velocity by
-dv; the path becomes the one of a body that has travelled with dv all along and stood at origin - dv t at the start, so
-one polynomial always describes what is left of the step.
-
 The loop comes in two variants. The plain one takes pairs that overlap at the end of their motion. The other one sweeps:
 pairs that are fast for their size, or all of them, are taken where they first touch on their way, see ``sweeps``.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
-from ..framework.compilation import inlined, kernel
-from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, row, scale, store, sub
+from ..framework.compilation import inlined, kernel, part
+from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, row, scale, sub
+from .blows import (
+    ASIDE,
+    BOUNCE,
+    CAPPED,
+    CLUSTER,
+    CROSS,
+    CROSSED,
+    FREE,
+    LAST,
+    LOGGED,
+    NOW,
+    STICK,
+    STOP,
+    STOPPED,
+    UNTIL,
+    WAITING,
+    bounce,
+    is_thrown,
+    stick,
+    stop,
+)  # fmt: skip
 from .event_heap import heap_pop, heap_push
 from .first_touch import APART, AT_CORNER
 from .mixing import mix_friction
@@ -25,92 +41,11 @@ from .sweeps import EVENT_DRIVEN, FAST, is_swept, leaves_at
 
 TIME_ITERATIONS = 80
 MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
-# Added to a body's impacts: the solver for contacts at rest is to leave it alone in this step; it moves no more in it.
-ASIDE, STOPPED = 1 << 40, 1 << 41
 
 # What the kernel returns: all is done; there is no room for events or the log; a body leaves the space in which its
 # neighbours are known, at clock[UNTIL].
 DONE, FULL, LEFT = range(3)
-# places in ``counts``: events waiting, impacts logged, impacts cut off by the cap, pairs that crossed, the pair of the
-# event now, or who is to be looked at instead
-WAITING, LOGGED, CAPPED, CROSSED, LAST = range(5)
-HITS, ALL, NOBODY = -1, -2, -3
-NOW, UNTIL = range(2)  # places in ``clock``
-# kinds of events: an impact, one that no cap counts, one beyond the cap, a crossing of what does not push
-BOUNCE, FREE, STOP, CROSS = range(4)
-
-
-@inlined
-def bounce(
-    event, dt, half_kick, pair_a, pair_b, position, velocity, start_velocity, inverse_mass, damping, motion, struck, spent,
-    pair_impulse, pair_normal, pair_point, pair_depth, events, event_values, log_pair, log_value, counts, like,
-):  # fmt: skip
-    """One impact: both bodies get their impulse now, and the rest of the step with the new velocities.
-
-    half_kick: whether damping acts at the end of the step, for half of it. Else it acts all the time, and the velocity
-    of a straight path is that of the end already.
-    """
-    origin, path = motion[0], motion[1]
-    c = events[event, 0]
-    a, b = pair_a[c], pair_b[c]
-    now = event_values[event, 0]
-    mass = 1.0 / (inverse_mass[a] + inverse_mass[b])
-    impulse = event_values[event, 1] * mass
-    change = like  # of the bodies' relative velocity, with what friction adds to it
-    for k in range(len(like)):
-        normal = event_values[event, 2 + k]
-        change = replace(change, k, event_values[event, 1] * normal + event_values[event, 2 + 2 * len(like) + k])
-        pair_normal[c, k] = normal
-        pair_point[c, k] = event_values[event, 2 + len(like) + k]
-    for side in range(2):
-        i = a if side == 0 else b
-        dv = scale(change, (-mass if side == 0 else mass) * inverse_mass[i])
-        if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
-            struck[i] += 1
-            spent[i] += 1 if events[event, 3] == BOUNCE else 0
-            store(start_velocity, i, add(row(start_velocity, i, like), dv))
-            store(origin, i, add_scaled(row(origin, i, like), dv, -now))
-            store(path, i, add(row(path, i, like), dv))
-            store(position, i, add_scaled(row(position, i, like), dv, dt - now))
-            fading = damping[i] * (0.5 * dt if half_kick else (dt - now if motion[4] > 1 else 0.0))
-            store(velocity, i, add_scaled(row(velocity, i, like), dv, math.exp(-fading) if fading > 0.0 else 1.0))
-    pair_impulse[c] += impulse
-    pair_depth[c] = 0.0
-    logged = counts[LOGGED]
-    log_pair[logged] = c
-    for k in range(2 + 2 * len(like)):
-        log_value[logged, k] = event_values[event, k]
-    log_value[logged, 1] = impulse
-    counts[LOGGED] += 1
-
-
-@inlined
-def is_thrown(i, start, size, origin, like):
-    """Whether blows have changed a body's way so much that it seems to come from far off its start.
-
-    The solver for contacts at rest moves bodies from there, and knows their contacts where they are.
-    """
-    away = sub(row(origin, i, like), row(start, i, like))
-    return length(away) > FAST * size[i]
-
-
-@inlined
-def stop(i, now, position, velocity, motion, struck, spent, like):
-    """Beyond the cap a fast body stays where it is until the step ends, and keeps its velocity."""
-    origin, path, second, third, degree = motion
-    x2, x3 = like, like
-    if degree > 1:
-        x2, x3 = row(second, i, like), row(third, i, like)
-    at = along(now, row(origin, i, like), row(path, i, like), x2, x3)
-    store(velocity, i, along_rate(now, row(path, i, like), x2, x3))
-    store(position, i, at)
-    store(origin, i, at)
-    store(path, i, like)
-    if degree > 1:
-        store(second, i, like)
-        store(third, i, like)
-    struck[i] += STOPPED
-    spent[i] += STOPPED
+HITS, ALL, NOBODY, MEMBERS = -1, -2, -3, -4  # in place of a pair in counts[LAST]
 
 
 @inlined
@@ -172,11 +107,16 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 low = middle
         return met, t, normal, point, apart, end_normal
 
+    @part
+    def depth_at(shape_a, a, shape_b, b, d, shapes, like):
+        return evaluate(shape_a, a, shape_b, b, d, shapes, like)[1]
+
     @inlined
     def consider(
         c, since, dt, pair_a, pair_b, passive, rank, size, shape_of, offset, shapes, velocity, start_velocity,
-        inverse_mass, start, motion, restitution, friction, rules, material, limits, share, struck, spent, sweep_of,
-        crossed, pair_impulse, events, event_times, event_keys, event_values, heap, counts, like,
+        inverse_mass, start, motion, restitution, friction, rules, material, limits, share, struck, spent, last,
+        clusters, supported, sweep_of, crossed, pair_impulse, events, event_times, event_keys, event_values, heap,
+        counts, like,
     ):  # fmt: skip
         """Put the pair's next impact into the queue, if it has one: a touch, and a fast approach.
 
@@ -191,7 +131,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         threshold = fixed_threshold
         if threshold < 0.0:
             threshold = 2.0 * max(share[a], share[b])
-        swept, met = False, False
+        swept, met, edge = False, False, slop
         t, normal, point, apart, end_normal = dt, like, like, like, like
         if sweeps:
             travel = travel_of(x1, x2, x3, dt)
@@ -239,6 +179,13 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             if not (fast and -(speed + curve * left) * left > slop):
                 return
             e, gain = 0.0, max(0.0, -curve * left)
+        if sweeps and swept and not passive and (supported[a] or supported[b]):
+            # What slides or rolls has sunk in a little, and meets the edge of the next thing in its row.
+            ahead = t - 2.0 * edge / speed
+            if not ahead <= dt:
+                return
+            if depth_at(shape_a, a, shape_b, b, along(ahead, x0, x1, x2, x3), shapes, like) <= edge:
+                return
         if motion[4] == 1 and e != 1.0:
             # A straight path has the flight's velocity in its middle only. With that of another time a bounce gains
             # or loses, and a ball that always meets the floor at the same phase of a step hops for ever. Elastic
@@ -255,7 +202,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             still = (struck[a] >= STOPPED or inverse_mass[a] == 0.0) and (
                 struck[b] >= STOPPED or inverse_mass[b] == 0.0
             )
-            if not sweeps or still or not (
+            sinks = -speed * (dt - t) > slop
+            if not sweeps or still or not sinks or not (
                 travel_of(x1, x2, x3, dt - t) > FAST * smaller(a, b, size)
                 or is_thrown(a, start, size, motion[0], like)
                 or is_thrown(b, start, size, motion[0], like)
@@ -263,11 +211,15 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 counts[CAPPED] += 1
                 return
             kind = STOP
+            one, two = clusters[0][a], clusters[0][b]
+            movable = one != two and clusters[3][one] + clusters[3][two] > 0.0
+            if movable and (e < 1.0 or t <= last[a] or t <= last[b]):
+                kind, e, gain = STICK, 0.0, 0.0
         elif sweeps and sweep_of[0] == EVENT_DRIVEN and e == 1.0:
             driven = (inverse_mass[a] == 0.0 and length(row(motion[1], a, like)) > 0.0) or (
                 inverse_mass[b] == 0.0 and length(row(motion[1], b, like)) > 0.0
             )
-            kind = BOUNCE if driven else FREE
+            kind = BOUNCE if driven or t <= last[a] or t <= last[b] else FREE  # with no time between, it need not end
         pull = scale(like, 0.0)
         mu = mix_friction(mix, rules[1], friction[material[a], a], friction[material[b], b])
         if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
@@ -293,18 +245,19 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
     def resolve_impacts(
         dt, pair_a, pair_b, pairs, responds, hits, supported, heads, links, looks, rank, size, shape_of, offset, shapes,
         position, velocity, start_velocity, inverse_mass, damping, start, motion, restitution, friction, rules,
-        material, limits, share, struck, spent, sweep_of, roam_lower, roam_upper, crossed, pair_impulse, pair_normal,
-        pair_point, pair_depth, events, event_times, event_keys, event_values, heap, log_pair, log_value, counts, clock,
-        like,
+        material, limits, share, struck, spent, last, clusters, sweep_of, roam_lower, roam_upper, crossed, pair_impulse,
+        pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values, heap, log_pair, log_value, counts,
+        clock, like,
     ):  # fmt: skip
         """Bounce every pair that touches in its motion and approaches faster than the threshold.
 
         hits: pairs that may have met; so may every pair of a body that is ``supported`` (n,). heads (n,), links
-        (2 pairs,), looks (pairs + 1,): room, see link_pairs.
+        (2 pairs,), looks (2 pairs + 1,): room, see link_pairs.
         restitution, friction: per slot and row, material: whose slot counts; rules: how two become one. limits: the
         threshold and the slop (below 0: from the bodies), the most impacts of a body.
         start (n, d): where the step started. share (n,): see reach. struck, spent (n,): impacts per dynamic body, and
-        those that the cap counts. sweep_of, roam_lower, roam_upper: see ``sweeps``. crossed (pairs,): pairs that met
+        those that the cap counts; last (n,): times of the latest. clusters: see ``blows.stick``. sweep_of, roam_lower,
+        roam_upper: see ``sweeps``. crossed (pairs,): pairs that met
         and do not push, or were stopped. pair_*: per pair, the impulse summed and the last impact's geometry and time.
         log_*: pair; time, impulse, normal, point of every impact. counts, clock: see WAITING, NOW.
         Returns DONE; FULL: call again with more room to go on; or LEFT.
@@ -327,10 +280,19 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 for p in range(pairs):
                     looks[p] = p
                 wanted = pairs
+            elif c != NOBODY and not linked:
+                link_pairs(pair_a, pair_b, pairs, heads, links)
+                linked = True
+            if c == MEMBERS:
+                i = counts[CLUSTER]
+                while i >= 0:
+                    entry = heads[i]
+                    while entry >= 0:
+                        looks[wanted] = entry // 2
+                        wanted += 1
+                        entry = links[entry]
+                    i = clusters[1][i]
             elif c >= 0:
-                if not linked:
-                    link_pairs(pair_a, pair_b, pairs, heads, links)
-                    linked = True
                 for side in range(2):
                     i = pair_a[c] if side == 0 else pair_b[c]
                     entry = heads[i] if inverse_mass[i] > 0.0 else -1
@@ -347,8 +309,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                     consider(
                         p, clock[NOW], dt, pair_a, pair_b, not responds[p], rank, size, shape_of, offset, shapes,
                         velocity, start_velocity, inverse_mass, start, motion, restitution, friction, rules, material,
-                        limits, share, struck, spent, sweep_of, crossed, pair_impulse, events, event_times, event_keys,
-                        event_values, heap, counts, like,
+                        limits, share, struck, spent, last, clusters, supported, sweep_of, crossed, pair_impulse,
+                        events, event_times, event_keys, event_values, heap, counts, like,
                     )  # fmt: skip
             chosen = -1
             while counts[WAITING] > 0 and chosen < 0:
@@ -373,6 +335,20 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 counts[CROSSED] += 1
                 counts[LAST] = NOBODY
                 continue
+            if sweeps and events[chosen, 3] == STICK:
+                counts[CLUSTER] = stick(
+                    chosen, dt, sweep_of[0] == EVENT_DRIVEN, pair_a, pair_b, position, velocity, start_velocity,
+                    inverse_mass, damping, motion, struck, spent, clusters, pair_impulse, pair_normal, pair_point,
+                    pair_depth, events, event_values, log_pair, log_value, counts, like,
+                )  # fmt: skip
+                counts[LAST] = MEMBERS
+                i = counts[CLUSTER]
+                while i >= 0:
+                    last[i] = clock[NOW]
+                    time = leaves_at(i, clock[NOW], dt, size, motion, sweep_of, roam_lower, roam_upper, like)
+                    clock[UNTIL] = min(clock[UNTIL], time)
+                    i = clusters[1][i]
+                continue
             if sweeps and events[chosen, 3] == STOP:
                 counts[CAPPED] += 1
                 pair_depth[c] = 0.0
@@ -389,6 +365,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                     if events[chosen, 3] == STOP:
                         stop(i, clock[NOW], position, velocity, motion, struck, spent, like)
                     else:
+                        last[i] = clock[NOW]
                         time = leaves_at(i, clock[NOW], dt, size, motion, sweep_of, roam_lower, roam_upper, like)
                         clock[UNTIL] = min(clock[UNTIL], time)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..framework.contacts import Contacts, empty_columns
-from .impacts import CAPPED, LOGGED
+from .blows import CAPPED, LOGGED
 from .pair_order import collect_contacts, sort_pairs
 
 if TYPE_CHECKING:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 NOTHING = np.empty(0, bool)
+NO_CLUSTERS = (*(np.empty(0, np.int64) for _ in range(3)), np.empty(0))
 
 
 class Response(System):
@@ -105,6 +106,10 @@ class Response(System):
         queue.begin(count, state.pairs, state.known_until if sweeping else np.inf)
         self._crossed = np.zeros(state.pairs if sweeping else 0, bool)
         resolve = state.kernels.sweeping_impacts if sweeping else state.kernels.resolve_impacts
+        last, clusters = np.empty(0), NO_CLUSTERS
+        if sweeping:
+            rows, alone = np.arange(count), np.full(count, -1, np.int64)
+            last, clusters = np.full(count, -1.0), (rows, alone, rows.copy(), arrays["inverse_mass"][:count].copy())
         rules, limits = (self._restitution_rule, self._friction_rule), (self._threshold, self._slop, self._cap)
         while True:
             with state.blame:
@@ -115,9 +120,9 @@ class Response(System):
                     arrays["linear_velocity"], scratch["start_velocity"], arrays["inverse_mass"],
                     arrays["linear_damping"], state.start_positions, state.motion(scratch["origin"]),
                     stacks["collider.restitution"], stacks["collider.friction"], rules, scratch["material"], limits,
-                    scratch["gravity_share"], struck, spent, state.sweep_of, scratch["roam_lower"],
-                    scratch["roam_upper"], self._crossed, state.pair_impulse, state.pair_normal, state.pair_point,
-                    state.pair_depth, *queue.arrays, state.like,
+                    scratch["gravity_share"], struck, spent, last, clusters, state.sweep_of,
+                    scratch["roam_lower"], scratch["roam_upper"], self._crossed, state.pair_impulse, state.pair_normal,
+                    state.pair_point, state.pair_depth, *queue.arrays, state.like,
                 )  # fmt: skip
             if outcome == DONE:
                 break

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..framework.compilation import inlined, kernel, part
 from ..framework.vectors import add, add_scaled, dot, row, store, sub
-from .impacts import ASIDE
+from .blows import ASIDE
 from .mixing import mix_friction
 from .sizes import reach, slop_of, smaller
 

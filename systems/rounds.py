@@ -13,7 +13,7 @@ import numpy as np
 
 from ..framework.compilation import kernel
 from ..framework.vectors import row, store
-from .impacts import LOGGED, UNTIL
+from .blows import LOGGED, UNTIL
 from .pair_filters import filtered
 from .pair_order import sort_pairs
 
