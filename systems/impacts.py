@@ -35,11 +35,12 @@ from .blows import (
 from .event_heap import heap_pop, heap_push
 from .first_touch import APART, AT_CORNER
 from .mixing import mix_friction
-from .paths import ROUNDING, along, along_rate, is_straight, relative_path, travel_of
+from .paths import ROUNDING, along, along_rate, first_root, is_straight, relative_path, travel_of
 from .sizes import reach, slop_of, smaller
 from .sweeps import EVENT_DRIVEN, FAST, is_swept, leaves_at
 
 TIME_ITERATIONS = 80
+QUICK = 1e-3  # of the step: what has lost energy and is struck again so soon goes on like that
 MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
 
 # What the kernel returns: all is done; there is no room for events or the log; a body leaves the space in which its
@@ -140,7 +141,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 return
             if swept:
                 straight = is_straight(a, b, x2, x3, dt, motion, like)
-                edge = reach(dt, a, b, share, size, fixed_slop)  # what slides may have sunk in by so much
+                # what slides may have sunk in by so much
+                edge = min(reach(dt, a, b, share, size, fixed_slop), FAST * smaller(a, b, size))
                 found, t, normal, point, apart = first_touch(
                     shape_a, a, shape_b, b, x0, x1, x2, x3, straight, since, dt, edge,
                     FAST * smaller(a, b, size) / travel * dt, threshold, shapes, like,
@@ -181,7 +183,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             e, gain = 0.0, max(0.0, -curve * left)
         if sweeps and swept and not passive and (supported[a] or supported[b]):
             # What slides or rolls has sunk in a little, and meets the edge of the next thing in its row.
-            ahead = t - 2.0 * edge / speed
+            curve = dot(add_scaled(x2, x3, 3.0 * t), normal)
+            ahead = t + first_root(2.0 * edge, speed, curve, dot(x3, normal), dt - t)
             if not ahead <= dt:
                 return
             if depth_at(shape_a, a, shape_b, b, along(ahead, x0, x1, x2, x3), shapes, like) <= edge:
@@ -213,7 +216,9 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             kind = STOP
             one, two = clusters[0][a], clusters[0][b]
             movable = one != two and clusters[3][one] + clusters[3][two] > 0.0
-            if movable and (e < 1.0 or t <= last[a] or t <= last[b]):
+            since_last = t - max(last[a], last[b])
+            collapse = e <= 0.0 or (e < 1.0 and since_last <= QUICK * dt)
+            if movable and (collapse or (sweep_of[0] == EVENT_DRIVEN and since_last <= 0.0)):
                 kind, e, gain = STICK, 0.0, 0.0
         elif sweeps and sweep_of[0] == EVENT_DRIVEN and e == 1.0:
             driven = (inverse_mass[a] == 0.0 and length(row(motion[1], a, like)) > 0.0) or (
@@ -246,8 +251,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
         dt, pair_a, pair_b, pairs, responds, hits, supported, heads, links, looks, rank, size, shape_of, offset, shapes,
         position, velocity, start_velocity, inverse_mass, damping, start, motion, restitution, friction, rules,
         material, limits, share, struck, spent, last, clusters, sweep_of, roam_lower, roam_upper, crossed, pair_impulse,
-        pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values, heap, log_pair, log_value, counts,
-        clock, like,
+        pair_normal, pair_point, pair_depth, events, event_times, event_keys, event_values, heap, log_pair, log_value,
+        counts, clock, like,
     ):  # fmt: skip
         """Bounce every pair that touches in its motion and approaches faster than the threshold.
 

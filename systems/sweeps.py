@@ -181,8 +181,8 @@ def make_sweep_kernel(first_touch):
                 straight = is_straight(a, b, x2, x3, dt, motion, like)
                 touch, t, normal, point, _ = first_touch(
                     shape_of[a], a, shape_of[b], b, x0, x1, x2, x3, straight, 0.0, dt,
-                    reach(dt, a, b, share, size, fixed_slop), FAST * smaller(a, b, size) / travel * dt, 0.0, shapes,
-                    like,
+                    min(reach(dt, a, b, share, size, fixed_slop), FAST * smaller(a, b, size)),
+                    FAST * smaller(a, b, size) / travel * dt, 0.0, shapes, like,
                 )  # fmt: skip
                 if touch == APART:
                     continue
