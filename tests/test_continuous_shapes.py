@@ -18,6 +18,7 @@ from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.one_way_segment import OneWaySegmentCollider
 
+pytestmark = pytest.mark.slow  # each set of shapes compiles for long
 DT = 1 / 60
 HEXAGON = 0.3 * np.array([(math.cos(k * math.pi / 3), math.sin(k * math.pi / 3)) for k in range(6)])
 SQUARE = 0.2 * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
@@ -61,7 +62,6 @@ MEETINGS = [
 ]
 
 
-@pytest.mark.slow  # compiles for long
 @each_sweep
 def test_every_pair_meets_where_it_should(mode):
     """All pairs at once, each on a lane, e = 1 and 0.5, 100 to 30,000 m/s, traced back from where they touch.
@@ -156,7 +156,6 @@ def test_a_one_way_segment_in_the_way_of_bullets(mode, e):
         assert (world.bodies.dynamic.position[:, 1] > heights - 0.002).all()
 
 
-@pytest.mark.slow  # compiles for long
 @pytest.mark.parametrize("mode", MODES)
 def test_a_polygon_that_flies_onto_a_capsule_on_the_ground(mode):
     """Under gravity, e = 0: everything ends at rest above the ground, whatever it is made of."""
