@@ -12,6 +12,7 @@ from ..framework import Settings, World
 from .shapes import Floats, rotation_matrix
 
 FLAT = 0.005  # of the smaller body: what counts as nothing, unless the settings give a number
+FAST = 0.2  # of the smaller body's size: pairs that travel farther in a step are swept
 
 
 @dataclass(eq=False)
@@ -45,6 +46,8 @@ class Body:
     support: Floats | None = field(init=False, default=None)  # velocity that those below it are expected to give
     struck: int = field(init=False, default=0)
     spent: int = field(init=False, default=0)  # of these, the impacts that the cap counts
+    last: float = field(init=False, default=-math.inf)  # the time of the latest
+    cluster: Cluster = field(init=False)  # what it sticks together with
     stopped: bool = field(init=False, default=False)  # beyond the cap: it stands still until the step ends
     aside: bool = field(init=False, default=False)  # stopped, or thrown from afar: no contact at rest holds it
 
@@ -69,6 +72,7 @@ class Body:
         self.start = self.seems_from = self.position
         self.first_velocity = self.velocity
         self.support, self.struck, self.spent = None, 0, 0
+        self.last, self.cluster = -math.inf, Cluster([self], fixed=self.inverse_mass == 0.0)
         self.stopped = self.aside = False
 
     def fly(self, dt: float, gravity: Floats, method: str, curved: bool) -> None:
@@ -99,6 +103,18 @@ class Body:
             travel, self.path = dt * speed, (speed, at_rest)
         self.position, self.velocity = self.position + travel, after
         self.gained = float(np.linalg.norm(after - before))
+
+
+@dataclass(eq=False)
+class Cluster:
+    """Bodies that stick together until the step ends; ``fixed``: to something that cannot be moved, too."""
+
+    members: list[Body]
+    fixed: bool
+
+    @property
+    def inverse_mass(self) -> float:
+        return 0.0 if self.fixed else 1.0 / sum(body.mass for body in self.members)
 
 
 @dataclass(eq=False)
@@ -146,6 +162,10 @@ class Pair:
     def margin(self, settings: Settings) -> float:
         """How near they are held: the slop and twice the way that forces make in a step from rest."""
         return self.slop(settings) + 2.0 * self.gained * settings.dt
+
+    def edge(self, settings: Settings) -> float:
+        """How deep what slides may have sunk in: where swept, what is behind so low an edge does not stop it."""
+        return min(self.margin(settings), FAST * self.size)
 
     def threshold(self, settings: Settings) -> float:
         """Approach, m/s, from which they bounce."""

@@ -10,23 +10,25 @@ import heapq
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..framework import Settings
 from .shapes import Floats
-from .testing_oracle_bodies import Body, Pair, Touch, only_corners, touch
-from .testing_oracle_sweeps import FAST, ROUNDING, Meeting, is_swept, sweep, way_of
+from .testing_oracle_bodies import FAST, Body, Cluster, Pair, Touch, only_corners, touch
+from .testing_oracle_sweeps import ROUNDING, Meeting, Way, is_swept, slides_over, sweep, way_of
 
 HALVINGS = 60  # of a step: below the rounding of its time
+QUICK = 1e-3  # of the step: what has lost energy and is struck again so soon goes on like that
+STUCK = 1 << 30  # impacts that no cap allows: whoever has stuck once goes on to stick
 
 
 @dataclass(frozen=True, eq=False)
 class Impact:
     """A bounce that lies ahead. ``slide``: the change of sliding speed that friction brings, (d,).
 
-    kind: bounce; free, if no cap counts it; stop, of what is fast and beyond the cap; cross, of what does not push
+    kind: bounce; free, if no cap counts it; stick and stop, beyond the cap; cross, of what does not push
     """
 
     pair: Pair
@@ -35,16 +37,17 @@ class Impact:
     normal: Floats
     slide: Floats
     struck: tuple[int, int]  # how often its two bodies had been struck when this was foreseen
-    kind: str = "bounce"
+    kind: str
+    impulse: float = field(init=False)  # N s, along the normal
+
+    def __post_init__(self) -> None:
+        one, two = (body.cluster if self.kind == "stick" else body for body in self.pair.bodies)
+        light = one.inverse_mass + two.inverse_mass
+        object.__setattr__(self, "impulse", self.speed / light if light else 0.0)
 
     @property
     def stale(self) -> bool:
         return self.struck != (self.pair.a.struck, self.pair.b.struck)
-
-    @property
-    def impulse(self) -> float:
-        """N s, along the normal."""
-        return self.pair.mass * self.speed
 
 
 class Impacts:
@@ -78,6 +81,10 @@ class Impacts:
                 for body in moved:
                     if not body.stopped:
                         _stop(body, impact.time)
+            elif impact.kind == "stick":
+                self.capped += 1
+                moved = self._stick(impact)
+                self.done.append(impact)
             else:
                 self._strike(impact)
                 self.done.append(impact)
@@ -128,15 +135,20 @@ class Impacts:
             if not (fast and -(along + curve * left) * left > pair.slop(settings)):
                 return None
             e, gain = 0.0, max(0.0, -curve * left)
+        supported = a.support is not None or b.support is not None
+        if swept and pair.pushes and supported and slides_over(pair, way, met, normal, settings):
+            return None
         if not self._curved and e != 1.0:  # a straight path has the true speed in its middle only
             bend = (b.velocity - b.first_velocity) - (a.velocity - a.first_velocity)
             along = min(0.0, along + float(bend @ normal) * (time / dt - 0.5))
             if self._sweeping and pair.pushes and not along < -nothing:
                 return None  # the flight does not have it
-        kind = self._kind(pair, e, way.length(left) > FAST * pair.size or any(map(_is_thrown, pair.bodies)))
+        kind = self._kind(pair, e, time, along, way)
         if kind is None:
             self.capped += 1
             return None
+        if kind == "stick":
+            return Impact(pair, time, -along, normal, np.zeros_like(normal), (a.struck, b.struck), kind)
         slide = np.zeros_like(normal)
         sliding = approach - normal * float(approach @ normal)
         fast, mu = float(np.linalg.norm(sliding)), pair.friction(settings)
@@ -146,27 +158,59 @@ class Impacts:
 
     def _strike(self, impact: Impact) -> None:
         """Both bodies get their impulse at the time of impact and make the rest of the step with new velocities."""
-        pair, dt = impact.pair, self._settings.dt
+        pair = impact.pair
         change = pair.mass * (impact.speed * impact.normal + impact.slide)
-        fading = 0.5 * dt if self._settings.collision == "event_driven" else dt - impact.time
         for body, sign in ((pair.a, -1.0), (pair.b, 1.0)):
             if body.inverse_mass > 0.0:
-                _push(body, sign * body.inverse_mass * change, impact.time, dt, fading)
+                self._push(body, sign * body.inverse_mass * change, impact.time)
                 body.spent += impact.kind == "bounce"
-        pair.impulse += impact.impulse
-        pair.normal = impact.normal
-        pair.involved = True
+        _note(impact)
 
-    def _kind(self, pair: Pair, e: float, fast: bool) -> str | None:
-        """None for what is left to the contacts at rest, being beyond the cap and not ``fast``."""
+    def _stick(self, impact: Impact) -> list[Body]:
+        """A plastic impact of two clusters, which are one from then on; who is in it."""
+        one, two = impact.pair.a.cluster, impact.pair.b.cluster
+        for cluster, sign in ((one, -1.0), (two, 1.0)):
+            dv = sign * cluster.inverse_mass * impact.impulse * impact.normal
+            for body in cluster.members:
+                if body.inverse_mass > 0.0:
+                    self._push(body, dv, impact.time)
+                    body.spent |= STUCK
+        _note(impact)
+        members = [body for body in (*one.members, *two.members) if body.inverse_mass > 0.0]
+        grown = Cluster(members, one.fixed or two.fixed)
+        for body in members:
+            body.cluster = grown
+        return members
+
+    def _push(self, body: Body, dv: Floats, time: float) -> None:
+        """Damping acts on what a blow gives: in the last half kick; all the time; not at all where a straight path has
+        the velocity of the step's end already."""
+        dt = self._settings.dt
+        fading = 0.5 * dt if self._settings.collision == "event_driven" else dt - time if self._curved else 0.0
+        body.struck, body.last = body.struck + 1, time
+        body.first_velocity = body.first_velocity + dv
+        body.velocity = body.velocity + dv * math.exp(-body.damping * fading)
+        body.position = body.position + dv * (dt - time)
+        body.seems_from = body.seems_from - dv * time
+        body.path = body.path[0] + dv, body.path[1]
+
+    def _kind(self, pair: Pair, e: float, time: float, along: float, way: Way) -> str | None:
+        """None for what is left to the contacts at rest, being beyond the cap, and too slow to get past them."""
         if not pair.pushes:
             return "cross"
-        if any(body.stopped or body.spent >= self._settings.impact_cap for body in pair.bodies):
-            moves = any(body.inverse_mass > 0.0 and not body.stopped for body in pair.bodies)
-            return "stop" if self._sweeping and fast and moves else None
-        driven = any(body.inverse_mass == 0.0 and body.path[0].any() for body in pair.bodies)
-        free = self._settings.collision == "event_driven" and self._sweeping and e == 1.0 and not driven
-        return "free" if free else "bounce"
+        a, b, left = pair.a, pair.b, self._settings.dt - time
+        since = time - max(a.last, b.last)
+        events = self._settings.collision == "event_driven" and self._sweeping
+        if not any(body.stopped or body.spent >= self._settings.impact_cap for body in pair.bodies):
+            driven = any(body.inverse_mass == 0.0 and body.path[0].any() for body in pair.bodies)
+            return "free" if events and e == 1.0 and not driven and since > 0.0 else "bounce"
+        moves = any(body.inverse_mass > 0.0 and not body.stopped for body in pair.bodies)
+        fast = way.length(left) > FAST * pair.size or any(map(_is_thrown, pair.bodies))
+        if not (self._sweeping and moves and fast and -along * left > pair.slop(self._settings)):
+            return None
+        ends_up = e <= 0.0 or (e < 1.0 and since <= QUICK * self._settings.dt) or (events and since <= 0.0)
+        one, two = a.cluster, b.cluster
+        return "stick" if ends_up and one is not two and not (one.fixed and two.fixed) else "stop"
 
 
 def _overlap(pair: Pair, since: float, settings: Settings) -> tuple[Meeting | None, Touch]:
@@ -202,19 +246,15 @@ def _is_thrown(body: Body) -> bool:
     return float(np.linalg.norm(body.seems_from - body.start)) > FAST * body.size
 
 
-def _push(body: Body, dv: Floats, time: float, dt: float, fading: float) -> None:
-    """fading: seconds in which damping acts on the new velocity."""
-    body.struck += 1
-    body.first_velocity = body.first_velocity + dv
-    body.velocity = body.velocity + dv * math.exp(-body.damping * fading)
-    body.position = body.position + dv * (dt - time)
-    body.seems_from = body.seems_from - dv * time
-    body.path = body.path[0] + dv, body.path[1]
+def _note(impact: Impact) -> None:
+    pair = impact.pair
+    pair.impulse += impact.impulse
+    pair.normal, pair.involved = impact.normal, True
 
 
 def _stop(body: Body, time: float) -> None:
-    """It stays there until the step ends, and keeps its velocity."""
-    body.stopped, body.struck = True, body.struck + 1
+    """It stays there until the step ends, whatever sticks to it, and keeps its velocity."""
+    body.stopped, body.struck, body.cluster.fixed = True, body.struck + 1, True
     body.velocity = body.velocity_at(time)
     body.position = body.seems_from = body.at(time)
     body.path = np.zeros_like(body.velocity), np.zeros_like(body.velocity)

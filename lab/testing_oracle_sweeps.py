@@ -16,9 +16,8 @@ import numpy as np
 
 from ..framework import Settings
 from .shapes import Floats
-from .testing_oracle_bodies import Pair, Touch, only_corners, touch
+from .testing_oracle_bodies import FAST, Pair, Touch, only_corners, touch
 
-FAST = 0.2  # of the smaller body's size: pairs that travel farther in a step are swept
 ROUNDING = 4e-16  # of a distance
 NEARLY = 1e-9  # of the size: whether so narrow a gap closes is for rounding to say
 PARTS = 64  # of a step, in which a parabola is as good as straight
@@ -70,7 +69,7 @@ def is_swept(pair: Pair, way: Way, settings: Settings) -> bool:
 
 def sweep(pair: Pair, way: Way, since: float, settings: Settings) -> Meeting | None:
     """The first touch from ``since`` to the end of the step, None if there is none."""
-    a, b, until, edge = pair.a, pair.b, settings.dt, pair.margin(settings)  # what slides may have sunk in by so much
+    a, b, until, edge = pair.a, pair.b, settings.dt, pair.edge(settings)
     time = _first_touch(pair, way, since, until)
     if time is None:
         return None
@@ -87,6 +86,29 @@ def sweep(pair: Pair, way: Way, since: float, settings: Settings) -> Meeting | N
     return Meeting(time, met, apart, at_corner=True)
 
 
+def slides_over(pair: Pair, way: Way, met: Meeting, normal: Floats, settings: Settings) -> bool:
+    """Whether what is supported and meets something on its way gets past it: the plane it touches would have to let it
+    in by twice the edge zone within the step, and there it must not be deeper than that zone."""
+    edge, left = pair.edge(settings), settings.dt - met.time
+    ahead = met.time + _closes(2.0 * edge, float(way.velocity(met.time) @ normal), float(way.bend @ normal))
+    depth = touch(pair.a, pair.b, way.at(ahead)).depth if ahead <= settings.dt else -math.inf
+    near_end = abs(ahead - settings.dt) <= NEARLY * left
+    pair.doubtful = pair.doubtful or near_end or abs(depth - edge) <= NEARLY * pair.size
+    return depth <= edge
+
+
+def _closes(gap: float, rate: float, bend: float) -> float:
+    """When a gap that changes so is 0 first; infinity: never. The larger root first, for it suffers no cancellation."""
+    if bend == 0.0:
+        return -gap / rate if rate < 0.0 else math.inf
+    inside = rate * rate - 4.0 * bend * gap
+    if inside < 0.0:
+        return math.inf
+    larger = -0.5 * (rate + math.copysign(math.sqrt(inside), rate))
+    roots = [larger / bend, gap / larger if larger else 0.0]
+    return min((root for root in roots if root >= 0.0), default=math.inf)
+
+
 def _first_touch(pair: Pair, way: Way, since: float, until: float) -> float | None:
     def gap(t: float) -> float:
         return -touch(pair.a, pair.b, way.at(t)).depth
@@ -98,10 +120,12 @@ def _first_touch(pair: Pair, way: Way, since: float, until: float) -> float | No
         if now <= 0.0:
             return since
         return _first_in(pair, gap, way, [since, until])
+    rate = float(way.velocity(since) @ touch(pair.a, pair.b, way.at(since)).normal)
+    if 0.0 < now <= 4.0 * ROUNDING * places and abs(rate) <= NEARLY * way.length(span) / span:
+        pair.doubtful = True  # whether they touch still: on a way that bends back it makes an odd time of a small gap
     if now > ROUNDING * float(np.linalg.norm(way.at(since))):
         edges = [since + span * k / PARTS for k in range(PARTS)]
         return _first_in(pair, gap, way, [*edges, until])
-    rate = float(way.velocity(since) @ touch(pair.a, pair.b, way.at(since)).normal)
     if abs(rate) <= NEARLY * way.length(span) / span and (pair.a.is_sphere or pair.b.is_sphere):
         pair.doubtful = True  # whether they part, as curved surfaces may, or go on touching
     if rate <= 0.0:

@@ -369,6 +369,7 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
                 if inverse_mass[i] > 0.0 and struck[i] < STOPPED:
                     if events[chosen, 3] == STOP:
                         stop(i, clock[NOW], position, velocity, motion, struck, spent, like)
+                        clusters[3][clusters[0][i]] = 0.0  # what sticks to it later does not push it on
                     else:
                         last[i] = clock[NOW]
                         time = leaves_at(i, clock[NOW], dt, size, motion, sweep_of, roam_lower, roam_upper, like)

@@ -80,8 +80,9 @@ def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable
             if not responds[c]:
                 continue
             a, b = pair_a[c], pair_b[c]
-            if struck[a] >= ASIDE or struck[b] >= ASIDE:
-                continue  # stopped, or thrown from afar
+            if struck[a] >= ASIDE or struck[b] >= ASIDE:  # stopped, or thrown from afar
+                involved[c] = True  # they may touch where they are now
+                continue
             hit = struck[a] > 0 or struck[b] > 0
             carried = supported[a] or supported[b]
             if not involved[c] and not hit and not carried:

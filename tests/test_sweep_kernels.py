@@ -185,7 +185,7 @@ def test_first_touch_on_parabolas_against_sampling(shape, d):
     def no_sweep(*_):
         return False, False, 0.0
 
-    first_touch = make_first_touch(shape, corner, no_sweep, lambda *_: True)
+    first_touch = make_first_touch(shape, corner, no_sweep, lambda *_: True, dented=False)
     plainly = getattr(first_touch, "py_func", first_touch)
     rng, like, found = np.random.default_rng(d), (0.0,) * d, 0
     for _ in range(60):
@@ -203,7 +203,7 @@ def test_first_touch_on_parabolas_against_sampling(shape, d):
         if abs(depths.max()) < 1e-4:
             continue
         outcome, time, normal, _, at = plainly(
-            0, 0, 0, 1, tuple(x0), tuple(x1), tuple(x2), like, False, 0.0, 1.0, 0.0, sizes, like
+            0, 0, 0, 1, tuple(x0), tuple(x1), tuple(x2), like, False, 0.0, 1.0, 0.0, 1e-3, 0.0, sizes, like
         )
         touched = depths >= 0.0
         assert outcome == (touches.TOUCHES if touched.any() else touches.APART)
@@ -223,19 +223,24 @@ def test_first_touch_on_parabolas_against_sampling(shape, d):
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.booleans())
 def test_flight_against_closed_forms(d, seed, damped):
-    """A parabola under the steady force, between two half kicks: of damping, and of what changes."""
+    """A parabola under the forces of the start, between two half kicks of damping; then the mean of the forces at both
+    ends. Forces that are the same at the end change nothing. Tolerance: a few roundings."""
     rng, h = np.random.default_rng(seed), 0.1
     n = 5
     position, velocity = rng.normal(size=(2, n, d))
-    steady, changing, later = rng.normal(size=(3, n, d))
+    early, later = rng.normal(size=(2, n, d))
     inverse_mass, damping = rng.uniform(0.1, 10, n), rng.uniform(0, 3, n) * damped
     x, v = position.copy(), velocity.copy()
     path, second = np.empty((2, n, d))
-    assert take_off(x, v, steady + changing, inverse_mass, damping, steady, path, second, h) == damped
+    assert take_off(x, v, early, inverse_mass, damping, path, second, h) == damped
     w, decay = inverse_mass[:, None], np.exp(-0.5 * damping * h)[:, None]
-    start = velocity * decay + 0.5 * h * w * changing
+    start = velocity * decay
     np.testing.assert_allclose(path, start, rtol=1e-14, atol=1e-14)
-    np.testing.assert_allclose(second, 0.5 * w * steady, rtol=1e-14)
-    np.testing.assert_allclose(x, position + start * h + 0.5 * w * steady * h * h, rtol=1e-14, atol=1e-14)
-    land(v, steady + later, inverse_mass, damping, steady, h)
-    np.testing.assert_allclose(v, (start + h * w * steady + 0.5 * h * w * later) * decay, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(second, 0.5 * w * early, rtol=1e-14)
+    np.testing.assert_allclose(x, position + start * h + 0.5 * w * early * h * h, rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(v, start + h * w * early, rtol=1e-14, atol=1e-14)
+    for force in (early, later):
+        landed = v.copy()
+        land(landed, force, inverse_mass, damping, second, h)
+        end = (start + 0.5 * h * w * (early + force)) * decay
+        np.testing.assert_allclose(landed, end, rtol=1e-13, atol=1e-13)
