@@ -29,7 +29,7 @@ APART, TOUCHES, AT_CORNER = range(3)
 def make_first_touch(evaluate: Any, corner: Any, swept: Any, convex: Any, dented: bool) -> Callable[..., Any]:
     """The swept test over the shapes of a scene; dented: some are not convex."""
     advance = make_advance(evaluate, corner)
-    march = make_march(evaluate) if dented else None
+    march: Any = make_march(evaluate) if dented else None
 
     @inlined
     def first_touch(
