@@ -18,6 +18,8 @@ from helpers_modes import both_dimensions, each_mode, each_sweep, mode_world
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.lab import testing as kit
 
+pytestmark = pytest.mark.slow  # its scenes compile for long
+
 DT = 1 / 60
 SHAKEN, GROWN = 1e-14, 1e-10  # of the scale: what tells a step that magnifies rounding beyond what is compared
 
@@ -138,7 +140,6 @@ def test_random_scenes(mode):
     assert told.crossed > 0
 
 
-@pytest.mark.slow
 @each_sweep
 def test_more_random_scenes(mode):
     """The same with up to 40 bodies."""
@@ -168,7 +169,6 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
     assert told.differ == 0
 
 
-@pytest.mark.slow
 @both_dimensions
 @each_sweep
 def test_more_fast_bodies(mode, d):

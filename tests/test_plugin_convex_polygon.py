@@ -17,6 +17,8 @@ from carom.plugins import Physics, convex_polygon
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.standard_shapes import convex_convex
 
+pytestmark = pytest.mark.slow  # its scenes compile for long
+
 COUNT = 10_000
 SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 

@@ -24,6 +24,8 @@ from carom.plugins.tile_grid import TileGridCollider, cells_of_text
 from carom.plugins.tile_grid.contact import deepest_contact
 from carom.plugins.tile_grid.sweep import first_touch
 
+pytestmark = pytest.mark.slow  # its scenes compile for long
+
 ROOT = Path(__file__).resolve().parent.parent
 
 
