@@ -154,6 +154,7 @@ class Spring(ForceSystem):
         return 2.0 * (bodies.position[:, 0] ** 2).sum()
 
 
+@pytest.mark.slow
 def test_a_spring_with_a_wall_is_of_second_order_in_event_driven_worlds():
     """Half an oscillator: an elastic wall at its middle, x = |cos 2t|. At half the step a quarter of the error, over 12
     phases, which still scatter; a method of first order has a half."""

@@ -442,6 +442,7 @@ def in_a_process(cache: Path, seed: str) -> tuple[str, int, int]:
     return digest, int(compiled), int(loaded)
 
 
+@pytest.mark.slow  # compiles everything twice
 def test_other_processes_with_a_cold_and_a_warm_cache_get_the_same_bits(tmp_path):
     cold, warm = in_a_process(tmp_path, "1"), in_a_process(tmp_path, "2")
     assert cold[1] > 5

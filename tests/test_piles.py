@@ -36,7 +36,7 @@ def test_a_pile_of_a_thousand(e):
     assert escaped == 0
 
 
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("e", [0.3, *(pytest.param(e, marks=pytest.mark.slow) for e in (0.0, 0.8))])
 def test_a_pile_of_a_thousand_spheres(e):
     """Without friction layers of spheres go on slipping now and then; the demand on big piles holds at 20 s."""
     energy, overlap, escaped = fall(3, 1000, e, 20)

@@ -70,7 +70,7 @@ def make_plugin():
     return plugin
 
 
-@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("sphere_first", [True, False])
 def test_a_shape_of_a_plugin_bounces_at_the_right_height(d, sphere_first):
     """Dropped from h with restitution e a ball comes back to e^2 h; here e = 1, over a rod that lies flat."""
