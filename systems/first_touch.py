@@ -75,7 +75,7 @@ def make_march(evaluate: Any) -> Callable[..., Any]:
                 t = 0.5 * (low + high)
                 if not low < t < high:
                     return TOUCHES, high, normal, point, at
-            elif t >= until:
+            elif not t < until:  # also if it is no number
                 return APART, t, normal, point, at
             else:
                 looks += 1

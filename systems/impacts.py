@@ -177,8 +177,8 @@ def make_impact_kernel(evaluate: Any, corner: Any, mix: Any, first_touch: Any = 
             # Too slow to bounce: a contact at rest, unless what is fast would be far past the surface by the end of the
             # step. That is stopped there, or, on a path that leads back in, sent up so that it is there at the end.
             left, curve = dt - t, dot(add_scaled(x2, x3, 3.0 * t), normal)
-            fast = swept and travel_of(x1, x2, x3, left) > FAST * smaller(a, b, size)
-            if not (fast and -(speed + curve * left) * left > slop):
+            goes_far = swept and travel_of(x1, x2, x3, left) > FAST * smaller(a, b, size)
+            if not (goes_far and -(speed + curve * left) * left > slop):
                 return
             e, gain = 0.0, max(0.0, -curve * left)
         if sweeps and swept and not passive and (supported[a] or supported[b]):
