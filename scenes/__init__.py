@@ -10,9 +10,11 @@ own default. The same protocol holds for a file given to ``carom run FILE.py``.
 from . import (
     asteroids,
     billiards,
+    bouncing,
     bullets,
     conveyor,
     cradle,
+    drops,
     fastgas,
     freefall,
     galperin,
@@ -22,6 +24,8 @@ from . import (
     lift,
     maze,
     mixed2d,
+    oblique,
+    orbit,
     pile2d,
     pile3d,
     platforms,
@@ -29,8 +33,10 @@ from . import (
     player_query,
     pyramid,
     shots,
+    spring,
     stack,
     static_world,
+    thermal_gas,
 )
 from .protocol import Build, Scene
 
@@ -60,6 +66,12 @@ _SCENES: dict[str, Scene] = {
         lift.SCENE,
         cradle.SCENE,
         galperin.SCENE,
+        spring.SCENE,
+        orbit.SCENE,
+        bouncing.SCENE,
+        oblique.SCENE,
+        thermal_gas.SCENE,
+        drops.SCENE,
     )
 }
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from worlds import make_world
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import World
+from carom.framework import Settings, World
+from carom.scenes import thermal_gas
 
-N, ETA, RADIUS = 400, 0.3, 0.5
+N, ETA, RADIUS = thermal_gas.BODIES, thermal_gas.ETA, thermal_gas.RADIUS
 BULK = 2.0632  # Z of hard discs at eta = 0.3, virial series of Clisby and McCoy
 REFERENCE = 2.088  # the same of N = 400 in this box, in measures that the centres can reach: exact event dynamics
 RATE = 2.399  # collisions of each disc per unit time at kT = m = sigma = 1: 2 sqrt(pi) rho sigma g
@@ -20,26 +18,8 @@ FINITE_RATE = 1.031  # walls keep centres out of a layer of R, so the gas is den
 
 
 def gas(dt: float, seed: int, n: int = N, **settings: Any) -> tuple[World, float]:
-    """Discs on a lattice, Gaussian velocities of mean zero scaled to kT = 1; the side of the box. n: a square."""
-    world = make_world(dt=dt, **settings)
-    side = math.sqrt(n * math.pi / (4 * ETA))
-    for axis in range(2):
-        for edge, outwards in ((0.0, -1), (side, 1)):
-            centre, half = np.full(2, side / 2), np.full(2, side)
-            centre[axis], half[axis] = edge + outwards * 5.0, 5.0
-            world.create_entity(Transform(centre), AABBCollider(half, restitution=1.0))
-    row = math.isqrt(n)
-    cells = np.stack(np.meshgrid(*[(np.arange(row) + 0.5) * side / row] * 2), axis=-1).reshape(-1, 2)
-    velocity = np.random.default_rng(seed).normal(size=(n, 2))
-    velocity -= velocity.mean(axis=0)
-    velocity *= math.sqrt(2 * n / (velocity**2).sum())
-    world.create_entities(
-        n,
-        Transform.many(cells),
-        RigidBody.many(mass=1.0, linear_velocity=velocity),
-        SphereCollider.many(radius=RADIUS, restitution=1.0),
-    )
-    return world, side
+    """The scene thermal_gas at ETA, and the side of its box. n: a square; settings: besides ``dt``."""
+    return thermal_gas.build(Settings(dt=dt, **settings), seed, n=n, eta=ETA), thermal_gas.side(n, ETA)
 
 
 @dataclass

@@ -1,0 +1,254 @@
+"""The scenes whose answers are known in closed form: spring, orbit, bouncing, oblique, thermal_gas and drops.
+
+Rounding: 1e-12 of what is measured unless a test says otherwise; anything coarser follows from the method's order.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from helpers_modes import MODES, each_mode, strikes
+
+from carom.components import AABBCollider
+from carom.framework import Settings
+from carom.scenes import bouncing, drops, oblique, orbit, spring, thermal_gas
+
+OMEGA = 2 * math.pi
+
+
+def energy(world):
+    return world.kinetic_energy() + world.potential_energy()
+
+
+def run(world, seconds):
+    """The world after the whole number of steps nearest to that many seconds."""
+    for _ in range(round(seconds / world.settings.dt)):
+        world.step()
+    return world
+
+
+# -- spring ----------------------------------------------------------------------------------------
+
+
+def test_spring_swings_as_velocity_verlet_does_to_rounding():
+    """x_n = cos(n theta) with cos theta = 1 - (omega dt)^2 / 2, which is the method's own closed form."""
+    with spring.build() as world:
+        dt = world.settings.dt
+        theta = math.acos(1 - (OMEGA * dt) ** 2 / 2)
+        for n in range(1, 301):
+            world.step()
+            assert world.bodies.position[0, 0] == pytest.approx(math.cos(n * theta), abs=1e-11)
+            assert world.bodies.position[0, 1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "damping"), [(OMEGA**2, 0.0), (OMEGA**2, 0.5), (OMEGA**2, 5.0), (10.0, 0.1), (0.0, 2.0)]
+)
+def test_spring_with_any_stiffness_and_damping_follows_its_formula(stiffness, damping):
+    """RK4: phase error omega t (omega dt)^4 / 120 = 4e-10 at 1/1000 s; twice that, for damping adds to it."""
+    settings = Settings(dt=1 / 1000, integrator="rk4")
+    with spring.build(settings, stiffness=stiffness, damping=damping) as world:
+        run(world, 5.0)
+        t, half = world.time, damping / 2
+        root = np.emath.sqrt(stiffness - half**2)
+        expected = math.exp(-half * t) * (np.cos(root * t) + half * np.sin(root * t) / root).real
+        assert world.bodies.position[0, 0] == pytest.approx(expected, abs=8e-10)
+
+
+def test_spring_has_the_energy_of_its_amplitude():
+    with spring.build(Settings(dt=1 / 1000, integrator="rk4")) as world:
+        assert world.potential_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-15)
+        assert energy(run(world, 0.25)) == pytest.approx(OMEGA**2 / 2, rel=1e-9)
+        assert world.kinetic_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-9)  # a quarter of a swing: in the middle
+
+
+# -- orbit -----------------------------------------------------------------------------------------
+
+
+def return_error(method, steps, eccentricity):
+    """How far from its start the planet is after one turn."""
+    with orbit.build(Settings(dt=orbit.PERIOD / steps, integrator=method), eccentricity=eccentricity) as world:
+        start = world.bodies.position.copy()
+        for _ in range(steps):
+            world.step()
+        return float(np.linalg.norm(world.bodies.position - start))
+
+
+@pytest.mark.parametrize(("method", "order"), [("velocity_verlet", 2), ("yoshida4", 4)])
+def test_orbit_closes_with_the_order_of_the_method(method, order):
+    coarse, fine = (return_error(method, steps, 0.6) for steps in (1000, 2000))
+    assert math.log2(coarse / fine) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.3, 0.6])
+def test_orbit_closes(eccentricity):
+    """RK4, 4,000 steps: the angle in a step at the perihelion is at most 5 dt = 0.008, its fourth power 4e-9, which
+    many steps there multiply."""
+    assert return_error("rk4", 4000, eccentricity) < 1e-7
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.6, 0.9])
+def test_orbit_has_the_energy_and_momentum_of_its_ellipse(eccentricity):
+    with orbit.build(eccentricity=eccentricity) as world:
+        (x, y), (u, v) = world.bodies.position[0], world.bodies.linear_velocity[0]
+        assert energy(world) == pytest.approx(-0.5, rel=1e-14)
+        assert x * v - y * u == pytest.approx(math.sqrt(1 - eccentricity**2), rel=1e-14)
+
+
+def test_orbit_keeps_its_energy_with_its_own_settings():
+    """Ten turns; Verlet's error returns to what it was with every turn, and is of order (5 dt)^2 = 1e-3 at most.
+    Angular momentum: to the rounding of 10,000 steps."""
+    with orbit.build() as world:
+        worst = 0.0
+        assert world.settings.dt * 10_000 == pytest.approx(orbit.SCENE.seconds, rel=1e-15)
+        for _ in range(10_000):
+            world.step()
+            worst = max(worst, abs(energy(world) / -0.5 - 1))
+        assert worst < 1e-3
+        assert abs(energy(world) / -0.5 - 1) < 0.1 * worst
+        (x, y), (u, v) = world.bodies.position[0], world.bodies.linear_velocity[0]
+        assert x * v - y * u == pytest.approx(0.8, rel=1e-12)
+
+
+# -- bouncing --------------------------------------------------------------------------------------
+
+
+def test_bouncing_keeps_its_energy_with_verlet_and_swept_impacts():
+    """A1: the mean of (E - E0)^2 of a ball below 1e-16 J^2; ten bounces in 20 s, one every 2 sqrt(2 (5 - 0.1) / g)."""
+    with bouncing.build() as world:
+        alone = world.bodies.dynamic
+        assert energy(world) == pytest.approx(7 * 490.5, rel=1e-14)
+        errors, hits = [], 0
+        for _ in range(1200):
+            world.step()
+            each = 5.0 * alone.linear_velocity[:, 1] ** 2 + 98.1 * alone.position[:, 1]
+            errors.append((each - 490.5) ** 2)
+            hits += len(world.contacts.impacts)
+        assert np.mean(errors) < 1e-16
+        assert hits == 7 * 10
+        assert np.ptp(alone.position[:, 1]) == 0.0  # all of them do the same
+        np.testing.assert_array_equal(alone.position[:, 0], [-6, -4, -2, 0, 2, 4, 6])
+
+
+def test_bouncing_from_another_height():
+    with bouncing.build(n=1, height=0.1) as world:  # on the ground from the start
+        run(world, 0.5)
+        assert world.bodies.dynamic.position[0].tolist() == pytest.approx([0.0, 0.1], abs=1e-3)
+    with bouncing.build(n=2, height=8.0) as world:
+        assert energy(world) == pytest.approx(2 * 98.1 * 8.0, rel=1e-14)
+        hits = strikes(world, 120)
+        np.testing.assert_allclose(hits.time, [math.sqrt(2 * 7.9 / 9.81)] * 2, rtol=1e-12)
+
+
+# -- oblique ---------------------------------------------------------------------------------------
+
+
+@each_mode
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 60, 3 / 43, 1.0])
+def test_oblique_equal_and_elastic(mode, dt):
+    """B10: one impact at 2.2 s and the places at 3 s, to rounding."""
+    with oblique.build(Settings(dt=dt, collision=mode)) as world:
+        hits = strikes(world, round(3 / dt))
+        np.testing.assert_allclose(hits.time, [2.2], rtol=1e-12)
+        np.testing.assert_allclose(hits.normal, [(0.8, -0.6)], rtol=1e-12)
+        np.testing.assert_allclose(world.bodies.position, [(-0.512, 0.984), (0.512, -0.384)], atol=1e-12)
+        np.testing.assert_allclose(world.bodies.linear_velocity, [(0.36, 0.48), (0.64, -0.48)], atol=1e-12)
+
+
+def test_oblique_with_another_mass_and_restitution():
+    """B10 with three times the mass and e = 0.5: the impulse is 0.9."""
+    with oblique.build(mass=3.0, restitution=0.5) as world:
+        hits = strikes(world, 180)
+        np.testing.assert_allclose(hits.impulse, [0.9], rtol=1e-12)
+        velocities = np.array([(0.28, 0.54), (0.24, -0.18)])
+        np.testing.assert_allclose(world.bodies.linear_velocity, velocities, atol=1e-12)
+        np.testing.assert_allclose(world.bodies.position, [(-0.8, 0.6), (0, 0)] + 0.8 * velocities, atol=1e-12)
+
+
+# -- thermal_gas -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("n", "eta", "seed"), [(400, 0.3, 0), (400, 0.3, 7), (4, 0.01, 0), (100, 0.78, 1)])
+def test_thermal_gas_starts_warm_at_rest_as_a_whole_and_apart(n, eta, seed):
+    """kT = <v^2> / 2 = 1, momentum 0, no overlap, and the share of the box that was asked for."""
+    with thermal_gas.build(seed=seed, n=n, eta=eta) as world:
+        moving, length = world.bodies.dynamic, thermal_gas.side(n, eta)
+        assert len(moving) == n
+        assert (moving.linear_velocity**2).sum() / (2 * n) == pytest.approx(1.0, rel=1e-13)
+        np.testing.assert_allclose(world.momentum(), 0.0, atol=1e-12)
+        assert n * math.pi / 4 / length**2 == pytest.approx(eta, rel=1e-14)
+        apart = np.linalg.norm(moving.position[:, None] - moving.position, axis=2) + 9 * length * np.eye(n)
+        assert apart.min() >= 1.0
+        assert moving.position.min() >= 0.5
+        assert moving.position.max() <= length - 0.5
+
+
+def test_thermal_gas_has_the_velocities_of_its_seed_with_normal_components():
+    """800 components: variance 1 by scaling, kurtosis 3 within three of its standard deviations, sqrt(24 / 800)."""
+    _, first = thermal_gas.initial_state(400, 0.3, 0)
+    _, other = thermal_gas.initial_state(400, 0.3, 1)
+    assert not np.any(first == other)
+    assert np.mean(first**4) == pytest.approx(3.0, abs=3 * math.sqrt(24 / 800))
+
+
+def test_thermal_gas_has_thick_walls_first():
+    with thermal_gas.build(n=4) as world:
+        length = thermal_gas.side(4, 0.3)
+        walls = world.bodies.static
+        assert walls.entity.tolist() == [1, 2, 3, 4]
+        half = np.array([world.component_for_entity(entity, AABBCollider).half_extents for entity in walls.entity])
+        lower, upper = walls.position - half, walls.position + half
+        np.testing.assert_allclose(lower.min(axis=0), -10.0, rtol=1e-14)
+        np.testing.assert_allclose(upper.max(axis=0), length + 10.0, rtol=1e-14)
+        assert half.min() == 5.0
+
+
+@pytest.mark.parametrize("mode", ["discrete", *MODES])
+def test_thermal_gas_keeps_energy_and_bodies(mode):
+    """Four seconds: some ten collisions of each disc, 2.4 a second and less as long as the lattice lasts."""
+    with thermal_gas.build(Settings(dt=0.05, collision=mode), n=100) as world:
+        hits = 0
+        for _ in range(80):
+            world.step()
+            hits += len(world.contacts.impacts)
+        assert hits > 100 * 2.4 * 4 / 2 * 0.7
+        assert energy(world) == pytest.approx(100.0, rel=1e-11)
+        position = world.bodies.dynamic.position
+        assert ((position > 0) & (position < thermal_gas.side(100, 0.3))).all()
+
+
+# -- drops -----------------------------------------------------------------------------------------
+
+
+@each_mode
+@pytest.mark.parametrize("dt", [1 / 240, 1 / 60])
+@pytest.mark.parametrize("restitution", [0.8, 0.9, 1.0])
+def test_drops_strike_when_they_must(mode, dt, restitution):
+    """B11: impact n at T (1 + 2 e (1 - e^(n-1)) / (1 - e)), and the energy of the apex 4.9 e^(2n) after it."""
+    settings = Settings(dt=dt, integrator="velocity_verlet", collision=mode)
+    with drops.build(settings, restitution=restitution) as world:
+        hits = strikes(world, round(5 / dt))
+        expected = [t for t in drops.impact_times(restitution, 10) if t < 5]
+        np.testing.assert_allclose(hits.time, expected, rtol=1e-11)
+        apex = energy(world) / 9.81 - 0.1
+        assert apex == pytest.approx(4.9 * restitution ** (2 * len(hits)), rel=1e-10)
+
+
+def test_drops_have_the_published_times():
+    first = math.sqrt(2 * 4.9 / 9.81)
+    for n, time in enumerate(drops.impact_times(0.8, 200), 1):
+        assert time == pytest.approx(first * (1 + 1.6 * (1 - 0.8 ** (n - 1)) / 0.2), rel=1e-13)
+    assert drops.impact_times(0.8, 200)[-1] == pytest.approx(8.995412, abs=1e-6)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_drops_come_to_rest(restitution):
+    """All is over after T (1 + e) / (1 - e) <= 3 s; then it lies on the floor, no deeper than the slop and a quarter:
+    0.005 of its diameter of 0.2 m."""
+    with drops.build(restitution=restitution) as world:
+        run(world, 5.0)
+        body = world.bodies.dynamic
+        assert -1.25 * 0.005 * 0.2 < body.position[0, 1] - 0.1 <= 1e-12
+        assert np.abs(body.linear_velocity).max() < 1e-6
