@@ -28,13 +28,21 @@ class Output:
     charts: Any
 
     @classmethod
-    def checked(cls, mark: str, as_json: bool, as_markdown: bool, into: Path | None, out: Path | None) -> Output:
-        """Problem for what cannot be: said before the long run, not after it."""
+    def checked(
+        cls,
+        mark: str,
+        as_json: bool,
+        as_markdown: bool,
+        into: Path | None,
+        out: Path | None,
+        charts: str = "bench_charts",
+    ) -> Output:
+        """Problem for what cannot be: said before the long run, not after it. charts: the module that draws."""
         if as_json and as_markdown:
             raise Problem("--json and --markdown exclude each other")
         if into is not None:
             between_marks(into, mark)
-        return cls(mark, as_json, as_markdown, into, out, None if out is None else _charts(out))
+        return cls(mark, as_json, as_markdown, into, out, None if out is None else _charts(out, charts))
 
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
         """Print the result, and put the tables into the page."""
@@ -61,9 +69,9 @@ class Output:
         click.echo(f"chart: {picture}" if picture is not None else "no chart: nothing is compared", err=True)
 
 
-def _charts(out: Path) -> Any:
+def _charts(out: Path, module: str) -> Any:
     try:
-        charts = importlib.import_module(".bench_charts", __package__)
+        charts = importlib.import_module(f".{module}", __package__)
     except ImportError as error:
         raise Problem("--out: matplotlib is missing; it comes with the extra: pip install 'carom[bench]'") from error
     try:
