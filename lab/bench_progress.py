@@ -1,4 +1,4 @@
-"""The progress bar of the benchmarks: drawn between the timed blocks only, with the time left."""
+"""The progress bar of all that is measured: drawn when something is done only, with the time left."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ class Progress:
     def __init__(self) -> None:
         self.done = 0.0
 
-    def begin(self, total: float) -> None:
-        """How much there is to do, in any unit."""
+    def begin(self, total: float, done: float = 0.0) -> None:
+        """How much there is to do, in any unit, and how much of it an earlier process has done."""
+        self.done = done
 
     def say(self, what: str) -> None:
         """What is being done."""
@@ -64,9 +65,13 @@ class Bar(Progress):
         log.listeners.remove(self._compiles)
         self._bar.stop()
 
-    def begin(self, total: float) -> None:
-        """How much there is to do, in any unit."""
-        self._bar.update(self._task, total=total)
+    def begin(self, total: float, done: float = 0.0) -> None:
+        """How much there is to do, in any unit, and how much of it an earlier process has done.
+
+        That part fills the bar and does not count for the time left.
+        """
+        super().begin(total, done)
+        self._bar.update(self._task, total=total, completed=done)
         self._bar.refresh()
 
     def say(self, what: str) -> None:

@@ -1,0 +1,128 @@
+"""What test_workers.py lets worker processes do: they can import this module, as pytest puts its folder on the path."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from carom.framework.compilation import log
+from carom.lab import workers
+
+DEADLINE = 60.0  # s; only a failing test waits so long
+
+
+class Task(NamedTuple):
+    """Which function below to call, a folder for marks of what has run, and a number."""
+
+    what: str
+    folder: str
+    number: int
+
+
+class Awkward(Exception):  # noqa: N818
+    """Can be pickled, but not be read again."""
+
+    def __init__(self, one: int, two: int) -> None:
+        super().__init__("awkward")
+
+
+def marks(folder: Path) -> list[str]:
+    """Which tasks have begun, and how often: `3` and `3 again`."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def until(condition: Any) -> None:
+    """Wait for it, but not for ever."""
+    end = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def perform(task: Task) -> Any:
+    """Leave a mark with the process id, and do what the task says."""
+    path = Path(task.folder) / str(task.number)
+    first = not path.exists()
+    if not first:
+        path = path.with_name(f"{path.name} again")
+        assert not path.exists()
+    path.with_suffix(".part").write_text(str(os.getpid()))
+    path.with_suffix(".part").rename(path)
+    return globals()[task.what](task, first)
+
+
+def square(task: Task, first: bool) -> int:
+    return task.number**2
+
+
+def wait_for_others(task: Task, first: bool) -> int:
+    """Lasts as long as the tasks before it need to begin."""
+    until(lambda: len(marks(Path(task.folder))) == task.number)
+    return task.number**2
+
+
+def last_for_ever(task: Task, first: bool) -> None:
+    time.sleep(DEADLINE)
+
+
+def killed_once(task: Task, first: bool) -> int:
+    if first:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return task.number**2
+
+
+def killed(task: Task, first: bool) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def exits(task: Task, first: bool) -> None:
+    os._exit(task.number)
+
+
+def fails(task: Task, first: bool) -> None:
+    raise ValueError(f"number {task.number}")
+
+
+def fails_awkwardly(task: Task, first: bool) -> None:
+    raise Awkward(1, 2)
+
+
+def fails_by_leaving(task: Task, first: bool) -> None:
+    sys.exit("enough")
+
+
+def gives_what_cannot_be_sent(task: Task, first: bool) -> Any:
+    return lambda: task
+
+
+def process(_: Any) -> int:
+    return os.getpid()
+
+
+def turned(content: bytes) -> bytes:
+    return content[::-1]
+
+
+def compiles(kernel: str) -> None:
+    for listener in log.listeners:
+        listener(kernel)
+
+
+def nested(number: int) -> list[tuple[int, int]]:
+    return list(workers.in_parallel(process, range(number), workers=2))
+
+
+def dies_at_once(*_: object) -> None:
+    os._exit(7)
