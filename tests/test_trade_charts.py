@@ -1,0 +1,296 @@
+"""Work-precision charts: what is drawn where, asked of matplotlib; and that nothing is left out."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import helpers_trade as made
+import pytest
+
+from carom.lab import published
+from carom.lab.bench_clock import Spread
+from carom.lab.problems import Problem
+from carom.lab.trade_charts import TIME, WORK, draw, figure, inline_svg, legend_text, quantities
+from carom.lab.trade_records import PYMUNK, Cell, Curve, ErrorBar, Point
+from carom.lab.trade_styles import FEW, styles
+
+
+def plot(chart):
+    return chart.axes[0]
+
+
+def strip(chart):
+    return chart.axes[1]
+
+
+def lines(axes, label):
+    """(x, y) of all lines with this label."""
+    return [
+        (float(x), float(y))
+        for line in axes.get_lines()
+        if line.get_label() == label
+        for x, y in zip(*line.get_data(), strict=True)
+    ]
+
+
+def legend(chart):
+    return [text.get_text() for text in chart.legends[0].get_texts()]
+
+
+def words(chart):
+    return [text.get_text() for text in chart.texts]
+
+
+# -- curves -----------------------------------------------------------------------------------------------------
+
+
+def test_a_curve_is_error_to_the_right_and_work_upwards():
+    case = made.smooth()
+    chart = figure(case)
+    assert (plot(chart).get_xscale(), plot(chart).get_yscale()) == ("log", "log")
+    # velocity Verlet: error 0.1 (15 dt)^2, work 60,000 a step
+    expected = [(0.1 * (15 * dt) ** 2, 60_000 / dt) for dt in made.STEPS]
+    for seen, meant in zip(lines(plot(chart), "velocity verlet"), expected, strict=True):
+        assert seen == pytest.approx(meant)
+    assert {line.get_label() for line in plot(chart).get_lines()} >= {curve.label for curve in case.curves}
+
+
+def test_everything_drawn_lies_within_the_axes():
+    for quantity in (WORK, TIME):
+        for case in (made.smooth(), made.bouncing(), made.crowded()):
+            for axes in figure(case, quantity).axes:
+                (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+                for line in axes.get_lines():
+                    if line.get_transform() == axes.transData:
+                        assert all(left <= x <= right for x in line.get_xdata())
+                        assert all(bottom <= y <= top for y in line.get_ydata())
+
+
+def test_orders_stand_in_the_legend():
+    assert legend(figure(made.smooth())) == [
+        "explicit euler, order 1.00 (1)",
+        "semi implicit euler, order 1.00 (1)",
+        "velocity verlet, order 2.00 (2)",
+        "rk4, order 4.00 (4)",
+        "yoshida4, order 4.00 (4)",
+        "pymunk, 10 iterations, order 1.00 (1)",
+    ]
+    assert legend(figure(made.bouncing()))[0] == "velocity verlet, event driven, exact"
+    assert legend_text(Curve("a method", [], {"energy": None}), "energy") == "a method"
+
+
+def test_wall_times_where_there_are_some():
+    assert quantities(made.smooth()) == [WORK, TIME]
+    assert quantities(made.smooth(timed=False)) == [WORK]
+    chart = figure(made.smooth(), TIME)
+    assert lines(plot(chart), "rk4")[0][1] == pytest.approx(1.1 * 90_000 * 15 * 1e-6)
+    assert "ms" in plot(chart).get_ylabel()
+
+
+def test_another_norm_can_be_chosen():
+    chart = figure(made.smooth(), norm="energy")
+    assert lines(plot(chart), "rk4")[1][0] == pytest.approx(0.01 / 2**5)
+    assert any("relative to that of the start" in text for text in words(chart))
+
+
+def test_steps_are_written_at_the_ends_of_curves():
+    written = [text.get_text() for text in plot(figure(made.smooth())).texts]
+    assert {"1/15 s", "1/960 s"} <= set(written)
+
+
+def test_repeats_have_bars_from_the_least_to_the_largest():
+    ends = [
+        (segment[0][0], segment[1][0])
+        for collection in plot(figure(made.smooth(against=False))).collections
+        for segment in collection.get_segments()
+    ]
+    assert len(ends) == 5 * len(made.STEPS) - 1  # all 64 repeats failed at one point
+    assert all(high == pytest.approx(4 * low) for low, high in ends)
+
+
+def test_untrusted_points_are_hollow_and_explained():
+    chart = figure(made.smooth())
+    hollow = [line for line in plot(chart).get_lines() if line.get_label() == "untrusted"]
+    assert len(hollow) == 2
+    assert all(line.get_markerfacecolor() != line.get_color() for line in hollow)
+    assert any("Hollow" in text for text in words(chart))
+    assert not any("Hollow" in text for text in words(figure(made.smooth(), norm="energy")))
+
+
+def test_an_error_of_nothing_is_drawn_at_the_left_edge():
+    chart = figure(made.bouncing())
+    left = plot(chart).get_xlim()[0]
+    assert [x for x, _ in lines(plot(chart), "zero")] == [left] * 3
+    least = min(point.errors["energy_square"].mean for point in made.bouncing().curves[1].points)
+    assert left < least / 9
+
+
+def test_a_case_without_any_error_above_nothing_draws():
+    case = made.bouncing()
+    case.curves = case.curves[:1]
+    assert len(lines(plot(figure(case)), "zero")) == 3
+
+
+# -- failures ---------------------------------------------------------------------------------------------------
+
+
+def test_failures_are_crosses_in_a_strip_at_their_work():
+    chart = figure(made.smooth())
+    # kinds in the order of the records: escaped, then tunnelled
+    assert lines(strip(chart), "escaped") == [(0.5, pytest.approx(60_000 * 30))]
+    tunnelled = lines(strip(chart), "tunnelled")
+    assert [y for _, y in tunnelled] == pytest.approx([60_000 * 15] * 2)
+    assert all(1 < x < 2 for x, _ in tunnelled)
+    texts = [text.get_text() for text in strip(chart).texts]
+    assert {"escaped", "tunnelled", "3/64", "2/64"} <= set(texts)
+    assert "64/64" not in texts
+    assert strip(chart).get_title() == "failed"
+    assert strip(chart).get_ylim() == plot(chart).get_ylim()
+
+
+def test_no_failure_is_left_out_of_the_chart_of_wall_times():
+    case = made.smooth()
+    for curve in case.curves:
+        for point in curve.points:
+            point.milliseconds = None if point.failed else point.milliseconds
+    chart = figure(case, TIME)
+    top = strip(chart).get_ylim()[1]
+    crosses = lines(strip(chart), "tunnelled") + lines(strip(chart), "escaped")
+    assert len(crosses) == 3
+    assert all(top / 2 < y < top for _, y in crosses)
+    assert any("wall time of 3 that failed is not known" in text for text in words(chart))
+
+
+def test_an_error_that_is_no_number_is_a_failure():
+    case = made.bouncing()
+    for place, value in enumerate((float("nan"), float("inf"))):
+        case.curves[1].points[place].errors["energy_square"] = ErrorBar(value, value, value, 0.0)
+    chart = figure(case)
+    assert len(lines(strip(chart), "not finite")) == 2
+    assert len(lines(plot(chart), "semi-implicit Euler, continuous")) == 1
+
+
+def test_a_case_in_which_all_failed_draws():
+    case = made.smooth(against=False)
+    for curve in case.curves:
+        for point in curve.points:
+            point.errors, point.failures = {}, {"blew up": point.repeats}
+    assert len(lines(strip(figure(case)), "blew up")) == 5 * len(made.STEPS)
+
+
+def test_no_strip_where_nothing_failed():
+    assert len(figure(made.bouncing()).axes) == 1
+
+
+def test_points_of_unknown_cost_are_counted():
+    case = made.bouncing()
+    case.curves[2].points[0].work = 0.0
+    assert any("work of 1 points is not known" in text for text in words(figure(case)))
+
+
+# -- what others published --------------------------------------------------------------------------------------
+
+
+def test_published_points_share_the_axes_of_wall_time():
+    chart = figure(made.bouncing(), TIME)
+    for engine in ("RaiSim", "ODE", "Bullet", "DART"):
+        points = [(p.error, p.milliseconds) for p in published.BOUNCING if p.engine == engine]
+        assert lines(plot(chart), f"{engine}, published") == points
+        assert f"{engine}, published" in legend(chart)
+    note = " ".join(words(chart))
+    assert "SimBenchmark" in note
+    assert "another machine (Intel i7-7700HQ, 49 balls)" in note
+
+
+def test_published_points_belong_to_one_scene_and_norm():
+    assert not any("published" in text for text in legend(figure(made.bouncing(), WORK)))
+    assert not any("published" in text for text in legend(figure(made.smooth(), TIME)))
+
+
+# -- colours, lines, markers ------------------------------------------------------------------------------------
+
+
+def test_few_curves_have_a_colour_each_and_pymunk_is_dashed():
+    looks = styles(made.smooth().curves)
+    assert len({look.colour for look in looks}) == len(looks)
+    assert [look.line for look in looks] == ["-"] * 5 + ["--"]
+
+
+def test_many_curves_are_told_apart_by_colour_line_and_marker():
+    case = made.crowded()
+    for substeps in (5, 10):
+        cell = Cell(1.0, "semi_implicit_euler", substeps=substeps, engine=PYMUNK)
+        case.curves.append(made.curve(cell, f"pymunk {substeps}", steps=made.STEPS[:2]))
+    assert len(case.curves) > FEW
+    looks = styles(case.curves)
+    assert len({(look.colour, look.line, look.marker) for look in looks}) == len(looks)
+    cells = [curve.points[0].cell for curve in case.curves]
+    for what, of in (("colour", "integrator"), ("line", "collision"), ("marker", "geometry")):
+        carom = [(getattr(look, what), getattr(cell, of)) for look, cell in zip(looks, cells, strict=True)][:-2]
+        assert len(set(carom)) == len({shown for shown, _ in carom}) == len({meant for _, meant in carom})
+    assert [look.line for look in looks[-2:]] == ["--", "--"]
+
+
+def test_a_covered_curve_still_shows():
+    sizes = [look.size for look in styles(made.smooth().curves)]
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(set(sizes)) == len(sizes)
+
+
+# -- files ------------------------------------------------------------------------------------------------------
+
+
+def test_draws_png_and_svg_for_each_measured_case(tmp_path):
+    paths = draw(made.trade(made.bouncing(), made.refused()), tmp_path / "charts")
+    assert [path.name for path in paths] == [
+        f"trade-bouncing-energy_square-{quantity}.{kind}" for quantity in (WORK, TIME) for kind in ("png", "svg")
+    ]
+    assert paths[0].read_bytes().startswith(b"\x89PNG")
+    assert ElementTree.fromstring(paths[1].read_text(encoding="utf-8")).tag.endswith("svg")
+
+
+def test_two_cases_of_one_name_do_not_overwrite_each_other(tmp_path):
+    case = made.bouncing()
+    for curve in case.curves:
+        for point in curve.points:
+            point.milliseconds = None
+    case.scene = "games/my scene.py"
+    names = {path.name for path in draw(made.trade(case, case), tmp_path)}
+    assert len(names) == 4
+    assert "trade-games-my-scene-py-energy_square-work.svg" in names
+
+
+def test_an_unknown_norm_and_a_file_in_the_way_are_problems(tmp_path):
+    with pytest.raises(Problem, match="no case here has the norm 'speed'"):
+        draw(made.trade(), tmp_path, "speed")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(Problem, match="file"):
+        draw(made.trade(made.bouncing()), tmp_path / "file")
+
+
+def test_svg_for_a_page_has_ids_of_its_own_and_no_address():
+    text = inline_svg(made.bouncing(), TIME, None, "here-")
+    assert text.startswith('<svg role="img" aria-label="bouncing: wall time')
+    assert 'viewBox="' in text
+    assert "http" not in text
+    ids = re.findall(r'\bid="([^"]*)"', text)
+    assert ids
+    assert len(ids) == len(set(ids))
+    assert all(name.startswith("here-") for name in ids)
+    used = set(re.findall(r'href="#([^"]*)"', text) + re.findall(r"url\(#([^)]*)\)", text))
+    assert used
+    assert used <= set(ids)
+
+
+def test_one_point_alone_draws():
+    case = made.bouncing()
+    bars = {"energy_square": ErrorBar.of([1.0])}
+    case.curves = [Curve("one", [Point(Cell(0.1), 1, bars, {}, {}, 5.0, Spread.of([1.0]))])]
+    assert lines(plot(figure(case)), "one") == [(1.0, 5.0)]
+
+
+def test_a_case_without_curves_draws():
+    case = made.bouncing()
+    case.curves = []
+    assert lines(plot(figure(case)), "trusted") == []

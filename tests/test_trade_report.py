@@ -1,0 +1,310 @@
+"""A trade as tables, sentences, files and lines of Python: made of points whose figures are known before."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+
+import helpers_trade as made
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from carom.framework import Settings
+from carom.lab import published, trade_report
+from carom.lab.problems import Problem
+from carom.lab.settings_line import python_line, seconds, settings_line
+from carom.lab.text_tables import TextTable
+from carom.lab.trade_files import COLUMNS, write_csv, write_json
+from carom.lab.trade_records import PYMUNK, Cell, ErrorBar, Point, Trade
+
+
+def column(table: TextTable, heading: str) -> list[str]:
+    place = table.headings.index(heading)
+    return [row[place] for row in table.rows]
+
+
+# -- the table of all points ------------------------------------------------------------------------------------
+
+
+def test_every_point_has_a_row_and_a_refused_case_no_table():
+    tables = trade_report.tables(made.trade())
+    assert [table.title.split(",")[0] for table in tables] == [
+        "orbit: position", "bouncing: energy_square", "bouncing: published",
+    ]  # fmt: skip
+    orbit, bouncing, _ = tables
+    assert len(orbit.rows) == 6 * len(made.STEPS)
+    assert len(bouncing.rows) == 9
+    assert all(len(row) == len(table.headings) for table in tables for row in table.rows)
+
+
+def test_error_with_uncertainty_and_worst_as_the_power_of_the_step_says():
+    table = made.trade(made.smooth())
+    rows = {(row[0], row[2]): row for row in trade_report.tables(table)[0].rows}
+    # rk4 at 1/30 s: 0.1 / 2^4, five percent of it, and twice it
+    assert rows["rk4", "1/30"][3:5] == ("0.00625 ± 3e-4", "0.0125")
+    assert rows["velocity verlet", "1/60"][3:5] == ("0.00625 ± 3e-4", "0.0125")
+
+
+def test_step_is_a_fraction_where_it_is_one_else_four_digits():
+    case = made.smooth(against=False)
+    period = 2 * math.pi / 1000
+    case.curves = [made.curve(Cell(1.0, "rk4"), "rk4", steps=(1 / 60, period))]
+    assert column(trade_report.points_table(case, "position"), "step, s") == ["1/60", "0.006283"]
+
+
+def test_only_counts_that_say_something_are_shown():
+    table = trade_report.points_table(made.smooth(), "position")
+    assert {"steps", "force evaluations", "impacts"} <= set(table.headings)
+    assert not {"candidates", "pair tests", "solver loops"} & set(table.headings)
+    of_rk4 = [row for row in table.rows if row[0] == "rk4"]
+    place = table.headings.index("force evaluations")
+    assert [row[place] for row in of_rk4[:2]] == ["60", "120"]  # four per step of 1/15 s and of 1/30 s
+
+
+def test_wall_time_is_left_out_where_nothing_was_timed():
+    assert "wall ms" in trade_report.points_table(made.smooth(), "position").headings
+    assert "wall ms" not in trade_report.points_table(made.smooth(timed=False), "position").headings
+
+
+def test_failures_in_words():
+    rows = trade_report.points_table(made.smooth(), "position")
+    failed = [text for text in column(rows, "failed") if text]
+    assert failed == ["tunnelled", "2 of 64 escaped", "3 of 64 tunnelled"]
+    assert rows.rows[0][3:5] == ("-", "-")  # none of 64 got to the end: no error
+    assert trade_report.failure_lines(made.smooth())[1] == "explicit euler, step 1/30 s: 2 of 64 escaped"
+
+
+def test_observed_order_beside_the_theory_once_for_each_curve():
+    orders = [text for text in column(trade_report.points_table(made.smooth(), "position"), "order") if text]
+    assert orders == ["1.00 (1)", "1.00 (1)", "2.00 (2)", "4.00 (4)", "4.00 (4)", "1.00 (1)"]
+    orders = [text for text in column(trade_report.points_table(made.bouncing(), "energy_square"), "order") if text]
+    assert orders == ["(exact)", "2.00 (2)", "1.50 (2)"]
+
+
+def test_another_norm_can_be_chosen_and_an_unknown_one_is_refused():
+    tables = trade_report.tables(made.trade(made.smooth(), made.bouncing()), "energy")
+    assert tables[0].title.startswith("orbit: energy,")
+    assert tables[1].title.startswith("bouncing: energy_square")  # it has no other
+    assert "worst" not in tables[0].headings  # no repeat differs
+    with pytest.raises(Problem, match=r"'enrgy'.*did you mean 'energy'"):
+        trade_report.tables(made.trade(), "enrgy")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"), (0.0123456, "0.0123"), (1234.0, "1,230"), (123456.0, "123,000"), (1.2345e-5, "1.23e-5"),
+        (4.56e7, "4.56e7"), (999_999.0, "1.00e6"), (0.00099996, "0.00100"), (math.inf, "inf"), (-0.5, "-0.500"),
+    ],
+)  # fmt: skip
+def test_compact_numbers(value, text):
+    assert trade_report.compact(value) == text
+
+
+# -- what is said about them ------------------------------------------------------------------------------------
+
+
+def test_remarks_name_kind_reference_norm_and_command():
+    text = "\n".join(trade_report.remarks(made.trade()))
+    for part in (
+        "carom trade orbit bouncing",
+        "a processor, Linux; python 3.13",
+        "orbit: smooth: no impact",
+        "10 s simulated, 64 start phases",
+        "position: largest error of a position at the end, relative to",
+        "reference: own runs of rk4 and yoshida4 at 1/7,680 s (position: 1.00e-9 apart)",
+        "my_scene.py: not measured: there is no wall",
+        "two starts 1e-9 apart",
+        "another machine (Intel i7-7700HQ, 49 balls)",
+    ):
+        assert part in text
+
+
+def test_untrusted_errors_are_marked_and_explained():
+    case = made.smooth()
+    marked = [text for text in column(trade_report.points_table(case, "position"), "error") if text.endswith("*")]
+    # 0.1 / 64^4 = 6e-9 is below ten times 1e-9: the last points of the two methods of fourth order
+    assert len(marked) == 2
+    assert any("* 2 of the errors are below 1.00e-8" in line for line in trade_report.case_remarks(case, "position"))
+    assert not any("*" in line for line in trade_report.case_remarks(case, "energy"))
+
+
+def test_an_order_that_is_off_the_theory_is_named():
+    lines = trade_report.case_remarks(made.bouncing(), "energy_square")
+    off = [line for line in lines if line.startswith("observed orders")]
+    assert off == ["observed orders more than 0.3 from the theory's: semi-implicit Euler, discrete 1.50 (2)"]
+    assert not any(line.startswith("observed orders") for line in trade_report.case_remarks(made.smooth(), "position"))
+
+
+# -- what to choose ---------------------------------------------------------------------------------------------
+
+
+def test_cheapest_setting_for_each_target():
+    case = made.smooth(against=False)
+    found = {target: point.cell for target, _, (_, point) in trade_report.choices(case)}
+    # worst errors are 0.2 (15 dt)^order, work is 50,000 + 10,000 per evaluation, per step
+    assert found[0.1] == Cell(1 / 30, "semi_implicit_euler")  # at 1/15 s it fails, and so does explicit Euler at 1/30
+    assert found[0.01] == Cell(1 / 60, "yoshida4")  # 0.2/256 at 80,000 a step; Verlet needs 1/120 at 60,000
+    assert found[0.001] == Cell(1 / 60, "yoshida4")
+    assert found[1e-6] == Cell(1 / 480, "yoshida4")
+    table = trade_report.cheapest(case)
+    assert column(table, "target") == ["10 %", "1 %", "0.1 %", "1e-6"]
+    assert column(table, "worst") == ["0.100", "7.81e-4", "7.81e-4", "1.91e-7"]
+
+
+def test_engines_are_chosen_apart_and_none_is_said():
+    table = trade_report.cheapest(made.smooth(), (0.01, 1e-6))
+    assert column(table, "engine") == ["carom", "pymunk", "carom", "pymunk"]
+    assert column(table, "method")[3] == "none"
+
+
+def test_a_target_that_the_reference_cannot_tell_is_not_promised():
+    case = made.smooth(against=False)
+    table = trade_report.cheapest(case, (9e-9, 1.1e-8))
+    assert column(table, "method") == ["the reference is not exact enough to tell", "none"]
+    case.reference.agreement["position"] = 0.0
+    assert column(trade_report.cheapest(case, (1.2e-8,)), "method") == ["yoshida4"]
+
+
+def test_a_failed_repeat_rules_a_setting_out_however_cheap():
+    case = made.smooth(against=False)
+    for curve in case.curves:
+        for point in curve.points:
+            point.failures = {"tunnelled": 1}
+    assert all(found is None for _, _, found in trade_report.choices(case))
+
+
+def test_statistics_are_judged_two_standard_errors_beyond_the_mean():
+    case = made.smooth(against=False)
+    case.reference.spread["position"] = 0.01
+    assert "mean + 2 s.e." in trade_report.points_table(case, "position").headings
+    assert "two standard errors beyond the mean" in trade_report.cheapest(case).title
+
+
+def test_lines_to_paste():
+    lines = dict(trade_report.choice_lines(made.smooth()))
+    assert lines["10 %, carom"] == "Settings(dt=1/30)"
+    assert lines["1e-6, carom"] == 'Settings(dt=1/480, integrator="yoshida4")'
+    assert lines["1 %, pymunk"] == "space.iterations = 10; space.step(1/480)"
+    assert "0.1 J², carom" in dict(trade_report.choice_lines(made.bouncing()))
+
+
+# -- the line of Python -----------------------------------------------------------------------------------------
+
+NAMES = st.sampled_from([*made.METHODS, "own", 'quoted"one', "back\\slash"])
+STEPS = st.one_of(
+    st.integers(1, 10_000).map(lambda n: 1 / n),
+    st.tuples(st.integers(1, 20), st.integers(1, 2000)).map(lambda pair: pair[0] / pair[1]),
+    st.floats(1e-300, 1e300),
+    st.integers(1, 10),
+)
+CELLS = st.builds(
+    Cell,
+    dt=STEPS,
+    integrator=NAMES,
+    collision=st.sampled_from(["discrete", "continuous", "event_driven"]),
+    substeps=st.integers(1, 100),
+    geometry=st.sampled_from(["precise", "bounds"]),
+)
+BASES = st.builds(
+    Settings,
+    slop=st.none() | st.floats(0, 1),
+    restitution_threshold=st.none() | st.floats(0, 10),
+    friction_mixing=st.sampled_from(["average", "geometric_mean"]),
+    debug=st.booleans(),
+)
+
+
+@given(CELLS, BASES)
+def test_the_line_evaluates_to_the_same_settings(cell, base):
+    assert eval(settings_line(cell, base), {"Settings": Settings}) == cell.settings(base)
+
+
+@pytest.mark.parametrize(
+    ("cell", "line"),
+    [
+        (Cell(1 / 60), "Settings()"),
+        (Cell(1 / 120, "velocity_verlet"), 'Settings(dt=1/120, integrator="velocity_verlet")'),
+        (Cell(2 / 45, substeps=8), "Settings(dt=2/45, substeps=8)"),
+        (
+            Cell(0.01, collision="continuous", geometry="bounds"),
+            'Settings(dt=0.01, collision="continuous", geometry="bounds")',
+        ),
+    ],
+)  # fmt: skip
+def test_the_line_is_short(cell, line):
+    assert settings_line(cell) == line
+
+
+def test_steps_as_python():
+    assert [seconds(dt) for dt in (1 / 7680, 0.001, 0.5, 2.0, 1e-5)] == ["1/7680", "0.001", "1/2", "2.0", "1e-05"]
+    assert seconds(2 * math.pi / 1000) == repr(2 * math.pi / 1000)
+
+
+def test_another_engine_has_no_settings():
+    cell = Cell(1 / 120, "its own", engine=PYMUNK, substeps=20)
+    with pytest.raises(ValueError, match="a cell of pymunk has no Settings"):
+        settings_line(cell)
+    assert python_line(cell) == "space.iterations = 20; space.step(1/120)"
+
+
+# -- files ------------------------------------------------------------------------------------------------------
+
+
+def test_json_goes_back_into_the_same_records(tmp_path):
+    trade = made.trade()
+    path = write_json(trade, tmp_path / "new" / "trade.json")
+    assert Trade.from_dict(json.loads(path.read_text())) == trade
+
+
+def test_csv_has_a_row_for_each_point_and_norm(tmp_path):
+    trade = made.trade()
+    with write_csv(trade, tmp_path / "trade.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6 * len(made.STEPS) * 2 + 9
+    assert list(rows[0]) == list(COLUMNS)
+    first, exact = rows[0], [row for row in rows if row["theory"] == "exact"]
+    assert (first["method"], first["failed"], first["error"]) == ("explicit euler", "tunnelled 64", "")
+    assert len(exact) == 3
+    finest = [row for row in rows if row["method"] == "rk4" and row["norm"] == "position"][-1]
+    assert float(finest["dt"]) == made.STEPS[-1]
+    assert float(finest["error"]) == pytest.approx(0.1 / 64**4, rel=1e-12)
+    assert finest["trusted"] == "0"
+
+
+def test_files_that_cannot_be_written_are_a_problem(tmp_path):
+    (tmp_path / "file").write_text("")
+    for write in (write_json, write_csv):
+        with pytest.raises(Problem, match="file"):
+            write(made.trade(), tmp_path / "file" / "trade")
+
+
+# -- what others published --------------------------------------------------------------------------------------
+
+
+def test_published_points_follow_the_laws_that_are_known_of_them():
+    points = published.published("bouncing", "energy_square")
+    assert len(points) == 20
+    assert published.published("orbit", "energy_square") == published.published("bouncing", "position") == []
+    # ODE's error is the lag of semi-implicit Euler: (M g dt / 2)^2 2/3 g (H - R), M = 490 kg, H - R = 4.9 m
+    lag = (490 * 9.81 / 2) ** 2 * 2 / 3 * 9.81 * 4.9
+    of_ode = {point.dt: point for point in points if point.engine == "ODE"}
+    for dt in (1e-5, 1e-4, 1e-3):
+        assert of_ode[dt].error == pytest.approx(lag * dt**2, rel=1e-3)
+    assert of_ode[1e-3].milliseconds == pytest.approx(1.89 / 20 * 1000)
+
+
+def test_a_point_without_counts_or_errors_still_has_a_row():
+    case = made.bouncing()
+    case.curves[0].points.append(Point(Cell(1e-4, engine=PYMUNK), 1, {}, {"stopped": 1}, {}, 0.0))
+    row = trade_report.points_table(case, "energy_square").rows[3]
+    assert row[2:4] == ("1/10000", "-")
+    assert row[-1] == "stopped"
+
+
+def test_a_single_repeat_has_no_uncertainty():
+    case = made.bouncing()
+    assert ErrorBar.of([1.9e6]) == ErrorBar(1.9e6, 1.9e6, 1.9e6, 0.0)
+    assert not any("±" in text for text in column(trade_report.points_table(case, "energy_square"), "error, J²"))
