@@ -10,24 +10,17 @@ from rich.console import Console
 from . import geometry_report
 from .bench_output import Output
 from .bench_progress import Bar
-from .geometry_study import COUNT, REPEATS, geometry_study
+from .geometry_measure import COUNT, REPEATS, geometry_study
+from .options import out_option, repeats_option, shown_options
 
 
 @click.command("geometry", short_help="False positives and cost of levels of collision geometry.")
 @click.option(
     "--objects", "count", type=click.IntRange(min=2), default=COUNT, show_default=True, help="How many in a world."
 )
-@click.option(
-    "--repeats", type=click.IntRange(min=1), default=REPEATS, show_default=True, help="Timed runs; the median counts."
-)
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Draw a picture into this folder.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
-@click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown.")
-@click.option(
-    "--into",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Also put the tables between the marks of this page.",
-)
+@repeats_option(REPEATS, "Timed runs; the median counts.")
+@out_option("Draw a picture into this folder.")
+@shown_options
 def geometry_command(
     count: int, repeats: int, out: Path | None, as_json: bool, as_markdown: bool, into: Path | None
 ) -> None:

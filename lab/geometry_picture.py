@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 
 from . import canvas
+from .geometry_measure import OPTIONS
 from .geometry_objects import OBJECTS, Object
 from .geometry_records import GeometryStudy
 from .geometry_report import attitude
-from .geometry_study import OPTIONS
 from .geometry_truth import placed
 
 SIZE = (12.5, 11.8)  # inches

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from .bench_report import NOTHING, digits
+from .geometry_measure import OPTIONS
 from .geometry_records import GeometryCost, GeometryStudy
-from .geometry_study import OPTIONS
 from .text_tables import TextTable
 
 BOUNDS = ("sphere", "box")  # the options of one cheap level, of which one fits better

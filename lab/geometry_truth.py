@@ -71,7 +71,8 @@ def _near(positions: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
 def expected_area(thing: Object, levels: tuple[str, ...], turned: bool) -> float | None:
     """m2 of the offsets at which two of these objects hit in every level; the mean over all turns if ``turned``.
 
-    Levels as in :data:`carom.lab.geometry_study.OPTIONS`. Circles: pi (2 r)^2. Boxes that stand: 4 w h; stretched ones:
+    Levels as in :data:`~carom.lab.geometry_measure.OPTIONS`. Circles: pi (2 r)^2.
+    Boxes that stand: 4 w h; stretched ones:
     2 E[W H] + 2 E[W]^2 with E[W] = 2 (w + h) / pi and E[W H] = w h + (w^2 + h^2) / pi. Polygons that stand: 2 A plus
     the mixed area; turned: 2 A + P^2 / (2 pi), after Santalo. None: a circle around a box that stretches has no such
     formula. A last level that lies within the ones before it decides alone.

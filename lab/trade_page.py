@@ -82,22 +82,26 @@ $parts
 
 
 def write_page(
-    trade: Trade, path: Path, pictures: Mapping[str, Sequence[Path]] | None = None, norm: str | None = None
+    trade: Trade,
+    path: Path,
+    pictures: Mapping[str, Sequence[Path]] | None = None,
+    norm: str | None = None,
+    charts: bool = True,
 ) -> Path:
     """Write the page and return its path.
 
     ``pictures``: by scene, files (PNG, JPEG or SVG) that go into the page. ``norm``: the one to show, where a case has
-    it; else its first. Problem for a norm that no case has, a file that cannot be read or written, and without
-    matplotlib.
+    it; else its first. ``charts``: draw them, which needs matplotlib. Problem for a norm that no case has, a file that
+    cannot be read or written, and for charts without matplotlib.
     """
     check_norm(trade, norm)
-    charts, shown = chart_module(), pictures or {}
+    module, shown = chart_module() if charts else None, pictures or {}
     names = [f"case-{number}" for number in range(1, len(trade.cases) + 1)]
     links = [
         f'<li><a href="#{name}">{escape(case.scene)}</a></li>' for name, case in zip(names, trade.cases, strict=True)
     ]
     cases = [
-        _case(case, name, charts, shown.get(case.scene, ()), norm_of(case, norm))
+        _case(case, name, module, shown.get(case.scene, ()), norm_of(case, norm))
         for name, case in zip(names, trade.cases, strict=True)
     ]
     page = PAGE.substitute(
@@ -127,7 +131,7 @@ def chart_module() -> Any:
 def _case(case: CaseTrade, name: str, charts: Any, pictures: Sequence[Path], norm: str) -> str:
     parts = []
     if not case.refused:
-        for quantity in charts.quantities(case):
+        for quantity in charts.quantities(case) if charts else ():
             drawing = charts.inline_svg(case, quantity, norm, f"{name}-{quantity}-")
             parts.append(_figure(drawing, f"{case.scene}: {CHART_WORDS[quantity]}"))
         parts.append(_heading("What to choose", _cheapest(case, norm)))

@@ -11,12 +11,12 @@ import pytest
 from click.testing import CliRunner
 from oracles import convex_brute
 
-from carom.lab import geometry_command, geometry_report, geometry_study
+from carom.lab import geometry_command, geometry_measure, geometry_report
 from carom.lab.commands import Commands
+from carom.lab.geometry_measure import OPTIONS
 from carom.lab.geometry_objects import OBJECTS, Object, area, smallest_circle
 from carom.lab.geometry_picture import BY_NAME, EXAMPLES, draw_geometry
 from carom.lab.geometry_records import GeometryStudy
-from carom.lab.geometry_study import OPTIONS
 from carom.lab.geometry_truth import expected_area, overlaps, placed, touching
 from carom.lab.problems import Problem
 from carom.plugins.convex_polygon import wrong_with
@@ -134,7 +134,7 @@ def test_touching_looks_at_every_pair():
 
 def study(**options):
     given = {"count": 1500, "repeats": 2, "worlds": 2, "things": ROUND_AND_TALL, "options": CHEAP}
-    return geometry_study.geometry_study(**{**given, **options})
+    return geometry_measure.geometry_study(**{**given, **options})
 
 
 def counts(result):
@@ -209,7 +209,7 @@ def test_an_engine_that_disagrees_with_the_oracle_is_not_measured(monkeypatch):
         pairs, depths = touching(*crowd)
         return pairs[1:], depths[1:]
 
-    monkeypatch.setattr(geometry_study, "touching", one_less)
+    monkeypatch.setattr(geometry_measure, "touching", one_less)
     with pytest.raises(Problem, match="other contacts than the separating axes"):
         study(options=("precise",), count=300)
 
@@ -310,7 +310,7 @@ def test_the_command(carom, result, tmp_path):
 
     done = carom("--markdown")
     assert done.stdout.startswith("**false positives")
-    assert done.asked[-1] == (geometry_study.COUNT, geometry_study.REPEATS)
+    assert done.asked[-1] == (geometry_measure.COUNT, geometry_measure.REPEATS)
     assert "better alone" in carom().stdout
 
 

@@ -1,0 +1,184 @@
+"""Cases: what is measured of a scene, with which norms, for how long, how often, and against what.
+
+Scenes whose answer is known have a case of their own here; any other gets one from its survey.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from . import grids
+from .closed_forms import FORMS
+from .norms import OF_KIND, norm_named
+from .observing import Seen
+from .problems import Problem
+from .subjects import Subject, subject_of
+from .survey import Survey, survey
+from .trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
+
+PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 4, CHAOTIC: 5}  # repeats; of chaotic scenes they are seeds
+BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare a run with one run
+FINER = 8  # times smaller than the smallest step are those of the own references
+MOST_REFINED = 3  # times
+QUICK_REPEATS = 8
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the library knows of a scene: anything left None comes from the survey."""
+
+    seconds: float | None = None
+    norms: tuple[str, ...] = ()
+    repeats: int | None = None
+    steps: tuple[float, ...] = ()
+    options: tuple[tuple[str, Any], ...] = ()
+
+
+def _halved(largest: float, count: int) -> tuple[float, ...]:
+    return tuple(largest / 2**k for k in range(count))
+
+
+KNOWN: Mapping[str, Known] = {
+    "jump": Known(1.0, ("apex", "position", "energy"), 16),
+    "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # not at a turn, where phase errors hide
+    "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 9)),
+    # As published: 49 balls, 20 s, these steps.
+    "bouncing": Known(
+        20.0, ("energy_square", "position", "energy"), 8, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
+    ),
+    "oblique": Known(3.0, ("position", "energy", "impact_time"), steps=_halved(0.8, 6)),
+    "stack": Known(5.0, ("overlap", "overlap_mean", "speed", "drift"), 1, _halved(1 / 30, 6)),
+    "thermal_gas": Known(100.0, ("pressure", "rate"), steps=_halved(0.8, 7)),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene ready to be measured.
+
+    reference
+        what a closed form gives; None: own fine runs decide
+    reference_cells
+        of the own runs, two methods
+    """
+
+    subject: Subject
+    survey: Survey
+    kind: str
+    why: str
+    norms: tuple[str, ...]
+    seconds: float
+    repeats: int
+    steps: tuple[float, ...]
+    form: str
+    reference: Seen | None
+    reference_cells: tuple[Cell, ...]
+
+    @property
+    def repeated(self) -> str:
+        return "seeds" if self.kind == CHAOTIC else "start phases"
+
+    def phase(self, repeat: int) -> float:
+        """The length of the first step of that repeat, in steps."""
+        return 1.0 if self.kind == CHAOTIC else 1.0 - repeat / self.repeats
+
+    def replace(self, **changes: Any) -> Case:
+        return dataclasses.replace(self, **changes)
+
+    def quick(self) -> Case:
+        """Every second step, and a few repeats: a first look."""
+        return self.replace(steps=self.steps[::2], repeats=min(self.repeats, QUICK_REPEATS))
+
+    def finer_reference(self) -> Case | None:
+        """The same with smaller steps in its own references; None where that has been tried often enough."""
+        cells = tuple(dataclasses.replace(cell, dt=cell.dt / FINER) for cell in self.reference_cells)
+        if not cells or cells[0].dt < self.steps[-1] / FINER**MOST_REFINED:
+            return None
+        return self.replace(reference_cells=cells, reference=None)
+
+
+def case_of(
+    target: Any,
+    *,
+    norms: Sequence[str] = (),
+    seconds: float | None = None,
+    repeats: int | None = None,
+    steps: Sequence[float] = (),
+    options: Mapping[str, Any] | None = None,
+    seed: int = 0,
+) -> Case:
+    """A case for a scene's name, a file, or a function build(settings, seed=0) -> World.
+
+    norms: the first decides; seconds: of each run; repeats; steps: s, from which the grid is made. What is not given
+    comes from the library or from a survey of the scene. Problem for a scene that cannot be measured.
+    """
+    check_arguments(norms, seconds, repeats, steps)
+    known = KNOWN.get(target, Known()) if isinstance(target, str) else Known()
+    subject = subject_of(target, {**dict(known.options), **(options or {})}, seed)
+    duration = seconds or known.seconds or subject.recommended[0]
+    facts = survey(subject, duration)
+    kind = facts.kind
+    chosen = tuple(norms) or known.norms or OF_KIND[kind]
+    ladder = tuple(sorted(set(steps or known.steps or grids.steps_for(facts)), reverse=True))
+    form, reference = _closed_form(subject, duration, kind)
+    if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
+        form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
+    found = Case(
+        subject, facts, kind, facts.why, chosen, duration, repeats or known.repeats or PHASES[kind], ladder, form,
+        reference, () if reference is not None else _own_references(facts, ladder),
+    )  # fmt: skip
+    chance = [name for name in chosen if name in BY_BODY]
+    if kind == CHAOTIC and chance:
+        raise Problem(
+            f"{subject.name} is chaotic: {facts.why}, so no body can be compared with itself after {duration:g} s, and "
+            f"{', '.join(chance)} would measure chance. Measure statistics (pressure, rate, kinetic), or a shorter time"
+        )
+    return found
+
+
+def check_arguments(
+    norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None, steps: Sequence[float] = ()
+) -> None:
+    """ValueError, TypeError or Problem for what no case can have."""
+    if isinstance(norms, str):
+        raise TypeError(f"norms must be a sequence of names, got {norms!r}")
+    for name in norms:
+        norm_named(name)
+    for name, numbers in (("seconds", () if seconds is None else (seconds,)), ("steps", steps)):
+        for number in numbers:
+            good = isinstance(number, (int, float)) and not isinstance(number, bool)
+            if not good or not math.isfinite(number) or number <= 0:
+                raise ValueError(f"{name} must be finite and above 0, got {number!r}")
+    if repeats is not None and (isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1):
+        raise ValueError(f"repeats must be a whole number from 1, got {repeats!r}")
+
+
+def _closed_form(subject: Subject, seconds: float, kind: str) -> tuple[str, Seen | None]:
+    """The name of the closed form and what it gives; rest needs none, for its right answer is 0."""
+    entry = FORMS.get(subject.target)
+    if entry is None or (subject.target == "jump" and kind != SMOOTH):
+        return "", None
+    world = subject.world(None)
+    text, function = entry
+    seen = function(world, seconds)
+    world.close()
+    return text, seen
+
+
+def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
+    """Two methods that share as little as possible, with a step far below the smallest one measured."""
+    own = facts.settings
+    fine = ladder[-1] / FINER
+    if facts.kind == CHAOTIC:  # long runs; the step does not matter where nothing bends the paths
+        fine = ladder[0] / 2 if not facts.forces and not facts.damping else ladder[-1]
+        pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
+    elif facts.force_systems:
+        collision = "continuous" if facts.contacts else own.collision
+        pairs = (("yoshida4", collision), ("rk4", collision))
+    else:
+        pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
+    return tuple(Cell(fine, integrator, collision, 32, "precise") for integrator, collision in pairs)

@@ -1,0 +1,94 @@
+"""What is measured: a scene of the library, a file, or a function of the caller's, built anew for each run."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import importlib.metadata
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .. import scenes
+from ..framework import Settings, World
+from .loading import Loaded, load
+
+DEFAULT_SECONDS = 5.0  # of what does not say
+
+
+@dataclass(frozen=True)
+class Subject:
+    """``target``: a scene's name or a file; or ``build``, a function build(settings, seed=0) -> World.
+
+    options
+        keywords for the scene's build besides settings and seed
+    """
+
+    name: str
+    target: str = ""
+    build: Any = None
+    options: tuple[tuple[str, Any], ...] = ()
+    seed: int = 0
+
+    def world(self, settings: Settings | None, seed: int | None = None) -> World:
+        """A new world; Problem for what goes wrong in somebody's file. settings None: the recommended ones."""
+        return self._loaded.build(settings, {}, self.seed if seed is None else seed)
+
+    def blamed(self) -> contextlib.AbstractContextManager[None]:
+        """What is raised inside becomes a Problem that names the line of the file it came from."""
+        return self._loaded.blame()
+
+    @property
+    def _loaded(self) -> Loaded:
+        if self.build is not None:
+            return Loaded(self.name, functools.partial(self.build, **dict(self.options)))
+        loaded = _load_once(self.target)
+        if not self.options:
+            return loaded
+        return Loaded(loaded.name, functools.partial(loaded.function, **dict(self.options)), loaded.file)
+
+    @property
+    def recommended(self) -> tuple[float, Any]:
+        """Seconds that the scene or file recommends, and its view or None."""
+        if self.build is not None:
+            return DEFAULT_SECONDS, None
+        loaded = _load_once(self.target)
+        return loaded.seconds or DEFAULT_SECONDS, loaded.view
+
+    @property
+    def description(self) -> str:
+        """One line of the library, of the file's docstring, or of the function's."""
+        if self.build is not None:
+            return _first_line(self.build.__doc__)
+        if self.target in scenes.names():
+            return scenes.get(self.target).description
+        module = getattr(_load_once(self.target).function, "__globals__", {})
+        return _first_line(module.get("__doc__"))
+
+    @property
+    def mark(self) -> str:
+        """What tells its results from those of another scene, file content or version of carom."""
+        text = repr((self.name, self.target, self.options, self.seed, importlib.metadata.version("carom")))
+        if self.build is None and self.target not in scenes.names():
+            file = _load_once(self.target).file
+            text += file.read_text(encoding="utf-8") if file is not None else ""
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+@functools.lru_cache(maxsize=32)
+def _load_once(target: str) -> Loaded:
+    return load(target)
+
+
+def _first_line(text: str | None) -> str:
+    return (text or "").strip().partition("\n")[0]
+
+
+def subject_of(target: Any, options: Mapping[str, Any] | None = None, seed: int = 0) -> Subject:
+    """A subject from a scene's name, a path, or a build function; Problem if there is none of that name."""
+    chosen = tuple(sorted((options or {}).items()))
+    if callable(target):
+        return Subject(getattr(target, "__name__", "scene"), build=target, options=chosen, seed=seed)
+    loaded = _load_once(str(target))
+    return Subject(loaded.name, target=str(target), options=chosen, seed=seed)

@@ -1,0 +1,156 @@
+"""What a scene is like: a trial run tells which dials matter in it, and of what kind it is.
+
+Two runs whose starts differ by less than anything that could be seen tell whether it is chaotic: how far they are apart
+in the end, over how far they were in the beginning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..framework import Settings, World
+from .engines import CaromEngine, ComesAndGoesError
+from .observing import Seen, observe
+from .problems import Problem
+from .subjects import Subject
+from .trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH
+
+NUDGE = 1e-10  # of the smallest body: the difference of the twins
+CHAOS = 1e7  # a nudge that grows so much within the run becomes a thousandth of a body
+STILL = 0.01  # sizes per second that count as rest
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Facts of a scene.
+
+    settings
+        those it recommends; all dials that are not varied stay so
+    growth
+        of the distance between two nearby starts, over the run
+    speed
+        the largest in the end, sizes per second
+    seeded
+        whether seeds change the start
+    trial
+        what the run with all impacts at their true times showed
+    """
+
+    settings: Settings
+    bodies: int
+    force_systems: bool
+    forces: bool
+    damping: bool
+    levels: bool
+    impacts: int
+    contacts: int
+    resting: int
+    growth: float
+    speed: float
+    seeded: bool
+    trial: Seen
+
+    @property
+    def kind(self) -> str:
+        """SMOOTH, IMPACTS, RESTING or CHAOTIC."""
+        if not self.contacts:
+            return SMOOTH
+        if self.resting and self.speed <= STILL:
+            return RESTING
+        return CHAOTIC if self.growth > CHAOS else IMPACTS
+
+    @property
+    def why(self) -> str:
+        """How the kind was found, in a sentence."""
+        grown = f"two starts {NUDGE:g} of a body apart grew {self.growth:.1e} times farther apart"
+        if self.kind == SMOOTH:
+            return "nothing touches anything"
+        if self.kind == RESTING:
+            return f"in the end all is at rest: no body faster than {self.speed:.1e} of its size per second"
+        return grown if self.kind == CHAOTIC else f"bodies meet; {grown}, which is no chaos"
+
+
+def survey(subject: Subject, seconds: float) -> Survey:
+    """Run the scene twice, with all impacts at their true times; Problem for one that cannot be measured."""
+    with_recommended = subject.world(None)
+    settings = with_recommended.settings
+    facts = _facts(with_recommended)
+    with_recommended.close()
+    exact = settings.replace(collision="event_driven")
+    first = _twin(subject, exact, seconds, 0.0)
+    second = _twin(subject, exact, seconds, NUDGE)
+    if first.failure:
+        raise Problem(f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed: {first.failure}")
+    apart = float(np.abs(second.position - first.position).max(initial=0.0))
+    return Survey(
+        settings,
+        growth=apart / _nudge_of(subject, settings),
+        impacts=first.impacts,
+        contacts=sum(first.struck),
+        resting=int(first.counts["solver_loops"] > 0),
+        speed=first.speed,
+        seeded=_seeded(subject, settings),
+        trial=first,
+        **facts,
+    )
+
+
+def _facts(world: World) -> dict[str, Any]:
+    dynamic = world.bodies.dynamic
+    if not len(dynamic):
+        raise Problem("there is no body that moves by itself: nothing to measure")
+    gravity = bool(np.any(world.gravity) and np.any(dynamic.gravity_scale))
+    constant = bool(np.any(dynamic.constant_force))
+    several = [len(world.components_for_entity(int(entity))) for entity in world.bodies.entity]
+    return {
+        "bodies": len(dynamic),
+        "force_systems": bool(world.force_systems),
+        "forces": gravity or constant or bool(world.force_systems),
+        "damping": bool(np.any(dynamic.linear_damping)),
+        "levels": max(several) > 2 and _has_levels(world),
+    }
+
+
+def _has_levels(world: World) -> bool:
+    """Whether one step tests first levels."""
+    world.step()
+    return world.stats().counters.get("first_level_tests", 0) > 0
+
+
+def nudge(world: World, size: float, seed: int = 0) -> None:
+    """Move every dynamic body by up to ``size`` along each axis, at random from ``seed``."""
+    position = world.bodies.dynamic.position
+    position += np.random.default_rng(seed).uniform(-size, size, position.shape)
+
+
+def _nudge_of(subject: Subject, settings: Settings) -> float:
+    world = subject.world(settings)
+    size = NUDGE * CaromEngine(world).size
+    world.close()
+    return size
+
+
+def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float) -> Seen:
+    world = subject.world(settings)
+    engine = CaromEngine(world)
+    if nudged:
+        nudge(world, nudged * engine.size)
+    try:
+        return observe(engine, seconds, settings.dt)
+    except ComesAndGoesError as error:
+        raise Problem(f"{subject.name}: {error}") from error
+    finally:
+        engine.close()
+
+
+def _seeded(subject: Subject, settings: Settings) -> bool:
+    """Whether seeds change the start."""
+    hashes = []
+    for seed in (0, 1):
+        world = subject.world(settings, seed)
+        hashes.append(world.state_hash())
+        world.close()
+    return hashes[0] != hashes[1]
