@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import click
 from rich.console import Console
@@ -15,6 +13,7 @@ from .bench_output import Output
 from .bench_progress import Bar
 from .bench_suite import LARGE, SIZES, SUITE, subjects
 from .commands import Commands
+from .options import out_option, repeats_option, shown_options
 from .peer_pymunk import pymunk_module
 from .problems import Problem
 
@@ -22,35 +21,8 @@ QUICK_SIZES, QUICK_REPEATS = (1000,), 2
 REPEATS = 5
 NAMES = ", ".join(dict.fromkeys(subject.scene for subject in SUITE))
 
-Option = Callable[[Any], Any]
-
-
-def _shown(function: Any) -> Any:
-    """The options that say how the result is shown."""
-    options: tuple[Option, ...] = (
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."),
-        click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown."),
-        click.option(
-            "--into",
-            type=click.Path(path_type=Path, dir_okay=False),
-            help="Also put the tables between the marks of this page.",
-        ),
-    )
-    for option in reversed(options):
-        function = option(function)
-    return function
-
-
-def _repeats(default: int) -> Option:
-    return click.option(
-        "--repeats", type=click.IntRange(min=1), default=default, show_default=True, help="Runs; the median counts."
-    )
-
-
-def _chart() -> Option:
-    return click.option(
-        "--out", type=click.Path(path_type=Path, file_okay=False), help="Draw a chart into this folder."
-    )
+RUNS = "Runs; the median counts."
+chart_option = out_option("Draw a chart into this folder.")
 
 
 @click.group("bench", cls=Commands, invoke_without_command=True, short_help="Time carom on this machine.")
@@ -66,8 +38,8 @@ def _chart() -> Option:
 @click.option("--large", is_flag=True, help=f"{LARGE:,} bodies too: takes long, above all pile2d.")
 @click.option("--quick", is_flag=True, help=f"{QUICK_SIZES[0]:,} bodies only, {QUICK_REPEATS} repeats.")
 @click.option("--no-peer", is_flag=True, help="carom alone, without pymunk.")
-@_chart()
-@_shown
+@chart_option
+@shown_options
 @click.pass_context
 def bench_command(
     context: click.Context,
@@ -106,9 +78,9 @@ def bench_command(
 @bench_command.command("scaling", short_help="How the time per body grows with their number.")
 @click.option("--sizes", metavar="N,N", help="Numbers of bodies (default: 1,000 to 100,000).")
 @click.option("--million", is_flag=True, help=f"{bench_scaling.LARGEST:,} bodies too: needs some gigabytes.")
-@_repeats(3)
-@_chart()
-@_shown
+@repeats_option(3, RUNS)
+@chart_option
+@shown_options
 def scaling_command(
     sizes: str | None,
     million: bool,
@@ -128,8 +100,8 @@ def scaling_command(
 
 
 @bench_command.command("startup", short_help="The time to the first step of a new process.")
-@_repeats(3)
-@_shown
+@repeats_option(3, RUNS)
+@shown_options
 def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time new processes up to their first step: with an empty cache of compiled kernels, then with a filled one."""
     output = Output.checked("carom bench startup", as_json, as_markdown, into, None)
@@ -139,8 +111,8 @@ def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path |
 
 
 @bench_command.command("pairs", short_help="What a pair of a plugin costs, next to one written by hand.")
-@_repeats(15)
-@_shown
+@repeats_option(15, RUNS)
+@shown_options
 def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time the narrow phase with a registered pair, and with the same maths written into its kernel by hand."""
     output = Output.checked("carom bench pairs", as_json, as_markdown, into, None)
@@ -151,8 +123,8 @@ def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | N
 
 @bench_command.command("ladder", short_help="What each feature costs, switched on alone.")
 @click.option("--bodies", type=click.IntRange(min=1), default=bench_ladder.BODIES, show_default=True)
-@_repeats(5)
-@_shown
+@repeats_option(5, RUNS)
+@shown_options
 def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time scenes that differ in one feature: nanoseconds per body per step beside the scene without it."""
     output = Output.checked("carom bench ladder", as_json, as_markdown, into, None)
@@ -166,8 +138,8 @@ def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, 
     "--steps", type=click.IntRange(min=1), default=bench_modes.STEPS, show_default=True,
     help="Steps timed of each scene; of bullets a sixth.",
 )  # fmt: skip
-@_repeats(bench_modes.REPEATS)
-@_shown
+@repeats_option(bench_modes.REPEATS, RUNS)
+@shown_options
 def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time the same bodies with discrete, continuous and event-driven collisions."""
     output = Output.checked("carom bench modes", as_json, as_markdown, into, None)

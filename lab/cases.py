@@ -22,6 +22,7 @@ from .trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
 
 PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 4, CHAOTIC: 5}  # repeats; of chaotic scenes they are seeds
 BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare a run with one run
+OF_CONTACTS = ("impact_time", "count", "overlap", "overlap_mean", "pressure", "rate")
 FINER = 8  # times smaller than the smallest step are those of the own references
 MOST_REFINED = 3  # times
 QUICK_REPEATS = 8
@@ -45,13 +46,14 @@ def _halved(largest: float, count: int) -> tuple[float, ...]:
 KNOWN: Mapping[str, Known] = {
     "jump": Known(1.0, ("apex", "position", "energy"), 16),
     "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # not at a turn, where phase errors hide
-    "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 9)),
+    "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8)),
     # As published: 49 balls, 20 s, these steps.
     "bouncing": Known(
         20.0, ("energy_square", "position", "energy"), 8, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
     ),
     "oblique": Known(3.0, ("position", "energy", "impact_time"), steps=_halved(0.8, 6)),
     "stack": Known(5.0, ("overlap", "overlap_mean", "speed", "drift"), 1, _halved(1 / 30, 6)),
+    "billiards": Known(1.0, steps=_halved(1 / 30, 6)),
     "thermal_gas": Known(100.0, ("pressure", "rate"), steps=_halved(0.8, 7)),
 }
 
@@ -89,9 +91,12 @@ class Case:
     def replace(self, **changes: Any) -> Case:
         return dataclasses.replace(self, **changes)
 
-    def quick(self) -> Case:
+    def quick(self, fewer_steps: bool = True, fewer_repeats: bool = True) -> Case:
         """Every second step, and a few repeats: a first look."""
-        return self.replace(steps=self.steps[::2], repeats=min(self.repeats, QUICK_REPEATS))
+        return self.replace(
+            steps=self.steps[::2] if fewer_steps else self.steps,
+            repeats=min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats,
+        )
 
     def finer_reference(self) -> Case | None:
         """The same with smaller steps in its own references; None where that has been tried often enough."""
@@ -131,6 +136,9 @@ def case_of(
         subject, facts, kind, facts.why, chosen, duration, repeats or known.repeats or PHASES[kind], ladder, form,
         reference, () if reference is not None else _own_references(facts, ladder),
     )  # fmt: skip
+    idle = [name for name in chosen if name in OF_CONTACTS]
+    if idle and not facts.contacts:
+        raise Problem(f"{subject.name}: {facts.why} within {duration:g} s, so there is no {' and no '.join(idle)}")
     chance = [name for name in chosen if name in BY_BODY]
     if kind == CHAOTIC and chance:
         raise Problem(

@@ -17,6 +17,7 @@ from .. import __version__, scenes
 from .bench_command import bench_command
 from .choices import parse_assignments, parse_view, preset
 from .commands import Commands
+from .geometry_command import geometry_command
 from .installed_plugins import plugin_named
 from .loading import Loaded, load, stdout_kept_clean
 from .options import plugin_option, seed_number, seed_option, set_option, settings_option
@@ -26,6 +27,8 @@ from .problems import Problem
 from .progress import StepProgress
 from .report import print_report
 from .run import Run, run
+from .trade_command import trade_command
+from .tune_command import tune_command
 from .warm_up import warm_up_command
 
 DEFAULT_SECONDS = 10.0  # of a file that does not say
@@ -131,6 +134,9 @@ def scenes_command() -> None:
 cli.add_command(plan_command)
 cli.add_command(plugins_command)
 cli.add_command(bench_command)
+cli.add_command(trade_command)
+cli.add_command(tune_command)
+cli.add_command(geometry_command)
 cli.add_command(warm_up_command)
 
 

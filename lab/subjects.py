@@ -6,6 +6,7 @@ import contextlib
 import functools
 import hashlib
 import importlib.metadata
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -70,10 +71,21 @@ class Subject:
     def mark(self) -> str:
         """What tells its results from those of another scene, file content or version of carom."""
         text = repr((self.name, self.target, self.options, self.seed, importlib.metadata.version("carom")))
-        if self.build is None and self.target not in scenes.names():
+        if self.build is not None:
+            text += _source_of(self.build)
+        elif self.target not in scenes.names():
             file = _load_once(self.target).file
             text += file.read_text(encoding="utf-8") if file is not None else ""
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _source_of(function: Any) -> str:
+    """What changes when the function does: its file's text, or its code where there is no file."""
+    code = getattr(function, "__code__", None)
+    try:
+        return inspect.getsource(inspect.getmodule(function) or function)
+    except (OSError, TypeError):
+        return repr((code.co_code, code.co_consts)) if code is not None else repr(function)
 
 
 @functools.lru_cache(maxsize=32)

@@ -28,6 +28,8 @@ class Runs:
     def __init__(
         self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS
     ) -> None:
+        if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+            raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
         self.workers, self.progress = workers, progress
         self._store = store
         self._kept: dict[str, dict[str, Any]] = {}

@@ -35,7 +35,10 @@ class Task:
     def key(self) -> str:
         """The same for the same run, in this process and in the next."""
         case = self.case
-        facts = (case.subject.mark, case.seconds, case.kind, self.reference, self.cell.key, self.repeat)
+        facts = (
+            case.subject.mark, case.seconds, case.kind, repr(case.survey.settings), self.reference, self.cell.key,
+            self.repeat,
+        )  # fmt: skip
         if not self.reference:
             facts = (*facts, case.repeats, case.form, tuple(cell.key for cell in case.reference_cells))
         return hashlib.sha256(repr(facts).encode()).hexdigest()[:24]

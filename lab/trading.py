@@ -86,9 +86,10 @@ def trade(
 
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the one that
     counts; seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. What is
-    not given follows from the scene. quick: every second step and at most 8 repeats, for a first look. workers:
-    processes, None for all cores; store: finished runs, to go on with. Of several scenes, one that cannot be measured
-    is in the result with the reason. ValueError or Problem for wrong arguments, and for a single scene that cannot be.
+    not given follows from the scene. quick: every second step and at most 8 repeats, where they are not given, for a
+    first look. workers: processes, None for all cores; store: finished runs, to go on with. Of several scenes, one that
+    cannot be measured is in the result with the reason. ValueError or Problem for wrong arguments, and for a single
+    scene that cannot be.
     """
     check_arguments(norms, seconds, repeats, steps)
     for target in targets:
@@ -107,7 +108,9 @@ def trade(
                 raise
             cases.append(_refused(name, problem.message))
             continue
-        cases.append(measure(case.quick() if quick else case, only or Only(), against_pymunk, timing, runs))
+        if quick:
+            case = case.quick(not steps, repeats is None)
+        cases.append(measure(case, only or Only(), against_pymunk, timing, runs))
     return Trade({**machine(), "clock": "wall time"}, command, cases)
 
 

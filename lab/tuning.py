@@ -65,6 +65,8 @@ class Tuning:
         the cheapest point that holds, and the cheapest of another method; None if there is none
     base
         the scene's own settings, whose other dials stay
+    case
+        as it was searched: with its reference and repeats
     """
 
     scene: str
@@ -78,6 +80,7 @@ class Tuning:
     reference: Reference
     base: Settings
     methods: int
+    case: Case = field(repr=False)
     choice: Point | None = None
     runner_up: Point | None = None
     trials: list[Trial] = field(default_factory=list)
@@ -162,31 +165,18 @@ class _Search:
     def __init__(self, case: Case, max_error: float, absolute: bool, only: Only, runs: Runs) -> None:
         self.runs = runs
         self.norm = NORMS[case.norms[0]]
-        self.case, self.reference = _exact_enough(case, self.norm.name, max_error, absolute, runs)
+        self.case, self.reference = exact_enough(case, self.norm.name, max_error, absolute, runs)
         seen = self.case.reference
         assert seen is not None
         self.scale = self.norm.scale(seen, seen)
         self.target = max_error / self.scale if absolute else max_error
         self.noise = self.reference.spread.get(self.norm.name, 0.0)
-        self.case = self._with_repeats()
+        self.case = enough_repeats(self.case, self.norm.name, self.noise, self.target)
         self.own = self.reference.agreement.get(self.norm.name, 0.0)
         self.trials: list[Trial] = []
         self.looks: dict[Cell, tuple[float, float]] = {}  # error and work of single runs
         self.whole: dict[Cell, Point] = {}
         self.methods = only.of(self.case)
-
-    def _with_repeats(self) -> Case:
-        """Enough seeds for a statistic to be known far better than the target."""
-        if not self.noise:
-            return self.case
-        wanted = max(self.case.repeats, math.ceil((NOISE * self.noise / self.target) ** 2))
-        if wanted > MOST_REPEATS:
-            raise Problem(
-                f"{self.case.subject.name}: the {self.norm.name} of one run of {self.case.seconds:g} s scatters by "
-                f"{self.noise:.2g}, so {self.target:.2g} cannot be told from chance by {MOST_REPEATS} runs: take a "
-                f"larger error or longer runs (--seconds)"
-            )
-        return self.case.replace(repeats=wanted)
 
     def result(self) -> Tuning:
         held = self._cheapest_two()
@@ -195,7 +185,7 @@ class _Search:
         case = self.case
         return Tuning(
             case.subject.name, self.norm.name, self.norm.text, self.target, self.scale, case.seconds, case.repeats,
-            case.repeated, self.reference, case.survey.settings, len(self.methods), held[0] if held else None,
+            case.repeated, self.reference, case.survey.settings, len(self.methods), case, held[0] if held else None,
             held[1] if len(held) > 1 else None, self.trials,
         )  # fmt: skip
 
@@ -211,6 +201,9 @@ class _Search:
             if held and expected > FAR_DEARER * held[0].work:
                 break
             error, work = self._look(cell)
+            if queue and work > expected and work > queue[0][0]:  # dearer than it promised: others come first
+                heapq.heappush(queue, (work, number, cell))
+                continue
             if error <= self.target + 3 * self.noise:
                 point = self._hold(cell)
                 if point is not None:
@@ -278,7 +271,21 @@ class _Search:
         return min((p for p in (point, middle, last) if p is not None), key=lambda found: found.work)
 
 
-def _exact_enough(
+def enough_repeats(case: Case, norm: str, noise: float, target: float) -> Case:
+    """Enough seeds for a statistic to be known far better than the target; Problem where that takes too many.
+
+    noise: the standard deviation of a single run; 0 for what is no statistic.
+    """
+    wanted = max(case.repeats, math.ceil((NOISE * noise / target) ** 2))
+    if wanted > MOST_REPEATS:
+        raise Problem(
+            f"{case.subject.name}: the {norm} of one run of {case.seconds:g} s scatters by {noise:.2g}, {target:.2g} "
+            f"cannot be told from chance by {MOST_REPEATS} runs: take a larger error or longer runs (--seconds)"
+        )
+    return case.replace(repeats=wanted)
+
+
+def exact_enough(
     case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
 ) -> tuple[Case, Reference]:
     """The case with a reference that knows the target: Problem if own runs cannot be brought to agree so well."""
