@@ -9,16 +9,43 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .geometry_measure import geometry_study
+    from .limits_sweep import limits
+    from .suggest import step_limits, suggest_dt
     from .trade_records import Trade
     from .trading import Only, trade
+    from .tune_check import check
+    from .tuning import NothingMeetsError, Tuning, search, tune
 
 _MODULES = {
+    "NothingMeetsError": "tuning",
     "Only": "trading",
     "Trade": "trade_records",
+    "Tuning": "tuning",
+    "check": "tune_check",
+    "geometry_study": "geometry_measure",
+    "limits": "limits_sweep",
+    "search": "tuning",
+    "step_limits": "suggest",
+    "suggest_dt": "suggest",
     "trade": "trading",
+    "tune": "tuning",
 }
 
-__all__ = ["Only", "Trade", "trade"]
+__all__ = [
+    "NothingMeetsError",
+    "Only",
+    "Trade",
+    "Tuning",
+    "check",
+    "geometry_study",
+    "limits",
+    "search",
+    "step_limits",
+    "suggest_dt",
+    "trade",
+    "tune",
+]
 
 
 def __getattr__(name: str) -> Any:

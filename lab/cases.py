@@ -49,7 +49,7 @@ KNOWN: Mapping[str, Known] = {
     "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8)),
     # As published: 49 balls, 20 s, these steps.
     "bouncing": Known(
-        20.0, ("energy_square", "position", "energy"), 8, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
+        20.0, ("energy_square", "position", "energy"), 4, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
     ),
     "oblique": Known(3.0, ("position", "energy", "impact_time"), steps=_halved(0.8, 6)),
     "stack": Known(5.0, ("overlap", "overlap_mean", "speed", "drift"), 1, _halved(1 / 30, 6)),

@@ -19,6 +19,7 @@ from .choices import parse_assignments, parse_view, preset
 from .commands import Commands
 from .geometry_command import geometry_command
 from .installed_plugins import plugin_named
+from .limits_command import limits_command
 from .loading import Loaded, load, stdout_kept_clean
 from .options import plugin_option, seed_number, seed_option, set_option, settings_option
 from .plan_command import plan_command
@@ -136,6 +137,7 @@ cli.add_command(plugins_command)
 cli.add_command(bench_command)
 cli.add_command(trade_command)
 cli.add_command(tune_command)
+cli.add_command(limits_command)
 cli.add_command(geometry_command)
 cli.add_command(warm_up_command)
 

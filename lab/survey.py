@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..framework import Settings, World
-from .engines import CaromEngine, ComesAndGoesError
+from .engines import CaromEngine
 from .observing import Seen, observe
 from .problems import Problem
 from .subjects import Subject
@@ -135,13 +135,15 @@ def _nudge_of(subject: Subject, settings: Settings) -> float:
 
 def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float) -> Seen:
     world = subject.world(settings)
+    if world.settings != settings:
+        world.close()
+        raise Problem(f"{subject.name}: build must hand its settings to the World: World(..., settings=settings)")
     engine = CaromEngine(world)
     if nudged:
         nudge(world, nudged * engine.size)
     try:
-        return observe(engine, seconds, settings.dt)
-    except ComesAndGoesError as error:
-        raise Problem(f"{subject.name}: {error}") from error
+        with subject.blamed():
+            return observe(engine, seconds, settings.dt)
     finally:
         engine.close()
 

@@ -103,6 +103,13 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
     """Two ensembles: their means differ by noise if both are right."""
     means = mean_of(seens[:half]), mean_of(seens[half:])
     both = mean_of(seens)
+    known = tuple(name for name in case.norms if not NORMS[name].signed or getattr(both, name))
+    if not known:
+        raise Problem(
+            f"{case.subject.name} is chaotic: {case.why}, and it has no statistic to be measured instead: "
+            f"{', '.join(case.norms)} are 0 throughout"
+        )
+    case = case.replace(norms=known)
     agreement, spread = {}, {}
     for name in case.norms:
         values = [NORMS[name].measure(seen, both) for seen in seens]

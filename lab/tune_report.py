@@ -105,19 +105,20 @@ def _verdict(met: bool, times: float) -> str:
 def compared_table(result: TuneResult) -> TextTable:
     """The choice, the runner-up and ``Settings.balanced()``."""
     tuning = result.tuning
-    named = [("choice", tuning.choice), ("runner-up", tuning.runner_up), ("Settings.balanced()", result.balanced)]
+    named = [("choice", tuning.choice), ("runner-up", tuning.runner_up), ("balanced", result.balanced)]
     points = [(name, point) for name, point in named if point is not None]
     cells = {point.cell.method for _, point in points} | {trial.cell.method for trial in tuning.trials}
     rows = []
     for name, point in points:
         bar = None if point.failed else point.errors[tuning.norm]
-        work = NOTHING if tuning.choice is None else f"{compact(point.work / tuning.choice.work)}"
+        work = NOTHING if tuning.choice is None else compact(point.work / tuning.choice.work)
         rows.append((
             name, label_of(point.cell.method, cells), number(point.cell.dt), _worst(bar), _part(bar, tuning.target),
             compact(point.work), work,
         ))  # fmt: skip
-    headings = ("", "method", "step, s", worst_heading(tuning), "of the target", "work", "times the choice's")
-    return TextTable(f"{tuning.scene}: {tuning.norm}, and work per simulated second", headings, rows, words=2)
+    headings = ("", "method", "step, s", worst_heading(tuning), "of target", "work", "of choice's")
+    title = f"{tuning.scene}: {tuning.norm}, and work per simulated second"
+    return TextTable(title, headings, rows, words=2)
 
 
 def worst_heading(tuning: Tuning) -> str:
@@ -237,8 +238,8 @@ def check_line(check: Check) -> str:
     if math.isinf(check.error):
         return f"{check.scene}: THE PROMISE IS BROKEN: the choice fails there"
     return (
-        f"{check.scene}: THE PROMISE IS BROKEN: {check.norm} {compact(check.error)} is {compact(check.times)} times what "
-        f"was promised, so the choice does not carry over: tune on that scene too, and take the dearer of the two"
+        f"{check.scene}: THE PROMISE IS BROKEN: {check.norm} {compact(check.error)}, {compact(check.times)} times what"
+        " was promised: the choice does not carry over, tune on that scene too"
     )
 
 
