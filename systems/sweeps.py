@@ -61,12 +61,33 @@ def leaves_at(i, now, dt, size, motion, sweep_of, roam_lower, roam_upper, like):
 
 
 @inlined
-def volume_of(edge, like):
-    """edge to the power of the dimension."""
-    volume = edge
-    for _ in range(1, len(like)):
-        volume *= edge
-    return volume
+def share_within(width, extents, like):
+    """Of what is spread evenly over these extents, the share that a cube of this width holds."""
+    share = 1.0
+    for k in range(len(like)):
+        if item(extents, k) > width:
+            share *= width / item(extents, k)
+    return share
+
+
+@inlined
+def width_that_holds(share, extents, like):
+    """The width of a cube that holds that share; infinity for all. Axes along which it reaches from end to end hold no
+    more if it grows: so bodies in a row count as in a row, however little they are off it."""
+    filled, width = 0.0, math.inf
+    for _ in range(len(like)):
+        product, free, narrowest = 1.0, 0, math.inf
+        for k in range(len(like)):
+            extent = item(extents, k)
+            if extent > filled:
+                product, free, narrowest = product * extent, free + 1, min(narrowest, extent)
+        if free == 0 or share >= 1.0:
+            return math.inf
+        width = (share * product) ** (1.0 / free)
+        if width <= narrowest:
+            return width
+        filled = narrowest
+    return width
 
 
 @inlined
@@ -102,23 +123,23 @@ def find_rooms(now, span, moving, shape, size, inverse_mass, before, motion, swe
             energy += 0.5 * room[i] * room[i] / inverse_mass[i]
             weighed += 1
     energy = energy / max(1, weighed)
-    volume = 1.0
+    extents = like
     for k in range(len(like)):
-        volume *= item(highest, k) - item(lowest, k)
-    cell = (volume / max(1, shaped)) ** (1.0 / len(like))
+        extents = replace(extents, k, max(0.0, item(highest, k) - item(lowest, k)))
+    cell = width_that_holds(1.0 / max(1, shaped), extents, like)
     crowd, wide = 0.0, 0
     for i in range(moving):
         speed = max(room[i], SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
         room[i] = 0.0
         if inverse_mass[i] > 0.0 and shape[i] >= 0 and roams(i, speed, span, size, sweep_of):
             room[i] = speed * span
-            crowd += volume_of(min(2.0 * room[i] / cell, 1e100), like) if cell > 0.0 else 0.0
+            crowd += shaped * share_within(2.0 * room[i], extents, like)
             wide += 2.0 * room[i] > cell
         if degree > 1:
             room[i] += 2.0 * bend_of(row(second, i, like), row(third, i, like), span)
     if shaped <= ALL_PAIRS or not crowd > CROWD * shaped:
         return math.inf
-    largest = 0.5 * cell * (CROWD * shaped / max(1, wide)) ** (1.0 / len(like))
+    largest = 0.5 * width_that_holds(CROWD / max(1, wide), extents, like)
     speeds, fast = 0.0, 0
     for i in range(moving):
         room[i] = min(room[i], largest)

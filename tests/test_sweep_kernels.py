@@ -156,6 +156,24 @@ def test_nobody_leaves_its_space_before_the_time_said(mode, degree, d):
     assert asked > 20
 
 
+@both_dimensions
+@pytest.mark.parametrize("off", [0.0, 1e-10, 0.3])
+def test_bodies_in_a_row_have_room_however_little_they_are_off_it(off, d):
+    """40 balls 2 m apart that fall 0.2 m in the step: each is alone in its room, 0.4 m wide, so no round is needed. A
+    volume that is next to nothing must not make them a crowd."""
+    n, like = 40, (0.0,) * d
+    origin = np.zeros((n, d))
+    origin[:, 0] = 2.0 * np.arange(n)
+    origin[:, 1:] = off * np.random.default_rng(1).random((n, d - 1))
+    path, second, third = np.zeros((n, d)), np.zeros((n, d)), np.zeros((n, d))
+    path[:, 1] = -0.2 / DT
+    motion, sweep_of = (origin, path, second, third, 1), (EVENT_DRIVEN, np.zeros(n, bool))
+    room = np.empty(n)
+    size, shape, inverse_mass = np.full(n, 0.2), np.zeros(n, np.int64), np.ones(n)
+    assert find_rooms(0.0, DT, n, shape, size, inverse_mass, origin, motion, sweep_of, room, like) == math.inf
+    assert (room >= 0.2).all()
+
+
 def plain_sphere(_, a, __, b, d, shapes, like):
     distance = math.hypot(*d)
     depth = shapes[a] + shapes[b] - distance
