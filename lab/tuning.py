@@ -30,9 +30,10 @@ from .trade_tasks import Task
 from .trade_work import WEIGHTS
 from .trading import Only
 
-BELOW = 64  # times the smallest step of the case: no method is driven further
+BELOW = 16  # times the smallest step of the case: no method is driven further
 MOST_REPEATS = 400  # of a noisy statistic
 NOISE = 4.0  # times smaller than the target must the standard error of a statistic be
+WORTH_IT = 4.0  # times better must references agree with a step 8 times smaller: else it is rounding or chance
 LONGEST_JUMP = 4  # halvings at once
 FINE = (1.5, 1.25, 1.75)  # times the step that holds: tried in this order, the last two as the first turns out
 FAR_DEARER = 4.0  # times the choice's work: no runner-up is looked for beyond it
@@ -289,6 +290,7 @@ def exact_enough(
     case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
 ) -> tuple[Case, Reference]:
     """The case with a reference that knows the target: Problem if own runs cannot be brought to agree so well."""
+    before = math.inf
     while True:
         with_own, reference = with_reference(case, runs)
         seen = with_own.reference
@@ -297,7 +299,8 @@ def exact_enough(
         agreement = reference.agreement.get(norm, 0.0)
         if agreement <= target / (NOISE if NORMS[norm].signed else TRUSTED):
             return with_own, reference
-        finer = case.finer_reference() if not NORMS[norm].signed else None
+        improves = not NORMS[norm].signed and agreement < before / WORTH_IT
+        before, finer = agreement, case.finer_reference() if improves else None
         if finer is None:
             raise Problem(
                 f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
