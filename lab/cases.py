@@ -44,7 +44,7 @@ def _halved(largest: float, count: int) -> tuple[float, ...]:
 
 
 KNOWN: Mapping[str, Known] = {
-    "jump": Known(1.0, ("apex", "position", "energy"), 16),
+    "jump": Known(1.0, ("apex", "position", "energy")),
     "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # not at a turn, where phase errors hide
     "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8)),
     # As published: 49 balls, 20 s, these steps.
@@ -132,9 +132,10 @@ def case_of(
     form, reference = _closed_form(subject, duration, kind)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
+    times = repeats or known.repeats or _repeats(kind, chosen)
     found = Case(
-        subject, facts, kind, facts.why, chosen, duration, repeats or known.repeats or PHASES[kind], ladder, form,
-        reference, () if reference is not None else _own_references(facts, ladder),
+        subject, facts, kind, facts.why, chosen, duration, times, ladder, form, reference,
+        () if reference is not None else _own_references(facts, ladder),
     )  # fmt: skip
     idle = [name for name in chosen if name in OF_CONTACTS]
     if idle and not facts.contacts:
@@ -163,6 +164,11 @@ def check_arguments(
                 raise ValueError(f"{name} must be finite and above 0, got {number!r}")
     if repeats is not None and (isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1):
         raise ValueError(f"repeats must be a whole number from 1, got {repeats!r}")
+
+
+def _repeats(kind: str, norms: Sequence[str]) -> int:
+    """Where within a step the highest point lies decides how much of it is seen: the worst of a few would flatter."""
+    return max(PHASES[kind], PHASES[IMPACTS]) if "apex" in norms else PHASES[kind]
 
 
 def _closed_form(subject: Subject, seconds: float, kind: str) -> tuple[str, Seen | None]:

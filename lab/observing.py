@@ -47,6 +47,8 @@ class Seen:
         which bodies touched anything
     failure
         None, or why the run says nothing
+    seconds
+        that it should last; simulated: that it did, which is less if it failed
     """
 
     position: Floats
@@ -70,6 +72,7 @@ class Seen:
     failure: str | None = None
     counts: dict[str, float] = field(default_factory=dict)
     seconds: float = 0.0
+    simulated: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -177,4 +180,5 @@ class _Watch:
             failure=self.failure,
             counts=engine.counts(),
             seconds=self.seconds,
+            simulated=engine.time,
         )

@@ -9,6 +9,7 @@ import importlib.metadata
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from .. import scenes
@@ -88,8 +89,17 @@ def _source_of(function: Any) -> str:
         return repr((code.co_code, code.co_consts)) if code is not None else repr(function)
 
 
-@functools.lru_cache(maxsize=32)
 def _load_once(target: str) -> Loaded:
+    """A file again only if it has changed."""
+    path = Path(target)
+    if target in scenes.names() or not path.is_file():
+        return load(target)
+    return _load_file(str(path.resolve()), target, path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=32)
+def _load_file(place: str, target: str, changed: int) -> Loaded:
+    del place, changed  # tell two files of one name, or of two times, apart
     return load(target)
 
 

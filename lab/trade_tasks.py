@@ -63,7 +63,7 @@ def perform(task: Task) -> dict[str, Any]:
     assert case.reference is not None
     failure = failure_of(seen, None if case.kind == CHAOTIC else case.reference)
     errors = {} if failure else errors_of(seen, case.reference, NORMS)
-    return dataclasses.asdict(Outcome(cell, task.repeat, errors, failure, seen.counts, case.seconds))
+    return dataclasses.asdict(Outcome(cell, task.repeat, errors, failure, seen.counts, seen.simulated))
 
 
 def _run(task: Task) -> Seen:

@@ -87,9 +87,9 @@ def trade(
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the one that
     counts; seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. What is
     not given follows from the scene. quick: every second step and at most 8 repeats, where they are not given, for a
-    first look. workers: processes, None for all cores; store: finished runs, to go on with. Of several scenes, one that
-    cannot be measured is in the result with the reason. ValueError or Problem for wrong arguments, and for a single
-    scene that cannot be.
+    first look. workers: processes at most, None for all cores (little work is done without them); store: finished runs,
+    to go on with. Of several scenes, one that cannot be measured is in the result with the reason. ValueError or
+    Problem for wrong arguments, and for a single scene that cannot be.
     """
     check_arguments(norms, seconds, repeats, steps)
     for target in targets:
