@@ -44,9 +44,11 @@ class Output:
             between_marks(into, mark)
         return cls(mark, as_json, as_markdown, into, out, None if out is None else _charts(out, charts))
 
-    def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
-        """Print the result, and put the tables into the page."""
-        markdown = "\n\n".join([*(table.markdown() for table in tables), *remarks])
+    def show(
+        self, result: Any, tables: list[TextTable], remarks: list[str], page: list[TextTable] | None = None
+    ) -> None:
+        """Print the result, and put the tables into the page; ``page``: others go there."""
+        markdown = _markdown(tables, remarks)
         if self.as_json:
             click.echo(json.dumps(result.as_dict(), indent=2))
         elif self.as_markdown:
@@ -58,7 +60,7 @@ class Output:
             for remark in remarks:
                 console.print(remark, style="dim", highlight=False)
         if self.into is not None:
-            replace_between_marks(self.into, self.mark, markdown)
+            replace_between_marks(self.into, self.mark, markdown if page is None else _markdown(page, remarks))
             click.echo(f"tables: {self.into}", err=True)
 
     def draw(self, function: str, result: Any) -> None:
@@ -67,6 +69,10 @@ class Output:
             return
         picture = getattr(self.charts, function)(result, self.out)
         click.echo(f"chart: {picture}" if picture is not None else "no chart: nothing is compared", err=True)
+
+
+def _markdown(tables: list[TextTable], remarks: list[str]) -> str:
+    return "\n\n".join([*(table.markdown() for table in tables), *remarks])
 
 
 def _charts(out: Path, module: str) -> Any:

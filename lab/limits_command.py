@@ -20,7 +20,15 @@ from .choices import parse_assignments, preset
 from .installed_plugins import plugin_named
 from .limits_sweep import AXES, limits
 from .loading import Loaded, load, stdout_kept_clean
-from .options import plugin_option, seed_number, seed_option, set_option, settings_option
+from .options import (
+    out_option,
+    plugin_option,
+    seed_number,
+    seed_option,
+    set_option,
+    settings_option,
+    shown_options,
+)
 from .problems import Problem, did_you_mean
 from .suggest import StepLimits, step_limits
 
@@ -35,13 +43,8 @@ NAMES = tuple(axis.name for axis in AXES)
 @click.option("--axes", "axis_names", metavar="NAME,NAME", help=f"Only these of {', '.join(NAMES)}.")
 @click.option("--quick", is_flag=True, help="Fewer values on each axis: about a minute.")
 @click.option("--long", "long_runs", is_flag=True, help="Runs of a million steps too: about twenty minutes.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
-@click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown.")
-@click.option(
-    "--into", type=click.Path(path_type=Path, dir_okay=False),
-    help="Also put the tables between the marks of this page.",
-)  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Draw a picture into this folder.")
+@out_option("Draw a picture into this folder.")
+@shown_options
 @click.option(
     "--seconds", type=float, help="Of a scene: how long to watch it (default: what it recommends; 0: its start)."
 )

@@ -39,6 +39,7 @@ from .trade_files import write_csv, write_json
 from .trade_page import chart_module, write_page
 from .trade_records import PYMUNK, Trade
 from .trade_report import COUNTS, cheapest, choice_lines, measured, remarks, tables
+from .trade_summary import summaries
 from .trading import Only, trade
 
 MARK = "carom trade"
@@ -103,11 +104,9 @@ def trade_command(
     charts = _charts_there()
     arguments = {
         "norms": norms, "seconds": seconds, "repeats": repeats, "steps": steps or (), "only": only,
-        "against_pymunk": against == PYMUNK, "timing": not no_timing, "options": options,
+        "against_pymunk": against == PYMUNK, "timing": not no_timing, "quick": quick, "options": options,
         "seed": seed_number(seed), "workers": workers, "command": _command_line(context),
     }  # fmt: skip
-    if quick:
-        arguments["quick"] = True
     with Store.open(out / RESULTS, resume) as store:
         if resume:
             click.echo(f"carom: {_results(store)} taken over from {store.path}", err=True)
@@ -115,12 +114,19 @@ def trade_command(
             with Bar(Console(stderr=True)) as bar:
                 result = trade(*targets, **arguments, store=store, progress=bar)
                 files = _write(result, out)
-                files += _draw(result, out, norms, [] if no_pictures else subjects, bar) if charts else []
+                pictures: dict[str, list[Path]] = {}
+                if charts:
+                    bar.say("charts")
+                    files += [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
+                    pictures = {} if no_pictures else _pictures(result, subjects, out, bar)
+                    files += [path for drawn in pictures.values() for path in drawn]
+                files.append(write_page(result, out / "trade.html", pictures, charts=charts))
         except KeyboardInterrupt:
             click.echo(f"carom: stopped; {_results(store)} kept in {store.path}, --resume goes on", err=True)
             raise click.exceptions.Exit(STOPPED) from None
     choices = [cheapest(case) for case in measured(result)]
-    output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)])
+    page = [*summaries(result), *choices]
+    output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)], page)
     for path in files:
         click.echo(f"written: {path}", err=True)
 
@@ -140,7 +146,7 @@ def _charts_there() -> bool:
     try:
         chart_module()
     except Problem as problem:
-        click.echo(f"carom: tables alone: {problem.message}", err=True)
+        click.echo(f"carom: no pictures: {problem.message}", err=True)
         return False
     return True
 
@@ -175,20 +181,17 @@ def _write(result: Trade, out: Path) -> list[Path]:
     return [write_json(result, out / "trade.json"), write_csv(result, out / "trade.csv")]
 
 
-def _draw(
-    result: Trade, out: Path, norms: Sequence[str], subjects: Sequence[Subject], progress: Progress
-) -> list[Path]:
-    """Charts of each norm that was asked for, pictures of the scenes, and the page with all of it."""
-    progress.say("charts")
-    files = [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
-    pictures = {}
-    for case in measured(result):
-        for subject in subjects:
-            if subject.name == case.scene:
-                progress.say(f"{case.scene}: pictures")
-                pictures[case.scene] = draw_scene(subject, case.seconds, out)
-    files += [path for drawn in pictures.values() for path in drawn]
-    return [*files, write_page(result, out / "trade.html", pictures)]
+def _pictures(
+    result: Trade, subjects: Sequence[Subject], out: Path, progress: Progress
+) -> dict[str, list[Path]]:
+    """By scene, of what was measured."""
+    seconds = {case.target: case.seconds for case in measured(result)}
+    found = {}
+    for subject in subjects:
+        if subject.target in seconds:
+            progress.say(f"{subject.name}: pictures")
+            found[subject.name] = draw_scene(subject, seconds[subject.target], out)
+    return found
 
 
 def draw_scene(subject: Subject, seconds: float, out: Path) -> list[Path]:

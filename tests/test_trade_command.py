@@ -1,0 +1,277 @@
+"""`carom trade`: what it writes and prints, and what it says of input that cannot be."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from helpers_trade_scenes import BALL, BULLET, CROWD, scene_file
+
+from carom.lab import Trade, cli, trade_command, trade_runs
+from carom.lab.cases import QUICK_REPEATS
+from carom.lab.norms import NORMS
+from carom.lab.trade_tasks import perform
+
+SHORT = ("--dt", "1/30,1/60", "--repeats", "2", "--no-timing", "--workers", "1")
+WRITTEN = {"results.jsonl", "trade.json", "trade.csv", "trade.html"}
+
+
+@pytest.fixture
+def carom(tmp_path, monkeypatch):
+    """Runs the command in an empty folder; the result has exit_code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str):
+        return CliRunner(env={"COLUMNS": "200"}).invoke(cli.cli, ["trade", *arguments])
+
+    return run
+
+
+def trade_in(folder: Path) -> Trade:
+    return Trade.from_dict(json.loads((folder / "trade.json").read_text()))
+
+
+# -- what it makes --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """(folder, result) of a bullet that discrete collisions miss, beside pymunk; timed, with pictures."""
+    folder = tmp_path_factory.mktemp("made")
+    mine = scene_file(folder, BULLET, first_line="A bullet & <a wall>.")
+    words = [mine, "--dt", "1/15,1/60", "--repeats", "4", "--workers", "1", "--against", "pymunk"]
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(cli.cli, ["trade", *words, "--out", str(folder / "out")])
+    assert result.exit_code == 0, result.output
+    return folder / "out", result
+
+
+def test_the_files_it_writes_are_there_and_named(made):
+    folder, result = made
+    charts = {f"trade-mine-py-position-{what}.{kind}" for what in ("work", "time") for kind in ("png", "svg")}
+    expected = WRITTEN | charts | {"mine-final.png", "mine-traces.png"}
+    assert {path.name for path in folder.iterdir()} == expected
+    for name in expected - {"results.jsonl"}:
+        assert f"written: {folder / name}" in result.stderr
+
+
+def test_json_and_csv_hold_every_point(made):
+    folder, _ = made
+    found = trade_in(folder)
+    [case] = found.cases
+    points = [point for curve in case.curves for point in curve.points]
+    assert {curve.points[0].cell.engine for curve in case.curves} == {"carom", "pymunk"}
+    assert all(len(point.milliseconds.values) == 5 for point in points if point.milliseconds)
+    with (folder / "trade.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(points) * len(case.norms)
+    by_key = {(row["method"], float(row["dt"]), row["norm"]): row for row in rows}
+    for curve in case.curves:
+        for point in curve.points:
+            row = by_key[curve.label, point.cell.dt, case.norm]
+            bar = point.errors.get(case.norm)
+            assert row["error"] == (repr(bar.mean) if bar else "")
+            assert bool(row["failed"]) == point.failed
+            assert float(row["work"]) == point.work
+
+
+def test_failures_are_in_the_table_on_the_chart_and_on_the_page(made):
+    folder, result = made
+    [case] = trade_in(folder).cases
+    [kind] = {kind for curve in case.curves for point in curve.points for kind in point.failures}
+    assert kind in result.stdout
+    assert kind in (folder / "trade.html").read_text()
+    assert kind in (folder / "trade-mine-py-position-work.svg").read_text()
+
+
+def test_the_page_needs_nothing_else_and_tells_what_made_it(made):
+    folder, _ = made
+    page = (folder / "trade.html").read_text()
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    assert page.count("<svg") == 2
+    assert page.count("data:image/png;base64,") == 2
+    assert "A bullet &amp; &lt;a wall&gt;." in page
+    assert "Settings(" in page
+    assert "carom trade " in page and "--against pymunk" in page  # noqa: PT018
+
+
+def test_what_it_prints(made):
+    _, result = made
+    for words in (
+        "mine.py: position, and work", "order", "pymunk, 10 iterations", "that keeps position below",
+        "reference: own runs", "carom: Settings(",
+    ):  # fmt: skip
+        assert words in result.stdout, words
+    assert "solver loops" not in result.stdout  # a terminal is not so wide
+
+
+def test_json_alone_goes_to_stdout_and_resume_takes_all_over(carom, monkeypatch):
+    first = carom("jump", *SHORT, "--no-pictures")
+    assert first.exit_code == 0, first.output
+    folder = Path("out/trade")
+    before = trade_in(folder)
+    assert before.command == f"carom trade jump {' '.join(SHORT)} --no-pictures"
+    kept = (folder / "results.jsonl").read_bytes()
+    monkeypatch.setattr(trade_runs, "perform", None)  # nothing runs
+    again = carom("jump", *SHORT, "--no-pictures", "--resume")
+    assert again.exit_code == 0, again.output
+    assert re.search(r"carom: \d+ results taken over from out/trade/results\.jsonl", again.stderr)
+    assert trade_in(folder) == before  # the command without --resume in it
+    again = carom("jump", *SHORT, "--no-pictures", "--json", "--resume")
+    printed = Trade.from_dict(json.loads(again.stdout))
+    assert printed.cases == before.cases
+    assert (folder / "results.jsonl").read_bytes() == kept
+
+
+def test_several_scenes_one_of_them_refused(carom, tmp_path):
+    scene_file(tmp_path, CROWD, "crowd.py")
+    result = carom("crowd.py", "jump", "--norm", "position", *SHORT, "--no-pictures", "--markdown")
+    assert result.exit_code == 0, result.output
+    assert "crowd.py: not measured: " in result.stdout
+    assert "**jump: position, and work" in result.stdout
+    assert "| explicit euler |" in result.stdout
+    assert (tmp_path / "out/trade/trade-jump-position-work.png").exists()
+
+
+def test_options_reach_the_scene_and_the_grid(carom, tmp_path):
+    scene_file(tmp_path, BALL)
+    result = carom(
+        "mine.py", *SHORT, "--no-pictures", "--option", "speed=2.5", "--integrators", "velocity_verlet", "--collisions",
+        "continuous,event_driven", "--seconds", "1", "--norm", "count", "--norm", "position", "--seed", "3",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    [case] = trade_in(Path("out/trade")).cases
+    cells = [curve.points[0].cell for curve in case.curves]
+    assert [(cell.integrator, cell.collision) for cell in cells] == [
+        ("velocity_verlet", "continuous"), ("velocity_verlet", "event_driven"),
+    ]  # fmt: skip
+    assert (case.seconds, list(case.norms)) == (1.0, ["count", "position"])
+    charts = {path.name for path in Path("out/trade").glob("*.png")}
+    assert charts == {"trade-mine-py-count-work.png", "trade-mine-py-position-work.png"}
+
+
+def test_quick_takes_every_second_step_and_few_repeats(carom):
+    few = ("--no-timing", "--no-pictures", "--integrators", "velocity_verlet", "--seconds", "0.6", "--norm", "apex")
+    result = carom("jump", "--quick", *few)
+    assert result.exit_code == 0, result.output
+    [case] = trade_in(Path("out/trade")).cases
+    steps = [point.cell.dt for point in case.curves[0].points]
+    assert all(a == 4 * b for a, b in itertools.pairwise(steps))
+    assert case.repeats == QUICK_REPEATS < 64
+
+
+def test_tables_go_into_a_page(carom, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Mine\n\n<!-- carom trade jump -->\nold\n<!-- end of carom trade jump -->\nend\n")
+    result = carom("jump", *SHORT, "--no-pictures", "--into", "page.md")
+    assert result.exit_code == 0, result.output
+    text = page.read_text()
+    assert "old" not in text
+    assert "| velocity verlet |" in text
+    assert f"carom trade jump {' '.join(SHORT)} --no-pictures --into page.md" in text
+    assert text.endswith("\nend\n")
+
+
+def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
+    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"] + ["carom.lab.trade_charts"]:
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    result = carom("jump", *SHORT)
+    assert result.exit_code == 0, result.output
+    assert result.stderr.startswith("carom: no pictures: no charts, matplotlib is missing")
+    assert {path.name for path in Path("out/trade").iterdir()} == WRITTEN
+    assert "<svg" not in Path("out/trade/trade.html").read_text()
+
+
+def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
+    ran = []
+
+    def interrupted(task):
+        if len(ran) == 3:
+            raise KeyboardInterrupt
+        ran.append(task)
+        return perform(task)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(trade_runs, "perform", interrupted)
+        result = carom("jump", *SHORT)
+    assert result.exit_code == 130
+    last = result.stderr.splitlines()[-1]
+    assert last == "carom: stopped; 3 results kept in out/trade/results.jsonl, --resume goes on"
+    again = carom("jump", *SHORT, "--no-pictures", "--resume")
+    assert "carom: 3 results taken over" in again.stderr
+    assert again.exit_code == 0
+
+
+# -- what it refuses ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("sprin",), "no scene named 'sprin'; did you mean 'spring'"),
+    (("spring", "orbti"), "no scene named 'orbti'; did you mean 'orbit'"),
+    (("gone.py",), "no file 'gone.py'"),
+    ((), "Missing argument"),
+    (("spring", "--norm", "positon"), "no norm 'positon'; did you mean 'position'"),
+    (("spring", "--dt", "0"), "--dt takes steps above 0 s"),
+    (("spring", "--dt", "1/60,x"), "--dt takes steps above 0 s"),
+    (("spring", "--dt", "nan"), "--dt takes steps above 0 s"),
+    (("spring", "--seconds", "0"), "--seconds takes a number above 0"),
+    (("spring", "--seconds", "inf"), "--seconds takes a number above 0"),
+    (("spring", "--repeats", "0"), "--repeats"),
+    (("spring", "--workers", "0"), "--workers"),
+    (("spring", "--seed", "-1"), "--seed takes a whole number"),
+    (("spring", "--against", "bullet"), "--against"),
+    (("spring", "--integrators", "rk5"), "did you mean 'rk4'"),
+    (("spring", "--integrators", ","), "--integrators takes names"),
+    (("spring", "--collisions", "discreet"), "--collisions: no 'discreet'; did you mean 'discrete'"),
+    (("spring", "--substeps", "0"), "--substeps takes whole numbers from 1"),
+    (("spring", "--geometry", "box"), "--geometry: no 'box'; there are: precise, bounds"),
+    (("spring", "--option", "n"), "--option takes NAME=VALUE"),
+    (("spring", "--option", "seed=1"), "--option cannot set seed"),
+    (("spring", "--option", "n=1", "--option", "n=2"), "--option gives n twice"),
+    (("spring", "--option", "mass=3"), "mass"),
+    (("spring", "--json", "--markdown"), "--json and --markdown exclude each other"),
+    (("spring", "--into", "page.md"), "--into page.md"),
+    (("spring", "--no-timign"), "--no-timing"),
+])  # fmt: skip
+def test_wrong_input_is_refused_at_once_in_one_line(carom, monkeypatch, arguments, words):
+    monkeypatch.setattr(trade_runs, "perform", None)  # nothing runs before
+    result = carom(*arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr.splitlines()[-1]
+    assert result.stderr.splitlines()[-1].startswith("carom: ")
+    assert result.stdout.strip() == ""
+
+
+def test_a_folder_that_cannot_be_written(carom):
+    Path("out").write_text("a file")
+    result = carom("spring")
+    assert result.exit_code == 2
+    assert "--out" in result.stderr
+
+
+def test_without_pymunk(carom, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymunk", None)
+    result = carom("spring", "--against", "pymunk")
+    assert result.exit_code == 2
+    assert "pymunk is missing" in result.stderr
+
+
+def test_the_chaotic_file_is_refused_with_the_reason(carom, tmp_path):
+    scene_file(tmp_path, CROWD, "chaos.py")
+    result = carom("chaos.py", "--norm", "position", *SHORT)
+    assert result.exit_code == 2
+    assert "chaos.py is chaotic: two starts" in result.stderr
+    assert "position would measure chance" in result.stderr
+
+
+def test_the_manual_has_every_option_and_norm():
+    text = (Path(__file__).parent.parent / "docs" / "trade.md").read_text(encoding="utf-8")
+    options = {o for parameter in trade_command.trade_command.params for o in parameter.opts if o.startswith("--")}
+    assert set(re.findall(r"^\| `(--[a-z-]+)", text, re.MULTILINE)) == options
+    assert [name for name in NORMS if f"`{name}`" not in text] == []

@@ -1,0 +1,147 @@
+"""What `trade()` has measured stays measured: over interruptions, killed workers, and any number of workers."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import pytest
+from helpers_trade_scenes import BALL, DEADLY, dies, scene_file
+
+from carom.lab import Only, Trade, trade, trade_runs
+from carom.lab.result_store import Store
+from carom.lab.trade_records import STOPPED
+from carom.lab.trade_tasks import perform
+
+needs_signals = pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
+FEW = {
+    "timing": False,
+    "repeats": 2,
+    "steps": (1 / 30, 1 / 60),
+    "only": Only(("semi_implicit_euler", "velocity_verlet"), ("continuous",)),
+}
+RUNS = 2 * 2 * 2 + 2  # methods, steps, repeats; and two references
+
+
+def measured(target, folder=None, resume=False, workers=1, **options) -> Trade:
+    if folder is None:
+        return trade(target, workers=workers, **{**FEW, **options})
+    with Store.open(folder / "results.jsonl", resume) as store:
+        return trade(target, workers=workers, store=store, **{**FEW, **options})
+
+
+@pytest.fixture(autouse=True)
+def however_few(monkeypatch):
+    """Workers are used even for work that takes less time than they need to start."""
+    monkeypatch.setattr(trade_runs, "FEW_STEPS", 0)
+
+
+@pytest.fixture
+def performed(monkeypatch):
+    """The keys of what ran, in this process."""
+    ran: list[str] = []
+
+    def counted(task):
+        ran.append(task.key)
+        return perform(task)
+
+    monkeypatch.setattr(trade_runs, "perform", counted)
+    return ran
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    return scene_file(tmp_path_factory.mktemp("scene"), BALL)
+
+
+@pytest.fixture(scope="module")
+def whole(ball) -> Trade:
+    """Measured in one go, in one process, with nothing kept."""
+    return measured(ball)
+
+
+def keys(path) -> list[str]:
+    return [json.loads(line)["key"] for line in path.read_text().splitlines()]
+
+
+def test_nothing_is_performed_twice_when_it_goes_on(ball, whole, performed, tmp_path):
+    path = tmp_path / "results.jsonl"
+    assert measured(ball, tmp_path) == whole
+    assert len(performed) == len(set(performed)) == RUNS
+    assert sorted(keys(path)) == sorted(performed)
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[:4]) + lines[4][:30])  # as a process leaves it that is killed while it writes
+    performed.clear()
+    assert measured(ball, tmp_path, resume=True) == whole
+    assert len(performed) == len(set(performed)) == RUNS - 4
+    assert path.read_bytes().splitlines(keepends=True)[:4] == lines[:4]
+    assert sorted(path.read_bytes().splitlines()) == sorted(line.rstrip(b"\n") for line in lines)
+    performed.clear()
+    assert measured(ball, tmp_path, resume=True) == whole
+    assert performed == []
+
+
+def test_an_interrupted_run_keeps_what_is_finished(ball, whole, monkeypatch, tmp_path):
+    ran = []
+
+    def interrupted(task):
+        if len(ran) == 5:
+            raise KeyboardInterrupt
+        ran.append(task.key)
+        return perform(task)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(trade_runs, "perform", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            measured(ball, tmp_path)
+    assert keys(tmp_path / "results.jsonl") == ran
+    assert measured(ball, tmp_path, resume=True) == whole
+
+
+def test_results_of_another_scene_time_or_step_are_not_taken(ball, performed, tmp_path):
+    only = {"only": Only(("velocity_verlet",), ("continuous",)), "steps": (1 / 30,), "repeats": 1}
+    measured(ball, tmp_path, **only)
+    before = len(performed)
+    measured(ball, tmp_path, resume=True, **only)
+    assert len(performed) == before
+    for change in ({"seconds": 1.5}, {"steps": (1 / 20,)}, {"options": {"speed": 2.0}}, {"seed": 1}):
+        before = len(performed)
+        measured(ball, tmp_path, resume=True, **{**only, **change})
+        assert len(performed) == before + 3, change  # the point and two references
+
+
+@pytest.mark.slow  # the next one needs two workers as well
+def test_two_workers_give_the_same_bits_as_one(ball, whole, tmp_path):
+    assert measured(ball, tmp_path, workers=2) == whole
+    found = keys(tmp_path / "results.jsonl")
+    assert len(found) == len(set(found)) == RUNS
+
+
+@needs_signals
+def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(tmp_path):
+    """The first process of two that builds the scene dies at once; its run is done again by another."""
+    mine = scene_file(tmp_path, DEADLY.format(times=1))
+    found = measured(mine, tmp_path, workers=2)
+    assert len(list((tmp_path / "mine.marks").iterdir())) >= 1  # it happened
+    assert found == measured(mine)
+    listed = keys(tmp_path / "results.jsonl")
+    assert len(listed) == len(set(listed)) == RUNS
+
+
+@needs_signals
+def test_a_run_that_always_kills_its_worker_is_a_failed_run(ball, whole, tmp_path, monkeypatch):
+    """Its process ended twice; the other runs are what they are."""
+    path = tmp_path / "results.jsonl"
+    measured(ball, tmp_path)
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))  # only the last run is missing
+    monkeypatch.setattr(trade_runs, "perform", dies)
+    found = measured(ball, tmp_path, resume=True, workers=2)
+    [(point, before)] = [
+        (one, other)
+        for curve, old in zip(found.cases[0].curves, whole.cases[0].curves, strict=True)
+        for one, other in zip(curve.points, old.points, strict=True)
+        if one != other
+    ]
+    assert point.failures == {STOPPED: 1}
+    assert before.failures == {}
+    assert "ended 2 times" in path.read_text().splitlines()[-1]
