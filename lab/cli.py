@@ -28,6 +28,7 @@ from .problems import Problem
 from .progress import StepProgress
 from .report import print_report
 from .run import Run, run
+from .settings_command import settings_command
 from .trade_command import trade_command
 from .tune_command import tune_command
 from .warm_up import warm_up_command
@@ -139,6 +140,7 @@ cli.add_command(trade_command)
 cli.add_command(tune_command)
 cli.add_command(limits_command)
 cli.add_command(geometry_command)
+cli.add_command(settings_command)
 cli.add_command(warm_up_command)
 
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 
 from .survey import Survey
-from .trade_records import CAROM, CHAOTIC, PYMUNK, RESTING, SMOOTH, Cell
+from .trade_records import CAROM, CHAOTIC, IMPACTS, PYMUNK, RESTING, SMOOTH, Cell
 
 ALL_METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 CONSTANT_FORCE = ("explicit_euler", "semi_implicit_euler", "velocity_verlet")
@@ -95,12 +95,12 @@ def theory(cell: Cell, norm: str, survey: Survey) -> float | None:
         return min(flight, 2.0)
     if survey.kind == SMOOTH:
         return _of_smooth(cell, norm, flight)
-    if cell.collision == "discrete":
-        return MISSED.get(norm) if survey.kind == CHAOTIC and flight == math.inf else None
+    if cell.collision == "discrete" and survey.kind == CHAOTIC:
+        return MISSED.get(norm) if flight == math.inf else None
     if survey.kind == CHAOTIC:
         return math.inf if flight == math.inf else None
     if flight == math.inf:
-        return math.inf
+        return None if cell.collision == "discrete" else math.inf  # a discrete world may miss grazes
     return {"energy": flight, "position": flight, "energy_square": 2 * flight}.get(norm) if flight == 1 else None
 
 
@@ -124,5 +124,7 @@ def _of_smooth(cell: Cell, norm: str, flight: float) -> float | None:
 
 def _of_pymunk(norm: str, survey: Survey) -> float | None:
     """It moves as explicit Euler does under gravity (measured), and sees impacts at the ends of steps: both order 1."""
-    first = {SMOOTH: ("position", "apex"), CHAOTIC: ("pressure", "rate")}
+    first = {SMOOTH: ("position", "apex"), IMPACTS: ("energy",), CHAOTIC: ("pressure", "rate")}
+    if survey.kind == IMPACTS and norm == "energy_square":
+        return 2.0
     return 1.0 if norm in first.get(survey.kind, ()) else None

@@ -24,13 +24,17 @@ Measure = Callable[[Seen, Seen], float]
 
 @dataclass(frozen=True)
 class Norm:
-    """``text`` says what it is and what it is relative to; ``scale`` gives that in the scene's units."""
+    """``text`` says what it is and what it is relative to; ``scale`` gives that in the scene's units.
+
+    signed: a statistic, single runs of which are noise; absolute: in units of its own, relative to nothing.
+    """
 
     name: str
     text: str
     measure: Measure
     scale: Measure
     signed: bool = False
+    absolute: bool = False
 
 
 def _one(seen: Seen, reference: Seen) -> float:
@@ -114,7 +118,7 @@ NORMS: Mapping[str, Norm] = {
              lambda seen, reference: reference.seconds),
         Norm("count", "number of impacts; 1 is the right number", _absolute("impacts"), _relative("impacts")[1]),
         Norm("energy_square", "mean square of the departure of the energy, in J²: not relative to anything",
-             *_own("energy_square")),
+             *_own("energy_square"), absolute=True),
         Norm("overlap", "deepest overlap in the second half, in sizes of the smaller body", *_own("overlap")),
         Norm("overlap_mean", "overlap per body in the second half, in sizes of the smaller body",
              *_own("overlap_mean")),

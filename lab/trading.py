@@ -34,7 +34,7 @@ from .trade_tasks import engine_of
 
 ROUNDING = 1e-12  # errors below it are rounding, which follows no order
 SMALL = 0.1  # an error of a tenth of the scale is no small one
-CLEAR = 4.0  # times its own uncertainty must an error be to tell an order
+CLEAR = 4.0  # times its own noise must a statistic's error be to tell an order
 ASYMPTOTIC = 4  # points, the finest, that the order is read from
 
 
@@ -171,11 +171,9 @@ def _tells(point: Point, norm: str, reference: Reference) -> bool:
     if point.failed or norm not in point.errors:
         return False
     error = point.errors[norm]
-    return (
-        ROUNDING < error.mean < SMALL
-        and error.mean > CLEAR * error.uncertainty
-        and reference.trusts(norm, error.mean)
-    )
+    small = NORMS[norm].absolute or error.mean < SMALL
+    noise = CLEAR * error.uncertainty if NORMS[norm].signed else 0.0
+    return small and error.mean > max(ROUNDING, noise) and reference.trusts(norm, error.mean)
 
 
 def label_of(method: Cell, others: Iterable[Cell]) -> str:
