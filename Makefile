@@ -2,6 +2,7 @@
 #   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
 #   make test    the tests, without the slow ones
 #   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
+#   make figures measure again what the tables and charts of docs/accuracy.md, limits.md, settings.md and levels.md show
 
 PYTHON ?= python3
 SCENE ?= asteroids
@@ -18,7 +19,7 @@ BENCH := .venv/bench-$(HERE)
 TEST := .venv/test-$(HERE)
 DEV := .venv/dev-$(HERE)
 
-.PHONY: run test test-slow bench ide typecheck lint clean
+.PHONY: run test test-slow bench figures ide typecheck lint clean
 
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -31,6 +32,19 @@ test-slow: $(TEST)
 
 bench: $(BENCH)
 	$(BIN)/carom bench $(ARGS)
+
+ACCURACY := spring orbit jump bouncing stack thermal_gas
+
+figures: $(BENCH)
+	for scene in $(ACCURACY); do \
+	  $(BIN)/carom trade $$scene --against pymunk --out out/$$scene --into docs/accuracy.md || exit 1; \
+	done
+	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md
+	cp out/*/trade-*-work.png out/bouncing/trade-*-time.png docs/pictures/
+	$(BIN)/carom limits --into docs/limits.md --out docs/pictures
+	$(BIN)/carom settings --into docs/settings.md
+	$(BIN)/carom settings --games --into docs/settings.md
+	$(BIN)/carom geometry --into docs/levels.md --out docs/pictures
 
 # Checkers and editors do not follow the import hooks of an editable install; they follow links.
 ide:

@@ -37,7 +37,8 @@ class Settings:
         approach speed, m/s, below which a contact is at rest instead of bouncing; None: 2 |a| dt, gravity's share of
         the step
     slop
-        overlap, m, that is left alone; None: 0.005 of the smaller body of the pair
+        how near, m, bodies are held as contacts before they touch, and how much touching corners are ignored; None:
+        0.005 of the smaller body of the pair
     max_steps_per_advance
         what one ``advance`` takes at most; the time beyond it is dropped and counted
     max_impacts_per_step

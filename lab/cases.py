@@ -20,7 +20,7 @@ from .subjects import Subject, subject_of
 from .survey import Survey, survey
 from .trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
 
-PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 2, CHAOTIC: 5}  # repeats; of chaotic scenes they are seeds
+PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 1, CHAOTIC: 5}  # repeats; of chaotic scenes they are seeds
 BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare a run with one run
 OF_CONTACTS = ("impact_time", "count", "overlap", "overlap_mean", "pressure", "rate")
 FINER = 8  # times smaller than the smallest step are those of the own references

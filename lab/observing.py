@@ -84,11 +84,15 @@ class Seen:
         return cls(**{**plain, "position": np.array(plain["position"], float)})
 
 
-def observe(engine: Engine, seconds: float, dt: float, phase: float = 1.0) -> Seen:
-    """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1."""
+def observe(engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False) -> Seen:
+    """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
+
+    whole_steps: leave out the last part of a step; contacts at rest are solved for the length of the step before, and
+    another one stirs them.
+    """
     watch = _Watch(engine, seconds)
     with np.errstate(over="ignore", invalid="ignore"):
-        for step in _steps(seconds, dt, phase):
+        for step in _steps(seconds, dt, phase, whole_steps):
             engine.step(step)
             watch.look()
             if watch.failure:
@@ -96,13 +100,13 @@ def observe(engine: Engine, seconds: float, dt: float, phase: float = 1.0) -> Se
         return watch.seen()
 
 
-def _steps(seconds: float, dt: float, phase: float) -> list[float]:
+def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[float]:
     """Their lengths. What would be left below a millionth of a step is rounding, and left out."""
     first = min(phase * dt, seconds)
     rest = seconds - first
     whole = int(rest / dt * (1 + 1e-12) + 1e-9)
     last = rest - whole * dt
-    return [first, *[dt] * whole, *([last] if last > 1e-6 * dt else [])]
+    return [first, *[dt] * whole, *([last] if last > 1e-6 * dt and not whole_steps else [])]
 
 
 class _Watch:

@@ -17,7 +17,7 @@ from .norms import NORMS, errors_of, failure_of
 from .observing import Seen, observe
 from .problems import Problem
 from .survey import NUDGE, nudge
-from .trade_records import CHAOTIC, PYMUNK, STOPPED, Cell, Outcome
+from .trade_records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
 
 FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes start elsewhere than what they judge
 
@@ -70,7 +70,9 @@ def _run(task: Task) -> Seen:
     engine = engine_of(task.case, task.cell, task.repeat + FIRST_REFERENCE_SEED * task.reference)
     try:
         with task.case.subject.blamed():
-            return observe(engine, task.case.seconds, task.cell.dt, task.case.phase(task.repeat))
+            case = task.case
+            phase = case.phase(task.repeat)
+            return observe(engine, case.seconds, task.cell.dt, phase, whole_steps=case.kind == RESTING)
     finally:
         engine.close()
 

@@ -83,6 +83,7 @@ def halves(method, share):
     return sizes[:2000].max(axis=0), sizes[2000:].max(axis=0)
 
 
+@pytest.mark.slow
 @all_methods
 def test_runs_stay_bounded_below_the_limit_and_grow_above(method):
     """B6, the runs themselves: 0.999 and 1.01 of the limit that is found."""

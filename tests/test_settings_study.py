@@ -1,0 +1,399 @@
+"""What each field of Settings costs and buys: every field is there, and the figures are those that theory gives."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from functools import partial
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from carom.framework import Settings
+from carom.lab import games, settings_clock, settings_command, settings_report, settings_scenes, settings_study
+from carom.lab.bench_clock import Spread
+from carom.lab.commands import Commands
+from carom.lab.settings_clock import costs
+from carom.lab.settings_records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
+from carom.lab.settings_study import VARIED, measured
+from carom.scenes import drops, jump, stack
+
+PAGE = Path(__file__).parent.parent / "docs" / "settings.md"
+EVERY = {(varied.field, varied.scene): varied for varied in VARIED}
+
+
+STUDIED = [("dt", "jump"), ("slop", "tiles"), ("debug", "jump"), ("friction_mixing", "sliding box")]
+
+
+def errors(field, scene, *values):
+    """What the study measures for these values, one after the other; without the clock."""
+    varied = EVERY[field, scene]
+    return [varied.measure(partial(varied.world, value), varied.seconds) for value in values or varied.values]
+
+
+def works(field, scene):
+    """The work of each value of a field, by value; counted, so always the same."""
+    varied = EVERY[field, scene]
+    taken = next(costs([partial(varied.world, value) for value in varied.values], varied.timed, 1, varied.play))
+    return dict(zip(varied.values, (cost.work for cost in taken), strict=True))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_timing():
+    """One span under the clock is enough where only counts are looked at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settings_clock, "ENOUGH", 1e-4)
+        yield
+
+
+# -- what is varied ------------------------------------------------------------------------------
+
+
+def test_no_field_is_forgotten():
+    assert {varied.field for varied in VARIED} == {field.name for field in dataclasses.fields(Settings)}
+
+
+@pytest.mark.parametrize("varied", VARIED, ids=lambda varied: f"{varied.field} {varied.scene}")
+def test_each_field_is_varied_alone(varied):
+    assert varied.default in varied.values
+    assert varied.default == getattr(Settings(), varied.field)
+    assert len(set(varied.values)) == len(varied.values) > 1
+    assert varied.field not in varied.others
+    assert varied.errors
+    for value in varied.values:
+        with varied.world(value) as world:
+            assert world.settings == varied.base.replace(**{varied.field: value})
+            if varied.play is not settings_scenes.frames:  # blocks hold whole steps, so that the ratios are true
+                steps = varied.timed / 5 / world.settings.dt
+                assert steps == pytest.approx(round(steps), abs=1e-9)
+
+
+# -- what theory says ----------------------------------------------------------------------------
+
+
+def test_the_first_order_of_the_default_in_the_apex():
+    """Semi-implicit Euler leaves out v0 dt / 2 of the height."""
+    for dt, found in zip((1 / 30, 1 / 60, 1 / 120, 1 / 240), errors("dt", "jump"), strict=True):
+        assert found["apex"] == pytest.approx(jump.JUMP_SPEED * dt / 2, rel=1e-9)
+
+
+def test_twice_the_steps_are_twice_the_work():
+    work = works("dt", "jump")
+    for dt in (1 / 30, 1 / 60, 1 / 120):
+        assert work[dt / 2] == pytest.approx(2 * work[dt], rel=1e-3)  # but for what the first steps test
+    assert works("dt", "jump") == work
+
+
+@pytest.mark.parametrize("field", ["dt", "substeps"])
+def test_a_tower_gives_way_with_the_square_of_the_substep(field):
+    """load |a| / (m w^2), w = 2 pi substeps / 4 dt: most between the lowest two, under nine boxes, m = 1/2."""
+    varied = EVERY[field, "stack of 10"]
+    for value, found in zip(varied.values, errors(field, "stack of 10"), strict=True):
+        settings = varied.base.replace(**{field: value})
+        w = math.pi / 2 * settings.substeps / settings.dt
+        assert found["overlap"] == pytest.approx(100 * (stack.BODIES - 1) * stack.GRAVITY / (0.5 * w * w), rel=1e-3)
+        assert found["speed"] < 1.0  # mm/s
+
+
+def test_substeps_are_work_where_something_rests():
+    work = works("substeps", "pyramid of 210")
+    loops = [work[count] - work[1] for count in (2, 4, 8)]  # in proportion to the substeps beyond the first
+    assert loops[1] / loops[0] == pytest.approx(3, rel=0.02)
+    assert loops[2] / loops[0] == pytest.approx(7, rel=0.02)
+
+
+def test_the_integrators_on_an_orbit():
+    names = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
+    found = dict(zip(names, errors("integrator", "orbit"), strict=True))
+    assert found["explicit_euler"]["growth"] > 50  # it gains energy at every step
+    assert found["semi_implicit_euler"]["energy"] < 10
+    assert found["velocity_verlet"]["energy"] < 0.1 * found["semi_implicit_euler"]["energy"]
+    for name in ("rk4", "yoshida4"):
+        assert found[name]["energy"] < 0.01 * found["velocity_verlet"]["energy"]
+    assert found["rk4"]["growth"] < 0  # it loses
+    assert abs(found["yoshida4"]["growth"]) < 0.01 * found["yoshida4"]["energy"]  # symplectic: it comes back
+    work = works("integrator", "orbit")
+    assert work["semi_implicit_euler"] == work["explicit_euler"] < work["velocity_verlet"] < work["rk4"]
+    assert work["rk4"] == work["yoshida4"]
+
+
+def test_the_integrators_on_the_jump():
+    """Both Euler methods miss by the same on either side, the others by what lies between two steps: g dt^2 / 8."""
+    found = [error["apex"] for error in errors("integrator", "jump")]
+    assert found[:2] == pytest.approx([2.0, 2.0])
+    assert found[2:] == pytest.approx([jump.GRAVITY / 60**2 / 8] * 3)
+
+
+def test_what_each_kind_of_collision_loses():
+    assert [found["wrong"] for found in errors("collision", "shots")] == [7, 0, 0]
+    discrete, continuous, exact = errors("collision", "fast gas")
+    assert discrete["outside"] > 20
+    assert discrete["missing"] > 50
+    assert continuous["outside"] == exact["outside"] == exact["missing"] == 0
+    assert abs(continuous["missing"]) < 4
+
+
+def test_a_smaller_step_loses_less():
+    lost = [found["outside"] for found in errors("dt", "fast gas", 1 / 60, 1 / 240, 1 / 960)]
+    assert lost == sorted(lost, reverse=True)
+    assert lost[-1] == 0
+
+
+@pytest.mark.parametrize(("scene", "share"), [
+    ("2,000 boxes in circles", 1 - 2 / math.pi),  # areas of the offsets at which two hit: 4 of 2 pi
+    ("2,000 boxes in spheres", 1 - 8 / (4 / 3 * math.pi * 3**1.5)),
+])  # fmt: skip
+def test_contacts_that_are_none(scene, share):
+    precise, bounds = errors("geometry", scene)
+    assert precise["false"] == 0
+    assert bounds["false"] == pytest.approx(100 * share, abs=6)  # of some hundred contacts
+
+
+def test_the_first_bounce_that_is_lost():
+    """A ball that hits the floor at the threshold v comes up by e^2 v^2 / 2g; the last bounce but one was higher."""
+    varied = EVERY["restitution_threshold", "drops"]
+    for threshold in (None, 0.5, 1.0, 2.0):
+        speed = 2 * drops.GRAVITY * varied.base.dt if threshold is None else threshold
+        limit = 1000 * drops.RESTITUTION**2 * speed**2 / (2 * drops.GRAVITY)
+        lost = errors(varied.field, varied.scene, threshold)[0]["lost"]
+        assert drops.RESTITUTION**2 * limit < lost <= limit
+
+
+def test_corners_below_the_slop_are_not_noticed():
+    usual = 0.005  # of the size of 1 m
+    for slop, found in zip((usual, 0.0, 0.001, 0.02, 0.1), errors("slop", "tiles"), strict=True):
+        assert found["stuck"] == pytest.approx(0 if slop else 100, abs=1e-6)
+        passed = max((step for step in settings_scenes.STEPS_UP if step < slop), default=0)
+        assert found["passed"] == pytest.approx(1000 * passed)
+
+
+def test_time_that_is_dropped():
+    """A slow frame is 15 steps long, and 29 others one each."""
+    for most, found in zip((1, 2, 4, 8, 16, 32), errors("max_steps_per_advance", "platforms"), strict=True):
+        assert found == pytest.approx({"dropped": 100 * max(15 - most, 0) / 44, "longest": min(most, 15)})
+
+
+def test_impacts_beyond_the_cap():
+    found = dict(zip((None, 1, 4, 64, 1000), errors("max_impacts_per_step", "galperin"), strict=True))
+    assert [found[cap]["missing"] for cap in (64, 1000)] == [0, 0]
+    assert max(found[cap]["energy"] for cap in (64, 1000)) < 1e-6
+    assert found[1]["missing"] > found[4]["missing"] > found[None]["missing"] > 0
+
+
+@pytest.mark.parametrize("key", [("restitution_mixing", "two balls"), ("friction_mixing", "sliding box")])
+def test_mixing_shows_as_the_rule_says(key):
+    shown = []
+    for found in errors(*key):
+        assert found["off"] < 1e-12
+        shown.append(round(found["shown"], 9))
+    assert sorted(shown) == [0.36, 0.4, 0.6, 0.65, 0.9]
+
+
+def test_what_must_change_nothing():
+    assert errors("broad_phase", "slow gas") == [{"elsewhere": 0}] * 2
+    assert errors("debug", "slow gas") == [{"elsewhere": 0, "unnamed": 1}, {"elsewhere": 0, "unnamed": 0}]
+    assert errors("debug", "jump") == [{"elsewhere": 0}] * 2
+    for field, scene in (("broad_phase", "slow gas"), ("debug", "jump"), ("slop", "stack of 10")):
+        assert len(set(works(field, scene).values())) == 1
+
+
+# -- the study, its records and tables -----------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def study():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settings_study, "VARIED", [EVERY[key] for key in STUDIED])
+        return settings_study.settings_study(["dt", "slop", "friction_mixing"], repeats=2)
+
+
+def test_the_study_can_be_kept(study):
+    assert study.fields == ["dt", "slop", "friction_mixing"]
+    kept = json.loads(json.dumps(study.as_dict(), allow_nan=False))
+    assert SettingsStudy.from_dict(kept) == study
+    of = study.setting("dt", "jump")
+    own = of.sample(1 / 60)
+    assert own.time == Spread.of([1.0, 1.0])
+    assert own.work == 1
+    assert of.sample(1 / 120).work == pytest.approx(2)
+    assert of.milliseconds.low > 0
+    with pytest.raises(KeyError, match="no dt in 'nowhere'"):
+        study.setting("dt", "nowhere")
+    with pytest.raises(KeyError, match="dt=2 was not tried in jump"):
+        of.sample(2)
+
+
+def test_all_that_is_counted_is_the_same_twice(study):
+    again = measured(EVERY["slop", "tiles"], repeats=1)
+    before = study.setting("slop", "tiles")
+    assert [(s.work, s.errors) for s in again.samples] == [(s.work, s.errors) for s in before.samples]
+
+
+def test_the_tables(study):
+    table, meanings = settings_report.tables(study)
+    assert table.headings == ("field", "scene", "value", "time", "work", "error")
+    first, own = table.rows[:2]
+    assert (first[:3], first[4:]) == (("dt", "jump", "1/30"), ("0.50", "4 px"))
+    assert own == ("", "", "1/60 (default)", "1.00", "1.00", "2 px")
+    assert len(table.rows) == sum(len(of.samples) for of in study.settings)
+    assert [row[:2] for row in meanings.rows] == [(of.field, of.scene) for of in study.settings]
+    assert "repeats of one value lie at most" in settings_report.remarks(study)[0]
+
+
+# -- games ---------------------------------------------------------------------------------------
+
+
+def test_the_six_kinds_of_games():
+    assert games.NAMES == (
+        "platformer", "shooter with bullets", "billiards", "particle rain", "puzzle stacks", "orbits"
+    )  # fmt: skip
+
+
+def check_game(game):
+    """The choice keeps its target, is the cheapest that is shown, and its line gives settings."""
+    tuned = game.tuned
+    assert tuned is not None
+    assert tuned.met
+    assert tuned.error <= game.target
+    assert tuned.milliseconds.low > 0
+    for choice in game.choices:
+        assert choice.met == (choice.error <= game.target)
+        assert not choice.met or tuned.work <= choice.work * (1 + 1e-9)
+        settings = eval(choice.line.removesuffix(f" with RigidBody({games.CCD})"), {"Settings": Settings})
+        assert settings.dt <= 1 / 60
+
+
+def test_the_shooter():
+    (shooter,) = games.games_study(["shooter with bullets"], repeats=1).games
+    check_game(shooter)
+    assert shooter.choice("balanced").also == {"of 8 wrong": 7, "of 300 out": 300, "impacts capped": 0}
+    assert shooter.choice(games.FINEST).also["of 300 out"] == 300
+    assert shooter.choice(games.CCD).met
+    assert "continuous" in shooter.tuned.line
+
+
+@pytest.mark.slow
+def test_every_game_gets_what_it_needs():
+    found = games.games_study(repeats=1)
+    assert [game.game for game in found.games] == [game.name for game in games.ALL]
+    for game in found.games:
+        check_game(game)
+    jumps = found.game("platformer", "jump")
+    assert jumps.choice("balanced").error == pytest.approx(2.0)
+    assert jumps.tuned.error == pytest.approx(1 / 64)
+    assert not found.game("orbits").choice("balanced").met
+    text = settings_report.choices(found).markdown()
+    assert 'Settings(integrator="velocity_verlet")' in text
+
+
+def made_up():
+    choices = [
+        Choice(TUNED, "Settings(substeps=8)", 0.03, True, 3.6e6, Spread.of([7.0]), also={"mm/s": 0.0}),
+        Choice("balanced", "Settings()", math.inf, False, 3.5e6, None, "escaped in 1 of 4"),
+    ]
+    lost = [Choice("fast", "Settings.fast()", 3.0, False, 1e6)]
+    return GamesStudy(
+        {"clock": "processor time", "processor": "none"},
+        [
+            GameChoices("puzzle stacks", "tower", "stands", 0.1, "%", games.SEARCH, 5, choices),
+            GameChoices("orbits", "one", "stays", 0.01, "%", games.SEARCH, 2, lost),
+        ],
+    )
+
+
+def test_games_as_tables_and_as_json():
+    study = made_up()
+    kept = json.loads(json.dumps(study.as_dict(), allow_nan=False))
+    assert GamesStudy.from_dict(kept) == study
+    table, needs = settings_report.game_tables(study)
+    assert table.rows == [
+        ("puzzle stacks", "tower", "Settings(substeps=8)", "0.0300 %, 0 mm/s", "3.33", "3.60", "7.00"),
+        ("", "", "Settings.balanced()", "escaped in 1 of 4", "misses", "3.50", "-"),
+        ("orbits", "one", "Settings.fast()", "3 %", "misses", "1.00", "-"),
+    ]
+    assert needs.rows[0] == ("puzzle stacks", "tower", "stands", "0.100 %", "search, 5 tried")
+    assert "nothing that was tried meets the target of orbits (one)" in settings_report.game_remarks(study)
+    assert study.game("orbits").tuned is None
+    with pytest.raises(KeyError, match="no game 'chess'"):
+        study.game("chess")
+    with pytest.raises(KeyError, match="no choice 'accurate' for orbits"):
+        study.game("orbits").choice("accurate")
+
+
+# -- the command and the page --------------------------------------------------------------------
+
+
+@pytest.fixture
+def carom(monkeypatch, study):
+    """The command with studies that are done already; returns what to call with arguments."""
+    cli = Commands("carom")
+    cli.add_command(settings_command.settings_command)
+    asked = []
+
+    def done(result):
+        return lambda names, repeats, bar: asked.append((names, repeats)) or result
+
+    monkeypatch.setattr(settings_command, "settings_study", done(study))
+    monkeypatch.setattr(settings_command, "games_study", done(made_up()))
+
+    def call(*arguments):
+        answer = CliRunner().invoke(cli, ["settings", *map(str, arguments)])
+        answer.asked = asked
+        return answer
+
+    return call
+
+
+def test_the_command(carom, study, tmp_path):
+    page = tmp_path / "page.md"
+    marks = [f"<!-- {name} -->\nold\n<!-- end of {name} -->\n" for name in ("carom settings", "carom settings games")]
+    page.write_text("".join(marks), encoding="utf-8")
+    done = carom("--json", "--repeats", 3, "--into", page)
+    assert done.exit_code == 0, done.output
+    assert done.asked == [(None, 3)]
+    assert SettingsStudy.from_dict(json.loads(done.stdout)) == study
+    assert "| dt | jump | 1/30 |" in page.read_text(encoding="utf-8")
+    done = carom("--games", "--json", "--into", page)
+    assert done.exit_code == 0, done.output
+    assert GamesStudy.from_dict(json.loads(done.stdout)) == made_up()
+    text = page.read_text(encoding="utf-8")
+    assert "| Settings(substeps=8) |" in text
+    assert "| dt | jump | 1/30 |" in text
+    assert "old" not in text
+    assert carom("dt", "slop", "--markdown").stdout.startswith("**each field alone")
+    assert done.asked[-1] == (("dt", "slop"), settings_study.REPEATS)
+    assert "what each game asks for" in carom("--games").stdout
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (("--json", "--markdown"), "--json and --markdown exclude each other"),
+    (("--repeats", 0), "0 is not in the range x>=1"),
+    (("--into", "missing.md"), "--into missing.md: No such file or directory"),
+    (("dt", "--into", PAGE), "--into fills the page with all of them: it takes no names"),
+    (("substep",), "no field 'substep'; did you mean 'substeps'"),
+    (("--games", "orbit"), "no game 'orbit'; did you mean 'orbits'"),
+])  # fmt: skip
+def test_what_the_command_refuses(carom, arguments, message):
+    done = carom(*arguments)
+    assert done.exit_code == 2
+    assert message in done.stderr
+    assert done.asked == []
+
+
+def test_the_page_has_all_fields_and_all_games():
+    text = PAGE.read_text(encoding="utf-8")
+    fields, kinds = (
+        re.search(f"<!-- {name} -->(.*)<!-- end of {name} -->", text, re.DOTALL)[1]
+        for name in ("carom settings", "carom settings games")
+    )
+    for varied in VARIED:
+        assert f"| {varied.field} | {varied.scene} | " in fields
+    for game in games.ALL:
+        assert f"| {game.name} | {game.label} | Settings(" in kinds
+    lines = re.findall(r"\| (Settings[.(][^|]*?) \|", kinds)
+    assert len(lines) >= 4 * len(games.ALL)
+    for line in lines:
+        assert isinstance(eval(line.removesuffix(f" with RigidBody({games.CCD})"), {"Settings": Settings}), Settings)
