@@ -98,6 +98,13 @@ class Case:
             repeats=min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats,
         )
 
+    def coarse_reference(self) -> Case:
+        """The same with the largest steps that its own references may have; those of chaotic scenes stay."""
+        coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
+        if self.kind == CHAOTIC or not self.reference_cells:
+            return self
+        return self.replace(reference_cells=tuple(dataclasses.replace(cell, dt=coarse) for cell in self.reference_cells))
+
     def finer_reference(self) -> Case | None:
         """The same with smaller steps in its own references; None where that has been tried often enough."""
         cells = tuple(dataclasses.replace(cell, dt=cell.dt / FINER) for cell in self.reference_cells)

@@ -102,8 +102,10 @@ class Tuning:
 
     @property
     def error(self) -> float:
-        """Of the choice, the worst of all repeats; inf without one."""
-        return math.inf if self.choice is None else self.choice.errors[self.norm].high
+        """Of the choice, the worst of all repeats and the reference's own; inf without a choice."""
+        if self.choice is None:
+            return math.inf
+        return self.choice.errors[self.norm].high + self.reference.agreement.get(self.norm, 0.0)
 
     @property
     def margin(self) -> float:
@@ -152,7 +154,8 @@ def search(
     :func:`carom.lab.trade`. ValueError for a target that is no positive number; Problem for a scene that cannot be
     measured, or not so exactly.
     """
-    if not (isinstance(max_error, (int, float)) and math.isfinite(max_error) and max_error > 0):
+    number = isinstance(max_error, (int, float)) and not isinstance(max_error, bool)
+    if not (number and math.isfinite(max_error) and max_error > 0):
         raise ValueError(f"max_error must be a number above 0, got {max_error!r}")
     progress.say("survey")
     case = case_of(
@@ -290,7 +293,7 @@ def exact_enough(
     case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
 ) -> tuple[Case, Reference]:
     """The case with a reference that knows the target: Problem if own runs cannot be brought to agree so well."""
-    before = math.inf
+    before, case = math.inf, case.coarse_reference()  # refined where the target asks for it
     while True:
         with_own, reference = with_reference(case, runs)
         seen = with_own.reference
