@@ -103,7 +103,8 @@ class Case:
         coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
         if self.kind == CHAOTIC or not self.reference_cells:
             return self
-        return self.replace(reference_cells=tuple(dataclasses.replace(cell, dt=coarse) for cell in self.reference_cells))
+        cells = tuple(dataclasses.replace(cell, dt=coarse) for cell in self.reference_cells)
+        return self.replace(reference_cells=cells)
 
     def finer_reference(self) -> Case | None:
         """The same with smaller steps in its own references; None where that has been tried often enough."""
