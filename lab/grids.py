@@ -22,11 +22,6 @@ ITERATIONS = (10, 50)  # of pymunk's solver: its default, and what it takes to h
 SLOWEST = 1 / 15  # s: the largest step of a game
 HALVINGS = 7
 ORDER = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "rk4": 4, "yoshida4": 4}
-# Discrete worlds date impacts back, so they lose nothing but grazes that begin and end within a step. A chord of length
-# l is missed with the chance 1 - l / (v dt); with u = l / 2 sigma, impacts come as u du / sqrt(1 - u^2), and what each
-# adds to the pressure goes as u. Up to s = v dt / 2 sigma that is s^3 / 12 of pi / 4 for the pressure, s^2 / 6 of 1 for
-# the rate.
-MISSED = {"pressure": 3.0, "rate": 2.0}
 OF_STATE = ("position", "energy", "kinetic")
 
 
@@ -95,12 +90,10 @@ def theory(cell: Cell, norm: str, survey: Survey) -> float | None:
         return min(flight, 2.0)
     if survey.kind == SMOOTH:
         return _of_smooth(cell, norm, flight)
-    if cell.collision == "discrete" and survey.kind == CHAOTIC:
-        return MISSED.get(norm) if flight == math.inf else None
-    if survey.kind == CHAOTIC:
-        return math.inf if flight == math.inf else None
     if flight == math.inf:
-        return None if cell.collision == "discrete" else math.inf  # a discrete world may miss grazes
+        return None if cell.collision == "discrete" else math.inf  # a discrete world misses grazes
+    if survey.kind == CHAOTIC:
+        return None
     return {"energy": flight, "position": flight, "energy_square": 2 * flight}.get(norm) if flight == 1 else None
 
 

@@ -70,11 +70,10 @@ def _energy(seen: Seen, reference: Seen) -> float:
 
 
 def _impact_time(seen: Seen, reference: Seen) -> float:
-    count = min(len(seen.times), len(reference.times))
-    if not count:
-        return 0.0 if not reference.times else 1.0
-    apart = np.abs(np.subtract(seen.times[:count], reference.times[:count]))
-    return float(apart.max()) / reference.seconds
+    """An impact that only one of the two has counts as if the other had it at the end of the run."""
+    count = max(len(seen.times), len(reference.times))
+    mine, right = (times + [reference.seconds] * (count - len(times)) for times in (seen.times, reference.times))
+    return float(np.abs(np.subtract(mine, right)).max(initial=0.0)) / reference.seconds
 
 
 def _relative(name: str) -> tuple[Measure, Measure]:
@@ -114,8 +113,8 @@ NORMS: Mapping[str, Norm] = {
         ),
         Norm("apex", "height of the highest point reached, at steps; 1 is the right height", _absolute("apex"),
              _relative("apex")[1]),
-        Norm("impact_time", "largest error of an impact's time; 1 is the whole run", _impact_time,
-             lambda seen, reference: reference.seconds),
+        Norm("impact_time", "largest error of an impact's time, a missing one being at the end; 1 is the whole run",
+             _impact_time, lambda seen, reference: reference.seconds),
         Norm("count", "number of impacts; 1 is the right number", _absolute("impacts"), _relative("impacts")[1]),
         Norm("energy_square", "mean square of the departure of the energy, in J²: not relative to anything",
              *_own("energy_square"), absolute=True),

@@ -7,6 +7,7 @@ import functools
 import hashlib
 import importlib.metadata
 import inspect
+import marshal
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,12 +82,18 @@ class Subject:
 
 
 def _source_of(function: Any) -> str:
-    """What changes when the function does: its file's text, or its code where there is no file."""
+    """What tells it from other functions, and from itself after a change: its module's text or its code, its name, and
+    what it closes over. Values that do not show themselves in their repr make it another one each time, which is safe.
+    """
     code = getattr(function, "__code__", None)
     try:
-        return inspect.getsource(inspect.getmodule(function) or function)
+        text = inspect.getsource(inspect.getmodule(function) or function)
     except (OSError, TypeError):
-        return repr((code.co_code, code.co_consts)) if code is not None else repr(function)
+        text = marshal.dumps(code).hex() if code is not None else ""
+    closed = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
+    defaults = getattr(function, "__defaults__", None), getattr(function, "__kwdefaults__", None)
+    own = function if code is None else vars(function)
+    return text + repr((getattr(function, "__qualname__", ""), closed, defaults, own))
 
 
 def _load_once(target: str) -> Loaded:

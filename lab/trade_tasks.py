@@ -12,7 +12,7 @@ import numpy as np
 from ..framework import World
 from .bench_bodies import NotPlainError
 from .cases import Case
-from .engines import Engine, engine_for
+from .engines import CaromEngine, Engine, engine_for
 from .norms import NORMS, errors_of, failure_of
 from .observing import Seen, observe
 from .problems import Problem
@@ -82,7 +82,7 @@ def world_of(case: Case, cell: Cell, repeat: int) -> World:
     seed = case.subject.seed + (repeat if case.kind == CHAOTIC else 0)
     world = case.subject.world(cell.settings(case.survey.settings), seed)
     if case.kind == CHAOTIC and not case.survey.seeded:
-        nudge(world, 1e3 * NUDGE, repeat)
+        nudge(world, 1e3 * NUDGE * CaromEngine(world).size, repeat)
     return world
 
 

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 from carom.lab import limits_report
 from carom.lab.commands import Commands
-from carom.lab.limits_sweep import AXES, limits, measured, sweep
 from carom.lab.limits_command import NAMES, limits_command
 from carom.lab.limits_records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method
+from carom.lab.limits_sweep import AXES, limits, measured, sweep
 
 PLAIN = Method("plain", ("discrete",))
 
