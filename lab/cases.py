@@ -24,6 +24,7 @@ PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 1, CHAOTIC: 5}  # repeats; of chaotic
 BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare a run with one run
 OF_CONTACTS = ("impact_time", "count", "overlap", "overlap_mean", "pressure", "rate")
 FINER = 8  # times smaller than the smallest step are those of the own references
+FEWEST_STEPS = 3  # of a run
 MOST_REFINED = 2  # times
 QUICK_REPEATS = 8
 
@@ -93,15 +94,17 @@ class Case:
 
     def quick(self, fewer_steps: bool = True, fewer_repeats: bool = True) -> Case:
         """Every second step, and a few repeats: a first look."""
-        return self.replace(
-            steps=self.steps[::2] if fewer_steps else self.steps,
-            repeats=min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats,
-        )
+        steps = self.steps[::2] if fewer_steps else self.steps
+        cells = self.reference_cells
+        if self.kind != CHAOTIC:
+            cells = tuple(dataclasses.replace(cell, dt=steps[-1] / FINER) for cell in cells)
+        repeats = min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats
+        return self.replace(steps=steps, repeats=repeats, reference_cells=cells)
 
     def coarse_reference(self) -> Case:
-        """The same with the largest steps that its own references may have; those of chaotic scenes stay."""
+        """The same with the largest steps that its own references may have, where smooth motion makes them converge."""
         coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
-        if self.kind == CHAOTIC or not self.reference_cells:
+        if self.kind != SMOOTH or not self.reference_cells:
             return self
         cells = tuple(dataclasses.replace(cell, dt=coarse) for cell in self.reference_cells)
         return self.replace(reference_cells=cells)
@@ -136,7 +139,7 @@ def case_of(
     facts = survey(subject, duration)
     kind = facts.kind
     chosen = tuple(norms) or known.norms or OF_KIND[kind]
-    ladder = tuple(sorted(set(steps or known.steps or grids.steps_for(facts)), reverse=True))
+    ladder = _fitting(steps or known.steps or grids.steps_for(facts), duration)
     form, reference = _closed_form(subject, duration, kind)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
@@ -145,6 +148,11 @@ def case_of(
         subject, facts, kind, facts.why, chosen, duration, times, ladder, form, reference,
         () if reference is not None else _own_references(facts, ladder),
     )  # fmt: skip
+    if kind == CHAOTIC and not facts.contacts:
+        raise Problem(
+            f"{subject.name} is chaotic: {facts.why}. No body can be compared with itself after {duration:g} s, and "
+            f"without contacts there is no pressure or rate to measure instead: take a shorter time"
+        )
     idle = [name for name in chosen if name in OF_CONTACTS]
     if idle and not facts.contacts:
         raise Problem(f"{subject.name}: {facts.why} within {duration:g} s, so there is no {' and no '.join(idle)}")
@@ -174,6 +182,15 @@ def check_arguments(
         raise ValueError(f"repeats must be a whole number from 1, got {repeats!r}")
 
 
+def _fitting(steps: Sequence[float], seconds: float) -> tuple[float, ...]:
+    """From the largest to the smallest, without those that a run has no room for; Problem if none is left."""
+    largest = seconds / FEWEST_STEPS
+    fitting = tuple(sorted({dt for dt in steps if dt <= largest}, reverse=True))
+    if not fitting:
+        raise Problem(f"a run of {seconds:g} s has no room for steps of {min(steps):g} s: at most {largest:g} s")
+    return fitting
+
+
 def _repeats(kind: str, norms: Sequence[str]) -> int:
     """Where within a step the highest point lies decides how much of it is seen: the worst of a few would flatter."""
     return max(PHASES[kind], PHASES[IMPACTS]) if "apex" in norms else PHASES[kind]
@@ -181,14 +198,15 @@ def _repeats(kind: str, norms: Sequence[str]) -> int:
 
 def _closed_form(subject: Subject, seconds: float, kind: str) -> tuple[str, Seen | None]:
     """The name of the closed form and what it gives; rest needs none, for its right answer is 0."""
-    entry = FORMS.get(subject.target)
-    if entry is None or (subject.target == "jump" and kind != SMOOTH):
+    form = FORMS.get(subject.target)
+    if form is None or (subject.target == "jump" and kind != SMOOTH):
+        return "", None
+    if {name for name, _ in subject.options} - set(form.options):
         return "", None
     world = subject.world(None)
-    text, function = entry
-    seen = function(world, seconds)
+    seen = form.function(world, seconds)
     world.close()
-    return text, seen
+    return form.text, seen
 
 
 def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
@@ -198,9 +216,10 @@ def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
     if facts.kind == CHAOTIC:  # long runs; the step does not matter where nothing bends the paths
         fine = ladder[0] / 2 if not facts.forces and not facts.damping else ladder[-1]
         pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
-    elif facts.force_systems:
-        collision = "continuous" if facts.contacts else own.collision
-        pairs = (("yoshida4", collision), ("rk4", collision))
+    elif facts.force_systems and not facts.contacts:
+        pairs = (("yoshida4", own.collision), ("rk4", own.collision))
+    elif facts.force_systems:  # two kinds of sweeps: both on a bent path would be wrong together
+        pairs = (("yoshida4", "continuous"), ("velocity_verlet", "event_driven"))
     else:
         pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
     return tuple(Cell(fine, integrator, collision, 32, "precise") for integrator, collision in pairs)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -113,11 +114,20 @@ def one_impact(world: World, seconds: float) -> Seen:
     return _seen(path, seconds, world, True, [when])
 
 
-FORMS: dict[str, tuple[str, Callable[[World, float], Seen]]] = {
-    "jump": ("the parabola, apex v²/2g", flight),
-    "freefall": ("parabolas", flight),
-    "spring": ("x(t) = cos(ωt)", swinging),
-    "orbit": ("Kepler's ellipse", kepler),
-    "bouncing": ("parabolas between elastic bounces", bounces),
-    "oblique": ("momentum and energy of one oblique impact", one_impact),
+@dataclass(frozen=True)
+class Form:
+    """``options``: keywords of the scene that it knows how to follow."""
+
+    text: str
+    function: Callable[[World, float], Seen]
+    options: tuple[str, ...] = ()
+
+
+FORMS: Mapping[str, Form] = {
+    "jump": Form("the parabola, apex v²/2g", flight),
+    "freefall": Form("parabolas", flight, ("n",)),
+    "spring": Form("x(t) = cos(ωt)", swinging, ("stiffness",)),
+    "orbit": Form("Kepler's ellipse", kepler, ("eccentricity",)),
+    "bouncing": Form("parabolas between elastic bounces", bounces, ("n", "height")),
+    "oblique": Form("momentum and energy of one oblique impact", one_impact, ("mass",)),
 }

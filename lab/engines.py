@@ -14,7 +14,7 @@ from .bench_bodies import NotPlainError, moving_and_fixed
 from .bench_quality import overlaps
 from .escape import Enclosure
 from .peer_pymunk import PymunkSpace
-from .shapes import Floats, shapes_of
+from .shapes import Floats, sensor_entities, shapes_of
 from .trade_records import PYMUNK
 from .trade_work import counts_of
 
@@ -123,6 +123,7 @@ class CaromEngine(Engine):
         super().__init__(world)
         self._solver_loops = 0.0
         self._resting = 0
+        self._sensors = np.array(sorted(sensor_entities(world)), np.int64)
 
     def step(self, dt: float) -> None:
         world = self.world
@@ -137,8 +138,9 @@ class CaromEngine(Engine):
         self.impulse, self.times = 0.0, []
         if len(contacts):
             a, b = self._rows(contacts.entity_a), self._rows(contacts.entity_b)
-            self.struck[a[a >= 0]] = True
-            self.struck[b[b >= 0]] = True
+            solid = self._solid()
+            self.struck[a[(a >= 0) & solid]] = True
+            self.struck[b[(b >= 0) & solid]] = True
             self.impulse = float(contacts.normal_impulse[(a < 0) | (b < 0)].sum())
         impacts = contacts.impacts
         if len(impacts):
@@ -159,14 +161,19 @@ class CaromEngine(Engine):
         places[places == len(self.ids)] = 0
         return np.where(self.ids[places] == entities, places, -1)
 
-    def _overlaps_of_contacts(self) -> Floats:
+    def _solid(self) -> np.ndarray:
+        """Which contacts are none of a sensor."""
         contacts = self.world.contacts
-        found = [
-            depth / min(self.sizes.get(a, math.inf), self.sizes.get(b, math.inf))
-            for a, b, depth in zip(contacts.entity_a, contacts.entity_b, contacts.depth, strict=True)
-            if depth > 0 and not (a not in self.sizes and b not in self.sizes)
-        ]
-        return np.array(found)
+        return ~(np.isin(contacts.entity_a, self._sensors) | np.isin(contacts.entity_b, self._sensors))
+
+    def _overlaps_of_contacts(self) -> Floats:
+        contacts, sizes = self.world.contacts, self.sizes
+        rows = zip(contacts.entity_a.tolist(), contacts.entity_b.tolist(), contacts.depth, self._solid(), strict=True)
+        return np.array([
+            depth / min(sizes.get(a, math.inf), sizes.get(b, math.inf))
+            for a, b, depth, solid in rows
+            if solid and depth > 0 and (a in sizes or b in sizes)
+        ])  # fmt: skip
 
     def counts(self) -> dict[str, float]:
         return counts_of(self.world, self._solver_loops)

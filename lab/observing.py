@@ -15,6 +15,7 @@ import numpy as np
 
 from .engines import Engine
 from .shapes import Floats
+from .trade_records import ESCAPED, NOT_FINITE
 
 SETTLED = 0.5  # of the run: contacts at rest are looked at after it
 EARLY = 0.2  # of the run: statistics begin after it
@@ -42,7 +43,7 @@ class Seen:
     overlap, overlap_mean
         after half of the run, the worst and the mean over samples of the sum per body, in sizes of the smaller body
     speed
-        the largest at the end, sizes per second; drift: the largest way from the start, sizes
+        the largest at the end, sizes per second; drift: the largest way since half of the run, sizes
     struck (n,)
         which bodies touched anything
     failure
@@ -84,13 +85,15 @@ class Seen:
         return cls(**{**plain, "position": np.array(plain["position"], float)})
 
 
-def observe(engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False) -> Seen:
+def observe(
+    engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True
+) -> Seen:
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last part of a step; contacts at rest are solved for the length of the step before, and
-    another one stirs them.
+    another one stirs them. walled: a body that gets beyond the walls around all bodies has escaped.
     """
-    watch = _Watch(engine, seconds)
+    watch = _Watch(engine, seconds, walled)
     with np.errstate(over="ignore", invalid="ignore"):
         for step in _steps(seconds, dt, phase, whole_steps):
             engine.step(step)
@@ -112,10 +115,11 @@ def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[f
 class _Watch:
     """Looks at the engine after each step."""
 
-    def __init__(self, engine: Engine, seconds: float) -> None:
-        self.engine, self.seconds = engine, seconds
+    def __init__(self, engine: Engine, seconds: float, walled: bool) -> None:
+        self.engine, self.seconds, self.walled = engine, seconds, walled
         self.failure: str | None = None
         self.start = engine.position
+        self.settled = self.start
         self.energy_start, self.scale = engine.energy, engine.kinetic
         self.reach = self.apex = self.worst = self.square = self.impulse = 0.0
         self.steps = self.impacts = self.late_impacts = 0
@@ -132,7 +136,7 @@ class _Watch:
         energy, kinetic = engine.energy, engine.kinetic
         self.steps += 1
         if not (np.isfinite(position).all() and math.isfinite(kinetic)):
-            self.failure = "not finite"
+            self.failure = NOT_FINITE
             return
         way = position - self.start
         self.reach = max(self.reach, float(np.sqrt((way * way).sum(axis=1).max(initial=0.0))))
@@ -148,20 +152,22 @@ class _Watch:
         if engine.time > EARLY * self.seconds:
             self.impulse += engine.impulse
             self.late_impacts += len(engine.times)
+        if engine.time <= SETTLED * self.seconds:
+            self.settled = position
         if engine.time >= self.next_sample:
             self.next_sample += self.seconds * (1 - SETTLED) / SAMPLES
             depths = engine.overlaps()
             self.deepest = max(self.deepest, float(depths.max(initial=0.0)))
             self.mean_overlaps.append(float(depths.sum()) / max(len(position), 1))
-        if engine.enclosure.outside(position):
-            self.failure = "escaped"
+        if self.walled and engine.enclosure.outside(position):
+            self.failure = ESCAPED
 
     def seen(self) -> Seen:
         engine = self.engine
         position, velocity = engine.position, engine.velocity
         late = (1 - EARLY) * self.seconds
         speeds = np.sqrt((velocity * velocity).sum(axis=1))
-        way = np.sqrt(((position - self.start) ** 2).sum(axis=1))
+        way = np.sqrt(((position - self.settled) ** 2).sum(axis=1))
         return Seen(
             position=position,
             reach=self.reach,

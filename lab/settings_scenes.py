@@ -76,7 +76,7 @@ def orbit(make: Make, seconds: float) -> Errors:
 
 def _closed_form(name: str, make: Make, seconds: float) -> Seen:
     with make() as world:
-        return FORMS[name][1](world, seconds)
+        return FORMS[name].function(world, seconds)
 
 
 def rest(make: Make, seconds: float) -> Errors:

@@ -16,7 +16,7 @@ from .engines import CaromEngine
 from .observing import Seen, observe
 from .problems import Problem
 from .subjects import Subject
-from .trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH
+from .trade_records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 
 NUDGE = 1e-10  # of the smallest body: the difference of the twins
 CHAOS = 1e7  # a nudge that grows so much within the run becomes a thousandth of a body
@@ -35,6 +35,8 @@ class Survey:
         the largest in the end, sizes per second
     seeded
         whether seeds change the start
+    walled
+        whether walls hold all bodies: who gets beyond them in another run has escaped
     trial
         what the run with all impacts at their true times showed
     """
@@ -51,13 +53,14 @@ class Survey:
     growth: float
     speed: float
     seeded: bool
+    walled: bool
     trial: Seen
 
     @property
     def kind(self) -> str:
         """SMOOTH, IMPACTS, RESTING or CHAOTIC."""
         if not self.contacts:
-            return SMOOTH
+            return CHAOTIC if self.growth > CHAOS else SMOOTH
         if self.resting and self.speed <= STILL:
             return RESTING
         return CHAOTIC if self.growth > CHAOS else IMPACTS
@@ -66,8 +69,8 @@ class Survey:
     def why(self) -> str:
         """How the kind was found, in a sentence."""
         grown = f"two starts {NUDGE:g} of a body apart grew {self.growth:.1e} times farther apart"
-        if self.kind == SMOOTH:
-            return "nothing touches anything"
+        if not self.contacts:
+            return f"nothing touches anything; {grown}" if self.kind == CHAOTIC else "nothing touches anything"
         if self.kind == RESTING:
             return f"in the end all is at rest: no body faster than {self.speed:.1e} of its size per second"
         return grown if self.kind == CHAOTIC else f"bodies meet; {grown}, which is no chaos"
@@ -80,8 +83,10 @@ def survey(subject: Subject, seconds: float) -> Survey:
     facts = _facts(with_recommended)
     with_recommended.close()
     exact = settings.replace(collision="event_driven")
-    first = _twin(subject, exact, seconds, 0.0)
-    second = _twin(subject, exact, seconds, NUDGE)
+    first, walled = _twin(subject, exact, seconds, 0.0, True), True
+    if first.failure == ESCAPED:  # as a ball that rolls off a platform
+        first, walled = _twin(subject, exact, seconds, 0.0, False), False
+    second = _twin(subject, exact, seconds, NUDGE, False)
     if first.failure:
         raise Problem(f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed: {first.failure}")
     apart = float(np.abs(second.position - first.position).max(initial=0.0))
@@ -93,6 +98,7 @@ def survey(subject: Subject, seconds: float) -> Survey:
         resting=int(first.counts["solver_loops"] > 0),
         speed=first.speed,
         seeded=_seeded(subject, settings),
+        walled=walled,
         trial=first,
         **facts,
     )
@@ -133,7 +139,7 @@ def _nudge_of(subject: Subject, settings: Settings) -> float:
     return size
 
 
-def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float) -> Seen:
+def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float, walled: bool) -> Seen:
     world = subject.world(settings)
     if world.settings != settings:
         world.close()
@@ -143,7 +149,7 @@ def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float) -
         nudge(world, nudged * engine.size)
     try:
         with subject.blamed():
-            return observe(engine, seconds, settings.dt)
+            return observe(engine, seconds, settings.dt, walled=walled)
     finally:
         engine.close()
 

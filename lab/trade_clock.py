@@ -15,8 +15,7 @@ from .trade_records import Point
 from .trade_tasks import engine_of
 
 REPEATS = 5
-BLOCK = 0.05  # s of wall time that one repeat takes at least, unless the run is over before
-FIRST_STEPS = 3  # compile what is missing; not timed
+BLOCKS = 20  # of a run
 
 
 def time_points(case: Case, points: Sequence[Point], progress: Progress) -> None:
@@ -40,22 +39,22 @@ def time_points(case: Case, points: Sequence[Point], progress: Progress) -> None
 
 
 def _seconds(case: Case, point: Point) -> float:
-    """Wall time per simulated second, from a block of steps at the run's start."""
+    """Wall time per simulated second of a whole run: what it costs may change as things gather and come to rest."""
     engine = engine_of(case, point.cell, 0)
     dt = point.cell.dt
     try:
-        engine.advance(FIRST_STEPS, dt)
-        most = max(int(case.seconds / dt) - FIRST_STEPS, 1)
-        steps, seconds, block = 0, 0.0, 1
-        while seconds < BLOCK and steps < most:
-            block = min(block, most - steps)
+        left = max(int(case.seconds / dt), 1)
+        block = max(left // BLOCKS, 1)
+        steps, seconds = 0, 0.0
+        while left:
+            count = min(block, left)
+            left -= count
             waited = log.waited
             started = time.perf_counter()
-            engine.advance(block, dt)
+            engine.advance(count, dt)
             spent = time.perf_counter() - started
-            if log.waited == waited or steps + block >= most:
-                steps, seconds = steps + block, seconds + spent
-            block *= 2
+            if log.waited == waited or not (left or steps):  # else kernels were compiled or loaded meanwhile
+                steps, seconds = steps + count, seconds + spent
         return seconds / (steps * dt)
     finally:
         engine.close()

@@ -72,7 +72,8 @@ def _run(task: Task) -> Seen:
         with task.case.subject.blamed():
             case = task.case
             phase = case.phase(task.repeat)
-            return observe(engine, case.seconds, task.cell.dt, phase, whole_steps=case.kind == RESTING)
+            whole, walled = case.kind == RESTING, case.survey.walled
+            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled)
     finally:
         engine.close()
 

@@ -12,6 +12,7 @@ from ..framework import Settings
 from .bench_progress import NO_PROGRESS, Progress
 from .cases import Case, case_of
 from .norms import NORMS
+from .result_store import Store
 from .trade_records import CAROM, Cell, Outcome, Point, Reference
 from .trade_runs import Runs, point_of, run_tasks
 from .tuning import Tuning, enough_repeats, exact_enough
@@ -65,20 +66,22 @@ def check(
     repeats: int | None = None,
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
-    runs: Runs | None = None,
+    workers: int | None = None,
+    store: Store | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> Check:
     """The error of the settings that ``tuning`` chose on a scene that they were not tuned on, by the same norm.
 
-    target, options, seed: as of :func:`carom.lab.trade`. seconds, repeats: as of the search if None. absolute: the
-    promise is meant in the scene's units, else in parts of the new scene's scale. All of the settings count, whatever
-    the scene recommends. NothingMeetsError if the search found none; Problem for a scene that cannot be measured so.
+    target, options, seed, workers, store: as of :func:`carom.lab.trade`. seconds, repeats: as of the search if None.
+    absolute: the promise is meant in the scene's units, else in parts of the new scene's scale. All of the settings
+    count, whatever the scene recommends. NothingMeetsError if the search found none; Problem for a scene that cannot be
+    measured so.
     """
     settings = tuning.settings
-    runs = runs or Runs(progress=progress)
+    runs = Runs(workers, store, progress)
     case = case_of(
-        target, norms=(tuning.norm,), seconds=seconds or tuning.seconds, repeats=repeats or tuning.repeats,
-        options=options, seed=seed,
+        target, norms=(tuning.norm,), seconds=tuning.seconds if seconds is None else seconds,
+        repeats=tuning.repeats if repeats is None else repeats, options=options, seed=seed,
     )  # fmt: skip
     case = case.replace(survey=dataclasses.replace(case.survey, settings=settings))
     promise = tuning.target * tuning.scale if absolute else tuning.target

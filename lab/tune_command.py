@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import shlex
 from pathlib import Path
 from typing import Any
@@ -40,11 +41,17 @@ RESULTS = "tune.jsonl"
 NONE_MEETS = 1  # exit code
 
 
+def _above_zero(context: click.Context, parameter: click.Parameter, value: float) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise Problem(f"--max-error takes a number above 0, not {value:g}")
+    return value
+
+
 @click.command("tune", cls=KeepsWords, short_help="The cheapest settings that keep an error.")
 @click.argument("target", metavar="SCENE|FILE.py")
 @together(
     click.option(
-        "--max-error", type=float, metavar="E", default=1e-3, show_default=True,
+        "--max-error", type=float, metavar="E", default=1e-3, show_default=True, callback=_above_zero,
         help="The largest error allowed, as a part of what the norm is relative to.",
     ),
     click.option("--absolute", is_flag=True, help="--max-error is in the scene's own units."),
@@ -109,9 +116,10 @@ def tune_command(
     with _store(out, resume) as store, Bar(Console(stderr=True)) as bar:
         try:
             tuning = search(target, max_error, norms[0] if norms else None, store=store, progress=bar, **arguments)
-            runs = Runs(workers, store, bar)
-            balanced = measured_with(tuning.case, Settings.balanced(), runs)
-            found = [_checked(tuning, other, absolute, runs) for other in checked] if tuning.choice else []
+            balanced = measured_with(tuning.case, Settings.balanced(), Runs(workers, store, bar))
+            found = []
+            for other in checked if tuning.choice is not None else ():
+                found.append(_checked(tuning, other, absolute=absolute, workers=workers, store=store, progress=bar))
         except KeyboardInterrupt:
             kept = f"; --resume goes on with what {store.path} holds" if store is not None else ""
             click.echo(f"carom: stopped{kept}", err=True)
@@ -125,10 +133,10 @@ def _store(out: Path | None, resume: bool) -> contextlib.AbstractContextManager[
     return contextlib.nullcontext() if out is None else Store.open(out / RESULTS, resume)
 
 
-def _checked(tuning: Tuning, target: str, absolute: bool, runs: Runs) -> Check:
+def _checked(tuning: Tuning, target: str, **options: Any) -> Check:
     """A scene that cannot be measured so takes nothing from what was found before."""
     try:
-        return check(tuning, target, absolute=absolute, runs=runs)
+        return check(tuning, target, **options)
     except Problem as problem:
         return Check(subject_of(target).name, tuning.norm, tuning.target, refused=problem.message)
 
@@ -136,7 +144,7 @@ def _checked(tuning: Tuning, target: str, absolute: bool, runs: Runs) -> Check:
 def _show(result: TuneResult, output: Output) -> None:
     """Tables and sentences; last, where the eye is, the line to paste."""
     words, tuning = sentences(result), result.tuning
-    pasted = [] if tuning.choice is None else [f"```python\n{tuning.line}\n```"]
+    pasted = [] if tuning.choice is None else [f"`{tuning.line}`"]
     plain = not output.as_json and not output.as_markdown
     output.show(result, tables(result), words if plain and output.into is None else [*words, *pasted])
     if plain and tuning.choice is not None:

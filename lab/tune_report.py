@@ -13,7 +13,7 @@ from .trade_records import Cell, ErrorBar, Point
 from .trade_report import NOTHING, compact, target_text
 from .trading import label_of
 from .tune_check import TOLERATED, Check
-from .tuning import FAR_DEARER, Tuning
+from .tuning import FAR_DEARER, Trial, Tuning
 
 
 @dataclass
@@ -88,7 +88,7 @@ def tried_table(tuning: Tuning) -> TextTable:
     rows = [
         (
             label_of(trial.cell.method, cells), number(trial.cell.dt), f"{trial.repeats:,}", _error(trial.error),
-            compact(trial.work), trial.failure or _verdict(trial.met, trial.error / tuning.target),
+            compact(trial.work), _verdict(trial, tuning),
         )
         for trial in tuning.trials
     ]  # fmt: skip
@@ -96,9 +96,12 @@ def tried_table(tuning: Tuning) -> TextTable:
     return TextTable(f"{tuning.scene}: what was tried, in this order", headings, rows)
 
 
-def _verdict(met: bool, times: float) -> str:
-    if met:
-        return "holds"
+def _verdict(trial: Trial, tuning: Tuning) -> str:
+    if trial.failure:
+        return trial.failure
+    if trial.met:
+        return "holds" if trial.repeats == tuning.repeats else "holds once"
+    times = trial.error / tuning.target
     return f"misses, {compact(times, 2)} times" if times > 1 else "misses with the reference's own error"
 
 

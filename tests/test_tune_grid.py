@@ -1,0 +1,311 @@
+"""What a search promises is kept: verified by runs that share nothing with the laboratory, against the whole grid, and
+on scenes that were not tuned on.
+
+The targets, the scenes held out and the tolerances (1.3 times the work of the grid's cheapest, twice the promise) were
+there before the first run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, RigidBody, Transform
+from carom.framework import ForceSystem, Settings, World
+from carom.lab.result_store import Store
+from carom.lab.trade_work import WEIGHTS
+from carom.lab.trading import trade
+from carom.lab.tune_check import check
+from carom.lab.tuning import Tuning, search
+from carom.plugins import Physics
+from carom.scenes import billiards, get, jump, orbit, spring, stack, thermal_gas
+
+pytestmark = pytest.mark.slow
+
+DEARER = 1.3  # times the cheapest of the grid is what the choice may cost
+BROKEN = 2.0  # times the promise is what the error may be elsewhere
+PERIODS = 10
+LEAST_STEP = WEIGHTS["steps"] + WEIGHTS["force_evaluations"]  # the work of a step in which nothing else happens
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """One target of the issue; verify(settings): the error in a run of the test's own, in parts of the target."""
+
+    max_error: float
+    norm: str
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+WANTED = {
+    "jump": Wanted(0.1, "apex", {"absolute": True}),  # pixels
+    "spring": Wanted(1e-3, "position"),
+    "orbit": Wanted(1e-4, "energy", {"seconds": PERIODS * orbit.PERIOD}),
+    "thermal_gas": Wanted(0.01, "pressure", {"seconds": 40.0}),
+    "stack": Wanted(1e-3, "overlap"),
+    # The break itself, to 2 mm where balls have moved by 2 m: 1 s takes in the rack's impacts and the first cushions,
+    # and two starts as near as numbers can be stay near, so there is a right answer. 32 phases keep the test short.
+    "billiards": Wanted(1e-3, "position", {"seconds": 1.0, "repeats": 32}),
+}
+
+
+class Laboratory:
+    """Searches each scene once, and keeps the runs."""
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        self.found: dict[str, Tuning] = {}
+
+    def tuned(self, name: str) -> Tuning:
+        if name not in self.found:
+            wanted = WANTED[name]
+            self.found[name] = search(name, wanted.max_error, wanted.norm, store=self.store, **wanted.options)
+        return self.found[name]
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory):
+    with Store.open(tmp_path_factory.mktemp("tune") / "runs.jsonl") as store:
+        yield Laboratory(store)
+
+
+# -- the target, in runs that the laboratory has no part in -------------------------------------------------------
+
+
+def hero(settings: Settings | None, seed: int = 0, *, speed: float, gravity: float, start: float = 0.0) -> World:
+    """A jump of its own with ``speed`` at height 0 (m/s or pixels/s), first seen ``start`` s after that."""
+    world = World(Physics(dimensions=2, gravity=(0.0, -gravity)), settings=settings or Settings())
+    height = speed * start - gravity * start**2 / 2
+    world.create_entity(
+        Transform((0.0, height)),
+        RigidBody(linear_velocity=(1.0, speed - gravity * start)),
+        AABBCollider((0.5, 0.5)),
+    )
+    return world
+
+
+def apex_error(settings: Settings) -> float:
+    """Pixels, at worst, of 64 jumps that leave the ground at another moment within a step."""
+    missed = []
+    for phase in range(64):
+        world = hero(settings, speed=jump.JUMP_SPEED, gravity=jump.GRAVITY, start=phase / 64 * settings.dt)
+        highest = 0.0
+        while world.time < 1.0:
+            world.step()
+            highest = max(highest, float(world.bodies.dynamic.position[0, 1]))
+        missed.append(abs(highest - 64.0))
+    return max(missed)
+
+
+def spring_error(settings: Settings) -> float:
+    """Parts of the longest way, 2: at worst in the last swing that is over by 5.2 s."""
+    world, omega = spring.build(settings), math.sqrt(spring.STIFFNESS / spring.MASS)
+    worst = 0.0
+    while world.time + settings.dt <= 5.2:
+        world.step()
+        if world.time > 4.2:
+            right = math.cos(omega * world.time)
+            worst = max(worst, abs(float(world.bodies.dynamic.position[0, 0]) - right) / 2)
+    return worst
+
+
+def orbit_error(settings: Settings) -> float:
+    """|E - E0| / |E0| at worst in ten periods."""
+    world = orbit.build(settings)
+
+    def energy() -> float:
+        x, v = world.bodies.dynamic.position[0], world.bodies.dynamic.linear_velocity[0]
+        return 0.5 * float(v @ v) - 1.0 / math.hypot(*x)
+
+    before, worst = energy(), 0.0
+    assert before == pytest.approx(-0.5, rel=1e-12)
+    for _ in range(math.ceil(PERIODS * orbit.PERIOD / settings.dt)):
+        world.step()
+        worst = max(worst, abs(energy() - before) / 0.5)
+    return worst
+
+
+def mean_pressure(settings: Settings, seeds: range, seconds: float = 60.0, discard: float = 12.0) -> float:
+    """Momentum that the walls take per second, from runs with other seeds than any of the laboratory's."""
+    found = []
+    for seed in seeds:
+        world = thermal_gas.build(settings, seed)
+        taken = 0.0
+        for _ in range(round(seconds / settings.dt)):
+            world.step()
+            if world.time > discard:
+                impacts = world.contacts.impacts
+                taken += float(impacts.normal_impulse[impacts.entity_a <= 4].sum())
+        found.append(taken / (seconds - discard))
+    return float(np.mean(found))
+
+
+def gas_error(settings: Settings) -> float:
+    """Of the pressure, against event-driven runs with a step of a thirtieth of a second."""
+    exact = Settings(dt=1 / 30, integrator="velocity_verlet", collision="event_driven")
+    return abs(mean_pressure(settings, range(8000, 8005)) / mean_pressure(exact, range(7000, 7005)) - 1)
+
+
+def stack_error(settings: Settings) -> float:
+    """The deepest overlap of ten boxes of side 1 from 2.5 s to 10 s, sizes."""
+    world, worst = stack.build(settings), 0.0
+    while world.time < 10.0:
+        world.step()
+        if world.time > 2.5:
+            height = np.sort(world.bodies.dynamic.position[:, 1])
+            worst = max(worst, float((1.0 - np.diff(height, prepend=-0.5)).max()))
+    return worst
+
+
+def billiards_error(settings: Settings) -> float:
+    """Parts of the way of the ball that comes farthest: after 1 s, against a sweep in steps of 1/16 000 s."""
+    exact = Settings(dt=1 / 16_000, integrator="rk4", collision="continuous")
+    start = billiards.build(settings).bodies.dynamic.position.copy()
+    places, reach = [], 0.0
+    for chosen in (settings, exact):
+        world = billiards.build(chosen)
+        for _ in range(round(1 / chosen.dt)):
+            world.step()
+            way = np.linalg.norm(world.bodies.dynamic.position - start, axis=1)
+            reach = max(reach, float(way.max()))
+        assert world.time == pytest.approx(1.0, abs=1e-9), "1 s is no whole number of these steps"
+        places.append(world.bodies.dynamic.position.copy())
+    return float(np.linalg.norm(places[0] - places[1], axis=1).max()) / reach
+
+
+VERIFY: dict[str, Callable[[Settings], float]] = {
+    "jump": apex_error, "spring": spring_error, "orbit": orbit_error, "thermal_gas": gas_error, "stack": stack_error,
+    "billiards": billiards_error,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_the_choice_meets_its_target_in_runs_of_the_test(laboratory, name):
+    tuning = laboratory.tuned(name)
+    assert tuning.error <= tuning.target
+    assert VERIFY[name](tuning.settings) <= WANTED[name].max_error
+    assert eval(tuning.line, {"Settings": Settings}) == tuning.settings
+
+
+# -- against the whole grid ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", WANTED)
+def test_the_choice_costs_little_more_than_the_cheapest_of_the_grid(laboratory, name):
+    """Of the same ladder of steps; those whose mere number costs more than the choice cannot be cheaper."""
+    tuning = laboratory.tuned(name)
+    assert tuning.choice is not None
+    ladder = tuning.case.steps
+    steps = [dt for dt in ladder if LEAST_STEP / dt * DEARER < tuning.choice.work] or [ladder[0]]
+    assert tuning.choice.cell.dt <= ladder[0]
+    options = {key: value for key, value in WANTED[name].options.items() if key != "absolute"}
+    options["repeats"] = tuning.repeats
+    [grid] = trade(
+        name, norms=(tuning.norm,), steps=steps, timing=False, store=laboratory.store, **options
+    ).cases
+    assert sum(len(curve.points) for curve in grid.curves) == tuning.methods * len(steps)
+    holding = [
+        point.work for curve in grid.curves for point in curve.points if point.meets(tuning.norm, tuning.target)
+    ]
+    assert tuning.choice.work <= DEARER * min(holding, default=math.inf)
+
+
+# -- on scenes that were not tuned on -----------------------------------------------------------------------------
+
+
+class Pull(ForceSystem):
+    """Springs of the given stiffness to the origin."""
+
+    def __init__(self, stiffness: float) -> None:
+        self.stiffness = stiffness
+
+    def add_forces(self, bodies: Any, time: float) -> None:
+        bodies.force[:] -= self.stiffness * bodies.position
+
+    def potential_energy(self, bodies: Any) -> float:
+        return 0.5 * self.stiffness * float((bodies.position**2).sum())
+
+
+Pair = tuple[float, float]
+
+
+def swinging(
+    settings: Settings | None, seed: int = 0, *, start: Pair, velocity: Pair, faster: float = 1.0
+) -> World:
+    """1 kg on a spring of omega = 2 pi faster, anywhere on its way."""
+    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings())
+    world.create_entity(Transform(start), RigidBody(mass=1.0, linear_velocity=velocity))
+    world.add_system(Pull((2 * math.pi * faster) ** 2))
+    return world
+
+
+def from_aphelion(settings: Settings | None, seed: int = 0) -> World:
+    """The tuned orbit's ellipse, e = 0.6, begun where the planet is slowest, and turned by 30 degrees."""
+    e, turn = 0.6, math.radians(30)
+    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings())
+    along, across = np.array([math.cos(turn), math.sin(turn)]), np.array([-math.sin(turn), math.cos(turn)])
+    speed = math.sqrt((1 - e) / (1 + e))
+    world.create_entity(Transform(-(1 + e) * along), RigidBody(mass=2.0, linear_velocity=-speed * across))
+    world.add_system(orbit.Sun())
+    return world
+
+
+def other_break(settings: Settings | None, seed: int = 0, *, speed: float, aside: float) -> World:
+    """The cue ball at another speed, ``aside`` m beside the middle."""
+    world = billiards.build(settings, seed)
+    bodies = world.bodies.dynamic
+    cue = int(np.argmax(np.abs(bodies.linear_velocity[:, 0])))
+    bodies.linear_velocity[cue] = (speed, 0.0)
+    bodies.position[cue, 1] = billiards.WIDTH / 2 + aside
+    return world
+
+
+HELD_OUT: dict[str, tuple[str, Any, dict[str, Any]]] = {
+    "a human's jump in metres": ("jump", hero, {"options": {"speed": 5.0, "gravity": 10.0}}),
+    "a quick jump in metres": ("jump", hero, {"options": {"speed": 12.0, "gravity": 30.0}}),
+    "a jump of 100 pixels": ("jump", hero, {"options": {"speed": 300.0, "gravity": 450.0}, "absolute": True}),
+    "a jump of 36 pixels": ("jump", hero, {"options": {"speed": 180.0, "gravity": 450.0}, "absolute": True}),
+    "a spring on an ellipse": (
+        "spring", swinging, {"options": {"start": (0.3, -0.8), "velocity": (2.0, 1.0)}}),
+    "a spring from the middle": ("spring", swinging, {"options": {"start": (0.0, 0.0), "velocity": (0.0, 9.0)}}),
+    "a slower spring": (
+        "spring", swinging, {"options": {"start": (1.0, 0.0), "velocity": (0.0, 0.0), "faster": 0.8}}),
+    "a faster spring": (
+        "spring", swinging, {"options": {"start": (1.0, 0.0), "velocity": (0.0, 0.0), "faster": 1.1}}),
+    "a rounder orbit": ("orbit", "orbit", {"options": {"eccentricity": 0.5}}),
+    "a nearly circular orbit": ("orbit", "orbit", {"options": {"eccentricity": 0.2}}),
+    "the orbit from its other end": ("orbit", from_aphelion, {}),
+    "fewer discs": ("thermal_gas", "thermal_gas", {"options": {"n": 225}}),
+    "a thinner gas": ("thermal_gas", "thermal_gas", {"options": {"eta": 0.25}}),
+    "a denser gas": ("thermal_gas", "thermal_gas", {"options": {"n": 225, "eta": 0.35}}),
+    "8 boxes": ("stack", "stack", {"options": {"n": 8}}),
+    "12 boxes": ("stack", "stack", {"options": {"n": 12}}),
+    "ten balls": ("stack", "stack", {"options": {"balls": True}}),
+    "the top box twice as heavy": ("stack", "stack", {"options": {"top_mass": 2.0}}),
+    "another rack": ("billiards", "billiards", {"seed": 1}),
+    "a third rack": ("billiards", "billiards", {"seed": 2}),
+    "a softer break": ("billiards", other_break, {"options": {"speed": 6.0, "aside": 0.004}}),
+    "a break from aside": ("billiards", other_break, {"options": {"speed": 8.0, "aside": -0.01}}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("held_out", HELD_OUT)
+def test_the_promise_holds_within_a_factor_of_two_elsewhere(laboratory, held_out):
+    name, target, options = HELD_OUT[held_out]
+    tuning = laboratory.tuned(name)
+    found = check(tuning, target, store=laboratory.store, **options)
+    print(f"{held_out}: {found.norm} {found.error:.3g}, {found.times:.2f} times the promise")
+    assert found.point is not None
+    assert not found.point.failed
+    assert found.times <= BROKEN
+    assert found.tolerated
+
+
+def test_every_scene_of_the_issue_is_here():
+    assert {get(name).name for name in WANTED} == set(WANTED)
+    assert {name for name, _, _ in HELD_OUT.values()} == set(WANTED)
