@@ -8,6 +8,7 @@ import hashlib
 import importlib.metadata
 import inspect
 import marshal
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,16 +70,25 @@ class Subject:
         module = getattr(_load_once(self.target).function, "__globals__", {})
         return _first_line(module.get("__doc__"))
 
-    @property
+    @functools.cached_property
     def mark(self) -> str:
         """What tells its results from those of another scene, file content or version of carom."""
         text = repr((self.name, self.target, self.options, self.seed, importlib.metadata.version("carom")))
         if self.build is not None:
             text += _source_of(self.build)
         elif self.target not in scenes.names():
-            file = _load_once(self.target).file
-            text += file.read_text(encoding="utf-8") if file is not None else ""
+            text += _text_around(_load_once(self.target).file)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _text_around(file: Path | None) -> str:
+    """That of the file and of the modules it has imported from its own folder."""
+    if file is None:
+        return ""
+    places = {Path(found) for module in list(sys.modules.values()) if (found := getattr(module, "__file__", None))}
+    near = {place for place in places if place.is_relative_to(file.parent) and "site-packages" not in place.parts}
+    sources = [place for place in sorted({file, *near}) if place.suffix == ".py" and place.is_file()]
+    return "".join(place.read_text(encoding="utf-8", errors="replace") for place in sources)
 
 
 def _source_of(function: Any) -> str:

@@ -36,6 +36,7 @@ NOISE = 4.0  # times smaller than the target must the standard error of a statis
 WORTH_IT = 4.0  # times better must references agree with a step 8 times smaller: else it is rounding or chance
 LONGEST_JUMP = 4  # halvings at once
 FINE = (1.5, 1.25, 1.75)  # times the step that holds: tried in this order, the last two as the first turns out
+ROUNDING = 1e-9  # of a step
 FAR_DEARER = 4.0  # times the choice's work: no runner-up is looked for beyond it
 STUCK = 3  # smaller steps in a row that bring nothing: an error that steps do not cure
 
@@ -211,13 +212,25 @@ class _Search:
             if error <= self.target + 3 * self.noise:
                 point = self._hold(cell)
                 if point is not None:
-                    held.append(point)
+                    held.append(self._walked_back(point))
                     continue
                 error = max(error, self._worst(cell))
             smaller = self._next(cell, error)
             if smaller is not None:
                 heapq.heappush(queue, (work * cell.dt / smaller.dt, number, smaller))
         return held
+
+    def _walked_back(self, point: Point) -> Point:
+        """The largest step of the grid down from which all hold: a jump may have gone too far."""
+        while True:
+            larger = dataclasses.replace(point.cell, dt=2 * point.cell.dt)
+            if larger in self.looks or larger.dt > self.case.steps[0] * (1 + ROUNDING):
+                return point
+            error, _ = self._look(larger)
+            found = self._hold(larger) if error <= self.target + 3 * self.noise else None
+            if found is None:
+                return point
+            point = found
 
     def _look(self, cell: Cell) -> tuple[float, float]:
         """Error and work of a single run, at the first start phase or seed."""
@@ -251,8 +264,8 @@ class _Search:
             (dt, e) for (dt, e) in ((c.dt, looked[0]) for c, looked in self.looks.items() if c.method == cell.method)
         )
         halvings = 1
-        if math.isfinite(error) and error > self.target:
-            order = grids.theory(cell, self.norm.name, self.case.survey) or 1.0
+        if math.isfinite(error) and error > self.target and not self.noise:
+            order = grids.theory(cell, self.norm.name, self.case.survey) or float(grids.ORDER.get(cell.integrator, 1))
             if len(history) > 1 and all(math.isfinite(e) and e > 0 for _, e in history[:2]):
                 (small, fine), (large, coarse) = history[:2]
                 order = math.log(coarse / fine) / math.log(large / small)
