@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..framework import Phase, World
+from ..framework import World
+from ..systems.force_accumulation import ForceAccumulation
 from .bench_bodies import NotPlainError, moving_and_fixed
 from .bench_quality import overlaps
 from .escape import Enclosure
@@ -193,6 +194,7 @@ class PymunkEngine(Engine):
         self.space = PymunkSpace(world)
         self.space.space.iterations = iterations
         self._iterations = iterations
+        [self._sums] = [system for system in world.systems if isinstance(system, ForceAccumulation)]
         self._time, self._steps, self._forces, self._pairs = 0.0, 0, 0, 0
         self._dt = 0.0
         self._impacts = 0
@@ -239,7 +241,7 @@ class PymunkEngine(Engine):
     def _push(self) -> None:
         """The forces of the force systems at this state, for one step; gravity is pymunk's own."""
         self._forces += 1
-        self.world.run(Phase.FORCES)
+        self._sums.evaluate(self._time)
         dynamic = self.world.bodies.dynamic
         weight = (dynamic.mass * dynamic.gravity_scale)[:, None] * np.asarray(self.world.gravity)
         force = (np.array(dynamic.force) - weight)[self._order]
