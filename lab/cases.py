@@ -95,26 +95,27 @@ class Case:
     def quick(self, fewer_steps: bool = True, fewer_repeats: bool = True) -> Case:
         """Every second step, and a few repeats: a first look."""
         steps = self.steps[::2] if fewer_steps else self.steps
-        cells = self.reference_cells
-        if self.kind != CHAOTIC:
-            cells = tuple(dataclasses.replace(cell, dt=steps[-1] / FINER) for cell in cells)
         repeats = min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats
-        return self.replace(steps=steps, repeats=repeats, reference_cells=cells)
+        return self.replace(steps=steps, repeats=repeats)._with_reference_step(steps[-1] / FINER)
+
+    def _with_reference_step(self, dt: float) -> Case:
+        """The same with other steps in its own references; those of chaotic scenes stay."""
+        if self.kind == CHAOTIC or not self.reference_cells:
+            return self
+        cells = [dataclasses.replace(cell, dt=dt) for cell in self.reference_cells[:2]]
+        return self.replace(reference_cells=with_twice_the_step(cells), reference=None)
 
     def coarse_reference(self) -> Case:
         """The same with the largest steps that its own references may have, where smooth motion makes them converge."""
         coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
-        if self.kind != SMOOTH or not self.reference_cells:
-            return self
-        cells = tuple(dataclasses.replace(cell, dt=coarse) for cell in self.reference_cells)
-        return self.replace(reference_cells=cells)
+        return self._with_reference_step(coarse) if self.kind == SMOOTH else self
 
     def finer_reference(self) -> Case | None:
         """The same with smaller steps in its own references; None where that has been tried often enough."""
-        cells = tuple(dataclasses.replace(cell, dt=cell.dt / FINER) for cell in self.reference_cells)
-        if not cells or cells[0].dt < self.steps[-1] / FINER**MOST_REFINED:
+        if self.kind == CHAOTIC or not self.reference_cells:
             return None
-        return self.replace(reference_cells=cells, reference=None)
+        finer = self.reference_cells[0].dt / FINER
+        return self._with_reference_step(finer) if finer >= self.steps[-1] / FINER**MOST_REFINED else None
 
 
 def case_of(
@@ -210,7 +211,8 @@ def _closed_form(subject: Subject, seconds: float, kind: str) -> tuple[str, Seen
 
 
 def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
-    """Two methods that share as little as possible, with a step far below the smallest one measured."""
+    """Two methods that share as little as possible, with a step far below the smallest one measured; and, of what is
+    not chaotic, the first one with twice that step, for what both may get wrong together."""
     own = facts.settings
     fine = ladder[-1] / FINER
     if facts.kind == CHAOTIC:  # long runs; the step does not matter where nothing bends the paths
@@ -222,4 +224,10 @@ def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
         pairs = (("yoshida4", "continuous"), ("velocity_verlet", "event_driven"))
     else:
         pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
-    return tuple(Cell(fine, integrator, collision, 32, "precise") for integrator, collision in pairs)
+    cells = tuple(Cell(fine, integrator, collision, 32, "precise") for integrator, collision in pairs)
+    return cells if facts.kind == CHAOTIC else with_twice_the_step(cells)
+
+
+def with_twice_the_step(cells: Sequence[Cell]) -> tuple[Cell, ...]:
+    """Two cells, and the first with twice the step."""
+    return (*cells, dataclasses.replace(cells[0], dt=2 * cells[0].dt))

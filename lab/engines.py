@@ -105,8 +105,9 @@ class Engine(ABC):
 
     @cached_property
     def size(self) -> float:
-        """The smallest dynamic body's extent; 1 where none has a shape."""
-        return min((self.sizes[e] for e in self.ids.tolist() if e in self.sizes), default=1.0) or 1.0
+        """The smallest dynamic body's extent; where none has a shape, how far from the origin they are, else 1."""
+        known = [self.sizes[e] for e in self.ids.tolist() if e in self.sizes]
+        return min(known, default=0.0) or float(np.abs(self.position).max(initial=0.0)) or 1.0
 
     @abstractmethod
     def counts(self) -> dict[str, float]:

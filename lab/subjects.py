@@ -8,6 +8,7 @@ import hashlib
 import importlib.metadata
 import inspect
 import marshal
+import pickle
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -102,8 +103,11 @@ def _source_of(function: Any) -> str:
         text = marshal.dumps(code).hex() if code is not None else ""
     closed = [cell.cell_contents for cell in getattr(function, "__closure__", None) or ()]
     defaults = getattr(function, "__defaults__", None), getattr(function, "__kwdefaults__", None)
-    own = function if code is None else vars(function)
-    return text + repr((getattr(function, "__qualname__", ""), closed, defaults, own))
+    facts = getattr(function, "__qualname__", ""), closed, defaults, function if code is None else vars(function)
+    try:
+        return text + pickle.dumps(facts).hex()  # repr would shorten large arrays
+    except (TypeError, AttributeError, pickle.PicklingError):
+        return text + repr(facts)
 
 
 def _load_once(target: str) -> Loaded:

@@ -14,8 +14,10 @@ from .cases import Case
 from .trade_records import Point
 from .trade_tasks import engine_of
 
-REPEATS = 5
-BLOCKS = 20  # of a run
+REPEATS = 5  # at most, of a run
+ENOUGH = 1.0  # s of one setting: long runs are not repeated
+BLOCKS = 20  # of a run, dealt out to PARTS that each see all of it: as many measurements
+PARTS = 5
 
 
 def time_points(case: Case, points: Sequence[Point], progress: Progress) -> None:
@@ -26,36 +28,42 @@ def time_points(case: Case, points: Sequence[Point], progress: Progress) -> None
     """
     wanted = [point for point in points if point.errors]
     found: dict[int, list[float]] = {id(point): [] for point in wanted}
+    spent = dict.fromkeys(found, 0.0)
     progress.begin(REPEATS * len(wanted))
     progress.say(f"{case.subject.name}: timing, on one core")
     with _one_core(), no_garbage_collection():
         for repeat in range(REPEATS):
             first = repeat * len(wanted) // REPEATS
             for point in (*wanted[first:], *wanted[:first]):
-                found[id(point)].append(1e3 * _seconds(case, point))
+                if spent[id(point)] < ENOUGH:
+                    parts = _parts(case, point)
+                    found[id(point)] += [1e3 * seconds / (steps * point.cell.dt) for seconds, steps in parts if steps]
+                    spent[id(point)] += sum(seconds for seconds, _ in parts)
                 progress.advance(1)
     for point in wanted:
         point.milliseconds = Spread.of(found[id(point)])
 
 
-def _seconds(case: Case, point: Point) -> float:
-    """Wall time per simulated second of a whole run: what it costs may change as things gather and come to rest."""
+def _parts(case: Case, point: Point) -> list[tuple[float, int]]:
+    """Seconds and steps of each part of a whole run: what steps cost may change as things gather and come to rest."""
     engine = engine_of(case, point.cell, 0)
     dt = point.cell.dt
+    seconds, steps = [0.0] * PARTS, [0] * PARTS
     try:
         left = max(int(case.seconds / dt), 1)
-        block = max(left // BLOCKS, 1)
-        steps, seconds = 0, 0.0
+        block, part = max(left // BLOCKS, 1), 0
         while left:
             count = min(block, left)
             left -= count
             waited = log.waited
             started = time.perf_counter()
             engine.advance(count, dt)
-            spent = time.perf_counter() - started
-            if log.waited == waited or not (left or steps):  # else kernels were compiled or loaded meanwhile
-                steps, seconds = steps + count, seconds + spent
-        return seconds / (steps * dt)
+            took = time.perf_counter() - started
+            if log.waited == waited or not (left or any(steps)):  # else kernels were compiled or loaded meanwhile
+                seconds[part] += took
+                steps[part] += count
+                part = (part + 1) % PARTS
+        return list(zip(seconds, steps, strict=True))
     finally:
         engine.close()
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from .bench_progress import NO_PROGRESS, Progress
@@ -19,6 +20,7 @@ from .trade_work import work_of
 from .workers import Lost, in_parallel
 
 FEW_STEPS = 20_000  # together: they take less time than workers need to start
+WORTH_IT = 4.0  # times better must references agree with a step 8 times smaller: else it is rounding or chance
 ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
 
 
@@ -84,13 +86,31 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
             )
     if case.kind == CHAOTIC:
         return _with_statistics(case, seens, half)
-    first, second = seens
-    agreement = {name: abs(value) for name, value in errors_of(second, first, NORMS).items()}
+    first, *others = seens
+    apart = [errors_of(other, first, NORMS) for other in others]
+    agreement = {name: max(abs(errors[name]) for errors in apart) for name in NORMS}
     if conserves(first):
         agreement["energy"] = 0.0  # what is conserved is known without a reference
-    a, b = case.reference_cells
-    text = f"own runs with {_words(a)} and with {_words(b)}, steps of {a.dt:.3g} s"
+    a, b, _ = case.reference_cells
+    text = f"own runs with {_words(a)} and with {_words(b)}, steps of {a.dt:.3g} s, and twice that"
     return case.replace(reference=first), Reference(text, {n: agreement[n] for n in case.norms})
+
+
+def refined_reference(
+    case: Case, runs: Runs, enough: Callable[[Case, Reference], bool]
+) -> tuple[Case, Reference, bool]:
+    """The case with its reference, whose steps are made smaller until it is ``enough`` or nothing is gained any more;
+    and whether it is enough."""
+    before, case = math.inf, case.coarse_reference()
+    while True:
+        with_own, reference = with_reference(case, runs)
+        if enough(with_own, reference):
+            return with_own, reference, True
+        agreement = reference.agreement.get(case.norms[0], 0.0)
+        finer = case.finer_reference() if agreement < before / WORTH_IT else None
+        if finer is None:
+            return with_own, reference, False
+        before, case = agreement, finer
 
 
 def reference_tasks(case: Case) -> list[Task]:

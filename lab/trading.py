@@ -29,10 +29,11 @@ from .trade_records import (
     by_method,
     observed_order,
 )
-from .trade_runs import Runs, point_of, run_tasks, with_reference
+from .trade_runs import Runs, point_of, refined_reference, run_tasks
 from .trade_tasks import engine_of
 
 ROUNDING = 1e-12  # errors below it are rounding, which follows no order
+SURE = 1e-10  # an agreement that leaves nothing to be wanted of a reference
 SMALL = 0.1  # an error of a tenth of the scale is no small one
 CLEAR = 4.0  # times its own noise must a statistic's error be to tell an order
 ASYMPTOTIC = 4  # points, the finest, that the order is read from
@@ -121,7 +122,9 @@ def measure(case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Ru
     peers = grids.peer_methods() if against_pymunk else ()
     if peers:
         engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # says what is in the way
-    case, reference = with_reference(case, runs)
+    case, reference, _ = refined_reference(
+        case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
+    )
     cells = grids.grid((*curves, *peers), case.steps)
     records = runs.all(run_tasks(case, cells), f"{name}: {len(cells)} settings, {case.repeats} {case.repeated}")
     outcomes: dict[Cell, list[Outcome]] = {}

@@ -25,7 +25,7 @@ from .problems import Problem
 from .result_store import Store
 from .settings_line import settings_line
 from .trade_records import TRUSTED, Cell, Outcome, Point, Reference
-from .trade_runs import Runs, point_of, run_tasks, with_reference
+from .trade_runs import Runs, point_of, refined_reference, run_tasks
 from .trade_tasks import Task
 from .trade_work import WEIGHTS
 from .trading import Only
@@ -33,7 +33,6 @@ from .trading import Only
 BELOW = 16  # times the smallest step of the case: no method is driven further
 MOST_REPEATS = 400  # of a noisy statistic
 NOISE = 4.0  # times smaller than the target must the standard error of a statistic be
-WORTH_IT = 4.0  # times better must references agree with a step 8 times smaller: else it is rounding or chance
 LONGEST_JUMP = 4  # halvings at once
 FINE = (1.5, 1.25, 1.75)  # times the step that holds: tried in this order, the last two as the first turns out
 ROUNDING = 1e-9  # of a step
@@ -306,24 +305,24 @@ def exact_enough(
     case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
 ) -> tuple[Case, Reference]:
     """The case with a reference that knows the target: Problem if own runs cannot be brought to agree so well."""
-    before, case = math.inf, case.coarse_reference()  # refined where the target asks for it
-    while True:
-        with_own, reference = with_reference(case, runs)
-        seen = with_own.reference
+    def told(known: Case, reference: Reference) -> float:
+        """The target over what the reference knows."""
+        seen = known.reference
         assert seen is not None
         target = max_error / NORMS[norm].scale(seen, seen) if absolute else max_error
-        agreement = reference.agreement.get(norm, 0.0)
-        if agreement <= target / (NOISE if NORMS[norm].signed else TRUSTED):
-            return with_own, reference
-        improves = not NORMS[norm].signed and agreement < before / WORTH_IT
-        before, finer = agreement, case.finer_reference() if improves else None
-        if finer is None:
-            raise Problem(
-                f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
-                f"{reference.text} agree to {agreement:.2g} only. Take a larger error"
-                + (" or longer runs" if NORMS[norm].signed else " or a shorter time")
-            )
-        case = finer
+        return target / max(reference.agreement.get(norm, 0.0), 1e-300)
+
+    wanted = NOISE if NORMS[norm].signed else TRUSTED
+    known, reference, enough = refined_reference(case, runs, lambda case, found: told(case, found) >= wanted)
+    if enough:
+        return known, reference
+    agreement = reference.agreement[norm]
+    target = told(known, reference) * agreement
+    raise Problem(
+        f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
+        f"{reference.text} agree to {agreement:.2g} only. Take a larger error"
+        + (" or longer runs" if NORMS[norm].signed else " or a shorter time")
+    )
 
 
 def _expected(cell: Cell) -> float:

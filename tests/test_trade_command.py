@@ -66,7 +66,7 @@ def test_json_and_csv_hold_every_point(made):
     [case] = found.cases
     points = [point for curve in case.curves for point in curve.points]
     assert {curve.points[0].cell.engine for curve in case.curves} == {"carom", "pymunk"}
-    assert all(len(point.milliseconds.values) == 5 for point in points if point.milliseconds)
+    assert all(len(point.milliseconds.values) >= 5 for point in points if point.milliseconds)
     with (folder / "trade.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(points) * len(case.norms)
