@@ -47,7 +47,7 @@ def _halved(largest: float, count: int) -> tuple[float, ...]:
 KNOWN: Mapping[str, Known] = {
     "jump": Known(1.0, ("apex", "position", "energy"), steps=_halved(1 / 15, 6)),
     "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # not at a turn, where phase errors hide
-    "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8)),
+    "orbit": Known(20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 7)),
     # As published: 49 balls, 20 s, these steps.
     "bouncing": Known(
         20.0, ("energy_square", "position", "energy"), 4, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
