@@ -21,6 +21,8 @@ from carom.lab.geometry_truth import expected_area, overlaps, placed, touching
 from carom.lab.problems import Problem
 from carom.plugins.convex_polygon import wrong_with
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 SQUARE = np.array(((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)))
 CHEAP = ("sphere", "box", "sphere then box")  # compiled by other tests too; polygons compile for long
 ROUND_AND_TALL = tuple(thing for thing in OBJECTS if thing.name in ("asteroid", "humanoid"))
@@ -188,7 +190,6 @@ def test_a_seed_gives_the_same_counts():
     assert counts(first) == counts(again) != counts(other)
 
 
-@pytest.mark.slow
 def test_levels_before_the_precise_shape(result):
     """The precise level reports what truly overlaps; the first level lets pass what it would report alone."""
     whole = study(options=tuple(OPTIONS))
@@ -203,7 +204,6 @@ def test_levels_before_the_precise_shape(result):
             assert (first.first_hits, first.first_share) == (alone.hits, alone.share)
 
 
-@pytest.mark.slow
 def test_an_engine_that_disagrees_with_the_oracle_is_not_measured(monkeypatch):
     def one_less(*crowd):
         pairs, depths = touching(*crowd)

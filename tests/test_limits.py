@@ -16,6 +16,8 @@ from carom.lab.limits_command import NAMES, limits_command
 from carom.lab.limits_records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method
 from carom.lab.limits_sweep import AXES, limits, measured, sweep
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 PLAIN = Method("plain", ("discrete",))
 
 
@@ -141,7 +143,6 @@ def test_springs_break_at_their_limits(method, limit):
     assert edge.last <= limit * 1.01
 
 
-@pytest.mark.slow
 def test_the_energy_of_springs_leaves_its_band_where_the_closed_forms_say():
     """B2. Semi-implicit Euler from (1, 0): E / E0 between 1 / (1 + z/2) and 1 / (1 - z/2); velocity Verlet down to
     1 - z^2 / 4; explicit Euler (1 + z^2)^1000; Runge-Kutta 4 1 - (1 - z^6/72)^1000."""
@@ -200,7 +201,6 @@ def test_ratios_of_sizes_and_masses(method):
         assert sample.error < 4 * 2.3e-16
 
 
-@pytest.mark.slow
 def test_loads():
     """B19: on a single box any ratio stands; on three the discrete solver gives way, 32 substeps ten times later."""
     assert max(sample.error for sample in line_of("load", "discrete", (1.0, 100.0, 1e12)).samples) < 0.01

@@ -21,6 +21,8 @@ from carom.lab.settings_records import TUNED, Choice, GameChoices, GamesStudy, S
 from carom.lab.settings_study import VARIED, measured
 from carom.scenes import drops, jump, stack
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 PAGE = Path(__file__).parent.parent / "docs" / "settings.md"
 EVERY = {(varied.field, varied.scene): varied for varied in VARIED}
 
@@ -275,7 +277,6 @@ def test_the_shooter():
     assert "continuous" in shooter.tuned.line
 
 
-@pytest.mark.slow
 def test_every_game_gets_what_it_needs():
     found = games.games_study(repeats=1)
     assert [game.game for game in found.games] == [game.name for game in games.ALL]

@@ -18,6 +18,8 @@ from carom.lab.cases import QUICK_REPEATS
 from carom.lab.norms import NORMS
 from carom.lab.trade_tasks import perform
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 SHORT = ("--dt", "1/30,1/60", "--repeats", "2", "--no-timing", "--workers", "1")
 WRITTEN = {"results.jsonl", "trade.json", "trade.csv", "trade.html"}
 

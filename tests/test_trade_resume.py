@@ -13,6 +13,8 @@ from carom.lab.result_store import Store
 from carom.lab.trade_records import STOPPED
 from carom.lab.trade_tasks import perform
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
 FEW = {
     "timing": False,

@@ -19,6 +19,8 @@ from carom.framework.compilation import log
 from carom.lab import workers
 from carom.lab.workers import Lost, in_parallel
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
 
 

@@ -1,0 +1,204 @@
+"""What the laboratory makes of a scene before it measures: its kind, its reference, its steps, what it watches."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from carom import scenes
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import ForceSystem, Settings, World
+from carom.lab.cases import case_of
+from carom.lab.engines import CaromEngine, PymunkEngine
+from carom.lab.norms import NORMS
+from carom.lab.observing import Seen, observe
+from carom.lab.problems import Problem
+from carom.lab.subjects import subject_of
+from carom.lab.survey import survey
+from carom.lab.trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
+from carom.lab.trade_runs import Runs, refined_reference
+from carom.lab.trade_tasks import Task
+from carom.lab.tuning import search
+from carom.plugins import Physics
+
+
+def world_of(settings, gravity=-10.0):
+    return World(Physics(dimensions=2, gravity=(0, gravity)), settings=settings or Settings())
+
+
+def stars(scale):
+    """Eight bodies that attract each other, at rest at first: chaos soon. scale: metres in the unit of length."""
+
+    class Attraction(ForceSystem):
+        def add_forces(self, bodies, time):
+            x = bodies.position / scale
+            apart = x[None] - x[:, None]
+            cube = (np.sum(apart**2, axis=2) + 1e-3) ** 1.5
+            bodies.force[:] += scale * np.sum(apart / cube[..., None], axis=1)
+
+    def build(settings, seed=0):
+        world = world_of(settings, 0.0)
+        for place in np.random.default_rng(1).uniform(-1, 1, (8, 2)):
+            world.create_entity(Transform(scale * place), RigidBody())
+        world.add_system(Attraction())
+        return world
+
+    return build
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds", "kind"),
+    [("jump", 1.0, SMOOTH), ("oblique", 3.0, IMPACTS), ("stack", 1.0, RESTING), ("drops", 2.0, IMPACTS)],
+)
+def test_the_kind_of_a_scene(name, seconds, kind):
+    assert survey(subject_of(name), seconds).kind == kind
+
+
+def test_a_gas_is_chaotic():
+    """A nudge grows as e^(3 t) in this gas (30 discs per collision time), so by more than 1e7 in 8 time units."""
+    assert survey(subject_of("thermal_gas", {"n": 100}), 8.0).kind == CHAOTIC
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e9])
+def test_chaos_without_contacts_is_refused_whatever_the_unit(scale):
+    with pytest.raises(Problem, match="chaotic: nothing touches anything"):
+        case_of(stars(scale), seconds=20.0)
+
+
+def test_a_ball_that_rolls_off_a_platform_has_not_escaped():
+    def build(settings, seed=0):
+        world = world_of(settings)
+        world.create_entity(Transform((0, -0.5)), AABBCollider((2, 0.5)))
+        world.create_entity(Transform((0, 0.5)), RigidBody(linear_velocity=(4, 0)), SphereCollider(0.5))
+        return world
+
+    assert not survey(subject_of(build), 2.0).walled
+
+
+def test_sensors_are_no_contacts():
+    def build(settings, seed=0):
+        world = world_of(settings, 0.0)
+        world.create_entity(Transform((3, 0)), AABBCollider((1, 1), sensor=True))
+        world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(3, 0)), SphereCollider(0.5))
+        return world
+
+    assert survey(subject_of(build), 1.5).kind == SMOOTH
+
+
+def test_build_must_use_its_settings():
+    with pytest.raises(Problem, match="must hand its settings to the World"):
+        case_of(lambda settings, seed=0: scenes.get("jump").build(None), seconds=1.0)
+
+
+def test_functions_that_close_over_different_values_are_different_scenes():
+    def make(values):
+        def build(settings, seed=0):
+            return scenes.get("spring").build(settings, stiffness=float(values[-1]))
+
+        return build
+
+    large = np.ones(5000)
+    other = large.copy()
+    other[2500] = 2.0
+    marks = [subject_of(make(values)).mark for values in (large, other, large)]
+    assert marks[0] == marks[2] != marks[1]
+
+
+def test_a_closed_form_is_used_for_what_it_knows_only():
+    assert case_of("spring", options={"stiffness": 20.0}, seconds=1.0).form
+    assert not case_of("spring", options={"damping": 2.0}, seconds=1.0).form
+    assert not case_of("oblique", options={"restitution": 0.5}).form
+
+
+def test_steps_that_a_run_has_no_room_for_are_left_out():
+    """A search cannot promise a step that it has never taken whole."""
+    assert max(case_of("spring", seconds=0.1).steps) <= 0.1 / 3
+    with pytest.raises(Problem, match="no room"):
+        case_of("spring", seconds=0.1, steps=(0.1,))
+
+
+def test_runs_of_one_setting_have_keys_of_their_own():
+    case = case_of("oblique", repeats=3)
+    keys = {Task(case, Cell(dt), repeat).key for dt in (0.1, 0.2) for repeat in range(3)}
+    assert len(keys) == 6
+
+
+def test_drift_is_what_moves_after_the_fall():
+    """A ball falls 5 m in 1 s, lies for the rest of 4 s and has not drifted: less than the slop of a hundredth."""
+    world = world_of(Settings())
+    world.create_entity(Transform((0, -0.5)), AABBCollider((5, 0.5)))
+    world.create_entity(Transform((0, 5.5)), RigidBody(), SphereCollider(0.5))
+    seen = observe(CaromEngine(world), 4.0, 1 / 60)
+    assert seen.drift < 0.01
+    assert seen.reach == pytest.approx(5.0, abs=0.01)
+
+
+def test_a_missing_impact_is_an_error_of_time():
+    right, missed = (Seen(np.zeros((1, 2)), times=times, seconds=2.0) for times in ([0.1, 0.5], [0.1]))
+    assert NORMS["impact_time"].measure(missed, right) == pytest.approx((2.0 - 0.5) / 2.0)
+    assert NORMS["impact_time"].measure(right, right) == 0.0
+
+
+def test_pymunk_gets_forces_of_its_own_time():
+    """x'' = cos(6 t): x(1) = (1 - cos 6) / 36; explicit Euler is off by the sum of dt a / 2, at most dt / 2."""
+
+    class Shaking(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force[:, 0] += math.cos(6 * time)
+
+    world = world_of(Settings(dt=1 / 240), 0.0)
+    world.create_entity(Transform((0, 0)), RigidBody())
+    world.add_system(Shaking())
+    engine = PymunkEngine(world, 10)
+    for _ in range(240):
+        engine.step(1 / 240)
+    assert engine.position[0, 0] == pytest.approx((1 - math.cos(6)) / 36, abs=1 / 240)
+
+
+def test_a_reference_of_a_spring_against_a_wall_knows_how_good_it_is():
+    """x = -cos until it meets the wall in the middle, where it turns at full speed: |cos| for ever. The two methods and
+    twice the step must not agree much better than the first of them is right."""
+
+    class Pull(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force[:, 0] -= 4.0 * (bodies.position[:, 0] + 0.5)
+
+        def potential_energy(self, bodies):
+            return 2.0 * float(((bodies.position[:, 0] + 0.5) ** 2).sum())
+
+    def build(settings, seed=0):
+        world = world_of(settings, 0.0)
+        world.create_entity(Transform((0.5, 0)), AABBCollider((0.5, 2), restitution=1.0))
+        world.create_entity(Transform((-1.5, 0)), RigidBody(), SphereCollider(0.5, restitution=1.0))
+        world.add_system(Pull())
+        return world
+
+    case, reference, _ = refined_reference(case_of(build, seconds=4.0, steps=(1 / 30,)), Runs(1), lambda *_: True)
+    assert case.reference is not None
+    true = abs(case.reference.position[0, 0] - (-0.5 - abs(math.cos(2 * 4.0))))
+    assert true < 20 * reference.agreement["position"]
+
+
+def test_a_search_walks_back_where_it_has_jumped_too_far():
+    """A damped spring: no theory tells the order. Its choice costs at most 1.3 times the cheapest step that holds,
+    found here by hand among the halvings of the ladder."""
+
+    def build(settings, seed=0):
+        world = world_of(settings, 0.0)
+        world.create_entity(Transform((1, 0)), RigidBody(linear_damping=0.2))
+
+        class Pull(ForceSystem):
+            def add_forces(self, bodies, time):
+                bodies.force[:] -= 400.0 * bodies.position
+
+        world.add_system(Pull())
+        return world
+
+    found = search(build, 1e-3, seconds=2.0, workers=1)
+    assert found.choice is not None
+    larger = [trial for trial in found.trials if trial.met and trial.work < found.choice.work / 1.3]
+    assert not [trial for trial in larger if trial.repeats > 1]
+    own = [trial.cell.dt for trial in found.trials if trial.cell.method == found.choice.cell.method]
+    assert min(dt for dt in own if dt > found.choice.cell.dt) <= 2 * found.choice.cell.dt * (1 + 1e-9)
