@@ -232,13 +232,13 @@ SHOOTERS: Mapping[str, tuple[Settings, bool]] = {
 
 def bullets(settings: Settings, ccd: bool) -> World:
     """The bullets of the library, fewer; ccd: each of them has it."""
-    world = settings_scenes.library("bullets", n=BULLETS)(settings)
+    world = settings_scenes.scene_of("bullets", n=BULLETS)(settings)
     world.bodies.dynamic.ccd[:] = ccd
     return world
 
 
 def _shots(settings: Settings, ccd: bool) -> World:
-    world = settings_scenes.library("shots")(settings)
+    world = settings_scenes.scene_of("shots")(settings)
     world.bodies.dynamic.ccd[:] = ccd
     return world
 

@@ -34,7 +34,7 @@ PHASES = 4  # of the first step, where it matters when within a step something h
 GRAVITY = 10.0  # m/s2, of what slides
 
 
-def library(name: str, **options: Any) -> Build:
+def scene_of(name: str, **options: Any) -> Build:
     """A scene of the library."""
     function: Any = scenes.get(name).build
     return lambda settings: function(settings, **options)
@@ -287,7 +287,7 @@ class EveryPair:
 
 def with_every_pair(settings: Settings, *, n: int) -> World:
     """The gas, with a broad phase more to choose from."""
-    world = library("gas2d", n=n)(settings.replace(broad_phase="automatic"))
+    world = scene_of("gas2d", n=n)(settings.replace(broad_phase="automatic"))
     world.add_plugin(every_pair)
     world.settings = settings
     return world

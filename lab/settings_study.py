@@ -82,44 +82,44 @@ SAME = {"elsewhere": "bodies"}
 
 VARIED: tuple[Varied, ...] = (
     Varied(
-        "dt", "jump", at.library("jump"), (1 / 30, 1 / 60, 1 / 120, 1 / 240), at.apex, {"apex": "px"},
+        "dt", "jump", at.scene_of("jump"), (1 / 30, 1 / 60, 1 / 120, 1 / 240), at.apex, {"apex": "px"},
         APEX, 1.0, 1.0,
     ),
     Varied(
-        "dt", "stack of 10", at.library("stack"), (1 / 30, 1 / 60, 1 / 120, 1 / 240), at.rest, OVERLAP, RESTS,
+        "dt", "stack of 10", at.scene_of("stack"), (1 / 30, 1 / 60, 1 / 120, 1 / 240), at.rest, OVERLAP, RESTS,
         5.0, 1.0,
     ),
     Varied(
-        "dt", "fast gas", at.library("fastgas"), (1 / 60, 1 / 120, 1 / 240, 1 / 960), at.lost, LOST,
+        "dt", "fast gas", at.scene_of("fastgas"), (1 / 60, 1 / 120, 1 / 240, 1 / 960), at.lost, LOST,
         IMPACTS_LOST, 0.5, 0.5,
     ),
     Varied(
-        "substeps", "stack of 10", at.library("stack"), (1, 2, 4, 8, 16, 32), at.rest, OVERLAP, RESTS, 5.0, 1.0
+        "substeps", "stack of 10", at.scene_of("stack"), (1, 2, 4, 8, 16, 32), at.rest, OVERLAP, RESTS, 5.0, 1.0
     ),
     Varied(
-        "substeps", "pyramid of 210", at.library("pyramid", rows=20), (1, 2, 4, 8, 16, 32), at.rest, OVERLAP, RESTS,
+        "substeps", "pyramid of 210", at.scene_of("pyramid", rows=20), (1, 2, 4, 8, 16, 32), at.rest, OVERLAP, RESTS,
         3.0, 0.5,
     ),
     Varied(
-        "integrator", "jump", at.library("jump"), INTEGRATORS, at.apex, {"apex": "px"},
+        "integrator", "jump", at.scene_of("jump"), INTEGRATORS, at.apex, {"apex": "px"},
         APEX, 1.0, 1.0,
     ),
     Varied(
-        "integrator", "orbit", at.library("orbit"), INTEGRATORS, at.orbit, {"energy": "%", "growth": "% in the end"},
+        "integrator", "orbit", at.scene_of("orbit"), INTEGRATORS, at.orbit, {"energy": "%", "growth": "% in the end"},
         "largest departure of the energy in ten turns of an ellipse (e = 0.6) of 377 steps each; what of it is left in "
         "the end, with its sign",
         at.TEN_TURNS, 2.0,
     ),
     Varied(
-        "collision", "shots", at.library("shots"), COLLISIONS, at.wrong_balls, {"wrong": "of 8 balls"},
+        "collision", "shots", at.scene_of("shots"), COLLISIONS, at.wrong_balls, {"wrong": "of 8 balls"},
         "balls that go 4 sizes in a step and are not where they must be, by more than 1 % of their size", 0.1, 1 / 12,
     ),
     Varied(
-        "collision", "fast gas", at.library("fastgas"), COLLISIONS, at.lost, LOST, IMPACTS_LOST, 0.5, 0.5,
+        "collision", "fast gas", at.scene_of("fastgas"), COLLISIONS, at.lost, LOST, IMPACTS_LOST, 0.5, 0.5,
     ),
-    Varied("collision", "slow gas", at.library("gas2d"), COLLISIONS, at.lost, LOST, IMPACTS_LOST, 2.0, 0.5),
+    Varied("collision", "slow gas", at.scene_of("gas2d"), COLLISIONS, at.lost, LOST, IMPACTS_LOST, 2.0, 0.5),
     Varied(
-        "collision", "pyramid of 210", at.library("pyramid", rows=20), COLLISIONS, at.rest, OVERLAP, RESTS, 3.0, 0.5
+        "collision", "pyramid of 210", at.scene_of("pyramid", rows=20), COLLISIONS, at.rest, OVERLAP, RESTS, 3.0, 0.5
     ),
     *(
         Varied(
@@ -132,14 +132,14 @@ VARIED: tuple[Varied, ...] = (
         for dimensions, thing in ((2, "circles"), (3, "spheres"))
     ),
     Varied(
-        "restitution_threshold", "drops", at.library("drops"), (None, 0.0, 0.1, 0.5, 1.0, 2.0), at.last_bounce,
+        "restitution_threshold", "drops", at.scene_of("drops"), (None, 0.0, 0.1, 0.5, 1.0, 2.0), at.last_bounce,
         {"lost": "mm"},
         "height of the first bounce that is not made any more, by the law of the scene: 4.9 e^(2n) m; a ball that "
         "hits the floor at the threshold v would come up by e²v²/2g",
         12.0, 2.0, SWEPT,
     ),
     Varied(
-        "restitution_threshold", "platforms", at.library("platforms"), (None, 0.0, 0.1, 0.5, 1.0, 2.0), at.restless,
+        "restitution_threshold", "platforms", at.scene_of("platforms"), (None, 0.0, 0.1, 0.5, 1.0, 2.0), at.restless,
         {"speed": "mm/s"},
         "60 crates that bounce a little and come to rest: the fastest of them after 6 s", 6.0, 3.0,
         {"max_impacts_per_step": 32},
@@ -151,23 +151,23 @@ VARIED: tuple[Varied, ...] = (
         "highest step up that it slides over all the same, of 1, 3, 10, 30, 60 and 120 mm",
         3.0, 3.0,
     ),
-    Varied("slop", "stack of 10", at.library("stack"), (None, 0.0, 0.1), at.rest, OVERLAP, RESTS, 5.0, 1.0),
+    Varied("slop", "stack of 10", at.scene_of("stack"), (None, 0.0, 0.1), at.rest, OVERLAP, RESTS, 5.0, 1.0),
     Varied(
-        "max_steps_per_advance", "platforms", at.library("platforms"), (1, 2, 4, 8, 16, 32), at.dropped,
+        "max_steps_per_advance", "platforms", at.scene_of("platforms"), (1, 2, 4, 8, 16, 32), at.dropped,
         {"dropped": "% dropped", "longest": "steps"},
         "60 frames a second are asked for, and each thirtieth takes a quarter of a second: time that is not simulated, "
         "steps of the longest frame",
         8 * at.CYCLE, 5 * at.CYCLE, {"max_impacts_per_step": 32}, at.frames,
     ),
     Varied(
-        "max_impacts_per_step", "galperin", at.library("galperin"), (None, 1, 4, 64, 1000), at.counted_pi,
+        "max_impacts_per_step", "galperin", at.scene_of("galperin"), (None, 1, 4, 64, 1000), at.counted_pi,
         {"missing": "% missed", "energy": "% energy lost"},
         "impacts that are missing of the 314 that two blocks and a wall must have, and kinetic energy that is lost; "
         "most of them fall into a few steps",
         9.0, 3.0, {"dt": 1 / 240},
     ),
     Varied(
-        "max_impacts_per_step", "fast gas", at.library("fastgas"), (None, 1, 4, 8, 16), at.lost, LOST, IMPACTS_LOST,
+        "max_impacts_per_step", "fast gas", at.scene_of("fastgas"), (None, 1, 4, 8, 16), at.lost, LOST, IMPACTS_LOST,
         0.5, 0.5, {"collision": "continuous"},
     ),
     Varied(
@@ -187,13 +187,13 @@ VARIED: tuple[Varied, ...] = (
         0.5, 1 / 12,
     ),
     Varied(
-        "debug", "slow gas", at.library("gas2d"), (False, True), at.culprit, {**SAME, "unnamed": "unnamed"},
+        "debug", "slow gas", at.scene_of("gas2d"), (False, True), at.culprit, {**SAME, "unnamed": "unnamed"},
         "bodies that end elsewhere than without, of 1,000; whether a system that makes a velocity nan stays unnamed in "
         "world.faults",
         0.5, 0.5,
     ),
     Varied(
-        "debug", "jump", at.library("jump"), (False, True), at.same_as(debug=False), SAME,
+        "debug", "jump", at.scene_of("jump"), (False, True), at.same_as(debug=False), SAME,
         "bodies that end elsewhere than without, in a world of one body, whose steps cost least", 1.0, 1.0,
     ),
 )  # fmt: skip
