@@ -37,10 +37,11 @@ ACCURACY := spring orbit jump bouncing stack thermal_gas
 
 figures: $(BENCH)
 	for scene in $(ACCURACY); do \
-	  $(BIN)/carom trade $$scene --against pymunk --out out/$$scene --into docs/accuracy.md || exit 1; \
+	  $(BIN)/carom trade $$scene --against pymunk --out out/$$scene --into docs/accuracy.md --no-pictures || exit 1; \
 	done
-	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md
-	cp out/*/trade-*-work.png out/bouncing/trade-*-time.png docs/pictures/
+	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md --no-pictures
+	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
+	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
 	$(BIN)/carom limits --into docs/limits.md --out docs/pictures
 	$(BIN)/carom settings --into docs/settings.md
 	$(BIN)/carom settings --games --into docs/settings.md
