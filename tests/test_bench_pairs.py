@@ -15,6 +15,8 @@ from carom.lab.cli import cli
 from carom.lab.problems import Problem
 from carom.plugins.standard_shapes import sphere_sphere
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 
 @pytest.fixture(scope="module")
 def result():

@@ -505,6 +505,7 @@ def test_a_collider_that_nobody_has_registered_is_named():
         world.step()
 
 
+@pytest.mark.slow
 def test_the_example_runs(capsys):
     """Levels find the same contacts as the last one alone; bounds finds the first level's hits."""
     runpy.run_path(str(ROOT / "examples" / "levels.py"))["main"](300)

@@ -221,6 +221,7 @@ def velocity_of(world, entity):
     return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
 
 
+@pytest.mark.slow
 @mostly_2d
 def test_bounces_at_the_right_height_however_it_is_turned(d):
     """From 2 m above the floor to e^2 2 m; verlet's flight is exact, impacts are at their time: 1e-3 is sampling."""

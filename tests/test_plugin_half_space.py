@@ -131,6 +131,7 @@ def velocity_of(world, entity):
     return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
 
 
+@pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("away", [0.0, 1e6])
 def test_bounces_at_the_right_height_wherever_it_is(d, away):

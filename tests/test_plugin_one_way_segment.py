@@ -57,6 +57,7 @@ def run(world, seconds, *entities):
 # -- through from below, held from above ------------------------------------------------------------
 
 
+@pytest.mark.slow
 @each_shape
 def test_a_jump_passes_and_lands(shape):
     """As high as without the platform, to the bit; then it stands on it, and has touched it once."""

@@ -30,6 +30,8 @@ from carom.lab.trade_records import (
 from carom.lab.trade_report import order
 from carom.plugins import Physics
 
+pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+
 ORDERS = {"explicit euler": 1, "semi implicit euler": 1, "velocity verlet": 2, "rk4": 4, "yoshida4": 4}
 
 
