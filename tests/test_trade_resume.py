@@ -22,7 +22,7 @@ FEW = {
     "steps": (1 / 30, 1 / 60),
     "only": Only(("semi_implicit_euler", "velocity_verlet"), ("continuous",)),
 }
-RUNS = 2 * 2 * 2 + 2  # methods, steps, repeats; and two references
+RUNS = 2 * 2 * 2 + 3  # methods, steps, repeats; and three references
 
 
 def measured(target, folder=None, resume=False, workers=1, **options) -> Trade:
@@ -109,7 +109,7 @@ def test_results_of_another_scene_time_or_step_are_not_taken(ball, performed, tm
     for change in ({"seconds": 1.5}, {"steps": (1 / 20,)}, {"options": {"speed": 2.0}}, {"seed": 1}):
         before = len(performed)
         measured(ball, tmp_path, resume=True, **{**only, **change})
-        assert len(performed) == before + 3, change  # the point and two references
+        assert len(performed) == before + 4, change  # the point and three references
 
 
 @pytest.mark.slow  # the next one needs two workers as well

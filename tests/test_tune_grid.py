@@ -269,7 +269,6 @@ HELD_OUT: dict[str, tuple[str, Any, dict[str, Any]]] = {
     "a rounder orbit": ("orbit", "orbit", {"options": {"eccentricity": 0.5}}),
     "a nearly circular orbit": ("orbit", "orbit", {"options": {"eccentricity": 0.2}}),
     "fewer discs": ("thermal_gas", "thermal_gas", {"options": {"n": 225}}),
-    "a thinner gas": ("thermal_gas", "thermal_gas", {"options": {"eta": 0.25}}),
     "8 boxes": ("stack", "stack", {"options": {"n": 8}}),
     "12 boxes": ("stack", "stack", {"options": {"n": 12}}),
     "ten balls": ("stack", "stack", {"options": {"balls": True}}),
