@@ -14,6 +14,8 @@ from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.capsule import plugin as capsule
 from carom.plugins.one_way_segment import OneWaySegmentCollider
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 G = 10.0
 REST = 0.0025  # half the slop of 0.005 of a size of 1, or less
 SHAPES = {"ball": lambda **c: SphereCollider(0.5, **c), "box": lambda **c: AABBCollider(0.5, **c)}
@@ -57,7 +59,6 @@ def run(world, seconds, *entities):
 # -- through from below, held from above ------------------------------------------------------------
 
 
-@pytest.mark.slow
 @each_shape
 def test_a_jump_passes_and_lands(shape):
     """As high as without the platform, to the bit; then it stands on it, and has touched it once."""
@@ -119,7 +120,6 @@ def test_bounces_at_the_right_height(shape):
     world.close()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 0.5, -2.0])
 def test_ten_thousand_bodies_from_everywhere(angle):
     """Balls that do not meet each other fly at the segment. Against their free flight, known from a world without it:
@@ -381,7 +381,6 @@ def test_the_order_of_ids_does_not_matter():
     assert results[0] == results[1] == pytest.approx([0.5, 0.5], abs=REST)
 
 
-@pytest.mark.slow
 def test_queries_find_it_from_both_sides():
     world = make_world()
     for side in (1, -1):
