@@ -24,6 +24,8 @@ from carom.framework import Plugin, column
 from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
 import math
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 plugin = Plugin("balls", version="1.2")
 
 @plugin.shape(cost=1.2)
@@ -485,14 +487,12 @@ def test_settings_can_name_what_a_plugin_brings(carom, tmp_path, monkeypatch):
 # -- what ships, checked as everybody's is --------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_the_built_in_shapes_pass_the_check(carom):
     result = carom("plugins", "check", "carom.plugins.standard_shapes")
     assert result.exit_code == 0, result.stdout
     assert sum(" ok" in line for line in result.stdout.splitlines()) >= 10
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", OFFERED)
 def test_what_ships_passes_the_check(carom, name):
     result = carom("plugins", "check", OFFERED[name].partition(":")[0])

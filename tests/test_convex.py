@@ -16,6 +16,8 @@ from carom.framework.compilation import inlined, kernel
 from carom.framework.vectors import dot, item, replace, row, scale, store
 from carom.systems.convex import convex_convex
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 # A core is the sum of a hull of points and an ellipsoid along the axes, so that one support serves all the tests.
 Shape = namedtuple("Shape", "points semi_axes radii row")
 both_dimensions = pytest.mark.parametrize("d", [2, 3])

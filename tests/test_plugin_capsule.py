@@ -16,6 +16,8 @@ from carom.framework.vectors import axes_at, row, store
 from carom.plugins import Physics, capsule
 from carom.plugins.capsule import CapsuleCollider, capsule_capsule, capsule_sphere
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 G = 10.0
 both_dimensions = pytest.mark.parametrize("d", [2, 3])
 mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
@@ -221,7 +223,6 @@ def velocity_of(world, entity):
     return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
 
 
-@pytest.mark.slow
 @mostly_2d
 def test_bounces_at_the_right_height_however_it_is_turned(d):
     """From 2 m above the floor to e^2 2 m; verlet's flight is exact, impacts are at their time: 1e-3 is sampling."""
@@ -310,7 +311,6 @@ def test_equal_capsules_exchange_their_speeds(d):
     world.close()
 
 
-@pytest.mark.slow
 @both_dimensions
 def test_queries_and_casts_find_it(d):
     world = make_world(d)
@@ -335,7 +335,6 @@ def test_queries_and_casts_find_it(d):
     world.close()
 
 
-@pytest.mark.slow
 def test_levels_a_sphere_around_a_capsule():
     """What meets the sphere only passes."""
     world = make_world(2)

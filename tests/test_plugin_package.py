@@ -35,6 +35,8 @@ from carom.framework.vectors import scale, sub
 
 from .geometry import surface
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 plugin = Plugin("diamonds", version="2.5")
 
 @plugin.shape(cost=3)
@@ -174,7 +176,6 @@ def test_an_installed_plugin_is_checked_by_its_name(python):
     assert "plugin 'broken' of package broken-package cannot be loaded" in result.stderr
 
 
-@pytest.mark.slow
 def test_a_ball_falls_on_its_shape_and_bounces(python):
     """On the upper right side, x + y = 1: centre 0.5 beside the middle, so the side is met at 0.5 - 0.25 cos 45 deg."""
     result = python("-c", GAME)
