@@ -66,7 +66,7 @@ class Case:
     reference
         what a closed form gives; None: own fine runs decide
     reference_cells
-        of the own runs, two methods
+        of the own runs: two methods, and the first with twice its step where the scene is not chaotic
     """
 
     subject: Subject

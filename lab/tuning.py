@@ -314,6 +314,9 @@ def exact_enough(
 
     wanted = NOISE if NORMS[norm].signed else TRUSTED
     known, reference, enough = refined_reference(case, runs, lambda case, found: told(case, found) >= wanted)
+    if norm not in known.norms:
+        others = " or ".join(f"--norm {name}" for name in known.norms)
+        raise Problem(f"{case.subject.name}: its {norm} is 0 throughout, nothing can be relative to it: take {others}")
     if enough:
         return known, reference
     agreement = reference.agreement[norm]
