@@ -13,6 +13,8 @@ from click.testing import CliRunner
 from carom.framework import Plugin
 from carom.lab.cli import cli
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OFFERED = PROJECT["entry-points"]["carom.plugins"]
@@ -23,8 +25,6 @@ from carom.components.colliders import Collider
 from carom.framework import Plugin, column
 from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
 import math
-
-pytestmark = pytest.mark.slow  # its shapes take long to compile
 
 plugin = Plugin("balls", version="1.2")
 

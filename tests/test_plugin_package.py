@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
 PROJECT = """
 [build-system]
 requires = ["setuptools>=68"]
@@ -34,8 +36,6 @@ from carom.framework import Plugin, column
 from carom.framework.vectors import scale, sub
 
 from .geometry import surface
-
-pytestmark = pytest.mark.slow  # its shapes take long to compile
 
 plugin = Plugin("diamonds", version="2.5")
 
