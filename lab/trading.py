@@ -144,7 +144,7 @@ def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> Case
     for method, found in methods.items():
         curve = Curve(label_of(method, methods), found)
         for norm in case.norms:
-            curve.theory[norm] = grids.theory(method, norm, case.survey)
+            curve.theory[norm] = case.theory(method, norm)
             curve.orders[norm] = order_of(found, norm, reference)
         curves.append(curve)
     return CaseTrade(

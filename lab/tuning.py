@@ -264,7 +264,7 @@ class _Search:
         )
         halvings = 1
         if math.isfinite(error) and error > self.target and not self.noise:
-            order = grids.theory(cell, self.norm.name, self.case.survey) or float(grids.ORDER.get(cell.integrator, 1))
+            order = self.case.theory(cell, self.norm.name) or float(grids.ORDER.get(cell.integrator, 1))
             if len(history) > 1 and all(math.isfinite(e) and e > 0 for _, e in history[:2]):
                 (small, fine), (large, coarse) = history[:2]
                 order = math.log(coarse / fine) / math.log(large / small)
