@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from helpers_modes import (
     along,
-    both_dimensions,
     bullet,
     each_mode,
     each_sweep,
     mode_world,
+    mostly_2d,
     positions,
     rows_of,
     strikes,
@@ -30,7 +30,7 @@ DT, G = 1 / 60, 9.81
 # -- sizes, places, steps --------------------------------------------------------------------------
 
 
-@both_dimensions
+@mostly_2d
 @each_sweep
 def test_c4_sizes_from_1e_minus_9_to_1e9(mode, d):
     """A speck of 1e-9 falls 2000 m onto a moon of 1e9 within a step, and two specks meet far from it: time and
@@ -54,7 +54,7 @@ def test_c4_sizes_from_1e_minus_9_to_1e9(mode, d):
     np.testing.assert_allclose(velocities(world, [a, b])[:, 0], [-1e-6 / 3, 5e-6 / 3], rtol=1e-9)
 
 
-@both_dimensions
+@mostly_2d
 @each_mode
 @pytest.mark.parametrize("offset", [0.0, 1e5, 1e7, 1e9, 1e12, 1e15])
 def test_c6_head_on_far_from_the_origin(mode, d, offset):
@@ -107,7 +107,7 @@ def test_c7_steps_from_1e_minus_9_to_10(mode, integrator, dt, steps):
 # -- only just -------------------------------------------------------------------------------------
 
 
-@both_dimensions
+@mostly_2d
 @each_mode
 @pytest.mark.parametrize("first", [ball, box])
 @pytest.mark.parametrize("second", [ball, box])
@@ -126,7 +126,7 @@ def test_c14_touching_exactly(mode, d, first, second, speed, sign, impacts):
     kept.check()
 
 
-@both_dimensions
+@mostly_2d
 @each_mode
 @pytest.mark.parametrize("beside", [-1e-6, -1e-9, -1e-12, -1e-16, 1e-16, 1e-12, 1e-9])
 def test_c15_grazing(mode, d, beside):
@@ -187,7 +187,7 @@ def brawl(mode, *, turn=lambda v: v, length=1.0, time=1.0, mass=1.0, order=None,
     return world.bodies.position[rows].copy(), world.bodies.linear_velocity[rows].copy(), hits
 
 
-@both_dimensions
+@mostly_2d
 @each_mode
 def test_c22_repeated_and_permuted(mode, d):
     """The same bits when run again, and when the same ids came about in another order; impacts included."""
@@ -230,7 +230,7 @@ def test_c24_other_units(mode, length, time, mass):
     np.testing.assert_array_equal(found[2].impulse, hits.impulse * mass * length / time)
 
 
-@both_dimensions
+@mostly_2d
 @each_mode
 def test_c23_galilean(mode, d):
     """A velocity added to all: relative motion the same to 1e-9, some impacts for each later. Rounding of 700 m, 1e-13,
@@ -254,7 +254,7 @@ def test_c23_galilean(mode, d):
 # -- snapshots -------------------------------------------------------------------------------------
 
 
-@both_dimensions
+@mostly_2d
 @each_sweep
 def test_a_restored_snapshot_goes_on_with_the_same_bits(mode, d):
     """In the middle of impacts, rest and flight: state, impacts and hash of every later step."""

@@ -80,6 +80,7 @@ def tile_world(cells, faces="all", gravity=0.0, **settings):
     return world
 
 
+@pytest.mark.slow  # maps of tiles take long to compile
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("gravity", [0.0, G])
 def test_a_map_is_struck_in_two_places_in_one_step(mode, gravity):
@@ -95,6 +96,7 @@ def test_a_map_is_struck_in_two_places_in_one_step(mode, gravity):
     assert y == pytest.approx(2 * 1.1 - (3.0 - 310 / 60), abs=0.01 if gravity else 1e-9)
 
 
+@pytest.mark.slow  # maps of tiles take long to compile
 @pytest.mark.parametrize("faces", ["all", "walls"])
 @pytest.mark.parametrize(
     "settings",
@@ -115,6 +117,7 @@ def test_no_shot_passes_the_wall_of_a_map(faces, settings):
     assert len(world.contacts.impacts) >= len(shots)
 
 
+@pytest.mark.slow  # maps of tiles take long to compile
 def test_what_falls_beside_a_wall_of_tiles_falls_on():
     """A centimetre of air between: nothing stops it, however fast it is."""
     cells = np.zeros((100, 2), bool)
