@@ -17,6 +17,7 @@ ORDERS = dict(zip(METHODS, (1, 1, 2, 4, 4), strict=True))
 STAGES = dict(zip(METHODS, (1, 1, 2, 4, 4), strict=True))
 DRIFT = {"explicit_euler": 1, "semi_implicit_euler": -1}  # times g dt t / 2: the methods' error under constant force
 FRAME_RATES = (15, 30, 60, 144)
+NOISE = 1e-6  # relative, of frequencies that finite differences give
 
 all_methods = pytest.mark.parametrize("method", METHODS)
 

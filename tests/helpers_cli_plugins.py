@@ -1,0 +1,81 @@
+"""The ``carom`` command in an empty folder, a plugin that is good, and those that ship."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from carom.lab.cli import cli
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OFFERED = PROJECT["entry-points"]["carom.plugins"]
+
+BALL = """
+from carom.components import SphereCollider
+from carom.components.colliders import Collider
+from carom.framework import Plugin, column
+from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
+import math
+
+plugin = Plugin("balls", version="1.2")
+
+@plugin.shape(cost=1.2)
+class BallCollider(Collider):
+    radius = column(minimum=0.0)
+    def bounds(shape, dimensions):
+        if dimensions == 2:
+            return shape.radius, shape.radius
+        return shape.radius, shape.radius, shape.radius
+    def support(shape, direction):
+        return scale(direction, 0.0)
+    def rounding(shape):
+        return shape.radius
+
+@plugin.kernel
+def along(d, distance):
+    return divided(d, distance) if distance > 0.0 else add(scale(d, 0.0), unit(d))
+
+@plugin.kernel
+def unit(d):
+    return (1.0, 0.0) if len(d) == 2 else (1.0, 0.0, 0.0)
+
+@plugin.pair(BallCollider, SphereCollider)
+def ball_sphere(a, b, d):
+    distance = length(d)
+    depth = a.radius + b.radius - distance
+    normal = along(d, distance)
+    return depth >= 0.0, depth, normal, scale(normal, a.radius - 0.5 * depth)
+
+@plugin.pair(BallCollider, BallCollider)
+def ball_ball(a, b, d):
+    distance = length(d)
+    depth = a.radius + b.radius - distance
+    normal = along(d, distance)
+    return depth >= 0.0, depth, normal, scale(normal, a.radius - 0.5 * depth)
+"""
+
+
+@pytest.fixture
+def carom(tmp_path, monkeypatch):
+    """Runs the command in an empty folder, on wide screens."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def run(*arguments: str):
+        return CliRunner().invoke(cli, list(arguments))
+
+    return run
+
+
+def row_of(output: str, start: str) -> str:
+    return next(line for line in output.splitlines() if line.startswith(start))
+
+
+def refusal(result) -> str:
+    assert result.exit_code == 2, (result.stdout, result.stderr, result.exception)
+    assert result.stdout == ""
+    return result.stderr.strip()

@@ -1,0 +1,38 @@
+"""Components of a game's own: one with a single column, and one with every option that a column has."""
+
+from __future__ import annotations
+
+import math
+
+from worlds import ball, make_world
+
+from carom.framework import Component, column
+
+NAN, INF = math.nan, math.inf
+
+
+class Charge(Component):
+    value = column(default=0.0)
+
+
+class Everything(Component):
+    """Every option that a column has."""
+
+    plain = column()
+    count = column(3, dtype=int)
+    on = column(False, dtype=bool)
+    size = column(1.0, positive=True)
+    level = column(0.0, minimum=-2.0)
+    limit = column(None, optional=True, minimum=0.0)
+    mode = column("idle", choices=("idle", "busy", "gone"))
+    push = column(0.0, item="vector")
+    facing = column(0.0, item="rotation")
+
+
+def full(d=2):
+    """A world with one body that has everything."""
+    world = make_world(d)
+    e = ball(world, 0.0)
+    world.add_component(e, Everything(5.0, push=(1.0, 2.0, 3.0)[:d]))
+    assert len(world.bodies) == 1
+    return world, e, world.component_for_entity(e, Everything)

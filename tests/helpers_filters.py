@@ -1,0 +1,39 @@
+"""Who meets whom, and who is pushed, as it is told in every path of a step.
+
+The paths: contacts found (NARROW), impacts, contacts at rest, begin, stay, end, handlers, ``contacts.of`` and
+``pairs``, queries. What is not pushed must move exactly as if the other were not there, to the last bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from worlds import position, velocity
+
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+DT = 1 / 60
+EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact")
+
+
+def up(d, height):
+    """A place above the origin."""
+    return (0.0, height, 0.0)[:d]
+
+
+def listen(world):
+    """Events as (name without ``contact_``, a, b), as they happen."""
+    told = []
+    for name in EVENTS:
+        world.on(name, lambda contact, name=name: told.append((name[8:] or name, contact.entity_a, contact.entity_b)))
+    return told
+
+
+def pairs(rows):
+    return list(zip(rows.entity_a.tolist(), rows.entity_b.tolist(), strict=True))
+
+
+def assert_same_motion(world, other, entities):
+    """The same bits: of entities that have the same ids in both worlds."""
+    for entity in entities:
+        np.testing.assert_array_equal(position(world, entity), position(other, entity))
+        np.testing.assert_array_equal(velocity(world, entity), velocity(other, entity))

@@ -1,0 +1,269 @@
+"""``carom plugins check``, as plugin authors meet it: what passes, and what is found."""
+
+from __future__ import annotations
+
+import helpers_cli_plugins
+import pytest
+from helpers_cli_plugins import BALL, OFFERED, refusal, row_of
+
+pytestmark = pytest.mark.slow  # its shapes take long to compile
+
+carom = helpers_cli_plugins.carom  # a fixture
+
+
+# -- carom plugins check --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def check(carom, tmp_path):
+    """Checks the good plugin with some of its text replaced; returns (exit code, what was printed)."""
+
+    def run(*changes: tuple[str, str]) -> tuple[int, str]:
+        text = BALL if not changes else BALL.replace("    radius = ", "    dimensions = (2,)\n    radius = ")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "checked.py").write_text(text)
+        result = carom("plugins", "check", "checked.py")
+        assert result.exit_code in (0, 1), (result.stdout, result.stderr, result.exception)
+        return result.exit_code, result.stdout
+
+    return run
+
+
+@pytest.mark.slow  # 2D and 3D, worlds and all; of the fast tests test_plugin_package.py checks a good one
+def test_a_good_plugin_passes(check):
+    code, said = check()
+    assert code == 0, said
+    assert said.splitlines()[-1] == "plugin balls: nothing found"
+    for row in ("shape BallCollider", "pair BallCollider and SphereCollider", "pair BallCollider and BallCollider"):
+        assert sum(line.startswith(row) and "12," in line for line in said.splitlines()) == 2
+
+
+DEPTH = "    depth = a.radius + b.radius - distance\n"
+SPHERE = "def ball_sphere(a, b, d):\n    distance = length(d)\n" + DEPTH
+TWIN = "def ball_ball(a, b, d):\n    distance = length(d)\n" + DEPTH
+RETURN = "    return depth >= 0.0, depth, normal, scale(normal, a.radius - 0.5 * depth)\n"
+MISTAKES = {  # what passes at registration, and what the check says of it
+    "depth of equal sizes only": (
+        (SPHERE, SPHERE.replace("b.radius", "a.radius")),
+        ("but their boxes do not", "make bounds enclose the whole shape"),
+    ),
+    "depth too large": (
+        (SPHERE, SPHERE + "    if depth > 0.0:\n        depth = 2.0 * depth\n"),
+        ("moved apart by that they are", "depth is how far the second shape has to move"),
+    ),
+    "depth too small": (
+        (SPHERE, SPHERE + "    if depth > 0.0:\n        depth = 0.5 * depth\n"),
+        ("moved apart by that they still overlap, by", "depth is how far the second shape has to move"),
+    ),
+    "apart where they touch": (
+        (SPHERE, SPHERE.replace("+ b.radius", "+ min(b.radius, 2.0)")),
+        ("along it, by their support functions, the depth is", "the depth, the normal, or the support function"),
+    ),
+    "never touching": (
+        (SPHERE, SPHERE + "    depth = -1e-300\n"),
+        ("they never touch", "to keep two shapes apart use layer and mask"),
+    ),
+    "distance too long": (
+        (SPHERE, SPHERE + "    if depth < 0.0:\n        depth = 3.0 * depth\n"),
+        ("the second shape moved by", "apart, depth is minus the distance"),
+    ),
+    "not the same from both sides": (
+        (TWIN, TWIN.replace("a.radius + b.radius", "2.0 * a.radius")),
+        ("and seen from the other shape", "a and b may change places"),
+    ),
+    "a root of what may be negative": (
+        (SPHERE, SPHERE + "    depth += 0.0 * math.sqrt(2.0 * a.radius - b.radius)\n"),
+        ("nan", "guard the divisions and roots that fail there"),
+    ),
+    "raises": (
+        (SPHERE, SPHERE + "    if b.radius > 4.0 * a.radius + 1.0:\n        raise ValueError('too big')\n"),
+        ("the compiled function raised ValueError: too big", "return a contact for every input"),
+    ),
+    "does not compile": (
+        (SPHERE, SPHERE + "    depth = {'depth': depth}.get('depth')\n"),
+        ("it does not compile", "use what numba compiles"),
+    ),
+    "point from the wrong centre": (
+        (RETURN, "    return depth >= 0.0, depth, normal, add(d, scale(normal, 2.0 * a.radius + b.radius))\n"),
+        ("the point of contact", "point counts from the centre of the first shape"),
+    ),
+    "bounds too small for large ones": (
+        ("def bounds(shape, dimensions):\n", "def bounds(shape, dimensions):\n        if 2.0 < shape.radius < 9.0:\n"
+         "            return 1.0, 1.0\n"),
+        ("reach beyond the bounds", "make bounds enclose the whole shape"),
+    ),
+    "support for unit vectors only": (
+        ("scale(direction, 0.0)", "scale(direction, 0.5 * shape.radius if 2.0 < shape.radius < 9.0 else 0.0)"),
+        ("for a direction of another length", "the direction has any length"),
+    ),
+}  # fmt: skip
+
+
+QUICK = ("depth too large", "not the same from both sides", "does not compile", "bounds too small for large ones")
+
+
+@pytest.mark.parametrize(
+    "mistake", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MISTAKES]
+)
+def test_mistakes_that_pass_at_registration_are_found(check, mistake):
+    change, expected = MISTAKES[mistake]
+    code, said = check(change)
+    assert code == 1, said
+    for words in expected:
+        assert words in said
+    findings = [line for line in said.splitlines() if line.startswith("1. ")]
+    assert len(findings) == 1
+    assert "   for " in said
+    assert "   cure: " in said
+    assert said.splitlines()[-1].startswith("plugin balls: ")
+
+
+def test_what_registration_refuses_is_one_line(carom, tmp_path):
+    (tmp_path / "refused.py").write_text(BALL.replace("def ball_sphere(a, b, d)", "def ball_sphere(a, b)"))
+    said = refusal(carom("plugins", "check", "refused.py"))
+    assert "refused.py, line 30: plugin balls: pair ball_sphere of BallCollider and SphereCollider takes (a, b)" in said
+
+
+def test_a_file_without_a_plugin_is_refused(carom, tmp_path):
+    (tmp_path / "empty.py").write_text("x = 1\n")
+    assert "empty.py defines no plugin" in refusal(carom("plugins", "check", "empty.py"))
+
+
+SWEEP = """
+@plugin.sweep(BallCollider, SphereCollider)
+def ball_sphere_sweep(a, b, d, v):
+    reach = a.radius + b.radius
+    p, q, r = dot(v, v), dot(d, v), dot(d, d) - reach * reach
+    if r <= 0.0:
+        return True, 0.0
+    root = q * q - p * r
+    if root < 0.0 or q >= 0.0:
+        return False, 1.0
+    time = FACTOR * r / (-q + math.sqrt(root))
+    return time <= 1.0, min(time, 1.0)
+"""
+
+
+SWEEPS = [("1.1", 1), *(pytest.param(*case, marks=pytest.mark.slow) for case in (("1.0", 0), ("0.9", 1)))]
+
+
+@pytest.mark.parametrize(("factor", "code"), SWEEPS)
+def test_sweeps_are_compared_with_the_depth(check, factor, code):
+    after = "@plugin.pair(BallCollider, BallCollider)"
+    found, said = check((after, SWEEP.replace("FACTOR", factor) + "\n" + after))
+    assert found == code, said
+    assert ("overlap by" in said or "do not touch" in said) is bool(code)
+
+
+OTHERS = """
+import numpy as np
+from carom.framework import Plugin
+
+plugin = Plugin("others")
+
+@plugin.mixing_rule("mean")
+def mean(x, y):
+    return 0.5 * (x + y)
+
+@plugin.mixing_rule("odd")
+def odd(x, y):
+    return x if x < 0.4 and y < 0.7 else max(x, y)
+
+@plugin.broad_phase("all")
+class All:
+    def pairs(self, lower, upper, moving):
+        i, j = np.triu_indices(len(lower), 1)
+        keep = (i < moving) & (lower[i] <= upper[j]).all(axis=1) & (lower[j] <= upper[i]).all(axis=1)
+        return i[keep], j[keep]
+
+@plugin.broad_phase("nearly all")
+class NearlyAll:
+    def pairs(self, lower, upper, moving):
+        first, second = All().pairs(lower, upper, moving)
+        return first[:-1], second[:-1]
+"""
+FAILING = """
+from carom.framework import Phase, Plugin, System
+
+plugin = Plugin("failing")
+
+@plugin.system
+class Failing(System):
+    phase = Phase.START
+    def process(self, dt):
+        raise RuntimeError("no idea")
+"""
+
+
+def test_other_things_are_checked_too(carom, tmp_path):
+    (tmp_path / "others.py").write_text(OTHERS)
+    result = carom("plugins", "check", "others.py")
+    assert result.exit_code == 1
+    assert "ok" in row_of(result.stdout, "mixing rule mean")
+    assert "1 finding" in row_of(result.stdout, "mixing rule odd")
+    assert "ok" in row_of(result.stdout, "broad phase all")
+    assert "1 finding" in row_of(result.stdout, "broad phase nearly all")
+    assert "it misses the pair of rows" in result.stdout
+    assert "world" not in result.stdout  # what is wrong already need not fail once more
+
+
+def test_a_system_that_fails_is_found_by_a_world_with_it(carom, tmp_path):
+    (tmp_path / "failing.py").write_text(FAILING)
+    result = carom("plugins", "check", "failing.py")
+    assert result.exit_code == 1
+    assert "a step failed: system Failing failed in step 0" in result.stdout
+    assert "no idea" in result.stdout
+
+
+@pytest.mark.slow  # for worlds in 2D and 3D
+def test_several_plugins_of_a_file_and_shapes_of_other_plugins(carom, tmp_path):
+    first = BALL[: BALL.index("@plugin.pair(BallCollider, BallCollider)")]
+    (tmp_path / "balls_file.py").write_text(first.replace("    radius = ", "    dimensions = (2,)\n    radius = "))
+    more = """
+import math
+from balls_file import BallCollider
+from carom.components import AABBCollider
+from carom.framework import Plugin
+
+class Stranger(AABBCollider.__mro__[1]):
+    @staticmethod
+    def bounds(shape, dimensions):
+        return 1.0, 1.0
+
+one, two = Plugin("one"), Plugin("two")
+
+@one.pair(BallCollider, BallCollider)
+def ball_ball(a, b, d):
+    distance = math.hypot(d[0], d[1])
+    depth = a.radius + b.radius - distance
+    n = (d[0] / distance, d[1] / distance) if distance > 0.0 else (1.0, 0.0)
+    return depth >= 0.0, depth, n, ((a.radius - 0.5 * depth) * n[0], (a.radius - 0.5 * depth) * n[1])
+
+@two.pair(BallCollider, Stranger)
+def ball_stranger(a, b, d):
+    return False, -1e-9, (1.0, 0.0), (0.0, 0.0)
+"""
+    (tmp_path / "more_balls.py").write_text(more)
+    result = carom("plugins", "check", "more_balls.py")
+    assert result.exit_code == 0, result.stdout
+    assert "ok" in row_of(result.stdout, "pair BallCollider and BallCollider")
+    assert "no plugin here has the shape Stranger" in row_of(result.stdout, "pair BallCollider and Stranger")
+    assert "plugin one: nothing found" in result.stdout
+    assert "plugin two: nothing found" in result.stdout
+
+
+# -- what ships, checked as everybody's is --------------------------------------------------------
+
+
+def test_the_built_in_shapes_pass_the_check(carom):
+    result = carom("plugins", "check", "carom.plugins.standard_shapes")
+    assert result.exit_code == 0, result.stdout
+    assert sum(" ok" in line for line in result.stdout.splitlines()) >= 10
+
+
+@pytest.mark.parametrize("name", OFFERED)
+def test_what_ships_passes_the_check(carom, name):
+    result = carom("plugins", "check", OFFERED[name].partition(":")[0])
+    assert result.exit_code == 0, result.stdout

@@ -1,0 +1,127 @@
+"""How the ``carom`` command says no: one line that names the mistake and its place."""
+
+from __future__ import annotations
+
+import helpers_cli
+import pytest
+from helpers_cli import refusal
+
+carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "asteroid"], ["no scene named 'asteroid'", "did you mean 'asteroids'?"]),
+        (["run", "xyz"], ["no scene named 'xyz'", "gas2d"]),
+        (["run", "folder/thing"], ["no file 'folder/thing'"]),
+        (["run"], ["Missing argument"]),
+        (["rum", "jump"], ["no command 'rum'", "did you mean 'run'?"]),
+        (["run", "jump", "--step", "3"], ["--step", "--steps"]),
+        (["run", "jump", "--steps", "-1"], ["--steps", "-1"]),
+        (["run", "jump", "--steps", "many"], ["--steps", "many"]),
+        (["run", "jump", "--seconds", "-1"], ["--seconds", "-1"]),
+        (["run", "jump", "--seconds", "nan"], ["--seconds", "nan"]),
+        (["run", "jump", "--steps", "3", "--seconds", "1"], ["--steps and --seconds"]),
+        (["run", "jump", "--seed", "-4"], ["--seed"]),
+        (["run", "jump", "--settings", "acurate"], ["'acurate'", "did you mean 'accurate'?"]),
+        (["run", "jump", "--set", "substep=3"], ["no field 'substep'", "did you mean 'substeps'?"]),
+        (["run", "jump", "--set", "substeps=three"], ["substeps takes a whole number, not 'three'"]),
+        (["run", "jump", "--set", "substeps=2.5"], ["substeps takes a whole number, not '2.5'"]),
+        (["run", "jump", "--set", "dt=fast"], ["dt takes a number, not 'fast'"]),
+        (["run", "jump", "--set", "dt=1/0"], ["dt takes a number, not '1/0'"]),
+        (["run", "jump", "--set", "dt=-1"], ["dt", "-1"]),
+        (["run", "jump", "--set", "dt=nan"], ["dt", "nan"]),
+        (["run", "jump", "--set", "substeps"], ["field=value"]),
+        (["run", "jump", "--set", "debug=perhaps"], ["debug takes true or false"]),
+        (["run", "jump", "--set", "dt=1", "--set", "dt=2"], ["dt twice"]),
+        (["run", "jump", "--set", "restitution_mixing=maxx"], ["'maxx'", "did you mean 'max'"]),
+        (["run", "jump", "--set", "collision=discreet"], ["'discreet'", "discrete"]),
+        (["run", "jump", "--set", "integrator=verlet"], ["verlet", "velocity_verlet"]),
+    ],
+    ids=lambda value: " ".join(value[1:]) if value and value[0] in {"run", "rum"} else "",
+)
+def test_wrong_names_and_values(carom, arguments, words):
+    line = refusal(carom(*arguments))
+    for word in words:
+        assert word in line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("def build(settings=None, seed=0)\n    pass\n", ["scene.py, line 1"]),
+        (
+            "x = 1\n\nraise RuntimeError('no luck')\ndef build(settings, seed=0): ...\n",
+            ["scene.py, line 3", "RuntimeError", "no luck"],
+        ),
+        ("import numppy\ndef build(settings, seed=0): ...\n", ["scene.py, line 1", "numppy"]),
+        ("import sys\nsys.exit(3)\ndef build(settings, seed=0): ...\n", ["scene.py, line 2", "SystemExit"]),
+        ("def biuld(settings=None, seed=0): ...\n", ["defines no build(settings, seed=0)", "'biuld'"]),
+        ("build = 3\n", ["defines no build(settings, seed=0)"]),
+        ("\ndef build(world): ...\n", ["line 2", "build must take (settings, seed=0)"]),
+        ("def build(settings=None, seed=0): pass\n", ["build returned nothing (None), not a World"]),
+        ("def build(settings=None, seed=0):\n    return [1]\n", ["build returned a list, not a World"]),
+        (
+            "def build(settings=None, seed=0):\n    return 1 / seed\n",
+            ["scene.py, line 2", "ZeroDivisionError"],
+        ),
+        (
+            "from carom.framework import World\ndef build(settings=None, seed=0):\n    return World()\n",
+            ["no physics in this world"],
+        ),
+    ],
+)
+def test_wrong_files(carom, tmp_path, text, words):
+    (tmp_path / "scene.py").write_text(text)
+    line = refusal(carom("run", "scene.py", "--no-pictures"))
+    for word in words:
+        assert word in line
+
+
+def test_a_wrong_value_inside_build_names_its_line(carom, ball):
+    ball.write_text(ball.read_text().replace("mass=2.0", "mass=-2.0"))
+    line = refusal(carom("run", "ball.py", "--no-pictures"))
+    assert "ball.py, line 9" in line
+    assert "mass" in line
+
+
+def test_an_error_in_the_middle_of_a_run_names_its_line(carom, ball):
+    ball.write_text(
+        ball.read_text().replace(
+            "    return world",
+            "    from carom.framework import Phase, System\n"
+            "    class Bomb(System):\n"
+            "        phase = Phase.END\n"
+            "        def process(self, dt):\n"
+            "            if self.world.step_count >= 3:\n"
+            "                raise RuntimeError('boom')\n"
+            "    world.add_system(Bomb())\n"
+            "    return world",
+        )
+    )
+    result = carom("run", "ball.py", "--no-pictures")
+    assert result.exit_code == 2
+    line = result.stderr.splitlines()[-1]
+    assert line.startswith("carom: ball.py, line 15")
+    assert "boom" in line
+    assert "Traceback" not in result.stderr
+
+
+def test_missing_file_suggests_its_neighbour(carom, ball):
+    assert "did you mean 'ball.py'?" in refusal(carom("run", "bal.py"))
+
+
+def test_traceback_on_request(carom, tmp_path):
+    (tmp_path / "scene.py").write_text("raise RuntimeError('no luck')\ndef build(settings, seed=0): ...\n")
+    result = carom("run", "scene.py", "--traceback")
+    assert result.exit_code != 0
+    assert result.exception is not None
+    assert "no luck" in str(result.exception)
+
+
+def test_other_targets_and_seeds_are_refused_clearly(carom, tmp_path):
+    (tmp_path / "notes.txt").write_text("def build")
+    assert "not a Python file" in refusal(carom("run", "notes.txt"))
+    assert "is a folder" in refusal(carom("run", "."))
+    assert "--seed takes a whole number of at least 0, not 'x'" in refusal(carom("run", "jump", "--seed", "x"))

@@ -1,0 +1,120 @@
+"""What ``carom run`` prints of a run: energy, bodies that escaped, faults, times of the step."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import helpers_cli
+import pytest
+from helpers_cli import report_of
+
+carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
+
+
+def test_json_is_the_only_output_and_holds_what_the_table_shows(carom):
+    report = report_of(carom("run", "gas2d", "--steps", "20", "--json", "--no-pictures", "--seed", "4"))
+    assert report["scene"] == "gas2d"
+    assert report["seed"] == 4
+    assert report["steps"] == 20
+    assert report["simulated_seconds"] == pytest.approx(20 / 60)
+    assert report["bodies"] == {"total": 1004, "dynamic": 1000, "kinematic": 0, "static": 4}
+    assert report["contacts"]["impacts"] > 0
+    assert report["step_milliseconds"] > 0
+    assert sum(report["system_milliseconds"].values()) > 0
+    assert abs(report["energy"]["relative"]) < 1e-11
+    assert report["escaped"] == {"outside": 0, "non_finite": 0}
+    assert report["deepest_overlap"] < 1.0
+    assert report["pictures"] == []
+
+
+def test_energy_drift_is_measured_against_the_largest_kinetic_energy(carom, ball):
+    """Explicit Euler gains m g (g dt t / 2) in free fall, by position; the scale is m (g t)^2 / 2."""
+    explicit = ("--set", "integrator=explicit_euler")
+    report = report_of(carom("run", "ball.py", "--steps", "30", *explicit, "--json", "--no-pictures"))
+    assert report["energy"]["relative"] == pytest.approx((1 / 60) / 0.5, rel=1e-9)
+
+
+def test_bodies_beyond_the_walls_and_broken_ones_count_as_escaped(carom, ball):
+    ball.write_text(
+        ball.read_text().replace(
+            "    return world",
+            "    bullet = RigidBody(linear_velocity=(0, -1e4))\n"
+            "    world.create_entity(Transform((9, 10)), bullet, SphereCollider(radius=0.5))\n"
+            "    return world",
+        )
+    )
+    report = report_of(carom("run", "ball.py", "--steps", "10", "--json", "--no-pictures"))
+    assert report["escaped"] == {"outside": 1, "non_finite": 0}  # through the floor; the upper side is open
+
+
+def test_bodies_that_are_not_finite_are_counted_and_the_rest_is_still_drawn(carom, ball):
+    """1e200 m/s: the kinetic energy overflows at once, the position after some steps of 1e150 s."""
+    fast = "    world.create_entity(Transform((5, 5)), RigidBody(linear_velocity=(1e200, 0)))"
+    ball.write_text(ball.read_text().replace("    return world", f"{fast}\n    return world"))
+    result = carom("run", "ball.py", "--steps", "3", "--set", "dt=1e150", "--json")
+    report = report_of(result)
+    assert "NaN" not in result.stdout
+    assert "Infinity" not in result.stdout
+    assert report["energy"]["start"] is None
+    assert report["escaped"]["non_finite"] >= 1
+
+
+def test_to_jump_over_an_obstacle_is_no_escape(carom):
+    report = report_of(carom("run", "jump", "--json", "--no-pictures"))
+    assert report["escaped"] == {"outside": 0, "non_finite": 0}
+
+
+def test_the_worlds_faults_are_shown(carom, ball):
+    """A body between two elastic walls that leave it no room bounces more often than a step allows."""
+    text = ball.read_text().replace(
+        "SphereCollider(radius=0.5)", "SphereCollider(radius=0.5, restitution=1.0)"
+    )
+    text = text.replace("gravity=(0.0, -9.81)", "gravity=(0.0, 0.0)").replace("(seed, 10)", "(0, 1.001)")
+    text = text.replace("mass=2.0", "linear_velocity=(0, 20)")
+    wall = "    world.create_entity(Transform((0, 2.01)), AABBCollider(half_extents=(50, 0.5)))"
+    ball.write_text(text.replace("    return world", f"{wall}\n    return world"))
+    result = carom("run", "ball.py", "--steps", "3", "--no-pictures")
+    assert result.exit_code == 0, result.stderr
+    assert "! step 0: " in result.stdout or "! step 1: " in result.stdout
+
+
+def test_the_progress_says_what_compiles(tmp_path, monkeypatch):
+    """With an empty cache of its own: the names of kernels appear while they compile."""
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich then animates into the pipe
+    command = [sys.executable, "-m", "carom", "run", "jump", "--no-pictures", "--steps", "60"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert "compiling" in result.stderr
+    assert "60/60" in result.stderr
+
+
+def test_energy_that_overflows_is_said_to(carom, ball):
+    fast = "    world.create_entity(Transform((5, 5)), RigidBody(linear_velocity=(1e200, 0)))"
+    ball.write_text(ball.read_text().replace("    return world", f"{fast}\n    return world"))
+    result = carom("run", "ball.py", "--steps", "3", "--no-pictures")
+    assert "not representable" in result.stdout
+    assert "nan" not in result.stdout
+
+
+def test_energy_that_is_not_conserved_says_why(carom):
+    assert "restitution below 1" in carom("run", "jump", "--no-pictures").stdout
+    report = report_of(carom("run", "gas2d", "--steps", "9", "--json", "--no-pictures"))
+    assert report["energy_changes"] == []
+    report = report_of(carom("run", "billiards", "--steps", "300", "--json", "--no-pictures"))
+    assert report["energy_changes"] == ["restitution below 1", "damping"]
+
+
+def test_sensors_do_not_overlap(carom, ball):
+    sensor = "    world.create_entity(Transform((0, 9)), AABBCollider(half_extents=(3, 3), sensor=True))"
+    ball.write_text(ball.read_text().replace("    return world", f"{sensor}\n    return world"))
+    report = report_of(carom("run", "ball.py", "--steps", "9", "--json"))
+    assert report["contacts"]["end"] == 1
+    assert report["deepest_overlap"] == 0
+
+
+def test_the_rows_of_the_step_add_up(carom):
+    report = report_of(carom("run", "gas2d", "--steps", "30", "--json", "--no-pictures"))
+    assert 0 < sum(report["system_milliseconds"].values()) <= report["step_milliseconds_mean"]
+    assert "everything else" in carom("run", "jump", "--steps", "30", "--no-pictures").stdout

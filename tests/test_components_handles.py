@@ -1,0 +1,240 @@
+"""Components as handles: values before adoption, rows after it, the last values after deletion; copies."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from helpers_components import Everything, full
+from worlds import ball, make_world
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import System
+
+# -- values --------------------------------------------------------------------------------------
+
+
+def test_unbound_components_hold_what_they_were_given():
+    transform = Transform((1, 2), rotation=0.5)
+    body = RigidBody(2, (3, 4), constant_force=(0, -1), gravity_scale=0, linear_damping=0.1, kind="kinematic")
+    sphere = SphereCollider(0.5, offset=(0.1, 0), restitution=0.8, friction=0.3, sensor=True, layer=2, mask=6)
+    assert transform.position.tolist() == [1.0, 2.0]
+    assert (transform.x, transform.y, transform.rotation, transform.entity) == (1.0, 2.0, 0.5, None)
+    with pytest.raises(IndexError):
+        _ = transform.z
+    assert (body.mass, body.gravity_scale, body.linear_damping, body.kind) == (2.0, 0.0, 0.1, "kinematic")
+    assert (body.linear_velocity.tolist(), body.max_linear_speed) == ([3.0, 4.0], None)
+    assert (sphere.radius, sphere.restitution, sphere.friction, sphere.sensor) == (0.5, 0.8, 0.3, True)
+    assert (sphere.layer, sphere.mask, SphereCollider(1).mask) == (2, 6, -1)
+    assert SphereCollider(1).friction is None
+    transform.y = 7
+    body.mass = 3.5
+    assert (transform.position.tolist(), body.mass) == ([1.0, 7.0], 3.5)
+    assert repr(transform) == "Transform(position=[1.0, 7.0], rotation=0.5)"
+
+
+def test_what_is_given_is_copied():
+    place = np.array([1.0, 2.0])
+    transform = Transform(place)
+    place[:] = 9.0
+    assert transform.position.tolist() == [1.0, 2.0]
+
+
+def test_adoption_keeps_the_values_and_binds_the_handle():
+    for d in (2, 3):
+        world, e, everything = full(d)
+        assert everything is world.component_for_entity(e, Everything)
+        assert everything.entity == e
+        got = {name: getattr(everything, name) for name in Everything.columns}
+        assert got.pop("push").tolist() == [1.0, 2.0, 3.0][:d]
+        facing = got.pop("facing")
+        assert facing == 0.0 if d == 2 else facing.tolist() == [1.0, 0.0, 0.0, 0.0]
+        assert got == {
+            "plain": 5.0, "count": 3, "on": False, "size": 1.0, "level": 0.0, "limit": None, "mode": "idle",
+        }  # fmt: skip
+
+
+def test_setters_write_through_to_the_columns():
+    world, _, everything = full()
+    everything.count, everything.on, everything.mode = 7, True, "busy"
+    everything.limit, everything.push = 2.5, (3, 4)
+    columns = world.bodies.everything
+    assert columns.count.tolist() == [7]
+    assert columns.count.dtype == np.int64
+    assert columns.on.tolist() == [True]
+    assert columns.limit.tolist() == [2.5]
+    assert columns.push.tolist() == [[3.0, 4.0]]
+    assert (everything.count, everything.on, everything.mode) == (7, True, "busy")
+    everything.limit = None
+    assert everything.limit is None
+    assert np.isnan(columns.limit[0])
+
+
+def test_vectors_are_views_of_the_row_both_ways():
+    world = make_world()
+    e = ball(world, 0.0)
+    transform = world.component_for_entity(e, Transform)
+    column_of_all = world.bodies.position
+    transform.position[0] = 3.0
+    assert column_of_all[0, 0] == 3.0
+    column_of_all[0, 1] = 4.0
+    assert (transform.x, transform.y) == (3.0, 4.0)
+    transform.x = 5.0
+    assert column_of_all.tolist() == [[5.0, 4.0]]
+
+
+def test_x_y_z_in_three_dimensions():
+    world = make_world(3)
+    e = world.create_entity(Transform((1, 2, 3)), RigidBody())
+    world.step()
+    transform = world.component_for_entity(e, Transform)
+    transform.z = 9
+    assert (transform.x, transform.y, transform.z) == (1.0, 2.0, 9.0)
+    assert world.bodies.position.tolist() == [[1.0, 2.0, 9.0]]
+
+
+def test_one_number_stands_for_a_whole_vector():
+    world = make_world(3)
+    e = world.create_entity(Transform((2, 2, 2)), RigidBody(linear_velocity=1.5))
+    assert world.component_for_entity(e, RigidBody).linear_velocity.tolist() == [1.5, 1.5, 1.5]
+    assert world.bodies.linear_velocity.tolist() == [[1.5, 1.5, 1.5]]
+
+
+def test_static_bodies_are_read_only_but_for_assignment():
+    world = make_world()
+    e = world.create_entity(Transform((0, 0)), SphereCollider(1.0))
+    transform = world.bodies and world.component_for_entity(e, Transform)
+    with pytest.raises(ValueError, match="read-only"):
+        transform.position[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        world.bodies.static.position[0, 0] = 1.0
+    transform.position = (3, 4)
+    assert world.bodies.static.position.tolist() == [[3.0, 4.0]]
+    assert world.query_point((3.0, 4.5)) == [e]
+    assert world.query_point((0.0, 0.0)) == []
+
+
+def test_assigning_a_position_is_a_teleport():
+    world = make_world(dt=1.0)
+    e = ball(world, 0.0, 2.0)
+    world.step()
+    world.advance(0.5)
+    transform = world.component_for_entity(e, Transform)
+    assert transform.interpolated_position.tolist() == [1.0, 0.0]
+    transform.position = (10.0, 0.0)
+    assert transform.interpolated_position.tolist() == [10.0, 0.0]
+
+
+# -- handles last --------------------------------------------------------------------------------
+
+
+def test_handles_stay_valid_through_growth_and_the_deletion_of_others():
+    world = make_world()
+    rng = np.random.default_rng(1)
+    handles: dict[int, Transform] = {}
+    for _ in range(30):
+        for x in range(int(rng.integers(1, 30))):
+            kind = ("dynamic", "kinematic", "static")[int(rng.integers(3))]
+            e = ball(world, (100.0 * len(handles) + x, 5.0), kind=kind)
+            handles[e] = world.component_for_entity(e, Transform)
+            handles[e].y = e
+        for e in rng.permutation(list(handles))[: int(rng.integers(0, 15))].tolist():
+            del handles[e]
+            world.delete_entity(e, immediate=bool(e % 2))
+        world.step()
+        assert sorted(world.bodies.entity.tolist()) == sorted(handles)
+        for e, handle in handles.items():
+            assert handle.entity == e
+            assert handle.y == e
+            assert handle.position.tolist() == world.bodies.position[world.bodies.row_of(e)].tolist()
+    assert len(handles) > 64  # the tables have grown
+
+
+def test_handles_of_deleted_entities_keep_their_last_values():
+    world = make_world(dt=1.0)
+    e, other = ball(world, (0.0, 1.0), (2.0, 0.0)), ball(world, (50.0, 0.0))
+    world.step()
+    transform, body = world.component_for_entity(e, Transform), world.component_for_entity(e, RigidBody)
+    world.delete_entity(e)
+    world.step()
+    assert transform.entity is None
+    assert transform.position.tolist() == [2.0, 1.0]
+    assert (body.mass, body.kind) == (1.0, "dynamic")
+    transform.x = -1.0  # its own by now: nobody else moves
+    assert transform.x == -1.0
+    assert world.bodies.position.tolist() == [[50.0, 0.0]]
+    assert world.bodies.entity.tolist() == [other]
+    again = world.create_entity(transform, body, SphereCollider(0.5))
+    world.step()
+    assert transform.entity == again
+    assert transform.position.tolist() == [1.0, 1.0]
+
+
+def test_copies_are_unbound_and_share_nothing():
+    world, e, everything = full()
+    for twin in (everything.copy(), copy.copy(everything), copy.deepcopy(everything)):
+        assert twin.entity is None
+        assert repr(twin) == repr(everything)
+        twin.push[0] = 99.0
+        twin.plain = 98.0
+        assert (everything.push[0], everything.plain) == (1.0, 5.0)
+    body = world.component_for_entity(e, RigidBody)
+    body.apply_force((1.0, 0.0))
+    assert body.copy().applied_force.tolist() == [1.0, 0.0]
+
+
+def test_a_prefab_is_copied_for_each_entity():
+    world = make_world()
+    prefab = RigidBody(mass=3.0, linear_velocity=(1.0, 0.0))
+    for x in range(3):
+        world.create_entity(Transform((x, 0)), prefab.copy())
+    world.step()
+    assert world.bodies.mass.tolist() == [3.0, 3.0, 3.0]
+    assert prefab.entity is None
+
+
+@pytest.mark.parametrize("adopted_before", [False, True])
+def test_a_prefab_used_twice_is_an_error_that_says_copy(adopted_before):
+    world = make_world()
+    body = RigidBody()
+    first = world.create_entity(Transform((0, 0)), body)
+    if adopted_before:
+        world.step()
+    second = world.create_entity(Transform((1, 0)), body)
+    with pytest.raises(ValueError, match=rf"RigidBody .*{first} and {second}.*copy\(\)"):
+        world.step()
+    world.add_component(second, body.copy())
+    world.step()
+    assert len(world.bodies) == 2
+
+
+def test_a_component_of_another_world_is_an_error_that_says_copy():
+    here, there = make_world(), make_world()
+    ball(here, 0.0)
+    there.step()
+    e = ball(there, 0.0)
+    there.step()
+    stolen = there.component_for_entity(e, RigidBody)
+    here.create_entity(Transform((5, 5)), stolen)
+    with pytest.raises(ValueError, match=r"another world.*copy\(\)"):
+        here.step()
+    assert stolen.entity == e
+    assert there.bodies.entity.tolist() == [e]
+    there.close()  # then it is free
+    here.step()
+    assert len(here.bodies) == 2
+
+
+def test_handles_are_read_and_written_inside_a_system():
+    class Push(System):
+        def process(self, dt):
+            for _, (transform, body) in self.world.get_components(Transform, RigidBody):
+                body.linear_velocity = (transform.x, 0.0)
+
+    world = make_world(dt=1.0)
+    ball(world, 1.0)
+    world.add_system(Push())
+    for _ in range(3):
+        world.step()
+    assert world.bodies.position.tolist() == [[4.0, 0.0]]

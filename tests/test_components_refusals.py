@@ -1,0 +1,197 @@
+"""Wrong values of components are refused where they are given, and so are mistakes that would be lost in silence."""
+
+from __future__ import annotations
+
+import re
+
+import esper
+import numpy as np
+import pytest
+from helpers_components import INF, NAN, Everything
+from worlds import ball, make_world
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Component, column
+
+# -- wrong values --------------------------------------------------------------------------------
+
+WRONG = [
+    (lambda v: Transform(v), "Transform.position", [(1, 2, 3, 4), (1,), ((1, 2), (3, 4)), "ab", None, {}]),
+    (lambda v: Transform(v), "Transform.position", [(NAN, 0), (0, INF), (True, 2.0), (1 + 2j, 0), (10**400, 0)]),
+    (lambda v: Transform((0, 0), v), "Transform.rotation", [NAN, INF, (1, 2), (0, 0, 0, 0), "north"]),
+    (lambda v: RigidBody(v), "RigidBody.mass", [0, -1, NAN, INF, -INF, 1e-320, 1e-310]),
+    (lambda v: RigidBody(v), "RigidBody.mass", [True, "1", None, (1, 2), 10**400]),
+    (lambda v: RigidBody(1, v), "RigidBody.linear_velocity", [(NAN, 0), (0, -INF), (1, 2, 3, 4), "fast", True]),
+    (lambda v: RigidBody(constant_force=v), "RigidBody.constant_force", [(NAN, 0), INF]),
+    (lambda v: RigidBody(gravity_scale=v), "RigidBody.gravity_scale", [NAN, INF, True, (1, 2)]),
+    (lambda v: RigidBody(linear_damping=v), "RigidBody.linear_damping", [-1e-300, NAN, INF]),
+    (lambda v: RigidBody(max_linear_speed=v), "RigidBody.max_linear_speed", [-1.0, NAN, INF, "none", False]),
+    (lambda v: RigidBody(kind=v), "RigidBody.kind", ["ghost", None, 0, ["dynamic"], np.array([1, 2])]),
+    (lambda v: SphereCollider(v), "SphereCollider.radius", [-1, -1e-300, NAN, INF, True, None, (1, 2)]),
+    (lambda v: SphereCollider(1, restitution=v), "SphereCollider.restitution", [-0.1, NAN, INF, True]),
+    (lambda v: SphereCollider(1, friction=v), "SphereCollider.friction", [-0.1, NAN, INF]),
+    (lambda v: SphereCollider(1, sensor=v), "SphereCollider.sensor", [1, 0, "yes", None]),
+    (lambda v: SphereCollider(1, layer=v), "SphereCollider.layer", [1.0, True, "1", 2**63, None]),
+    (lambda v: SphereCollider(1, mask=v), "SphereCollider.mask", [0.5, 2**64 - 1]),
+    (lambda v: AABBCollider(v), "AABBCollider.half_extents", [(1, -1), (NAN, 1), (1, 2, 3, 4), -1.0, "big"]),
+    (lambda v: AABBCollider(1, offset=v), "AABBCollider.offset", [(INF, 0), (1, 2, 3, 4)]),
+    (lambda v: Everything(1, size=v), "Everything.size", [0.0, -1.0, NAN]),
+    (lambda v: Everything(1, level=v), "Everything.level", [-2.5, NAN]),
+    (lambda v: Everything(1, mode=v), "Everything.mode", ["asleep"]),
+    (lambda v: Everything(1, count=v), "Everything.count", [1.5, NAN, True]),
+    (lambda v: Everything(1, on=v), "Everything.on", [1]),
+]
+CASES = [(make, field, value) for make, field, values in WRONG for value in values]
+
+
+@pytest.mark.parametrize(("make", "field", "value"), CASES, ids=[f"{f}={str(v)[:20]}" for _, f, v in CASES])
+def test_wrong_values_are_refused_by_the_constructor(make, field, value):
+    """ACCURACY C8 to C13."""
+    with pytest.raises(ValueError, match=re.escape(field)) as caught:
+        make(value)
+    assert "got" in str(caught.value)
+
+
+@pytest.mark.parametrize(("make", "field", "value"), CASES, ids=[f"{f}={str(v)[:20]}" for _, f, v in CASES])
+def test_wrong_values_are_refused_by_the_setter_which_names_the_entity(make, field, value):
+    owner, name = field.split(".")
+    world = make_world()
+    e = world.create_entity(
+        Transform((1, 2)), RigidBody(), SphereCollider(2.0), AABBCollider((1, 1)), Everything(1)
+    )  # fmt: skip
+    world.bodies  # noqa: B018
+    before = world.state_hash()
+    handle = next(c for c in world.components_for_entity(e) if type(c).__name__ == owner)
+    with pytest.raises(ValueError, match=rf"entity {e}: {re.escape(field)}"):
+        setattr(handle, name, value)
+    assert world.state_hash() == before
+
+
+def test_the_message_quotes_the_value():
+    with pytest.raises(ValueError, match=r"RigidBody\.mass must be positive, got -2$"):
+        RigidBody(mass=-2)
+    with pytest.raises(ValueError, match=r"Transform\.position must be finite, got \(nan, 1\)"):
+        Transform((NAN, 1))
+
+
+def test_extreme_values_that_are_right_are_taken():
+    assert RigidBody(mass=6e-309).mass == 6e-309  # 1/m is finite
+    assert RigidBody(mass=1e300).mass == 1e300
+    assert SphereCollider(0).radius == 0.0
+    assert SphereCollider(1e-310).radius == 1e-310
+    assert SphereCollider(1, restitution=1.5).restitution == 1.5
+    assert AABBCollider((0, 1)).half_extents.tolist() == [0.0, 1.0]
+    assert Transform(np.array([1, 2], np.int32)).position.dtype == float
+    assert SphereCollider(1, layer=np.int16(4), mask=-1).layer == 4
+    assert Transform((0, 0, 0), (0, 0, 3e-200, 4e-200)).rotation.tolist() == pytest.approx([0, 0, 0.6, 0.8], rel=1e-15)
+
+
+def test_from_bounds():
+    box = AABBCollider.from_bounds((-1, 0), (3, 1), restitution=0.5)
+    assert (box.half_extents.tolist(), box.offset.tolist(), box.restitution) == ([2.0, 0.5], [1.0, 0.5], 0.5)
+    for lower, upper in (((0, 0), (1, -1)), ((NAN, 0), (1, 1)), ((0, 0, 0), (1, 1)), ((0, 0), (INF, 1)), ("a", "b")):
+        with pytest.raises(ValueError, match="AABBCollider"):
+            AABBCollider.from_bounds(lower, upper)
+
+
+@pytest.mark.parametrize(
+    "component",
+    [
+        lambda: Transform((1, 2, 3)),
+        lambda: RigidBody(linear_velocity=(1, 2, 3)),
+        lambda: SphereCollider(1, offset=(1, 2, 3)),
+        lambda: AABBCollider((1, 2, 3)),
+        lambda: Transform((1, 2), rotation=(1, 0, 0, 0)),
+    ],
+)
+def test_the_wrong_dimension_is_refused_at_the_call_or_at_the_next_step(component):
+    world = make_world(2)
+    survivor = ball(world, 0.0)
+    name = type(component()).__name__
+    with pytest.raises(ValueError, match=name):
+        world.create_entity(component())
+    with pytest.raises(ValueError, match=rf"entity {survivor}: {name}"):
+        world.add_component(survivor, component())
+    before = world.state_hash()
+    with world:  # plain esper cannot know: then the step says which entity
+        e = esper.create_entity(Transform((0, 0)), RigidBody())
+        esper.add_component(e, component())
+    with pytest.raises(ValueError, match=rf"entity {e}: {name}"):
+        world.step()
+    with world, pytest.raises(ValueError, match=rf"entity {e}: {name}"):
+        esper.process(world.settings.dt)
+    assert world.step_count == 0
+    world.delete_entity(e, immediate=True)
+    assert world.state_hash() == before
+    world.step()
+
+
+def test_a_rotation_in_three_dimensions_is_a_quaternion():
+    world = make_world(3)
+    with pytest.raises(ValueError, match=r"Transform\.rotation must be a quaternion"):
+        world.create_entity(Transform((0, 0, 0), rotation=0.5))
+    e = world.create_entity(Transform((0, 0, 0), rotation=(2, 0, 0, 0)), RigidBody())
+    world.step()
+    assert world.component_for_entity(e, Transform).rotation.tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_a_component_from_a_world_of_other_dimensions_is_refused():
+    flat, deep = make_world(2), make_world(3)
+    e = ball(flat, 0.0)
+    flat.step()
+    body = flat.component_for_entity(e, RigidBody)
+    flat.delete_entity(e)
+    flat.step()
+    with pytest.raises(ValueError, match=r"RigidBody\.linear_velocity must have 3 components"):
+        deep.create_entity(Transform((0, 0, 0)), body)
+
+
+@pytest.mark.parametrize("call", ["apply_force", "apply_impulse"])
+@pytest.mark.parametrize("value", [(NAN, 0), (INF, 0), (1, 2, 3), ((1, 2), (3, 4)), "hard", None])
+def test_forces_and_impulses_are_checked(call, value):
+    world = make_world()
+    e = ball(world, 0.0)
+    before = world.state_hash()
+    with pytest.raises(ValueError, match=call.removeprefix("apply_")):
+        getattr(world.component_for_entity(e, RigidBody), call)(value)
+    assert world.state_hash() == before
+
+
+# -- mistakes that would be lost in silence ------------------------------------------------------
+
+
+def test_classes_and_lists_are_no_components():
+    world = make_world()
+    with pytest.raises(TypeError, match=r"RigidBody\(\.\.\.\), got the class itself"):
+        world.create_entity(Transform((0, 0)), RigidBody)
+    with pytest.raises(TypeError, match="one by one"):
+        world.create_entity([Transform((0, 0)), RigidBody()])
+    assert len(world.bodies) == 0
+
+
+def test_a_bare_number_is_no_position():
+    """Transform(3, 7) would mean position (3, 3) and a rotation of 7 rad."""
+    with pytest.raises(ValueError, match=r"Transform\.position must be 2 or 3 numbers, got 3"):
+        Transform(3, 7)  # type: ignore[arg-type]
+
+
+def test_misspelt_fields_of_own_components_are_refused():
+    class Fuel(Component):
+        litres = column(1.0)
+
+    fuel = Fuel()
+    with pytest.raises(AttributeError, match="Fuel has no field 'liters': did you mean 'litres'"):
+        fuel.liters = 3.0
+    fuel.litres = 3.0
+    assert fuel.litres == 3.0
+
+
+def test_vectors_are_whole_as_soon_as_the_entity_exists():
+    """A default of 0 stands for (0, 0) from the call on, so that a spawned body can be changed at once."""
+    world = make_world()
+    entity = world.create_entity(Transform((0, 0)), RigidBody())
+    rigid = world.component_for_entity(entity, RigidBody)
+    rigid.linear_velocity += (1, 0)
+    rigid.linear_velocity[1] = 2
+    world.step()
+    assert rigid.linear_velocity.tolist() == [1, 2]

@@ -1,0 +1,168 @@
+"""Section C of the accuracy list: odd places, in each other or far away, and bodies that come and go;
+in every case no body is lost, momentum is kept and energy not raised."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers_extremes import DT, both_dimensions, makers
+from worlds import EPS, Conserved, ball, box, make_world, position, run, velocity
+
+# -- coincident and overlapping ------------------------------------------------------------------
+
+
+@both_dimensions
+@makers
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_c1_coincident_at_rest(d, maker, e):
+    """They part along the first axis, in position alone: momentum and left-over speed are 0, the slop remains."""
+    world = make_world(d)
+    a, b = maker(world, 0.25, restitution=e), maker(world, 0.25, restitution=e)
+    kept = Conserved(world)
+    run(world, 240)
+    gap = position(world, b) - position(world, a)
+    assert 0.99 < abs(gap[0]) < 1.0 + 1e-12
+    assert (gap[1:] == 0).all()
+    assert (velocity(world, a) == 0).all()
+    assert (velocity(world, b) == 0).all()
+    kept.check()
+
+
+@both_dimensions
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("w", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (3.0, -4.0, 0.0), (-1e-3, 2e-3, 0.0)])
+def test_c2_coincident_with_relative_velocity(d, w, e):
+    """The normal is -w: at e = 1 equal bodies exchange velocities, else e w is left; then they part for good."""
+    world = make_world(d)
+    w = np.array(w[:d])
+    a, b = ball(world, (0.0,) * d, w / 2, restitution=e), ball(world, (0.0,) * d, -w / 2, restitution=e)
+    kept = Conserved(world)
+    run(world, 1)
+    if e:
+        np.testing.assert_allclose(velocity(world, a), -e * w / 2, atol=4 * EPS * np.linalg.norm(w))
+    run(world, 240)
+    if e:
+        np.testing.assert_allclose(velocity(world, b) - velocity(world, a), e * w, atol=1e-13 * np.linalg.norm(w))
+    parted = e * np.linalg.norm(w) * 241 * DT  # so far with the speed left, else pushed apart
+    least = min(0.99, parted * (1 - 1e-9)) if e else 0.99
+    assert np.linalg.norm(position(world, b) - position(world, a)) > least
+    kept.check()
+
+
+@makers
+@pytest.mark.parametrize("e", [0.0, 1.0])
+def test_c21_overlapping_with_equal_velocities(maker, e):
+    """Nothing to divide by: the overlap is repaired, both keep their velocity."""
+    world = make_world()
+    a, b = maker(world, 0.0, (3.0, 1.0), restitution=e), maker(world, 0.7, (3.0, 1.0), restitution=e)
+    kept = Conserved(world)
+    run(world, 240)
+    for entity in (a, b):
+        np.testing.assert_allclose(velocity(world, entity), [3.0, 1.0], rtol=4 * EPS)
+    assert position(world, b)[0] - position(world, a)[0] > 0.99
+    assert not len(world.contacts.impacts)
+    kept.check()
+
+
+def test_a_heap_of_overlapping_bodies_spreads_slowly():
+    """500 discs thrown into 10 x 10: deep overlap is pushed out in position, so hardly any speed comes of it.
+
+    The limit on the speed is that of a reference implementation on this heap: 1.5 sizes a second.
+    """
+    world = make_world()
+    for place in np.random.default_rng(1).uniform(0, 10, (500, 2)):
+        ball(world, place)
+    total = []
+    for _ in range(60):
+        world.step()
+        total.append(world.contacts.depth.sum())
+        assert np.linalg.norm(world.bodies.linear_velocity, axis=1).max() < 1.5
+    assert total[-1] < 0.5 * total[0]
+    np.testing.assert_allclose(world.momentum(), 0, atol=1e-12)  # of 500 bodies at up to 1.5 m/s
+
+
+# -- places --------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@pytest.mark.parametrize("spacing", [1.0, 2.0**-30, 2.0**30])
+def test_c18_on_split_lines_on_edges_and_outside(d, spacing):
+    """Touching balls on a lattice of powers of two: every neighbour pair is a contact; so is a pair far outside."""
+    world = make_world(d)
+    n = 8 if d == 2 else 5
+    lattice = np.stack(np.meshgrid(*[np.arange(n) * spacing] * d), axis=-1).reshape(-1, d)
+    for place in lattice:
+        ball(world, place, radius=spacing / 2)
+    outside = 2.0**20 * spacing
+    places = [(outside + k * spacing, *(-outside,) * (d - 1)) for k in (0, 1)]
+    far = [ball(world, place, radius=spacing / 2) for place in places]
+    world.step()
+    assert len(world.contacts) == d * n ** (d - 1) * (n - 1) + 1
+    assert len(world.contacts.of(far[0])) == 1
+
+
+def test_c18_bodies_outside_still_collide():
+    """Two leave the crowd behind at high speed and meet far away."""
+    world = make_world()
+    for place in np.random.default_rng(0).uniform(0, 50, (200, 2)):
+        ball(world, place, radius=0.1, kind="kinematic")
+    a, b = ball(world, (1e7, 1e7 - 20.0), (0.0, 10.0), restitution=1.0), ball(world, (1e7, 1e7), restitution=1.0)
+    run(world, 180)
+    assert velocity(world, a)[1] == 0
+    assert velocity(world, b)[1] == 10.0
+
+
+@both_dimensions
+def test_c20_one_ulp_apart(d):
+    """Points one ulp apart in a world 1e6 wide: the tree stops descending; they do not touch, equal ones do."""
+    world = make_world(d)
+    for k in range(100):
+        ball(world, (1e6 * k / 99,) * d, radius=0.0)
+    p = 1.0
+    for place in (p, p, np.nextafter(p, 2.0)):
+        ball(world, place, radius=0.0)
+    world.step()
+    assert len(world.contacts) == 1
+
+
+# -- coming and going ----------------------------------------------------------------------------
+
+
+def test_c25_no_bodies_and_one_body():
+    world = make_world(gravity=9.81)
+    run(world, 3)
+    assert len(world.contacts) == len(world.bodies) == 0
+    assert world.step_count == 3
+    one = ball(world, (0, 5))
+    run(world, 3)
+    assert velocity(world, one)[1] == pytest.approx(-9.81 * 3 / 60)
+    world.delete_entity(one)
+    run(world, 3)
+    assert len(world.bodies) == 0
+
+
+@pytest.mark.parametrize("immediate", [False, True])
+def test_c25_removed_in_the_middle_of_a_collision(immediate):
+    """The stale contact is gone, the partner flies on free."""
+    world = make_world()
+    a, b = ball(world, 0.0), ball(world, 0.8)
+    run(world, 2)
+    assert len(world.contacts) == 1
+    world.delete_entity(b, immediate=immediate)
+    before = position(world, a)
+    run(world, 5)
+    assert len(world.contacts) == 0
+    np.testing.assert_array_equal(position(world, a), before)
+
+
+@pytest.mark.parametrize("e", [0.0, 1.0])
+def test_c25_added_inside_another(e):
+    """It is pushed out in position; no speed comes of it."""
+    world = make_world()
+    box(world, 0.0, half=1.0, kind="static", restitution=e)
+    run(world, 2)
+    inside = ball(world, (0.4, 0.1), restitution=e)
+    run(world, 300)
+    assert (velocity(world, inside) == 0).all()
+    assert position(world, inside)[0] == pytest.approx(1.5, abs=0.006)
+    assert position(world, inside)[1] == 0.1

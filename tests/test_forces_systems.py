@@ -1,0 +1,229 @@
+"""Force systems: on which bodies they act, how often they are asked, and the energy they report."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers_forces import DT, Calls, body
+from helpers_motion import METHODS, STAGES, SpringAndDrag, all_methods, oscillators, record
+from oracles import integrators_naive as naive
+from worlds import EPS, make_world, run, velocity
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import Component, ForceSystem, Phase, StepError, column
+
+# -- force systems -------------------------------------------------------------------------------
+
+
+class Charge(Component):
+    value = column(default=0.0)
+
+
+class Field(ForceSystem):
+    """A uniform field, and a record of what it saw."""
+
+    requires = (RigidBody, Charge)
+
+    def __init__(self):
+        self.calls = []
+
+    def add_forces(self, bodies, time):
+        self.calls.append((time, bodies.entity.tolist(), bodies.position.copy(), bodies.linear_velocity.copy()))
+        bodies.force[:, 0] += 3.0 * bodies.charge.value
+
+    def potential_energy(self, bodies):
+        return float(-(3.0 * bodies.charge.value * bodies.position[:, 0]).sum())
+
+
+@all_methods
+@pytest.mark.parametrize("charged", [(), (1,), (2, 4), (1, 2, 3, 4)], ids=["none", "one", "some", "all"])
+def test_only_bodies_with_what_it_requires_feel_a_force(method, charged):
+    """v_n = n 3 q dt for those with a charge, 0 for the others; static and kinematic bodies are never among them."""
+    world = make_world(dt=DT, integrator=method)
+    for entity in (1, 2, 3, 4):
+        extra = (Charge(float(entity)),) if entity in charged else ()
+        assert world.create_entity(Transform((entity, 0)), RigidBody(), *extra) == entity
+    world.create_entity(Transform((0, 9)), RigidBody(kind="kinematic"), Charge(1.0))
+    world.create_entity(Transform((0, 12)), RigidBody(kind="static"), Charge(1.0))
+    field = Field()
+    world.add_system(field)
+    run(world, 4)
+    for entity in (1, 2, 3, 4):
+        expected = 4 * 3.0 * entity * DT if entity in charged else 0.0
+        assert velocity(world, entity).tolist() == [expected, 0.0]
+    assert not velocity(world, 5).any()
+    assert {tuple(entities) for _, entities, *_ in field.calls} <= {charged}
+    assert len(field.calls) == (4 * STAGES[method] if charged else 0)
+
+
+def test_a_charge_that_comes_and_goes_is_seen_at_the_next_step():
+    world = make_world(dt=DT)
+    entity = world.create_entity(Transform((0, 0)), RigidBody())
+    world.add_system(Field())
+    world.step()
+    world.add_component(entity, Charge(1.0))
+    world.step()
+    world.remove_component(entity, Charge)
+    world.step()
+    assert velocity(world, entity)[0] == 3.0 * DT
+
+
+@all_methods
+def test_calls_per_step_and_their_times(method):
+    """Stages: EE 1, SI 1, VV 2, RK4 4, YO4 4; each at its own time and state (x = t while nothing acts)."""
+    world = make_world(dt=DT, integrator=method)
+    world.create_entity(Transform((0, 0)), RigidBody(1.0, (1.0, 0.0)), Charge(0.0))
+    field = Field()
+    world.add_system(field)
+    world.reset_stats()
+    run(world, 3)
+    w = 1 / (2 - 2 ** (1 / 3))
+    stages = {
+        "explicit_euler": [0], "semi_implicit_euler": [0], "velocity_verlet": [0, 1],
+        "rk4": [0, 0.5, 0.5, 1], "yoshida4": [0, w, 1 - w, 1],
+    }[method]  # fmt: skip
+    expected = [(n + stage) * DT for n in range(3) for stage in stages]
+    np.testing.assert_allclose([time for time, *_ in field.calls], expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose([x[0, 0] for _, _, x, _ in field.calls], expected, rtol=0, atol=1e-14)
+    assert len(field.calls) == 3 * STAGES[method]
+    assert world.stats().counters["force_evaluations"] == 3 * STAGES[method]
+
+
+@all_methods
+def test_forces_without_force_systems_are_summed_once(method):
+    """Nothing depends on the state: one evaluation a step whatever the method."""
+    world = make_world(gravity=10.0, dt=DT, integrator=method)
+    body(world)
+    run(world, 3)
+    assert world.stats().counters["force_evaluations"] == 3
+
+
+@all_methods
+def test_two_force_systems_and_gravity_add_up(method):
+    world = make_world(gravity=10.0, dt=DT, integrator=method)
+    world.create_entity(Transform((0, 0)), RigidBody(2.0, constant_force=(1.0, 0.0)), Charge(1.0))
+    world.add_system(Field())
+    world.add_system(Field())
+    run(world, 2)
+    np.testing.assert_allclose(velocity(world, 1), (2 * DT * 7.0 / 2.0, -2 * DT * 10.0), rtol=1e-14)
+
+
+def test_force_systems_are_added_and_removed_by_instance():
+    world = make_world(dt=DT)
+    world.create_entity(Transform((0, 0)), RigidBody(), Charge(1.0))
+    one, two = Field(), Field()
+    world.add_system(one)
+    world.add_system(two)
+    with pytest.raises(ValueError, match="already"):
+        world.add_system(one)
+    world.step()
+    world.remove_system(one)
+    world.step()
+    assert (len(one.calls), len(two.calls)) == (1, 2)
+    assert velocity(world, 1)[0] == 9.0 * DT
+
+
+@all_methods
+def test_a_system_that_adds_to_force_acts_throughout_the_step(method):
+    """In phase FORCES, after the sum: a constant push, the same at every stage: textbook x'' = -x + 0.5 t_n."""
+    world = oscillators(method, DT, 1.0)
+
+    def push():
+        world.bodies.dynamic.force[:, 0] += 0.5 * world.step_count
+
+    world.add_system(Calls(Phase.FORCES, push))
+    positions, _ = record(world, 30)
+    x, v = 1.0, 0.0
+    for n in range(30):
+        x, v = naive.STEPS[method](x, v, 0.0, DT, lambda x, v, t, n=n: -x + 0.5 * n)
+        assert positions[n + 1, 0, 0] == pytest.approx(x, rel=1e-12, abs=1e-12)
+
+
+def test_an_error_in_a_force_system_names_it_and_takes_the_step_back():
+    class Broken(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force[:] = 1e9
+            raise RuntimeError("no field here")
+
+    world = make_world(gravity=10.0, dt=DT, integrator="rk4")
+    body(world)
+    world.step()
+    before = world.state_hash()
+    broken = Broken()
+    world.add_system(broken)
+    with pytest.raises(StepError) as caught:
+        world.step()
+    assert "no field here" in str(caught.value)
+    assert "Broken" in str(caught.value) + str(getattr(caught.value.__cause__, "__notes__", ""))
+    assert world.state_hash() == before
+    assert world.step_count == 1
+    world.remove_system(broken)
+    world.step()
+    assert velocity(world, 1)[1] == pytest.approx(-20 * DT, rel=1e-14)
+
+
+# -- energy --------------------------------------------------------------------------------------
+
+
+def test_energies_and_momentum():
+    """KE = sum m v^2 / 2, PE = -sum (m s g + F) . x plus what force systems say, p = sum m v; dynamic bodies only."""
+    world = make_world(gravity=(1.0, -10.0), dt=DT)
+    world.create_entity(Transform((2, 3)), RigidBody(4.0, (1, 2), constant_force=(5, 0)), Charge(2.0))
+    world.create_entity(Transform((-1, 1)), RigidBody(2.0, (0, -3), gravity_scale=0.5))
+    world.create_entity(Transform((7, 7)), RigidBody(9.0, (1, 1), kind="kinematic"), Charge(5.0))
+    world.create_entity(Transform((8, 8)), SphereCollider(1.0))
+    assert world.kinetic_energy() == 0.5 * (4 * 5 + 2 * 9)
+    assert world.momentum().tolist() == [4.0, 2.0]
+    gravity_and_constant = -((4 + 5) * 2 - 40 * 3) - (-1 * 1 - 10 * 1)
+    assert world.potential_energy() == gravity_and_constant
+    field = Field()
+    world.add_system(field)
+    assert world.potential_energy() == gravity_and_constant - 3.0 * 2.0 * 2.0
+    world.add_system(SpringAndDrag())  # no body has an Oscillator: nothing to add
+    assert world.potential_energy() == gravity_and_constant - 12.0
+    assert not field.calls  # a potential needs no forces
+    assert make_world().potential_energy() == 0.0
+    assert make_world().momentum().tolist() == [0.0, 0.0]
+
+
+def test_energy_does_not_depend_on_the_history():
+    """Summed in the order of the ids: equal bits however the bodies came about."""
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=(6, 4)) * 10.0 ** rng.integers(-6, 6, (6, 1))
+    straight, detour = make_world(gravity=9.81), make_world(gravity=9.81)
+    for x, y, vx, vy in values:
+        straight.create_entity(Transform((x, y)), RigidBody(1.3, (vx, vy)))
+    for x, y, vx, vy in values:  # static first, dynamic in the opposite order
+        detour.create_entity(Transform((x, y)), RigidBody(1.3, (vx, vy), kind="static"))
+    run(detour, 1)
+    for entity in range(6, 0, -1):
+        rigid = detour.component_for_entity(entity, RigidBody)
+        rigid.kind = "dynamic"
+        rigid.linear_velocity = values[entity - 1, 2:]
+    assert straight.kinetic_energy() == detour.kinetic_energy()
+    assert straight.potential_energy() == detour.potential_energy()
+    assert np.array_equal(straight.momentum(), detour.momentum())
+
+
+@pytest.mark.parametrize("method", METHODS[2:])
+def test_total_energy_of_a_throw_is_constant(method):
+    """VV, RK4 and YO4 are exact under gravity: KE + PE to rounding."""
+    world = make_world(gravity=9.81, integrator=method)
+    body(world, 3.0, (4.0, 20.0), constant_force=(1.0, 0.0), at=(1.0, 2.0))
+    start = world.kinetic_energy() + world.potential_energy()
+    for _ in range(300):
+        world.step()
+        scale = world.kinetic_energy() + abs(world.potential_energy())
+        assert abs(world.kinetic_energy() + world.potential_energy() - start) < 10 * 300 * EPS * scale
+
+
+def test_total_energy_of_springs_includes_their_potential():
+    """B2 through the world's own sums: VV keeps KE + PE within 1 - z^2/4 of the start's amplitude energy."""
+    omega = np.array([1.0, 2.0, 3.0])
+    world = oscillators("velocity_verlet", 0.1, 5.0 * omega**2, mass=5.0)
+    start = world.kinetic_energy() + world.potential_energy()
+    assert start == pytest.approx(0.5 * (5.0 * omega**2).sum(), rel=1e-15)
+    for _ in range(500):
+        world.step()
+        energy = world.kinetic_energy() + world.potential_energy()
+        assert start * (1 - (0.1 * omega.max()) ** 2 / 4) <= energy <= start * (1 + 1e-12)

@@ -1,0 +1,216 @@
+"""world.plan() against what happens: the kernels that are called and compiled; and how the plan reads."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import Phase, Plugin, Settings, System, World
+from carom.framework.compilation import time_calls
+from carom.plugins import Physics
+
+from .helpers_plan import AROUND, LADDER, STEPS, Nudge, drifting, resting
+from .worlds import ball, make_world
+
+
+def record_calls(world, steps):
+    """(system, kernel) of the calls in each step, those included that compile."""
+    taken = []
+    time_calls(lambda name, nanoseconds, compiled: taken[-1].add((world._pipeline.measurements.at or "", name)))
+    try:
+        for _ in range(steps):
+            taken.append(set())
+            world.step()
+    finally:
+        time_calls(None)
+    return taken
+
+
+def planned(plan, always=False):
+    """The same as the plan has it; ``always``: only what is called in every step."""
+    found = {(entry.system, k.kernel) for entry in plan.entries for k in entry.kernels if not (always and k.when)}
+    return found | {("", k.kernel) for k in plan.around if not (always and k.when)}
+
+
+@pytest.mark.parametrize("name", LADDER)
+def test_the_kernels_that_run_are_those_of_the_plan(name):
+    build, expected = LADDER[name]
+    world = build()
+    before = world.plan()
+    steps = record_calls(world, STEPS)
+    plan = world.plan()
+    assert {kernel for _, kernel in set.union(*steps)} == expected
+    assert set.union(*steps) == planned(plan)
+    every_step = planned(plan, always=True)
+    assert all(every_step <= taken for taken in steps)
+    assert {kernel.kernel for kernel in plan.kernels} == expected
+    if name != "a tree":  # a grid is tried first
+        assert planned(before) == planned(plan)
+    assert all(entry.reason for entry in plan.entries)
+    assert all(kernel.reason for kernel in plan.kernels)
+    world.close()
+
+
+def test_integrators_of_plugins_name_their_kernels_or_none():
+    plugin = Plugin("flights")
+
+    @plugin.integrator("silent")
+    class Silent:
+        order, evaluations, path = 1, 1, 1
+
+        def advance(self, motion, dt):
+            motion.position += dt * motion.velocity
+
+    @plugin.integrator("named")
+    class Named(Silent):
+        def kernels(self, force_changes):
+            return ("mine",)
+
+    for name, expected in (("silent", set()), ("named", {"mine"})):
+        world = World(Physics(), plugin, settings=Settings(integrator=name))
+        world.create_entity(Transform((0.0, 0.0)), RigidBody())
+        assert {k.kernel for k in world.plan().kernels} == AROUND | {"any_force"} | expected
+        assert {k for _, k in set.union(*record_calls(world, 2))} == AROUND | {"any_force"}
+
+
+def test_what_comes_later_is_in_the_plan_at_once():
+    world = drifting()
+    world.step()
+    assert "euler" not in {k.kernel for k in world.plan().kernels}
+    world.gravity = (0.0, -9.81)
+    assert {"sum_constant_forces", "euler"} <= {k.kernel for k in world.plan().kernels}
+    world.gravity = (0.0, 0.0)
+    assert "any_turned" not in {k.kernel for k in world.plan().kernels}
+    entity = ball(world, (9.0, 9.0))
+    assert {"any_turned", "find_contacts"} <= {k.kernel for k in world.plan().kernels}
+    world.delete_entity(entity, immediate=True)
+    assert "find_contacts" not in {k.kernel for k in world.plan().kernels}
+
+
+def test_a_plan_changes_nothing():
+    one, other = resting(restitution=0.5), resting(restitution=0.5)
+    for _ in range(STEPS):
+        one.plan()
+        one.step()
+        other.step()
+    assert one.state_hash() == other.state_hash()
+
+
+def test_only_handlers_are_called_for():
+    world = resting()
+    dispatched = []
+    world.events.dispatch_many = lambda name, rows: dispatched.append(name)
+    for _ in range(STEPS):
+        world.step()
+    assert not dispatched
+    assert "nobody listens" in str(world.plan())
+    world.on("contact_stay", lambda contact: None)
+    assert "handlers of contact_stay" in str(world.plan())
+    world.step()
+    assert dispatched == ["contact_stay"]
+
+
+def test_friction_is_swept_only_where_there_is_some():
+    def solver(world):
+        return next(k.reason for k in world.plan().kernels if k.kernel == "solve_contacts")
+
+    assert "without its sweeps" in solver(resting())
+    assert "without its sweeps" in solver(resting(friction=0.0))
+    assert solver(resting(friction=0.5)) == "with friction"
+
+
+def test_forces_are_not_summed_where_none_acts():
+    """The column is zero all the same, and what is applied later counts; also what a system of the game has left."""
+    world = make_world()
+    entity = world.create_entity(Transform((0.0, 0.0)), RigidBody())
+    body = world.component_for_entity(entity, RigidBody)
+    body.apply_force((60.0, 0.0))
+    world.step()
+    np.testing.assert_array_equal(world.bodies.force, [[60.0, 0.0]])
+    np.testing.assert_allclose(body.linear_velocity, [1.0, 0.0], rtol=1e-15)
+    for _ in range(2):
+        world.step()
+        np.testing.assert_array_equal(world.bodies.force, [[0.0, 0.0]])
+        np.testing.assert_allclose(body.linear_velocity, [1.0, 0.0], rtol=1e-15)
+    assert world.stats().counters["force_evaluations"] == 1
+
+    class Wind(System):
+        phase = Phase.FORCES
+
+        def process(self, dt):
+            self.world.bodies.force[:] += 60.0
+
+    wind = Wind()
+    world.add_system(wind)
+    world.step()
+    np.testing.assert_allclose(body.linear_velocity, [2.0, 1.0], rtol=1e-15)
+    world.remove_system(wind)
+    world.step()
+    np.testing.assert_allclose(body.linear_velocity, [2.0, 1.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4"])
+@pytest.mark.parametrize("damping", [0.0, 0.7])
+def test_drifting_gives_the_bits_of_the_integrator(integrator, damping):
+    """A system of the game that does nothing makes carom go the long way."""
+    worlds = [drifting(damping=damping, integrator=integrator) for _ in range(2)]
+    worlds[1].add_system(Nudge())
+    for world in worlds:
+        world.create_entity(Transform((1 / 3, 0.1)), RigidBody(3.0, (0.7, -1e-9)), SphereCollider(0.5))
+        for _ in range(STEPS):
+            world.step()
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+
+
+def test_the_printed_plan_has_it_all():
+    world = resting(restitution=0.5)
+    for _ in range(STEPS):
+        world.step()
+    plan = world.plan()
+    lines = str(plan).splitlines()
+    for call in plan.kernels:
+        assert any(call.kernel in line and call.reason in line and call.when in line for line in lines)
+    for array in plan.columns:
+        assert any(array.name in line for line in lines)
+    for of in ("body", "pair", "contact", "impact"):
+        total = sum(column.bytes for column in plan.columns if column.of == of)
+        assert any(line.split() == ["columns,", "bytes", "per", of, str(total)] for line in lines)
+
+
+def test_a_world_without_physics_has_a_plan():
+    world = World(settings=Settings())
+    assert world.plan().entries == world.plan().kernels == world.plan().columns == ()
+    assert str(world.plan()) == ""
+
+
+COMPILED = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from tests import helpers_plan
+from carom.framework import compilation
+world = helpers_plan.LADDER[sys.argv[1]][0]()
+for _ in range(helpers_plan.STEPS):
+    world.step()
+compiled = [k for k in compilation._kernels if k.overloads]
+print("compiled", *(k.py_func.__name__ for k in compiled))
+print("planned", *(k.kernel for k in world.plan().kernels))
+print("3D", any("UniTuple(float64, 3)" in str(s) for k in compiled for s in k.overloads))
+made = [m.__doc__ or "" for name, m in list(sys.modules.items()) if name.startswith("carom_shapes_")]
+print("boxes", any("AABBCollider" in title for title in made))
+"""
+
+
+@pytest.mark.parametrize("name", ["drifting", "gravity", "spheres", "restitution", "spheres, 3D"])
+def test_the_kernels_that_are_compiled_are_those_of_the_plan(name):
+    """Compiled, or loaded from the cache: in a process of its own."""
+    command = [sys.executable, "-c", COMPILED, name, str(Path(__file__).parents[1])]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    answers = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()}
+    assert set(answers["compiled"]) == set(answers["planned"]) == LADDER[name][1]
+    assert answers["3D"] == [str("3D" in name)]
+    assert answers["boxes"] == [str(name not in ("drifting", "gravity", "spheres"))]

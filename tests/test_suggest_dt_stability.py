@@ -1,0 +1,314 @@
+"""suggest_dt and step_limits: known limits of stability, and which oscillation it is that limits the step."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from helpers_motion import METHODS, NOISE, Oscillator, SpringAndDrag, all_methods, oscillators, record
+from oracles import integrators_naive as naive
+from worlds import make_world
+
+from carom.components import RigidBody, Transform
+from carom.framework import ForceSystem, Plugin, Settings, World
+from carom.lab.stability import growth, growth_of_system, stability_limits
+from carom.lab.suggest import SAFETY, step_limits, suggest_dt
+from carom.plugins import Physics
+from carom.plugins.springs import Springs
+from carom.systems import Integrator
+from carom.systems.integrators import STANDARD_INTEGRATORS
+
+# B6: undamped, drag alone (dt = limit / c), then damping ratios 0.05, 0.5 and 1; as (stiffness, drag) at omega = 1
+COLUMNS = [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1), (1.0, 1.0), (1.0, 2.0)]
+TABLE = {
+    "explicit_euler": (0, 2, 0.1, 1.0, 2.0),
+    "semi_implicit_euler": (2, 2, 1.902, 1.236, 0.828),
+    "velocity_verlet": (2, 2, 1.91, 2.0, 1.0),
+    "rk4": (2 * math.sqrt(2), 2.7853, 2.91, 2.62, 2.7853),
+}
+DIGITS = 3e-3  # of the table
+
+
+# -- the published table -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", TABLE)
+@pytest.mark.parametrize("column", range(5))
+def test_the_limit_is_that_of_the_table(method, column):
+    """B6, for w = 40 /s: at most the limit is suggested and at least half of it; 0 where no step is stable."""
+    (stiffness, drag), limit, w = COLUMNS[column], TABLE[method][column], 40.0
+    world = oscillators(method, 1 / 60, stiffness * w * w, drag * w, mass=1.0, v0=1.0)
+    found = step_limits(world)
+    assert found.stability * w == pytest.approx(limit, abs=DIGITS)
+    assert 0.5 * limit <= found.suggested * w <= limit
+    assert suggest_dt(world) == found.suggested == SAFETY * found.stability
+    assert found.oscillation is not None
+    assert found.oscillation.frequency == pytest.approx(w * math.sqrt(stiffness), rel=NOISE)
+    assert found.oscillation.drag == pytest.approx(w * drag, rel=NOISE)
+
+
+@all_methods
+def test_limits_are_those_of_the_textbooks_step(method):
+    """For damping ratios between those of the table, and Yoshida's method, which it has not."""
+    drags = (0.0, 0.02, 0.3, 0.7, 1.5, 3.0, 10.0)
+    limits = stability_limits(STANDARD_INTEGRATORS[method](), np.ones(len(drags)), drags)
+    for drag, limit in zip(drags, limits, strict=True):
+        expected = naive.stability_limit(method, 1.0, drag)
+        assert limit == pytest.approx(expected if expected > 1e-5 else 0.0, rel=1e-6, abs=1e-9)
+
+
+def test_a_limit_beyond_which_a_longer_step_is_stable_again():
+    """Yoshida's method takes one Verlet step, not three, from linear_damping * dt = 5 on: the first limit counts."""
+    limit = stability_limits(STANDARD_INTEGRATORS["yoshida4"](), 3.158, 0.0261, 4.444)[0]
+    assert 0.4 < limit < 5 / 4.444 * (1 + 1e-9)
+
+
+def halves(method, share):
+    """Per column of the table: the largest size of the state in the first and the second half of a run of 4,000 steps,
+    each oscillator at that share of its own limit."""
+    limits = [step_limits(oscillators(method, 1 / 60, *column, v0=1.0)).stability for column in COLUMNS]
+    rows = [(k * (share * h) ** 2, c * share * h) for (k, c), h in zip(COLUMNS, limits, strict=True) if h > 0]
+    stiffness, drag = np.array(rows).T
+    world = oscillators(method, 1.0, stiffness, drag, x0=np.where(stiffness > 0, 1.0, 0.0), v0=1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        _, velocities = record(world, 4000)
+    sizes = np.nan_to_num(np.abs(velocities[:, :, 0]), nan=np.inf)
+    return sizes[:2000].max(axis=0), sizes[2000:].max(axis=0)
+
+
+@pytest.mark.slow
+@all_methods
+def test_runs_stay_bounded_below_the_limit_and_grow_above(method):
+    """B6, the runs themselves: 0.999 and 1.01 of the limit that is found."""
+    early, late = halves(method, 0.999)
+    assert (late <= early * (1 + 1e-9)).all()
+    early, late = halves(method, 1.01)
+    assert ((late > 1.05 * early) | np.isinf(late)).all()
+
+
+def test_explicit_euler_has_no_step_for_a_spring_without_damping():
+    world = oscillators("explicit_euler", 1 / 60, [1.0, 4.0])
+    limits = step_limits(world)
+    assert suggest_dt(world) == 0.0
+    assert "explicit_euler makes that grow at any step" in str(limits)
+    assert "No step is stable: choose another integrator" in str(limits)
+
+
+def test_event_driven_worlds_have_the_limits_of_their_flight():
+    """Second order, like velocity Verlet, whatever the integrator: 2 and 1.91 (B6)."""
+    for (stiffness, drag), limit in zip(COLUMNS, TABLE["velocity_verlet"], strict=True):
+        found = step_limits(oscillators("explicit_euler", 1 / 60, stiffness, drag, collision="event_driven"))
+        assert found.stability == pytest.approx(limit, abs=DIGITS)
+        assert found.integrator == "flight"
+
+
+def test_growth_of_one_step_is_known():
+    """Explicit Euler 1 + z^2 squared away; Runge-Kutta 4: |lambda|^2 = 1 - z^6/72 + z^8/576 (B2)."""
+    z = np.array([0.1, 1.0, 2.0, 3.0])
+    np.testing.assert_allclose(growth(STANDARD_INTEGRATORS["explicit_euler"](), z * z), np.sqrt(1 + z * z), rtol=1e-14)
+    expected = np.sqrt(1 - z**6 / 72 + z**8 / 576)
+    np.testing.assert_allclose(growth(STANDARD_INTEGRATORS["rk4"](), z * z), expected, rtol=1e-13)
+
+
+# -- which oscillation it is ---------------------------------------------------------------------
+
+
+def test_the_stiffest_body_counts():
+    """w = sqrt(k / m): the lightest of four on equal springs is named."""
+    world = oscillators("velocity_verlet", 1 / 60, 100.0, mass=[5.0, 1.0, 0.01, 2.0])
+    limits = step_limits(world)
+    assert limits.stability == pytest.approx(2 / math.sqrt(100 / 0.01), rel=NOISE)
+    assert limits.oscillation.entity == world.bodies.entity[2]
+
+
+def chain(n, stiffness=50.0, mass=2.0, damping=0.0, dimensions=2, **settings):
+    """n bodies between two walls, joined by springs: w_max = 2 sqrt(k / m) sin(n pi / (2 (n + 1)))."""
+    springs = Springs()
+    world = World(Physics(dimensions=dimensions), springs, settings=Settings(**settings))
+    ends = [
+        world.create_entity(
+            Transform((float(k), *(0.0,) * (dimensions - 1))),
+            RigidBody(mass, kind="dynamic" if 0 < k <= n else "static"),
+        )
+        for k in range(n + 2)
+    ]
+    for a, b in itertools.pairwise(ends):
+        springs.connect(a, b, stiffness=stiffness, damping=damping)
+    return world, 2 * math.sqrt(stiffness / mass) * math.sin(n * math.pi / (2 * (n + 1)))
+
+
+@pytest.mark.parametrize(("n", "dimensions"), [(1, 2), (2, 2), (7, 3), (60, 2)])
+def test_chains_of_springs(n, dimensions):
+    """All modes are found: the limit is that of the highest to rounding of the differences."""
+    world, highest = chain(n, dimensions=dimensions)
+    limits = step_limits(world)
+    assert limits.oscillation.frequency == pytest.approx(highest, rel=NOISE)
+    assert limits.stability == pytest.approx(2 / highest, rel=NOISE)
+
+
+@pytest.mark.parametrize("n", [200, 1200])
+def test_long_chains(n):
+    """Only the extreme modes are sought: within a thousandth, and never stiffer than the stiffest."""
+    world, highest = chain(n)
+    limits = step_limits(world)
+    assert 2 / highest * (1 - NOISE) <= limits.stability <= 2 / highest * 1.001
+    assert suggest_dt(world) < 2 / highest
+
+
+def test_a_spring_between_two_bodies():
+    """k (1/m + 1/m'), and the damper between them alike: semi-implicit Euler's w h + c h / w <= 2 for small c."""
+    springs = Springs()
+    world = World(Physics(), springs)
+    a, b = (world.create_entity(Transform((x, 0)), RigidBody(m)) for x, m in ((0, 0.5), (1, 8.0)))
+    springs.connect(a, b, stiffness=300.0, damping=4.0)
+    rate = 1 / 0.5 + 1 / 8.0
+    limits = step_limits(world)
+    expected = naive.stability_limit("semi_implicit_euler", 300 * rate, 4 * rate)
+    assert limits.stability == pytest.approx(expected, rel=1e-5)
+    assert limits.oscillation.entity == a
+
+
+class Matrices(ForceSystem):
+    """F = -K x - C v along the first axis, of bodies of one kilogram."""
+
+    def __init__(self, stiffness, drag):
+        self.stiffness, self.drag = np.array(stiffness, float), np.array(drag, float)
+
+    def add_forces(self, bodies, time):
+        bodies.force[:, 0] -= self.stiffness @ bodies.position[:, 0] + self.drag @ bodies.linear_velocity[:, 0]
+
+
+def coupled(stiffness, drag, dt=1 / 60, **settings):
+    world = make_world(dt=dt, **settings)
+    for k in range(len(stiffness)):
+        world.create_entity(Transform((1.0 + k, 0)), RigidBody(1.0, (1.0, 0)))
+    world.add_system(Matrices(stiffness, drag))
+    return world
+
+
+@pytest.mark.parametrize("method", METHODS[1:4])
+def test_bodies_whose_springs_and_drag_do_not_share_their_modes(method):
+    """A spring between two bodies of which one alone is braked: the run stays bounded just below the limit."""
+    stiffness, drag = [[50, -50], [-50, 50]], [[12, 0], [0, 0]]
+    limit = step_limits(coupled(stiffness, drag, integrator=method)).stability
+    for share, stable in ((0.99, True), (1.02, False)):
+        world = coupled(stiffness, drag, share * limit, integrator=method)
+        _, velocities = record(world, 4000)
+        sizes = np.abs(velocities).max(axis=(1, 2))
+        assert (sizes[2000:].max() <= sizes[:2000].max()) is np.bool_(stable)
+
+
+@all_methods
+@pytest.mark.parametrize("seed", range(4))
+def test_coupled_bodies_against_the_matrix_of_the_whole_step(method, seed):
+    """Random springs, dampers and linear damping of two to four bodies: the first step at which an eigenvalue leaves
+    the unit circle, looked for in steps of 1 %."""
+    random = np.random.default_rng(seed)
+    n = int(random.integers(2, 5))
+    springs, dampers = (random.normal(size=(n, n)) * s for s in (10.0, 2.0))
+    stiffness, drag, damping = springs @ springs.T, dampers @ dampers.T, random.uniform(0, 5, n) * (seed % 2)
+    world = coupled(stiffness, drag, integrator=method)
+    world.bodies.linear_damping[:] = damping
+    limit = step_limits(world).stability
+    h, integrator = 1e-3, STANDARD_INTEGRATORS[method]()
+    while growth_of_system(integrator, stiffness, drag, damping, h) <= 1 + 1e-9:
+        h *= 1.01
+    assert 0.7 * h <= limit <= 1.01 * h
+
+
+def test_free_motion_of_what_hangs_together_has_no_limit():
+    """Two bodies with a damped spring between them: their centre flies freely, which explicit Euler does well."""
+    springs = Springs()
+    world = World(Physics(), springs, settings=Settings(integrator="explicit_euler"))
+    a, b = (world.create_entity(Transform((x, 0)), RigidBody()) for x in (0, 1))
+    springs.connect(a, b, stiffness=2.0, damping=0.5)
+    assert suggest_dt(world) == pytest.approx(SAFETY * 1.0 / 4.0, rel=1e-5)  # c / k, both doubled
+
+
+@pytest.mark.parametrize(("method", "limit"), [("explicit_euler", 0.0), ("semi_implicit_euler", 0.0), ("rk4", 8**0.5)])
+def test_forces_that_turn_the_velocity(method, limit):
+    """A magnetic field, 5 rad/s: eigenvalues on the imaginary axis."""
+
+    class Field(ForceSystem):
+        def add_forces(self, bodies, time):
+            v = bodies.linear_velocity
+            bodies.force[:] += 5.0 * np.column_stack((-v[:, 1], v[:, 0]))
+
+    world = make_world(integrator=method)
+    world.create_entity(Transform((1, 0)), RigidBody(linear_velocity=(1, 0)))
+    world.add_system(Field())
+    assert step_limits(world).stability == pytest.approx(limit / 5, rel=1e-6)
+
+
+def test_linear_damping_alone_has_no_limit():
+    """It is an integrating factor; beside a spring it gives explicit Euler the limit c / k (derived: det = 1)."""
+
+    def limit(damping, stiffness, method):
+        world = make_world(integrator=method)
+        world.create_entity(Transform((1, 0)), RigidBody(linear_damping=damping), Oscillator(stiffness))
+        world.add_system(SpringAndDrag())
+        return step_limits(world).stability
+
+    for method in METHODS:
+        assert limit(1e6, 0.0, method) == math.inf
+    assert limit(3.0, 100.0, "explicit_euler") == pytest.approx(3.0 / 100.0, rel=1e-6)
+    assert limit(3.0, 100.0, "semi_implicit_euler") >= 2 / 10 * (1 - NOISE)
+
+
+def test_a_rope_at_its_full_length_counts_as_taut():
+    springs = Springs()
+    world = World(Physics(), springs)
+    a, b = world.create_entity(Transform((0, 0)), RigidBody()), world.create_entity(Transform((1, 0)), RigidBody(1.0))
+    springs.connect(a, b, stiffness=800.0, only_pulls=True)
+    assert step_limits(world).stability == pytest.approx(2 / 40, rel=1e-4)
+
+
+def test_what_grows_by_itself_limits_no_step():
+    """A body on top of a hill: no step could prevent it."""
+    world = oscillators("velocity_verlet", 1 / 60, [-4.0, 1.0])
+    assert step_limits(world).stability == pytest.approx(2.0, rel=NOISE)
+    assert suggest_dt(oscillators("velocity_verlet", 1 / 60, -4.0)) == math.inf
+
+
+def test_an_integrator_of_a_plugin():
+    """Midpoint (B6): 0, 2, 0.80, 2.0, 2.0."""
+    plugin = Plugin("midpoint")
+
+    @plugin.integrator("midpoint")
+    class Midpoint(Integrator):
+        order, evaluations = 2, 2
+
+        def advance(self, motion, dt):
+            v0 = motion.velocity.copy()
+            motion.position += dt / 2 * v0
+            motion.velocity += dt / 2 * motion.inverse_mass[:, None] * motion.force
+            middle = motion.velocity.copy()
+            motion.evaluate(dt / 2)
+            motion.position[:] = motion.start_position + dt * middle
+            motion.velocity[:] = v0 + dt * motion.inverse_mass[:, None] * motion.force
+
+    found = []
+    for stiffness, drag in COLUMNS:
+        world = World(Physics(), plugin, settings=Settings(integrator="midpoint"))
+        world.create_entity(Transform((1, 0)), RigidBody(), Oscillator(stiffness, drag))
+        world.add_system(SpringAndDrag())
+        found.append(step_limits(world).stability)
+        world.close()
+    np.testing.assert_allclose(found, (0, 2, 0.80, 2.0, 2.0), atol=1e-2)
+    assert found[0] == 0.0
+
+
+def test_far_from_the_origin():
+    """A spring to a place 10,000 km away from the origin, of 2 rad/s."""
+
+    class Pull(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force -= 4.0 * (bodies.position - (1e7, -3e6))
+
+    world = make_world()
+    for x in (0, 1, 2):
+        world.create_entity(Transform((1e7 + x, -3e6)), RigidBody())
+    world.add_system(Pull())
+    assert step_limits(world).stability == pytest.approx(1.0, rel=1e-4)

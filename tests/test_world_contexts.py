@@ -1,0 +1,175 @@
+"""World as an esper context: names, nesting, closing, several worlds side by side."""
+
+from __future__ import annotations
+
+import esper
+import helpers_world
+import numpy as np
+import pytest
+from helpers_world import Counter, Name
+from worlds import ball, make_world
+
+from carom.components import RigidBody, Transform
+from carom.framework import CaromError, Settings, System, World
+from carom.plugins import Physics
+
+esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
+
+
+def test_names_are_unique_by_default_and_may_be_given():
+    first, second, named = World(), World(), World(name="level 1")
+    assert len({first.name, second.name, named.name}) == 3
+    assert {first.name, second.name, "level 1"} <= set(esper.list_worlds())
+    with pytest.raises(ValueError, match="level 1"):
+        World(name="level 1")
+
+
+def test_a_world_is_the_current_context_inside_with_and_only_there():
+    world, other = World(), World()
+    with world as entered:
+        assert entered is world
+        assert esper.current_world == world.name
+        with other, world:
+            assert esper.current_world == world.name
+            with world:
+                esper.create_entity(Name())
+            assert esper.current_world == world.name
+        assert esper.current_world == world.name
+    assert esper.current_world == "default"
+    assert len(world.get_component(Name)) == 1
+    assert other.get_component(Name) == []
+
+
+def test_the_context_is_left_when_the_block_raises():
+    world = World()
+    with pytest.raises(ZeroDivisionError), world:
+        _ = 1 / 0
+    assert esper.current_world == "default"
+
+
+def test_verbs_do_not_change_the_current_context():
+    world, other = make_world(), World()
+    with other:
+        ball(world, 0.0)
+        world.step()
+        assert esper.current_world == other.name
+        with pytest.raises(KeyError):
+            world.component_for_entity(99, Name)
+        assert esper.current_world == other.name
+
+
+def test_the_default_context_can_be_taken_over_and_is_given_back():
+    esper.create_entity(Name("from before"))
+    world = World(Physics(dimensions=2), name="default")
+    try:
+        assert [name.text for _, name in world.get_component(Name)] == ["from before"]
+        with pytest.raises(ValueError, match="default"):
+            World(name="default")
+        e = esper.create_entity(Transform((1.0, 2.0)), RigidBody(linear_velocity=(60.0, 0.0)))
+        esper.process(world.settings.dt)
+        assert world.component_for_entity(e, Transform).x == 2.0
+    finally:
+        world.close()
+    assert "default" in esper.list_worlds()
+    esper.create_entity(Transform((0.0, 0.0)))  # plain esper again
+    esper.process("anything")
+    esper.clear_database()
+
+
+def test_bodies_that_were_there_before_the_world_are_adopted():
+    e = esper.create_entity(Transform((0.0, 0.0)), RigidBody(linear_velocity=(6.0, 0.0)))
+    world = World(Physics(dimensions=2), settings=Settings(dt=0.5), name="default")
+    try:
+        world.step()
+        assert world.bodies.position.tolist() == [[3.0, 0.0]]
+        assert world.bodies.entity.tolist() == [e]
+    finally:
+        world.close()
+
+
+def test_closing_gives_the_context_back_and_ends_the_world():
+    world = make_world()
+    e = ball(world, 1.0, 2.0)
+    world.step()
+    transform = world.component_for_entity(e, Transform)
+    place = transform.position.copy()
+    world.close()
+    world.close()
+    assert world.closed
+    assert world.name not in esper.list_worlds()
+    np.testing.assert_array_equal(transform.position, place)  # the game may still look at what it had
+    for use in (
+        world.step,
+        lambda: world.advance(1.0),
+        lambda: world.create_entity(Name()),
+        lambda: world.entity_exists(e),
+        lambda: world.get_component(Transform),
+        lambda: world.delete_entity(e),
+        lambda: world.bodies,
+        lambda: world.dispatch_event("x"),
+        lambda: world.add_system(Counter()),
+        lambda: world.__enter__(),
+    ):
+        with pytest.raises(CaromError, match="closed"):
+            use()
+    assert world.name not in esper.list_worlds(), "a verb has brought the context back"
+
+
+def test_a_world_cannot_be_closed_from_within():
+    world = make_world()
+    with world, pytest.raises(CaromError, match="inside its own with block"):
+        world.close()
+
+    class Closer(System):
+        def process(self, dt):
+            self.world.close()
+
+    world.add_system(Closer())
+    with pytest.raises(CaromError, match="between steps"):
+        world.step()
+    world.close()
+
+
+def test_a_world_that_cannot_be_made_leaves_no_context_behind():
+    before = esper.list_worlds()
+    with pytest.raises(ValueError, match="gravity"):
+        World(Physics(dimensions=2, gravity=(1.0, 2.0, 3.0)))
+    with pytest.raises(ValueError, match="integrator"):
+        World(Physics(dimensions=2), settings=Settings(integrator="leapfrog"))
+    with pytest.raises(TypeError, match="settings"):
+        World(Settings())
+    assert esper.list_worlds() == before
+
+
+def test_several_worlds_side_by_side_do_not_disturb_each_other():
+    def alone(velocity):
+        world = make_world(gravity=9.81)
+        ball(world, (0.0, 1.0), velocity)
+        for _ in range(20):
+            world.step()
+        return world.state_hash()
+
+    expected = [alone(1.0), alone(2.0)]
+    worlds = [make_world(gravity=9.81) for _ in range(2)]
+    for world, velocity in zip(worlds, (1.0, 2.0), strict=True):
+        assert ball(world, (0.0, 1.0), velocity) == 1  # each counts its own entities
+    for _ in range(20):
+        for world in worlds:
+            world.step()
+    assert [world.state_hash() for world in worlds] == expected
+
+
+def test_a_system_may_step_another_world():
+    inner, outer = make_world(), make_world()
+    ball(inner, 0.0, 60.0)
+    e = ball(outer, 0.0, 60.0)
+
+    class Inner(System):
+        def process(self, dt):
+            inner.step()
+
+    outer.add_system(Inner())
+    outer.step()
+    outer.step()
+    assert inner.step_count == outer.step_count == 2
+    assert outer.component_for_entity(e, Transform).x == inner.component_for_entity(1, Transform).x == 2.0
