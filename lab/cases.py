@@ -13,7 +13,7 @@ from typing import Any
 
 from . import grids
 from .closed_forms import FORMS
-from .norms import OF_KIND, norm_named
+from .norms import NORMS, OF_KIND, norm_named
 from .observing import Seen
 from .problems import Problem
 from .subjects import Subject, subject_of
@@ -161,7 +161,7 @@ def case_of(
     kind = facts.kind
     chosen = tuple(norms) or known.norms or OF_KIND[kind]
     ladder = _fitting(steps or known.steps or grids.steps_for(facts), duration)
-    form, reference = _closed_form(subject, duration, kind)
+    form, reference = _closed_form(subject, duration, kind, chosen)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
     times = repeats or known.repeats or _repeats(kind, chosen)
@@ -218,8 +218,9 @@ def _repeats(kind: str, norms: Sequence[str]) -> int:
     return max(PHASES[kind], PHASES[IMPACTS]) if "apex" in norms else PHASES[kind]
 
 
-def _closed_form(subject: Subject, seconds: float, kind: str) -> tuple[str, Seen | None]:
-    """The name of the closed form and what it gives; rest needs none, for its right answer is 0."""
+def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[str]) -> tuple[str, Seen | None]:
+    """The name of the closed form and what it gives, if it tells all the norms; rest needs none, for its right answer
+    is 0."""
     form = FORMS.get(subject.target)
     if form is None or (subject.target == "jump" and kind != SMOOTH):
         return "", None
@@ -228,7 +229,7 @@ def _closed_form(subject: Subject, seconds: float, kind: str) -> tuple[str, Seen
     world = subject.world(None)
     seen = form.function(world, seconds)
     world.close()
-    return form.text, seen
+    return (form.text, seen) if all(NORMS[name].tells(seen) for name in norms) else ("", None)
 
 
 def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:

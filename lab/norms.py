@@ -26,7 +26,8 @@ Measure = Callable[[Seen, Seen], float]
 class Norm:
     """``text`` says what it is and what it is relative to; ``scale`` gives that in the scene's units.
 
-    signed: a statistic, single runs of which are noise; absolute: in units of its own, relative to nothing.
+    signed: a statistic, single runs of which are noise; absolute: in units of its own, relative to nothing;
+    relative_to: what of ``Seen`` it is relative to, if it is 1 that is right.
     """
 
     name: str
@@ -35,6 +36,11 @@ class Norm:
     scale: Measure
     signed: bool = False
     absolute: bool = False
+    relative_to: str = ""
+
+    def tells(self, reference: Seen) -> bool:
+        """Whether runs can be compared by it: nothing is relative to 0."""
+        return not self.relative_to or getattr(reference, self.relative_to) != 0
 
 
 def _one(seen: Seen, reference: Seen) -> float:
@@ -76,18 +82,18 @@ def _impact_time(seen: Seen, reference: Seen) -> float:
     return float(np.abs(np.subtract(mine, right)).max(initial=0.0)) / reference.seconds
 
 
-def _relative(name: str) -> tuple[Measure, Measure]:
+def _relative(name: str, text: str, attribute: str = "", signed: bool = False) -> Norm:
+    """A quantity whose right value is 1; attribute: of ``Seen``, if it has another name."""
+    attribute = attribute or name
+
     def scale(seen: Seen, reference: Seen) -> float:
-        return abs(getattr(reference, name)) or abs(getattr(seen, name)) or 1.0
+        return abs(getattr(reference, attribute)) or abs(getattr(seen, attribute)) or 1.0
 
     def measure(seen: Seen, reference: Seen) -> float:
-        return (getattr(seen, name) - getattr(reference, name)) / scale(seen, reference)
+        error = (getattr(seen, attribute) - getattr(reference, attribute)) / scale(seen, reference)
+        return error if signed else abs(error)
 
-    return measure, scale
-
-
-def _absolute(name: str) -> Measure:
-    return lambda seen, reference: abs(_relative(name)[0](seen, reference))
+    return Norm(name, text, measure, scale, signed, relative_to=attribute)
 
 
 def _own(name: str) -> tuple[Measure, Measure]:
@@ -111,11 +117,10 @@ NORMS: Mapping[str, Norm] = {
             _energy,
             _energy_scale,
         ),
-        Norm("apex", "height of the highest point reached, at steps; 1 is the right height", _absolute("apex"),
-             _relative("apex")[1]),
+        _relative("apex", "height of the highest point reached, at steps; 1 is the right height"),
         Norm("impact_time", "largest error of an impact's time, a missing one being at the end; 1 is the whole run",
              _impact_time, lambda seen, reference: reference.seconds),
-        Norm("count", "number of impacts; 1 is the right number", _absolute("impacts"), _relative("impacts")[1]),
+        _relative("count", "number of impacts; 1 is the right number", "impacts"),
         Norm("energy_square", "mean square of the departure of the energy, in J²: not relative to anything",
              *_own("energy_square"), absolute=True),
         Norm("overlap", "deepest overlap in the second half, in sizes of the smaller body", *_own("overlap")),
@@ -124,11 +129,10 @@ NORMS: Mapping[str, Norm] = {
         Norm("speed", "largest speed in the end, in sizes of the smallest body per second", *_own("speed")),
         Norm("drift", "largest distance that a body gets in the second half, in sizes of the smallest body",
              *_own("drift")),
-        Norm("pressure", "mean force on all that stands still, after the first fifth; 1 is the right one",
-             *_relative("pressure"), signed=True),
-        Norm("rate", "impacts per second, after the first fifth; 1 is the right rate", *_relative("rate"),
-             signed=True),
-        Norm("kinetic", "kinetic energy in the end; 1 is the right one", *_relative("kinetic"), signed=True),
+        _relative("pressure", "mean force on all that stands still, after the first fifth; 1 is the right one",
+                  signed=True),
+        _relative("rate", "impacts per second, after the first fifth; 1 is the right rate", signed=True),
+        _relative("kinetic", "kinetic energy in the end; 1 is the right one", signed=True),
     )
 }  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from .bench_progress import NO_PROGRESS, Progress
 from .cases import Case
-from .norms import NORMS, conserves, errors_of
+from .norms import NORMS, OF_KIND, conserves, errors_of
 from .observing import Seen
 from .problems import Problem
 from .result_store import Store
@@ -87,6 +87,7 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
     if case.kind == CHAOTIC:
         return _with_statistics(case, seens, half)
     first, *others = seens
+    case = _told(case, first)
     apart = [errors_of(other, first, NORMS) for other in others]
     agreement = {name: max(abs(errors[name]) for errors in apart) for name in NORMS}
     if conserves(first):
@@ -123,13 +124,7 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
     """Two ensembles: their means differ by noise if both are right."""
     means = mean_of(seens[:half]), mean_of(seens[half:])
     both = mean_of(seens)
-    known = tuple(name for name in case.norms if not NORMS[name].signed or getattr(both, name))
-    if not known:
-        raise Problem(
-            f"{case.subject.name} is chaotic: {case.why}, and it has no statistic to be measured instead: "
-            f"{', '.join(case.norms)} are 0 throughout"
-        )
-    case = case.replace(norms=known)
+    case = _told(case, both)
     agreement, spread = {}, {}
     for name in case.norms:
         values = [NORMS[name].measure(seen, both) for seen in seens]
@@ -144,6 +139,18 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
         f"{a.dt:.3g} s"
     )
     return case.replace(reference=both), Reference(text, agreement, spread)
+
+
+def _told(case: Case, reference: Seen) -> Case:
+    """The case with the norms that the reference tells; Problem if there are none."""
+    told = tuple(name for name in case.norms if NORMS[name].tells(reference))
+    if not told:
+        others = ", ".join(name for name in OF_KIND[case.kind] if NORMS[name].tells(reference))
+        raise Problem(
+            f"{case.subject.name}: {' and '.join(case.norms)} {'are' if len(case.norms) > 1 else 'is'} 0 throughout, "
+            f"nothing can be relative to that; what can be measured here: {others}"
+        )
+    return case.replace(norms=told)
 
 
 def _words(cell: Cell) -> str:

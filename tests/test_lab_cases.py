@@ -202,3 +202,33 @@ def test_a_search_walks_back_where_it_has_jumped_too_far():
     assert not [trial for trial in larger if trial.repeats > 1]
     own = [trial.cell.dt for trial in found.trials if trial.cell.method == found.choice.cell.method]
     assert min(dt for dt in own if dt > found.choice.cell.dt) <= 2 * found.choice.cell.dt * (1 + 1e-9)
+
+
+def trap(settings, seed=0):
+    """Nine elastic discs swing around the origin and meet; nothing stands still, and nothing has a height."""
+
+    class Trap(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force[:] -= 4.0 * bodies.position
+
+    world = world_of(settings, 0.0)
+    world.add_system(Trap())
+    for place in np.ndindex(3, 3):
+        velocity = np.random.default_rng([seed, *place]).uniform(-4, 4, 2)
+        disc = SphereCollider(0.5, restitution=1.0)
+        world.create_entity(Transform(2 * np.array(place) - 2.0), RigidBody(linear_velocity=velocity), disc)
+    return world
+
+
+@pytest.mark.parametrize("norm", ["pressure", "apex"])
+def test_what_is_0_throughout_is_no_error_of_0(norm):
+    """Without walls there is no pressure, without gravity no height: every setting would meet every target."""
+    with pytest.raises(Problem, match=rf"trap: {norm} is 0 throughout.* position, energy, impact_time, count"):
+        search(trap, 0.1, norm, seconds=1.0, steps=(1 / 30, 1 / 60), workers=1)
+
+
+def test_a_norm_that_the_closed_form_does_not_tell_has_own_references():
+    assert case_of("bouncing", seconds=3.0).reference is not None
+    case = case_of("bouncing", seconds=3.0, norms=("pressure",))
+    assert case.reference is None
+    assert len(case.reference_cells) == 3
