@@ -7,10 +7,8 @@ The paths: contacts found (NARROW), impacts, contacts at rest, begin, stay, end,
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from worlds import position, velocity
 
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 DT = 1 / 60
 EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact")
 

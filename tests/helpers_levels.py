@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 
 

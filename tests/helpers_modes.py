@@ -17,8 +17,6 @@ SWEPT = (*MODES, "ccd")  # the last: a discrete world, and bullets that ask for 
 
 each_mode = pytest.mark.parametrize("mode", MODES)
 each_sweep = pytest.mark.parametrize("mode", SWEPT)
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
-mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
 
 
 def mode_world(mode: str, d: int = 2, gravity: Any = 0.0, **settings: Any) -> World:

@@ -10,13 +10,11 @@ import pytest
 from helpers_queries import GRAZE, Bodies, directions, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds import ball, box, make_world
+from worlds import ball, both_dimensions, box, make_world
 
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
 from carom.framework import Plugin, Settings, World, column
 from carom.plugins import Physics
-
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 def check_cast(hits, one, bodies, way, least, tolerance):

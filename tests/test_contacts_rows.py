@@ -7,13 +7,12 @@ import itertools
 import numpy as np
 import pytest
 from helpers_contacts import ids, listen
-from worlds import ball, box, floor, make_world, run, velocity
+from worlds import ball, both_dimensions, box, floor, make_world, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Component, Phase, System, column
 
 COLUMNS = {"entity_a": 1, "entity_b": 1, "point": 2, "normal": 2, "depth": 1, "normal_impulse": 1, "step": 1}
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 class Missile(Component):

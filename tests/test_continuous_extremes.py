@@ -7,19 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import (
-    along,
-    bullet,
-    each_mode,
-    each_sweep,
-    mode_world,
-    mostly_2d,
-    positions,
-    rows_of,
-    strikes,
-    velocities,
-)
-from worlds import EPS, Conserved, ball, box, floor, make_world, position, run, velocity
+from helpers_modes import along, bullet, each_mode, each_sweep, mode_world, positions, rows_of, strikes, velocities
+from worlds import EPS, Conserved, ball, box, floor, make_world, mostly_2d, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.lab.testing import create_in_order

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import along, both_dimensions, mode_world, strikes
-from worlds import ball, box, position, velocity
+from helpers_modes import along, mode_world, strikes
+from worlds import ball, both_dimensions, box, position, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
 

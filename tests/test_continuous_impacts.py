@@ -9,8 +9,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from helpers_modes import along, both_dimensions, bullet, each_mode, mode_world, positions, strikes, velocities
-from worlds import EPS, ball, box, floor, make_world, position, run, velocity
+from helpers_modes import along, bullet, each_mode, mode_world, positions, strikes, velocities
+from worlds import EPS, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 DT, G = 1 / 60, 9.81
 RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]

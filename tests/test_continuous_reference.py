@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import both_dimensions, bullet, each_sweep, mode_world, positions, rows_of, strikes, velocities
-from worlds import ball
+from helpers_modes import bullet, each_sweep, mode_world, positions, rows_of, strikes, velocities
+from worlds import ball, both_dimensions
 
 DT = 1 / 60
 INFINITE = math.inf

@@ -10,7 +10,6 @@ import pytest
 from helpers_modes import (
     Impacts,
     along,
-    both_dimensions,
     bullet,
     each_mode,
     each_sweep,
@@ -19,7 +18,7 @@ from helpers_modes import (
     strikes,
     velocities,
 )  # fmt: skip
-from worlds import ball, box, make_world, position, run, velocity
+from worlds import ball, both_dimensions, box, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Plugin, Settings, System, World

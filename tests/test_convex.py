@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import convex_brute
+from worlds import both_dimensions
 
 from carom.framework.compilation import inlined, kernel
 from carom.framework.vectors import dot, item, replace, row, scale, store
@@ -20,7 +21,6 @@ pytestmark = pytest.mark.slow  # its shapes take long to compile
 
 # A core is the sum of a hull of points and an ellipsoid along the axes, so that one support serves all the tests.
 Shape = namedtuple("Shape", "points semi_axes radii row")
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 COUNT = 10_000
 EPS = 1e-13  # of the coordinates; measured 3e-15
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worlds import both_dimensions
 
 from carom.systems.even_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
-
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 def frame_of(lower, upper):

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import along, both_dimensions, bullet, each_mode, mode_world, positions, strikes, velocities
-from worlds import Conserved, ball, box, floor, make_world, position, run, velocity
+from helpers_modes import along, bullet, each_mode, mode_world, positions, strikes, velocities
+from worlds import Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem, Settings

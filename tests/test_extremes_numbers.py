@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_extremes import DT, both_dimensions, makers
-from worlds import EPS, Conserved, ball, box, make_world, position, run, velocity
+from helpers_extremes import DT, makers
+from worlds import EPS, Conserved, ball, both_dimensions, box, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_filters import DT, assert_same_motion, both_dimensions, listen, pairs, up
-from worlds import ball, box, floor, make_world, position, run, velocity
+from helpers_filters import DT, assert_same_motion, listen, pairs, up
+from worlds import ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 from carom.components import AABBCollider
 from carom.framework import Phase, System

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_rest import G, tower
-from worlds import Conserved, ball, box, floor, make_world, position, run, velocity
+from worlds import Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, Transform
 
 DT = 1 / 60
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 makers = pytest.mark.parametrize("maker", [box, ball])
 
 

@@ -8,13 +8,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from worlds import EPS, Conserved, ball, box, floor, make_world, position, run, velocity
+from worlds import EPS, Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 DT = 1 / 60
 LAG = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5}  # they keep v^2/2 + g y + lag g dt v in free fall
 RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]
 makers = pytest.mark.parametrize("maker", [ball, box])
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 integrators = pytest.mark.parametrize(
     "integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4"]
 )

@@ -10,10 +10,9 @@ import math
 import numpy as np
 import pytest
 from helpers_rest import G, energy, heights, overlaps, rows_of, soft_overlap, speed, tower
-from worlds import EPS, ball, box, floor, make_world, position, run, velocity
+from worlds import EPS, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 DT = 1 / 60
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 makers = pytest.mark.parametrize("maker", [ball, box])
 
 

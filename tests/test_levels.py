@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers_levels import COUNTERS, both_dimensions, levelled, pairs
+from helpers_levels import COUNTERS, levelled, pairs
 from oracles import narrow_naive
-from worlds import EPS, ball, box, floor, make_world, position, run, velocity
+from worlds import EPS, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_levels import COUNTERS, both_dimensions, levelled, pairs
-from worlds import ball, box, make_world, run
+from helpers_levels import COUNTERS, levelled, pairs
+from worlds import ball, both_dimensions, box, make_world, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider

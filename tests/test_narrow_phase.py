@@ -9,12 +9,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracles import narrow_naive
-from worlds import EPS, ball, box, floor, make_world, run
+from worlds import EPS, ball, both_dimensions, box, floor, make_world, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, StepError, System
 
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 lengths = st.one_of(st.sampled_from([0.0, 0.25, 0.5, 1.0, 2.0]), st.floats(1e-3, 3))
 coordinates = st.one_of(st.integers(-4, 4).map(lambda k: k / 2), st.floats(-3, 3))
 

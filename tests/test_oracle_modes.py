@@ -13,7 +13,8 @@ import itertools
 
 import numpy as np
 import pytest
-from helpers_modes import both_dimensions, each_mode, each_sweep, mode_world
+from helpers_modes import each_mode, each_sweep, mode_world
+from worlds import both_dimensions
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.lab import testing as kit

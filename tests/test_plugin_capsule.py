@@ -8,6 +8,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 from oracles import convex_brute
+from worlds import both_dimensions, mostly_2d
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -19,8 +20,6 @@ from carom.plugins.capsule import CapsuleCollider, capsule_capsule, capsule_sphe
 pytestmark = pytest.mark.slow  # its shapes take long to compile
 
 G = 10.0
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
-mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
 Capsule = namedtuple("Capsule", "radius half_height axes")
 Sphere = namedtuple("Sphere", "radius")
 Met = namedtuple("Met", "hit depth normal point")

@@ -7,6 +7,7 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
+from worlds import both_dimensions, mostly_2d
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -16,8 +17,6 @@ from carom.plugins import Physics, half_space
 from carom.plugins.half_space import HalfSpaceCollider, half_space_convex, two_half_spaces
 
 G = 10.0
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
-mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
 HalfSpace = namedtuple("HalfSpace", "normal axes")
 Box = namedtuple("Box", "half_extents radius")  # a rounded one
 convex = next(pair for (_, other), pair in half_space.plugin.pairs.items() if other is not HalfSpaceCollider).function

@@ -7,12 +7,10 @@ import math
 import numpy as np
 import pytest
 from helpers_queries import directions, scene
-from worlds import ball, make_world
+from worlds import ball, both_dimensions, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System
-
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 @both_dimensions

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worlds import both_dimensions
 
 from carom.systems.spatial_tree import CandidateLimitError, SpatialTree
 
@@ -30,7 +31,6 @@ def load_oracle(name):
 brute_force = load_oracle("brute_force")
 PointerQuadtree = load_oracle("pointer_quadtree").PointerQuadtree
 
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 def tree_of(lower, upper, start=0, stop=None):

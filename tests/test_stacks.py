@@ -11,12 +11,11 @@ import math
 import numpy as np
 import pytest
 from helpers_rest import SLOP, G, depths, energy, heights, overlaps, rows_of, soft_overlap, speed, tower
-from worlds import ball, box, floor, make_world, run
+from worlds import ball, both_dimensions, box, floor, make_world, run
 
 from carom.components import AABBCollider, Transform
 from carom.scenes import pyramid
 
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 makers = pytest.mark.parametrize("maker", [box, ball])
 
 

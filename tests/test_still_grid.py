@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worlds import both_dimensions
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
 from carom.systems import even_grid, spatial_tree, still_grid
 from carom.systems.still_grid import OUTSIDE, StillGrid
-
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 def check(lower, upper, start, stop):

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import both_dimensions
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worlds import both_dimensions
 
 from carom.systems import first_touch as touches
 from carom.systems.event_heap import heap_pop, heap_push

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from worlds import box, make_world
+from worlds import both_dimensions, box, make_world
 
 from carom.components import AABBCollider, SphereCollider, Transform
 from carom.framework import World
@@ -31,7 +31,6 @@ Capsule = namedtuple("Capsule", "radius half_height axes")
 EPS = float(np.finfo(float).eps)
 MISS, AT_ONCE = (False, 0.0), (True, 0.0)
 NOWHERE = 1e-300  # keeps tolerances above zero
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 
 
 def exact_time(d, v, reach):

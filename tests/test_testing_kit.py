@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worlds import both_dimensions
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, System
 from carom.lab import testing as kit
 
 G = 9.81
-both_dimensions = pytest.mark.parametrize("d", [2, 3])
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 
 

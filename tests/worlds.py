@@ -1,14 +1,20 @@
-"""What the tests share beyond the kit that users have, carom.lab.testing: what must hold after any impact."""
+"""What the tests share beyond the kit that users have, carom.lab.testing: dimensions, and what any impact must keep."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from carom.lab.testing import ball, box, floor, make_world, position, run, velocity
 
-__all__ = ["EPS", "Conserved", "ball", "box", "floor", "make_world", "position", "run", "velocity"]
+__all__ = [
+    "EPS", "Conserved", "ball", "both_dimensions", "box", "floor", "make_world", "mostly_2d", "position", "run",
+    "velocity",
+]  # fmt: skip
 
 EPS = np.finfo(float).eps
+both_dimensions = pytest.mark.parametrize("d", [2, 3])
+mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
 
 
 class Conserved:
