@@ -42,7 +42,7 @@ figures: $(BENCH)
 	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md --no-pictures
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
-	$(BIN)/carom limits --into docs/limits.md --out docs/pictures
+	$(BIN)/carom limits --long --into docs/limits.md --out docs/pictures
 	$(BIN)/carom settings --into docs/settings.md
 	$(BIN)/carom settings --games --into docs/settings.md
 	$(BIN)/carom geometry --into docs/levels.md --out docs/pictures

@@ -98,6 +98,11 @@ class Case:
     def repeated(self) -> str:
         return "seeds" if self.kind == CHAOTIC else "start phases"
 
+    @property
+    def repeats_told(self) -> str:
+        """For messages: 1 start phase, 64 start phases, 5 seeds."""
+        return f"{self.repeats} {self.repeated if self.repeats > 1 else self.repeated[:-1]}"
+
     def theory(self, cell: Cell, norm: str) -> float | None:
         """The order that the method should show in this norm, as ``grids.theory``."""
         for integrator, name, order in self.orders:

@@ -42,7 +42,7 @@ NAMES = tuple(axis.name for axis in AXES)
 @click.argument("target", metavar="[SCENE|FILE.py]", required=False)
 @click.option("--axes", "axis_names", metavar="NAME,NAME", help=f"Only these of {', '.join(NAMES)}.")
 @click.option("--quick", is_flag=True, help="Fewer values on each axis: about a minute.")
-@click.option("--long", "long_runs", is_flag=True, help="Runs of a million steps too: about twenty minutes.")
+@click.option("--long", "long_runs", is_flag=True, help="Runs of a million steps too: about ten minutes more.")
 @out_option("Draw a picture into this folder.")
 @shown_options
 @click.option(

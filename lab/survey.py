@@ -6,6 +6,7 @@ in the end, over how far they were in the beginning.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,15 +81,17 @@ def survey(subject: Subject, seconds: float) -> Survey:
     """Run the scene twice, with all impacts at their true times; Problem for one that cannot be measured."""
     with_recommended = subject.world(None)
     settings = with_recommended.settings
-    facts = _facts(with_recommended)
+    facts = _facts(subject.name, with_recommended)
     with_recommended.close()
+    seeded = _seeded(subject, settings)
+    _obedient(subject, settings.replace(dt=settings.dt / 2, substeps=settings.substeps + 1)).close()
     exact = settings.replace(collision="event_driven")
     first, walled = _twin(subject, exact, seconds, 0.0, True), True
     if first.failure == ESCAPED:  # as a ball that rolls off a platform
         first, walled = _twin(subject, exact, seconds, 0.0, False), False
     second = _twin(subject, exact, seconds, NUDGE, False)
-    if first.failure:
-        raise Problem(f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed: {first.failure}")
+    if not first.reach and not first.counts["solver_loops"]:
+        raise Problem(f"{subject.name}: no body moves within {seconds:g} s: nothing to measure")
     apart = float(np.abs(second.position - first.position).max(initial=0.0))
     return Survey(
         settings,
@@ -97,17 +100,17 @@ def survey(subject: Subject, seconds: float) -> Survey:
         contacts=sum(first.struck),
         resting=int(first.counts["solver_loops"] > 0),
         speed=first.speed,
-        seeded=_seeded(subject, settings),
+        seeded=seeded,
         walled=walled,
         trial=first,
         **facts,
     )
 
 
-def _facts(world: World) -> dict[str, Any]:
+def _facts(name: str, world: World) -> dict[str, Any]:
     dynamic = world.bodies.dynamic
     if not len(dynamic):
-        raise Problem("there is no body that moves by itself: nothing to measure")
+        raise Problem(f"{name}: there is no body that moves by itself: nothing to measure")
     gravity = bool(np.any(world.gravity) and np.any(dynamic.gravity_scale))
     constant = bool(np.any(dynamic.constant_force))
     several = [len(world.components_for_entity(int(entity))) for entity in world.bodies.entity]
@@ -140,25 +143,49 @@ def _nudge_of(subject: Subject, settings: Settings) -> float:
 
 
 def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float, walled: bool) -> Seen:
-    world = subject.world(settings)
-    if world.settings != settings:
-        world.close()
-        raise Problem(f"{subject.name}: build must hand its settings to the World: World(..., settings=settings)")
-    engine = CaromEngine(world)
+    engine = CaromEngine(_obedient(subject, settings))
     if nudged:
-        nudge(world, nudged * engine.size)
+        nudge(engine.world, nudged * engine.size)
     try:
         with subject.blamed():
-            return observe(engine, seconds, settings.dt, walled=walled)
+            seen = observe(engine, seconds, settings.dt, walled=walled)
+        if seen.failure not in (None, ESCAPED):
+            raise Problem(
+                f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed after {seen.simulated:.4g} s: "
+                f"{'; '.join([seen.failure, *engine.world.faults[:1]])}"
+            )
+        return seen
     finally:
         engine.close()
 
 
+def _obedient(subject: Subject, settings: Settings) -> World:
+    """The world with these settings; Problem if it has others."""
+    world = subject.world(settings)
+    changed = [
+        f"{field.name}={getattr(world.settings, field.name)!r} instead of {getattr(settings, field.name)!r}"
+        for field in dataclasses.fields(settings)
+        if getattr(world.settings, field.name) != getattr(settings, field.name)
+    ]
+    if changed:
+        world.close()
+        raise Problem(
+            f"{subject.name}: build must hand its settings to the World as they are, World(..., settings=settings); "
+            f"its World has {', '.join(changed)}"
+        )
+    return world
+
+
 def _seeded(subject: Subject, settings: Settings) -> bool:
-    """Whether seeds change the start."""
+    """Whether seeds change the start; Problem where the same seed does."""
     hashes = []
-    for seed in (0, 1):
+    for seed in (0, 0, 1):
         world = subject.world(settings, seed)
         hashes.append(world.state_hash())
         world.close()
-    return hashes[0] != hashes[1]
+    if hashes[0] != hashes[1]:
+        raise Problem(
+            f"{subject.name}: build makes another world each time, with the same settings and seed: draw what is "
+            "random from numpy.random.default_rng(seed)"
+        )
+    return hashes[0] != hashes[2]

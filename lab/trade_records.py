@@ -212,6 +212,8 @@ class CaseTrade:
         what differs between repeats: "start phases" or "seeds"
     refused
         why nothing was measured, else ""
+    whole
+        repeats that it takes to trust the worst of them: a quick look has fewer
     """
 
     scene: str
@@ -226,6 +228,7 @@ class CaseTrade:
     reference: Reference
     curves: list[Curve]
     refused: str = ""
+    whole: int = 0
 
     @property
     def norm(self) -> str:

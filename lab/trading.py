@@ -109,9 +109,9 @@ def trade(
                 raise
             cases.append(_refused(name, problem.message))
             continue
-        if quick:
-            case = case.quick(not steps, repeats is None)
-        cases.append(measure(case, only or Only(), against_pymunk, timing, runs))
+        looked = case.quick(not steps, repeats is None) if quick else case
+        measured = measure(looked, only or Only(), against_pymunk, timing, runs)
+        cases.append(dataclasses.replace(measured, whole=case.repeats))
     return Trade({**machine(), "clock": "wall time"}, command, cases)
 
 
@@ -126,7 +126,7 @@ def measure(case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Ru
         case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
     )
     cells = grids.grid((*curves, *peers), case.steps)
-    records = runs.all(run_tasks(case, cells), f"{name}: {len(cells)} settings, {case.repeats} {case.repeated}")
+    records = runs.all(run_tasks(case, cells), f"{name}: {len(cells)} settings, {case.repeats_told}")
     outcomes: dict[Cell, list[Outcome]] = {}
     for record in records:
         outcome = Outcome.from_dict(record)

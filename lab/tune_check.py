@@ -100,7 +100,7 @@ def check(
 def measured_with(case: Case, settings: Settings, runs: Runs) -> Point:
     """The point of these settings over all repeats of a case; dials that no cell has stay the scene's."""
     cell = cell_of(settings)
-    records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats} {case.repeated}")
+    records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats_told}")
     return point_of([Outcome.from_dict(record) for record in records])
 
 

@@ -102,7 +102,7 @@ def _verdict(trial: Trial, tuning: Tuning) -> str:
     if trial.met:
         return "holds" if trial.repeats == tuning.repeats else "holds once"
     times = trial.error / tuning.target
-    return f"misses, {compact(times, 2)} times" if times > 1 else "misses with the reference's own error"
+    return f"misses, {compact(times, 2 if times >= 2 else 3)} times" if times > 1 else "misses with the reference's own error"
 
 
 def compared_table(result: TuneResult) -> TextTable:
@@ -138,11 +138,13 @@ def checks_table(result: TuneResult) -> TextTable:
     rows = []
     for check in result.checks:
         if check.refused:
-            rows.append((check.scene, NOTHING, NOTHING, NOTHING, "not measured"))
+            rows.append((check.scene, NOTHING, NOTHING, NOTHING, NOTHING, "not measured"))
             continue
         times = compact(check.times) if math.isfinite(check.times) else NOTHING
-        rows.append((check.scene, _worst(_bar(check)), compact(check.promise), times, _kept(check)))
-    headings = ("scene", worst_heading(result.tuning), "promise", "times the promise", "")
+        rows.append((
+            check.scene, number(check.seconds), _worst(_bar(check)), compact(check.promise), times, _kept(check),
+        ))  # fmt: skip
+    headings = ("scene", "over, s", worst_heading(result.tuning), "promise", "times the promise", "")
     return TextTable("on scenes that it was not tuned on", headings, rows)
 
 
@@ -186,7 +188,9 @@ def sentences(result: TuneResult) -> list[str]:
 
 def _about(tuning: Tuning) -> list[str]:
     agreement = tuning.reference.agreement.get(tuning.norm, 0.0)
-    apart = f" ({tuning.norm}: {compact(agreement)} apart)" if agreement else ""
+    apart = ""
+    if agreement:
+        apart = f" ({tuning.norm}: {compact(agreement)} apart, which what was tried and the margin add to their errors)"
     units = "" if tuning.scale == 1 else f", {compact(tuning.target * tuning.scale)} in the scene's units"
     repeated = f" in {tuning.repeats} {tuning.repeated}" if tuning.repeats > 1 else ""
     return [

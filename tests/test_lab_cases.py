@@ -9,7 +9,7 @@ import pytest
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, Settings, World
+from carom.framework import ForceSystem, Settings, System, World
 from carom.lab.cases import case_of
 from carom.lab.engines import CaromEngine, PymunkEngine
 from carom.lab.norms import NORMS
@@ -232,3 +232,56 @@ def test_a_norm_that_the_closed_form_does_not_tell_has_own_references():
     case = case_of("bouncing", seconds=3.0, norms=("pressure",))
     assert case.reference is None
     assert len(case.reference_cells) == 3
+
+
+# -- worlds that cannot be measured, and why ------------------------------------------------------
+
+
+def thrown(settings, velocity=(3.0, 9.0)):
+    world = world_of(settings)
+    world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=velocity), SphereCollider(0.3))
+    return world
+
+
+def still(settings, seed=0):
+    world = world_of(settings, 0.0)
+    world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.3))
+    return world
+
+
+def unseeded(settings, seed=0):
+    return thrown(settings, np.random.default_rng().uniform(1, 3, 2))
+
+
+def own_step(settings, seed=0):
+    return thrown((settings or Settings()).replace(dt=1 / 120))
+
+
+def own_substeps(settings, seed=0):
+    return thrown(Settings(dt=settings.dt) if settings else None)
+
+
+def spoilt(settings, seed=0):
+    class Spoiler(System):
+        def process(self, dt):
+            if self.world.time > 0.5:
+                self.world.bodies.linear_velocity[0] = np.nan
+
+    world = thrown(settings)
+    world.add_system(Spoiler())
+    return world
+
+
+@pytest.mark.parametrize(
+    ("build", "reason"),
+    [
+        (still, "still: no body moves within 2 s: nothing to measure"),
+        (unseeded, r"unseeded: build makes another world each time.*default_rng\(seed\)"),
+        (own_step, r"own_step: build must hand its settings to the World as they are.* has dt=0\.00833\d* instead"),
+        (own_substeps, "own_substeps: build must hand.* has substeps=4 instead of 5"),
+        (spoilt, r"spoilt: the trial run .* failed after 0\.5333 s: not finite; entity 1: linear_velocity is \[nan"),
+    ],
+)
+def test_the_reason_why_a_world_cannot_be_measured(build, reason):
+    with pytest.raises(Problem, match=reason):
+        survey(subject_of(build), 2.0)

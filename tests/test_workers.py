@@ -247,7 +247,7 @@ import os
 import carom.lab.workers
 
 def where(number):
-    print("said by a worker")
+    print("said by a worker\\n", end="")  # in one write, so that two processes do not mix
     os.system("echo said by its child")
     return os.getpid(), carom.__file__
 """
