@@ -157,8 +157,11 @@ def step_limits(world: World) -> StepLimits:
     A spring that stiffens as it is stretched, or a ball that will fall, may set another limit later. What systems of
     the game do in a step besides force systems is not seen. The world is left bit for bit as it was.
 
-    ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError inside a step.
+    ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError inside a step, TypeError
+    for what is no World.
     """
+    if not isinstance(world, World):
+        raise TypeError(f"world must be a World, got {world!r}")
     if world.physics is None:
         raise NoPhysicsError("no physics in this world: World(Physics(...))")
     services: Any = world.physics

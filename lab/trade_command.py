@@ -109,7 +109,7 @@ def trade_command(
     }  # fmt: skip
     with Store.open(out / RESULTS, resume) as store:
         if resume:
-            click.echo(f"carom: {_results(store)} taken over from {store.path}", err=True)
+            click.echo(f"carom: {_results(store)} in {store.path}: those that fit are taken over", err=True)
         try:
             with Bar(Console(stderr=True)) as bar:
                 result = trade(*targets, **arguments, store=store, progress=bar)

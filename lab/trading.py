@@ -12,7 +12,7 @@ from .bench_progress import NO_PROGRESS, Progress
 from .bench_results import machine
 from .cases import Case, case_of, check_arguments
 from .norms import NORMS
-from .problems import Problem
+from .problems import Problem, did_you_mean
 from .result_store import Store
 from .subjects import subject_of
 from .trade_clock import time_points
@@ -41,15 +41,26 @@ ASYMPTOTIC = 4  # points, the finest, that the order is read from
 
 @dataclass(frozen=True)
 class Only:
-    """What of the grid is wanted; empty: all that matters in the scene."""
+    """What of the grid is wanted; empty: all that matters in the scene. TypeError for a name instead of several."""
 
     integrators: tuple[str, ...] = ()
     collisions: tuple[str, ...] = ()
     substeps: tuple[int, ...] = ()
     geometries: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            if isinstance(getattr(self, field.name), (str, int)):
+                raise TypeError(f"Only.{field.name} must be a sequence, got {getattr(self, field.name)!r}")
+
     def of(self, case: Case) -> tuple[Cell, ...]:
         """The methods of the case; a dial that is named is varied even where it changes nothing. Problem for none."""
+        world = case.subject.world(None)
+        known = world.registry.integrators
+        world.close()
+        for name in self.integrators:
+            if name not in known:
+                raise Problem(f"no integrator {name!r}{did_you_mean(name, known)}")
         found = grids.methods(case.survey)
         fields = {
             "integrator": self.integrators,

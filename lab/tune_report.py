@@ -102,7 +102,9 @@ def _verdict(trial: Trial, tuning: Tuning) -> str:
     if trial.met:
         return "holds" if trial.repeats == tuning.repeats else "holds once"
     times = trial.error / tuning.target
-    return f"misses, {compact(times, 2 if times >= 2 else 3)} times" if times > 1 else "misses with the reference's own error"
+    if times <= 1:
+        return "misses with the reference's own error"
+    return f"misses, {compact(times, 2 if times >= 2 else 3)} times"
 
 
 def compared_table(result: TuneResult) -> TextTable:

@@ -36,6 +36,7 @@ NOISE = 4.0  # times smaller than the target must the standard error of a statis
 LONGEST_JUMP = 4  # halvings at once
 FINE = (1.5, 1.25, 1.75)  # times the step that holds: tried in this order, the last two as the first turns out
 ROUNDING = 1e-9  # of a step
+SMALLEST = 1e-13  # of the scale: what own runs can tell at best, ten times the rounding of some hundred steps
 FAR_DEARER = 4.0  # times the choice's work: no runner-up is looked for beyond it
 STUCK = 3  # smaller steps in a row that bring nothing: an error that steps do not cure
 
@@ -169,6 +170,7 @@ class _Search:
     def __init__(self, case: Case, max_error: float, absolute: bool, only: Only, runs: Runs) -> None:
         self.runs = runs
         self.norm = NORMS[case.norms[0]]
+        self.methods = only.of(case)
         self.case, self.reference = exact_enough(case, self.norm.name, max_error, absolute, runs)
         seen = self.case.reference
         assert seen is not None
@@ -180,7 +182,6 @@ class _Search:
         self.trials: list[Trial] = []
         self.looks: dict[Cell, tuple[float, float]] = {}  # error and work of single runs
         self.whole: dict[Cell, Point] = {}
-        self.methods = only.of(self.case)
 
     def result(self) -> Tuning:
         held = self._cheapest_two()
@@ -310,6 +311,11 @@ def exact_enough(
         seen = known.reference
         assert seen is not None
         target = max_error / NORMS[norm].scale(seen, seen) if absolute else max_error
+        if case.reference is None and target < SMALLEST:
+            raise Problem(
+                f"{case.subject.name}: a {norm} error of {target:.3g} is below rounding, no own runs can tell it: take "
+                f"{SMALLEST:g} or more"
+            )
         return target / max(reference.agreement.get(norm, 0.0), 1e-300)
 
     wanted = NOISE if NORMS[norm].signed else TRUSTED

@@ -10,6 +10,7 @@ import pytest
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, System, World
+from carom.lab import Only, suggest_dt
 from carom.lab.cases import case_of
 from carom.lab.engines import CaromEngine, PymunkEngine
 from carom.lab.norms import NORMS
@@ -22,6 +23,7 @@ from carom.lab.trade_runs import Runs, refined_reference
 from carom.lab.trade_tasks import Task
 from carom.lab.tuning import search
 from carom.plugins import Physics
+from carom.scenes import orbit
 
 
 def world_of(settings, gravity=-10.0):
@@ -285,3 +287,35 @@ def spoilt(settings, seed=0):
 def test_the_reason_why_a_world_cannot_be_measured(build, reason):
     with pytest.raises(Problem, match=reason):
         survey(subject_of(build), 2.0)
+
+
+def planet(settings, seed=0):
+    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings())
+    world.add_system(orbit.Sun())
+    world.create_entity(Transform((1.0, 0.0)), RigidBody(linear_velocity=(0.0, 1.0)))
+    return world
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"max_error": 1e-15}, "planet: a position error of 1e-15 is below rounding.*take 1e-13 or more"),
+        ({"only": Only(integrators=("rk5",))}, "no integrator 'rk5'; did you mean 'rk4'"),
+    ],
+)
+def test_a_search_that_cannot_end_does_not_begin(options, reason):
+    with pytest.raises(Problem, match=reason):
+        search(planet, seconds=1.0, steps=(1 / 30, 1 / 60), workers=1, **options)
+
+
+@pytest.mark.parametrize("field", ["integrators", "collisions", "substeps", "geometries"])
+def test_one_name_is_no_sequence_of_names(field):
+    with pytest.raises(TypeError, match=f"Only.{field} must be a sequence, got 4"):
+        Only(**{field: 4})
+    with pytest.raises(TypeError, match=f"Only.{field} must be a sequence, got 'rk4'"):
+        Only(**{field: "rk4"})
+
+
+def test_limits_are_those_of_a_world():
+    with pytest.raises(TypeError, match="world must be a World, got <function planet"):
+        suggest_dt(planet)
