@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 from rich.console import Console
 
 from ..framework import World
@@ -130,6 +131,9 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
             before = world.step_count
             while world.step_count < look:
                 world.step()
+            moving = world.bodies.dynamic
+            if not (np.isfinite(moving.position).all() and np.isfinite(moving.linear_velocity).all()):
+                raise Problem(f"{loaded.name}: not finite after {world.time:.4g} s: {'; '.join(world.faults[:1])}")
             found.append((world.time, step_limits(world)))
             progress.advance(world.step_count - before)
     return found

@@ -282,12 +282,14 @@ def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
     for point, style in wanted:
         x, y = _place(sheet, point) or (0.0, 0.0)
         across, up = to_share.transform(sheet.axes.transData.transform((x, y)))
-        if any(abs(across - a) < APART[0] and abs(up - b) < APART[1] for a, b in kept):
-            continue
-        kept.append((across, up))
         beside: dict[str, Any] = {"xytext": (6, 5), "textcoords": "offset points"}
+        middle = across + APART[0] / 2
         if across > 0.93:
             beside.update(xytext=(-6, 5), ha="right")
+            middle = across - APART[0] / 2
+        if any(abs(middle - a) < APART[0] and abs(up - b) < APART[1] for a, b in kept):
+            continue
+        kept.append((middle, up))
         text = f"{number(point.cell.dt)} s"
         sheet.axes.annotate(text, (x, y), color=style.colour, fontsize=7, zorder=5, **beside)
 

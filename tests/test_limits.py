@@ -353,6 +353,34 @@ def test_the_command_watches_a_scene_of_the_library():
     assert "overlap on a way of 0.1143 m" in result.stdout
 
 
+BROKEN_ON_THE_WAY = """
+import numpy as np
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import System, World
+from carom.plugins import Physics
+
+class Spoiler(System):
+    def process(self, dt):
+        if self.world.time > 0.5:
+            self.world.bodies.linear_velocity[0] = np.nan
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2), settings=settings)
+    world.add_system(Spoiler())
+    world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)), SphereCollider(0.3))
+    return world
+"""
+
+
+def test_the_command_tells_what_broke_while_it_watched(tmp_path):
+    """A world whose numbers are gone is not one whose step nothing limits."""
+    file = tmp_path / "broken.py"
+    file.write_text(BROKEN_ON_THE_WAY)
+    result = invoke(str(file), "--seconds", "2")
+    assert result.exit_code == 2
+    assert "broken.py: not finite after 0.6 s: entity 1: linear_velocity is [nan, nan]" in result.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
