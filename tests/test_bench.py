@@ -9,8 +9,8 @@ import itertools
 import json
 import sys
 
+import helpers_cli
 import pytest
-from click.testing import CliRunner
 
 from carom import scenes
 from carom.framework.compilation import CompilationLog
@@ -20,21 +20,10 @@ from carom.lab.bench_clock import Spread
 from carom.lab.bench_progress import Progress
 from carom.lab.bench_queries import QUESTIONS
 from carom.lab.bench_suite import LARGE, SUITE, Subject, Window, subjects
-from carom.lab.cli import cli
 from carom.lab.problems import Problem
 
+carom = helpers_cli.carom  # fixture
 SHORT_GAS = Subject("gas2d", (Window("first", 2, 12), Window("later", 20, 40)), targets={("later", 30): 2.0})
-
-
-@pytest.fixture
-def carom(tmp_path, monkeypatch):
-    """Runs the command in an empty folder; the result has exit_code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str):
-        return CliRunner().invoke(cli, list(arguments))
-
-    return run
 
 
 @pytest.fixture
