@@ -6,8 +6,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..framework.columns import REQUIRED, Column, column
-from ..framework.component import Component
+from ..framework.data.columns import REQUIRED, Column, column
+from ..framework.data.component import Component
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set

@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..framework import esper_bridge
-from ..framework.columns import Column, column
-from ..framework.component import Component
-from ..framework.table import KINDS
+from ..framework.data import esper_bridge
+from ..framework.data.columns import Column, column
+from ..framework.data.component import Component
+from ..framework.data.table import KINDS
 
 Kind = Literal["dynamic", "kinematic", "static"]
 # Arguments, checked as fields are.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.columns import column
-from ..framework.component import Component
+from ..framework.data.columns import column
+from ..framework.data.component import Component
 
 
 def _teleport(table: Any, row: int) -> None:

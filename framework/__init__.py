@@ -1,10 +1,9 @@
 """World, settings, tables, schedule, registry: what everything else stands on; knows no physics itself."""
 
-from .array_columns import array_column
-from .bodies import Bodies
-from .columns import Column, column
-from .component import Component
-from .contacts import Contact, Contacts
+from .data.array_columns import array_column
+from .data.bodies import Bodies
+from .data.columns import Column, column
+from .data.component import Component
 from .errors import (
     CaromError,
     MissingComponentError,
@@ -14,13 +13,14 @@ from .errors import (
     StepError,
     UnhandledPairError,
 )
-from .hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
-from .plan import Plan
-from .plugin import Convex, Plugin
-from .schedule import ForceSystem, Phase, System
+from .plugins.plugin import Convex, Plugin
+from .schedule.phases import ForceSystem, Phase, System
+from .schedule.plan import Plan
+from .schedule.profile_report import Stats
 from .settings import Settings
-from .statistics import Stats
-from .world import World
+from .world.contacts import Contact, Contacts
+from .world.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
+from .world.world import World
 
 __all__ = [
     "Bodies",

@@ -1,6 +1,6 @@
 """Compiled kernels: numba dispatchers that keep their machine code on disk, say when they compile, and can be timed.
 
-The cache is ours (:mod:`kernel_cache`). What compiling and loading costs a process stands in :data:`log`; a program
+The cache is ours (:mod:`jit.cache`). What compiling and loading costs a process stands in :data:`log`; a program
 that shows it itself joins ``log.listeners``, for all others there is the logger ``carom``: a line of level WARNING when
 the first kernel compiles, because seconds without a word look like a hang, one of level INFO for each, and one of level
 DEBUG for each that is loaded.
@@ -21,8 +21,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
 
-from .deep_hash import deep_hash as deep_hash
-from .kernel_cache import CACHE_FOLDER_VARIABLE, KernelCache, cache_folder
+from .jit.cache import CACHE_FOLDER_VARIABLE, KernelCache, cache_folder
+from .jit.hash import deep_hash as deep_hash
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..components import AABBCollider, RigidBody, SphereCollider, Transform
 from ..framework import ForceSystem, Settings, World
-from ..framework.schedule import System
+from ..framework.schedule.phases import System
 from ..plugins import Physics
 from ..scenes import gas
 from .bench_clock import Spread, no_garbage_collection, timed

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from ..framework import Plugin, PluginError
-from ..framework.discovery import GROUP, find
+from ..framework.plugins.discovery import GROUP, find
 from .loading import import_file, stdout_kept_clean
 from .problems import Problem, did_you_mean, one_line
 

@@ -12,7 +12,7 @@ from numba.core.errors import NumbaError
 
 from ..components import RigidBody, SphereCollider, Transform
 from ..framework import CaromError, Convex, Plugin, Settings, World
-from ..framework.registry import Pair, Registry, Shape
+from ..framework.plugins.registry import Pair, Registry, Shape
 from ..plugins import Physics
 from .plugin_check_code import RaisedError, SupportCode, compiler_said
 from .plugin_findings import Finding, Report, Subject, row_shown

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.array_columns import array_at
 from ..framework.compilation import inlined, kernel
-from ..framework.registry import Pair, Shape
+from ..framework.data.array_columns import array_at
+from ..framework.plugins.registry import Pair, Shape
 from ..framework.vectors import axes_at, row, store
 from ..systems.shape_code import pair_call, parameters_source, source_module
 from .plugin_samples import Rows

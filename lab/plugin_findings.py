@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.plugin_checks import plain, shown
+from ..framework.plugins.checks import plain, shown
 from .plugin_samples import KINDS, Poses, Rows
 
 

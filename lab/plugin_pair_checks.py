@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.plugin_checks import plain
-from ..framework.registry import Pair, Shape
+from ..framework.plugins.checks import plain
+from ..framework.plugins.registry import Pair, Shape
 from .plugin_check_code import PairCode, RaisedError, Results, SupportCode
 from .plugin_findings import Subject, numbers_shown, pose_shown
 from .plugin_samples import KINDS, Poses, directions

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..components import Collider
-from ..framework.array_columns import ArrayColumn
-from ..framework.columns import REQUIRED, Column
-from ..framework.registry import Shape
+from ..framework.data.array_columns import ArrayColumn
+from ..framework.data.columns import REQUIRED, Column
+from ..framework.plugins.registry import Shape
 from ..systems.rotation import axes_of
 from ..systems.shape_code import half_extents_kernel, parameter_columns
 

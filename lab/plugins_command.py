@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..framework import Plugin
-from ..framework.discovery import offers
+from ..framework.plugins.discovery import offers
 from .commands import Commands
 from .installed_plugins import needed_by, plugins_of
 from .loading import stdout_kept_clean

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from ..framework.statistics import SINGULAR, Stats
+from ..framework.schedule.profile_report import SINGULAR, Stats
 
 UNITS = tuple(SINGULAR.values())  # body, candidate, pair, contact
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from ..framework.compilation import log
-from ..framework.kernel_cache import CACHE_FOLDER_VARIABLE, cache_folder
+from ..framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_folder
 
 REFRESH = 0.1  # s between two updates of the numbers
 

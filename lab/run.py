@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..components import AABBCollider, SphereCollider
 from ..framework import World
 from ..framework.compilation import log
-from ..framework.statistics import Stats, Totals
+from ..framework.schedule.profile_report import Stats, Totals
 from .blows import Blow, blows_of, with_corners
 from .escape import Enclosure
 from .profiling import profile_of

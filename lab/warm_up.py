@@ -18,7 +18,7 @@ from .. import scenes
 from ..components import AABBCollider, SphereCollider
 from ..framework import Settings, World
 from ..framework.compilation import log
-from ..framework.kernel_cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
+from ..framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
 from ..plugins import Physics
 from .loading import Loaded, load, stdout_kept_clean
 from .problems import Problem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..framework.plugin import Plugin
+from ..framework.plugins.plugin import Plugin
 from ..systems import (
     BroadPhase,
     ContactEvents,
@@ -18,7 +18,7 @@ from ..systems.state import PhysicsState
 from .standard_shapes import standard_shapes
 
 if TYPE_CHECKING:
-    from ..framework.world import World
+    from ..framework.world.world import World
 
 
 class Physics(Plugin):

@@ -11,7 +11,7 @@ import math
 
 from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import inlined
-from ..framework.plugin import Convex, Plugin
+from ..framework.plugins.plugin import Convex, Plugin
 from ..framework.vectors import divided, item, length, replace, scale
 from ..systems.convex import convex_convex
 from .standard_sweeps import box_box_sweep, sphere_box_sweep, sphere_sphere_sweep

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from ..framework.compilation import kernel
-from ..framework.plan import PlannedKernel
-from ..framework.schedule import Phase, System
+from ..framework.schedule.phases import Phase, System
+from ..framework.schedule.plan import PlannedKernel
 from ..framework.settings import AUTOMATIC
 from ..framework.vectors import add, item, replace, row, store
 from .broad_plan import EVEN, STILL, planned_pairs

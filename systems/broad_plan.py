@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..framework.plan import PlannedKernel
+from ..framework.schedule.plan import PlannedKernel
 from .few_boxes import FEW, TESTS_AT_MOST
 
 EVEN, STILL = "even", "still"  # grids: one of what moves, or that and one of what does not

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..framework.compilation import kernel
-from ..framework.contacts import ContactRows, empty_columns
-from ..framework.plan import PlannedKernel
-from ..framework.schedule import Phase, System
+from ..framework.schedule.phases import Phase, System
+from ..framework.schedule.plan import PlannedKernel
+from ..framework.world.contacts import ContactRows, empty_columns
 
 if TYPE_CHECKING:
     from .state import PhysicsState

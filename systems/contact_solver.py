@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..framework.plan import PlannedKernel
+from ..framework.schedule.plan import PlannedKernel
 from .blows import STOPPED
 from .contact_bodies import COLOURS, gather, put_back, squeeze
 from .contact_memory import ContactMemory, recall, remember

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ..framework.compilation import part
-from ..framework.stack_arrays import stack_array
+from ..framework.jit.stack_arrays import stack_array
 from ..framework.vectors import add, add_scaled, divided, dot, length, replace, scale
 from .expanding_polygon import CORNERS as POLYGON_CORNERS
 from .expanding_polygon import polygon_depth

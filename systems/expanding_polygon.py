@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..framework.compilation import inlined, part
-from ..framework.stack_arrays import stack_array
+from ..framework.jit.stack_arrays import stack_array
 from ..framework.vectors import dot, negative, row, store
 from .simplex import ROUNDING, corner, edge, norm, polished, support_points
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..framework.compilation import inlined, part
-from ..framework.stack_arrays import stack_array
+from ..framework.jit.stack_arrays import stack_array
 from ..framework.vectors import add_scaled, divided, dot, negative, row, scale, store
 from .simplex import ROUNDING, corner, cross, edge, face_normal, norm, polished, support_points
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..framework.bodies import SelectedBodies
 from ..framework.compilation import kernel
-from ..framework.plan import PlannedKernel
-from ..framework.schedule import ForceSystem, Phase, System
+from ..framework.data.bodies import SelectedBodies
+from ..framework.schedule.phases import ForceSystem, Phase, System
+from ..framework.schedule.plan import PlannedKernel
 from .motion import limit_speeds
 
 if TYPE_CHECKING:

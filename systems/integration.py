@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..framework.plan import PlannedKernel
-from ..framework.schedule import Phase, System
+from ..framework.schedule.phases import Phase, System
+from ..framework.schedule.plan import PlannedKernel
 from .flight import Flight
 from .integrators import CUBIC, LINE, PARABOLA, STANDARD_INTEGRATORS, Integrator, drift
 from .motion import Motion, limit_distance, limit_speeds

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..components import AABBCollider, Collider, SphereCollider
-from ..framework.component import Component
+from ..framework.data.component import Component
+from ..framework.data.handles import Sources
+from ..framework.data.table import Table
 from ..framework.errors import UnhandledPairError
-from ..framework.handles import Sources
-from ..framework.registry import Registry
-from ..framework.table import Table
+from ..framework.plugins.registry import Registry
 from .shape_code import half_extents_kernel, parameter_columns
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..framework.compilation import inlined
-from ..framework.registry import Registry
+from ..framework.plugins.registry import Registry
 from ..framework.settings import MIXING_RULES
 
 AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(len(MIXING_RULES))  # in their order

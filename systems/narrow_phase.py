@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..framework.compilation import inlined, kernel
-from ..framework.plan import PlannedKernel
-from ..framework.schedule import Phase, System
+from ..framework.schedule.phases import Phase, System
+from ..framework.schedule.plan import PlannedKernel
 from ..framework.vectors import add, length, row, store, sub
 from .levels import COUNTERS
 from .pair_filters import filtered

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..framework.compilation import kernel
-from ..framework.hits import Neighbours
 from ..framework.vectors import length, row, sub
+from ..framework.world.hits import Neighbours
 from .few_boxes import FEW, FewBoxes
 from .spatial_tree import SpatialTree
 from .tree_build import REACH

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..framework.contacts import Contacts, empty_columns
+from ..framework.world.contacts import Contacts, empty_columns
 from .blows import CAPPED, LOGGED
 from .pair_order import collect_contacts, sort_pairs
 
 if TYPE_CHECKING:
-    from ..framework.table import Table
+    from ..framework.data.table import Table
 
 Columns = dict[str, np.ndarray]
 NONE = np.empty(0, np.int64)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..framework.columns import REQUIRED
-from ..framework.plan import PlannedColumn
+from ..framework.data.columns import REQUIRED
+from ..framework.schedule.plan import PlannedColumn
 
 if TYPE_CHECKING:
     from .state import PhysicsState

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..components import Collider, RigidBody, SphereCollider, Transform
-from ..framework.bodies import SelectedBodies
-from ..framework.component import Component
-from ..framework.schedule import ForceSystem
-from ..framework.world import World
+from ..framework.data.bodies import SelectedBodies
+from ..framework.data.component import Component
+from ..framework.schedule.phases import ForceSystem
+from ..framework.world.world import World
 from .few_boxes import FEW
 from .levels import in_order
 

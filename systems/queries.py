@@ -8,9 +8,9 @@ import numpy as np
 
 from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import kernel
-from ..framework.hits import CastHits, Hits, NearestHits, Neighbours
-from ..framework.services import QueryServices
 from ..framework.vectors import divided, length, row, store
+from ..framework.world.hits import CastHits, Hits, NearestHits, Neighbours
+from ..framework.world.services import QueryServices
 from .casts import ENDLESS
 from .neighbours import NeighbourSearch
 from .query_code import QueryKernels, query_kernels

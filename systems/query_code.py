@@ -7,10 +7,10 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from ..framework.array_columns import array_at
 from ..framework.compilation import inlined
-from ..framework.component import Component
-from ..framework.registry import Registry, Shape
+from ..framework.data.array_columns import array_at
+from ..framework.data.component import Component
+from ..framework.plugins.registry import Registry, Shape
 from ..framework.vectors import add, axes_at, negative, row
 from .casts import make_cast_kernel
 from .nearest import make_nearest_kernel

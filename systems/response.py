@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..framework.plan import PlannedKernel
-from ..framework.schedule import Phase, System
+from ..framework.schedule.phases import Phase, System
+from ..framework.schedule.plan import PlannedKernel
 from ..framework.settings import Settings
 from .contact_solver import ContactSolver
 from .event_queue import EventQueue

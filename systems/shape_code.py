@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.array_columns import ArrayColumn, array_at
 from ..framework.compilation import deep_hash, inlined, kernel
-from ..framework.component import Component
-from ..framework.registry import Pair, Registry, Shape
+from ..framework.data.array_columns import ArrayColumn, array_at
+from ..framework.data.component import Component
+from ..framework.plugins.registry import Pair, Registry, Shape
 from ..framework.vectors import axes_at, dot, negative, row, store, sub
 from .mixing import mixing
 

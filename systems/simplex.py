@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from ..framework.compilation import inlined, part
-from ..framework.stack_arrays import stack_array
+from ..framework.jit.stack_arrays import stack_array
 from ..framework.vectors import add, add_scaled, divided, dot, item, negative, replace, row, scale, store, sub
 
 ROUNDING = 2e-15  # of the coordinates: a few times what one support point may be off

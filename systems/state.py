@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..components import AABBCollider, Collider, RigidBody, Transform
-from ..framework.adoption import Adoption
-from ..framework.bodies import Bodies
-from ..framework.component import Component
-from ..framework.contacts import Contacts, EntityLookup
-from ..framework.plan import PlannedColumn, PlannedKernel
-from ..framework.services import PhysicsServices
+from ..framework.data.adoption import Adoption
+from ..framework.data.bodies import Bodies
+from ..framework.data.component import Component
+from ..framework.data.table import Table
+from ..framework.schedule.plan import PlannedColumn, PlannedKernel
 from ..framework.settings import AUTOMATIC, MIXING_RULES
-from ..framework.table import Table
+from ..framework.world.contacts import Contacts, EntityLookup
+from ..framework.world.services import PhysicsServices
 from . import preparation
 from .blame import Blame
 from .energy import kinetic_energy, momentum, potential_energy
@@ -35,7 +35,7 @@ from .shape_code import TRACE_SIZE, ShapeCode, parameter_columns, shape_code
 from .sweeps import DISCRETE, MODES
 
 if TYPE_CHECKING:
-    from ..framework.world import World
+    from ..framework.world.world import World
 
 
 class PhysicsState(PairBuffers, PhysicsServices):

@@ -6,7 +6,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider, column
 from carom.framework import ForceSystem, Phase, Plugin, System, World
 from carom.framework.compilation import kernel
-from carom.framework.plan import PlannedKernel
+from carom.framework.schedule.plan import PlannedKernel
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
 from carom.systems.few_boxes import FEW

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from carom.framework import compilation, kernel_cache
+from carom.framework import compilation
 from carom.framework.compilation import deep_hash, inlined, kernel, part
-from carom.framework.kernel_cache import cache_contents, clear_cache
+from carom.framework.jit import cache as kernel_cache
+from carom.framework.jit.cache import cache_contents, clear_cache
 
 HELPERS = """
 from carom.framework.compilation import part

@@ -13,7 +13,7 @@ from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, StepError, System
-from carom.framework.clock import Clock
+from carom.framework.schedule.clock import Clock
 
 
 def busy_world(**settings):

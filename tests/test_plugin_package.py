@@ -79,7 +79,7 @@ import json
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import World
 from carom.framework.compilation import log
-from carom.framework.discovery import find
+from carom.framework.plugins.discovery import find
 from carom.plugins import Physics
 from diamonds_package.shapes import DiamondCollider
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, ForceSystem, Phase, System
 from carom.framework.compilation import Kernel, TimedKernel, kernel, log
-from carom.framework.statistics import Stats, Totals
+from carom.framework.schedule.profile_report import Stats, Totals
 from carom.lab.cli import cli
 from carom.systems import integrators
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from carom.components import AABBCollider, SphereCollider
-from carom.framework.registry import Registry
+from carom.framework.plugins.registry import Registry
 from carom.lab.plugin_check_code import PairCode
 from carom.lab.plugin_samples import Poses, Rows, poses
 from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment

@@ -17,7 +17,7 @@ from worlds import both_dimensions, box, make_world
 
 from carom.components import AABBCollider, SphereCollider, Transform
 from carom.framework import World
-from carom.framework.registry import Registry
+from carom.framework.plugins.registry import Registry
 from carom.lab.plugin_check_code import PairCode
 from carom.lab.plugin_samples import Rows, poses
 from carom.plugins import Physics, capsule, half_space

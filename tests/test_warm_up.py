@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from carom import scenes
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, ForceSystem, System, UnhandledPairError, column
-from carom.framework.kernel_cache import cache_folder
+from carom.framework.jit.cache import cache_folder
 from carom.lab import warm_up
 from carom.lab.cli import cli
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...components.colliders import ALL_LAYERS, Collider
 from ...framework import Plugin, array_column, column
-from ...framework.columns import Column
+from ...framework.data.columns import Column
 from .cells import sums_of, tiles_of, tiles_of_sums, wrong_with
 
 plugin = Plugin("tile_grid", version="1.0")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.stack_arrays import stack_array
+from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, sub
 from ..standard_shapes import convex_convex
 from .collider import plugin

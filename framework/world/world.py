@@ -12,23 +12,24 @@ from typing import Any, Self
 import esper
 import numpy as np
 
-from . import esper_bridge, snapshots
-from .bodies import Bodies
-from .clock import Clock
-from .component import Component
+from ..data import esper_bridge
+from ..data.bodies import Bodies
+from ..data.component import Component
+from ..errors import CaromError, NoPhysicsError, PluginError
+from ..plugins.plugin import Plugin
+from ..plugins.registry import Registry
+from ..schedule.clock import Clock
+from ..schedule.phases import ForceSystem, Phase, System
+from ..schedule.plan import Plan
+from ..schedule.profile_report import Stats
+from ..schedule.step import Pipeline
+from ..settings import Settings
+from . import snapshots
 from .contacts import Contacts
 from .entities import EntityVerbs
-from .errors import CaromError, NoPhysicsError, PluginError
 from .events import Events
-from .pipeline import Pipeline
-from .plan import Plan
-from .plugin import Plugin
-from .query_verbs import QueryVerbs
-from .registry import Registry
-from .schedule import ForceSystem, Phase, System
+from .queries import QueryVerbs
 from .services import PhysicsServices
-from .settings import Settings
-from .statistics import Stats
 
 _numbers = itertools.count(1)
 

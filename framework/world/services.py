@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from .adoption import Adoption
-from .bodies import Bodies
+from ..data.adoption import Adoption
+from ..data.bodies import Bodies
+from ..data.table import Table
+from ..schedule.plan import PlannedColumn, PlannedKernel
 from .contacts import Contacts
 from .hits import CastHits, Hits, NearestHits, Neighbours
-from .plan import PlannedColumn, PlannedKernel
-from .table import Table
 
 
 class QueryServices(ABC):

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import MissingComponentError
 from . import esper_bridge
 from .component import Component
-from .errors import MissingComponentError
 from .handles import Sources
 from .table import STATIC, Table
 

@@ -3,7 +3,7 @@
 numba's own cache has three properties a framework cannot live with: it does not notice an edit in a function that
 lives in another file, it misses for functions made by factories (closures over other kernels), and the import of a
 module fails where it finds no folder to write to. Here a file is named by a hash of everything the machine code depends
-on (:mod:`deep_hash`), and ends with a checksum of what it holds: whatever happened to it, a damaged file is compiled
+on (:mod:`hash`), and ends with a checksum of what it holds: whatever happened to it, a damaged file is compiled
 anew. Files are written whole or not at all, so any number of processes share a folder.
 """
 
@@ -25,7 +25,7 @@ from numba.core import compiler
 from numba.core.caching import _Cache
 from numba.core.serialize import dumps
 
-from .deep_hash import deep_hash
+from .hash import deep_hash
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
 KERNELS, UNFINISHED = "*.kernel", "*.unfinished"

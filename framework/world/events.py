@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from . import esper_bridge
+from ..data import esper_bridge
 
 Handler = Callable[..., None]
 

@@ -1,4 +1,4 @@
-"""What a world's pipeline measures while it runs; :mod:`statistics` makes means of it."""
+"""What a world's pipeline measures while it runs; :mod:`profile_report` makes means of it."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from . import compilation
-from .errors import CaromError
-from .statistics import OUTSIDE, Stats, Totals, units_of
+from .. import compilation
+from ..errors import CaromError
+from .profile_report import OUTSIDE, Stats, Totals, units_of
 
 if TYPE_CHECKING:
-    from .pipeline import Pipeline
+    from .step import Pipeline
 
 
 class Measurements:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from .schedule import Phase
+from .phases import Phase
 
 # What the work of a phase grows with. The counters of the same names count it; each system's time is divided by them.
 UNITS = {

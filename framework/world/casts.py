@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ..data.component import Component, Many
+from ..plugins.registry import Registry
 from . import query_arguments as check
-from .component import Component, Many
 from .hits import CastHit, CastHits
-from .registry import Registry
 from .services import PhysicsServices
 
 

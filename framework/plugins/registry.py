@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from .component import Component
-from .errors import PluginError, UnhandledPairError
-from .settings import AUTOMATIC, MIXING_RULES
+from ..data.component import Component
+from ..errors import PluginError, UnhandledPairError
+from ..settings import AUTOMATIC, MIXING_RULES
 
 if TYPE_CHECKING:
+    from ..world.world import World
     from .plugin import Plugin
-    from .world import World
 
 
 class Convex:

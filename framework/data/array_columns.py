@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..compilation import pasted
 from .columns import Column
-from .compilation import pasted
 
 
 class Pool:

@@ -7,15 +7,15 @@ import weakref
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from . import plugin_checks as checks
-from .compilation import inlined, pasted
-from .component import Component
-from .errors import PluginError
+from ..compilation import inlined, pasted
+from ..data.component import Component
+from ..errors import PluginError
+from ..vectors import dot, scale
+from . import checks
 from .registry import Convex, Pair, Registry, Shape
-from .vectors import dot, scale
 
 if TYPE_CHECKING:
-    from .world import World
+    from ..world.world import World
 
 Thing = TypeVar("Thing")
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import esper
 
-from . import esper_bridge
-from .compilation import log
-from .errors import NoPhysicsError, ScheduleError
-from .schedule import ForceSystem, Phase, System, in_order, means
+from ..compilation import log
+from ..data import esper_bridge
+from ..errors import NoPhysicsError, ScheduleError
+from .phases import ForceSystem, Phase, System, in_order, means
 
 if TYPE_CHECKING:
-    from .pipeline import Pipeline
+    from .step import Pipeline
 
 PLACED = ("before", "after", "phase")  # attributes of a system that being added may set
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib.metadata
 from dataclasses import dataclass
 
-from .errors import PluginError
+from ..errors import PluginError
 from .plugin import Plugin
 
 GROUP = "carom.plugins"

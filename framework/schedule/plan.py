@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .world import World
+    from ..world.world import World
 
 NO_SYSTEM = "no system"
 WIDTH = 120  # of the printed lines

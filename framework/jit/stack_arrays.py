@@ -14,7 +14,7 @@ from numba import types
 from numba.core import cgutils
 from numba.np.arrayobj import populate_array
 
-from .vectors import _emitted
+from ..vectors import _emitted
 
 
 def _sign_stack_array(count: Any, like: Any) -> Any:

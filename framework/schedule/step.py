@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import esper
 
-from . import esper_bridge, snapshots
+from ..data import esper_bridge
+from ..errors import CaromError, StepError
+from ..world import snapshots
 from .clock import Clock
-from .errors import CaromError, StepError
-from .lineup import Lineup
-from .measurements import Measurements
-from .schedule import FIRST_PRIORITY, LAST_PRIORITY, Phase
+from .phases import FIRST_PRIORITY, LAST_PRIORITY, Phase
+from .profiler import Measurements
+from .system_order import Lineup
 
 if TYPE_CHECKING:
-    from .world import World
+    from ..world.world import World
 
 
 class _Opening(esper.Processor):

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import esper
 
-from .component import Component
-from .errors import ScheduleError
+from ..data.component import Component
+from ..errors import ScheduleError
 
 if TYPE_CHECKING:
-    from .world import World
+    from ..world.world import World
 
 
 class Phase(IntEnum):

@@ -10,10 +10,10 @@ from typing import Any, TypeVar
 
 import esper
 
-from . import esper_bridge
-from .component import Component, Many, RowStore, components_in
-from .errors import NoPhysicsError
-from .handles import make_handles
+from ..data import esper_bridge
+from ..data.component import Component, Many, RowStore, components_in
+from ..data.handles import make_handles
+from ..errors import NoPhysicsError
 
 C = TypeVar("C")
 

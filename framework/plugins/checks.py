@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .columns import REQUIRED
-from .component import Component
-from .errors import PluginError
+from ..data.columns import REQUIRED
+from ..data.component import Component
+from ..errors import PluginError
 from .registry import Convex, Shape
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import query_arguments as check
-from .cast_verbs import CastVerbs
+from .casts import CastVerbs
 from .hits import Hits, NearestHit, NearestHits, Neighbours
 
 

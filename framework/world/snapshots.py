@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .clock import Clock
+from ..schedule.clock import Clock
 from .services import PhysicsServices
 
 NO_ENTITIES = np.empty(0, np.int64)  # rows do not move within a step
