@@ -23,7 +23,7 @@ from ..framework import Phase, Plugin, World, column
 from ..framework.compilation import inlined
 from ..framework.vectors import divided, length, scale
 from ..plugins import Physics
-from ..systems.narrow_phase import make_narrow_kernel
+from ..systems.narrow_phase.system import make_narrow_kernel
 from .bench_clock import Spread, no_garbage_collection, now
 from .bench_progress import NO_PROGRESS, Progress
 from .bench_report import digits, span

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..framework import World
-from ..systems.force_accumulation import ForceAccumulation
+from ..systems.forces.accumulation import ForceAccumulation
 from .bench_bodies import NotPlainError, moving_and_fixed
 from .bench_quality import overlaps
 from .escape import Enclosure

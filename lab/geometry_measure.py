@@ -19,7 +19,7 @@ from ..components import AABBCollider, RigidBody, SphereCollider, Transform
 from ..framework import Phase, World
 from ..plugins import Physics, convex_polygon
 from ..plugins.convex_polygon import ConvexPolygonCollider
-from ..systems.narrow_phase import NarrowPhase
+from ..systems.narrow_phase.system import NarrowPhase
 from .bench_clock import Spread, no_garbage_collection, now
 from .bench_progress import NO_PROGRESS, Progress
 from .bench_results import machine

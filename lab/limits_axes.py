@@ -15,7 +15,7 @@ import numpy as np
 from ..components import AABBCollider, RigidBody, SphereCollider, Transform
 from ..framework import ForceSystem, World
 from ..plugins import Physics
-from ..systems.integrators import STANDARD_INTEGRATORS
+from ..systems.integration.integrators import STANDARD_INTEGRATORS
 from .limits_records import FLYING, Axis, BrokenError, Method, by_integrator, by_mode, decades
 
 GRAVITY = 10.0  # m/s^2

@@ -14,7 +14,7 @@ from ..framework.compilation import inlined, kernel
 from ..framework.data.array_columns import array_at
 from ..framework.plugins.registry import Pair, Shape
 from ..framework.vectors import axes_at, row, store
-from ..systems.shape_code import pair_call, parameters_source, source_module
+from ..systems.shapes.dispatch import pair_call, parameters_source, source_module
 from .plugin_samples import Rows
 
 # Of the compiler's messages: lines that say nothing, and files that are not the plugin's.

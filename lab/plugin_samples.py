@@ -12,8 +12,8 @@ from ..components import Collider
 from ..framework.data.array_columns import ArrayColumn
 from ..framework.data.columns import REQUIRED, Column
 from ..framework.plugins.registry import Shape
-from ..systems.rotation import axes_of
-from ..systems.shape_code import half_extents_kernel, parameter_columns
+from ..systems.shapes.dispatch import half_extents_kernel, parameter_columns
+from ..systems.shapes.rotation import axes_of
 
 ORDINARY = 10_000  # poses of a pair
 EXTREME = 300  # of each of the kinds below

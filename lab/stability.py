@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..systems import Integrator
-from ..systems.motion import Motion
+from ..systems.integration.motion import Motion
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -13,7 +13,7 @@ from ..systems import (
     NarrowPhase,
     Response,
 )
-from ..systems.integrators import STANDARD_INTEGRATORS
+from ..systems.integration.integrators import STANDARD_INTEGRATORS
 from ..systems.state import PhysicsState
 from .standard_shapes import standard_shapes
 

@@ -13,7 +13,7 @@ from ..components import AABBCollider, SphereCollider
 from ..framework.compilation import inlined
 from ..framework.plugins.plugin import Convex, Plugin
 from ..framework.vectors import divided, item, length, replace, scale
-from ..systems.convex import convex_convex
+from ..systems.shapes.convex.pair import convex_convex
 from .standard_sweeps import box_box_sweep, sphere_box_sweep, sphere_sphere_sweep
 
 standard_shapes = Plugin("standard shapes")

@@ -1,13 +1,13 @@
 """The built-in systems, in the order of a step: forces, integration, broad phase, narrow phase, response."""
 
-from .broad_phase import BroadPhase
-from .contact_events import ContactEvents
-from .force_accumulation import ForceAccumulation
-from .integration import Integration
-from .integrators import CUBIC, LINE, PARABOLA, Integrator
-from .narrow_phase import NarrowPhase
-from .response import Response
-from .spatial_tree import CandidateLimitError, SpatialTree
+from .broad_phase.system import BroadPhase
+from .broad_phase.tree.tree import CandidateLimitError, SpatialTree
+from .contacts.events import ContactEvents
+from .contacts.response import Response
+from .forces.accumulation import ForceAccumulation
+from .integration.integrators import CUBIC, LINE, PARABOLA, Integrator
+from .integration.system import Integration
+from .narrow_phase.system import NarrowPhase
 
 __all__ = [
     "CUBIC",

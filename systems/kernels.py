@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from .broad_phase import make_box_kernel
-from .first_touch import make_first_touch
-from .impacts import make_impact_kernel
-from .narrow_phase import make_narrow_kernel
-from .resting import make_resting_kernels
-from .shape_code import ShapeCode
-from .sweeps import make_sweep_kernel
+from .broad_phase.system import make_box_kernel
+from .ccd.search_bounds import make_sweep_kernel
+from .ccd.time_of_impact import make_first_touch
+from .contacts.resting import make_resting_kernels
+from .impacts.find import make_impact_kernel
+from .narrow_phase.system import make_narrow_kernel
+from .shapes.dispatch import ShapeCode
 
 
 class SceneKernels:

@@ -15,8 +15,8 @@ from ..framework.data.bodies import SelectedBodies
 from ..framework.data.component import Component
 from ..framework.schedule.phases import ForceSystem
 from ..framework.world.world import World
-from .few_boxes import FEW
-from .levels import in_order
+from .broad_phase.brute_force import FEW
+from .shapes.geometry_levels import in_order
 
 if TYPE_CHECKING:
     from .state import PhysicsState

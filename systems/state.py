@@ -19,20 +19,20 @@ from ..framework.settings import AUTOMATIC, MIXING_RULES
 from ..framework.world.contacts import Contacts, EntityLookup
 from ..framework.world.services import PhysicsServices
 from . import preparation
-from .blame import Blame
-from .energy import kinetic_energy, momentum, potential_energy
-from .flat_columns import all_finite, any_turned, invert_masses
-from .flight import Flight
-from .handled_pairs import check_pairs
-from .integrators import Integrator
+from .ccd.search_bounds import DISCRETE, MODES
+from .forces.energy import kinetic_energy, momentum, potential_energy
+from .integration.flat_columns import all_finite, any_turned, invert_masses
+from .integration.flight import Flight
+from .integration.integrators import Integrator
 from .kernels import SceneKernels, kernels_for
-from .levels import COUNTERS, LevelCheck, arrange, check_sensors, in_order
-from .pair_buffers import PairBuffers
+from .narrow_phase.buffers import PairBuffers
 from .planned_columns import planned_columns
-from .queries import Queries
-from .rotation import axes_of
-from .shape_code import TRACE_SIZE, ShapeCode, parameter_columns, shape_code
-from .sweeps import DISCRETE, MODES
+from .queries.system import Queries
+from .shapes.attribute_errors import Blame
+from .shapes.dispatch import TRACE_SIZE, ShapeCode, parameter_columns, shape_code
+from .shapes.geometry_levels import COUNTERS, LevelCheck, arrange, check_sensors, in_order
+from .shapes.pair_coverage import check_pairs
+from .shapes.rotation import axes_of
 
 if TYPE_CHECKING:
     from ..framework.world.world import World

@@ -9,7 +9,7 @@ from carom.framework.compilation import kernel
 from carom.framework.schedule.plan import PlannedKernel
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
-from carom.systems.few_boxes import FEW
+from carom.systems.broad_phase.brute_force import FEW
 
 from .worlds import ball, box, floor, make_world
 

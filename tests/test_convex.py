@@ -15,7 +15,7 @@ from worlds import both_dimensions
 
 from carom.framework.compilation import inlined, kernel
 from carom.framework.vectors import dot, item, replace, row, scale, store
-from carom.systems.convex import convex_convex
+from carom.systems.shapes.convex.pair import convex_convex
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
 

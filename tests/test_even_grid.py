@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.systems.even_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
+from carom.systems.broad_phase.uniform_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
 
 
 def frame_of(lower, upper):

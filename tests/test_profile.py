@@ -14,7 +14,7 @@ from carom.framework import CaromError, ForceSystem, Phase, System
 from carom.framework.compilation import Kernel, TimedKernel, kernel, log
 from carom.framework.schedule.profile_report import Stats, Totals
 from carom.lab.cli import cli
-from carom.systems import integrators
+from carom.systems.integration import integrators
 
 from .worlds import ball, floor, make_world, run
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.systems.spatial_tree import CandidateLimitError, SpatialTree
+from carom.systems.broad_phase.tree.tree import CandidateLimitError, SpatialTree
 
 
 def load_oracle(name):

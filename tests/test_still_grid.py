@@ -11,8 +11,10 @@ from worlds import both_dimensions
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
-from carom.systems import even_grid, spatial_tree, still_grid
-from carom.systems.still_grid import OUTSIDE, StillGrid
+from carom.systems.broad_phase import static_grid as still_grid
+from carom.systems.broad_phase import uniform_grid as even_grid
+from carom.systems.broad_phase.static_grid import OUTSIDE, StillGrid
+from carom.systems.broad_phase.tree import tree as spatial_tree
 
 
 def check(lower, upper, start, stop):

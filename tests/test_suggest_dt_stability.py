@@ -18,7 +18,7 @@ from carom.lab.suggest import SAFETY, step_limits, suggest_dt
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
 from carom.systems import Integrator
-from carom.systems.integrators import STANDARD_INTEGRATORS
+from carom.systems.integration.integrators import STANDARD_INTEGRATORS
 
 # B6: undamped, drag alone (dt = limit / c), then damping ratios 0.05, 0.5 and 1; as (stiffness, drag) at omega = 1
 COLUMNS = [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1), (1.0, 1.0), (1.0, 2.0)]

@@ -11,13 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.systems import first_touch as touches
-from carom.systems.event_heap import heap_pop, heap_push
-from carom.systems.first_touch import make_first_touch
-from carom.systems.flight import land, take_off
-from carom.systems.paths import first_root
-from carom.systems.rounds import merge_pairs
-from carom.systems.sweeps import CONTINUOUS, DISCRETE, EVENT_DRIVEN, find_rooms, leaves_at, places_at, widen
+from carom.systems.ccd import time_of_impact as touches
+from carom.systems.ccd.refresh_pairs import merge_pairs
+from carom.systems.ccd.search_bounds import CONTINUOUS, DISCRETE, EVENT_DRIVEN, find_rooms, leaves_at, places_at, widen
+from carom.systems.ccd.time_of_impact import make_first_touch
+from carom.systems.impacts.heap import heap_pop, heap_push
+from carom.systems.integration.flight import land, take_off
+from carom.systems.integration.trajectory import first_root
 
 DT = 1 / 60
 

@@ -1,0 +1,67 @@
+"""One code against several neighbours at once: LLVM's vectors, which become whatever the processor has.
+
+The plain functions say what the compiled ones do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+
+from ...framework.vectors import _emitted
+
+_BITS = ir.IntType(64)
+_INDEX = ir.IntType(32)
+
+
+def _compared(width: int) -> tuple[Any, Any]:
+    """(emit, signature) of a comparison with ``width`` codes."""
+    lanes = ir.VectorType(_BITS, width)
+
+    def splat(builder: Any, value: Any) -> Any:
+        first = builder.insert_element(ir.Constant(lanes, ir.Undefined), value, ir.Constant(_INDEX, 0))
+        everywhere = ir.Constant(ir.VectorType(_INDEX, width), [0] * width)
+        return builder.shuffle_vector(first, ir.Constant(lanes, ir.Undefined), everywhere)
+
+    def emit(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+        codes = context.make_array(arguments[0])(context, builder, values[0])
+        place = cgutils.get_item_pointer(context, builder, arguments[0], codes, [values[1]])
+        members = builder.load(builder.bitcast(place, lanes.as_pointer()), align=8)
+        guards = splat(builder, values[3])
+        left = builder.and_(builder.sub(splat(builder, values[2]), members), guards)
+        hits = builder.bitcast(builder.icmp_signed("==", left, guards), ir.IntType(width))
+        return builder.zext(hits, _BITS)
+
+    def signature(codes: Any, at: Any, code: Any, guards: Any) -> Any:
+        return types.int64(codes, types.intp, types.int64, types.int64)
+
+    return emit, signature
+
+
+@_emitted(*_compared(4))
+def four_at(codes, at, code, guards):
+    """Bit k is set if all guard bits outlast ``code - codes[at + k]``, k below 4; there must be so many codes."""
+    return sum(1 << k for k in range(4) if (code - int(codes[at + k])) & guards == guards)
+
+
+@_emitted(*_compared(8))
+def eight_at(codes, at, code, guards):
+    """The same for k below 8."""
+    return sum(1 << k for k in range(8) if (code - int(codes[at + k])) & guards == guards)
+
+
+def _emit_lowest(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+    return builder.cttz(values[0], ir.Constant(ir.IntType(1), 1))
+
+
+def _sign_lowest(bits: Any) -> Any:
+    return types.int64(types.int64)
+
+
+@_emitted(_emit_lowest, _sign_lowest)
+def lowest_bit(bits):
+    """The place of the lowest bit that is set; there must be one."""
+    return (bits & -bits).bit_length() - 1

@@ -1,0 +1,189 @@
+"""Levels of geometry: several colliders on one body, the cheap one tested first, the precise one only if that hits.
+
+Levels are ordered by the registered cost of their shapes, ties by name. The cheaper one encloses the costlier one, so
+that it never hides a contact; that is checked here when the colliders are adopted.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...components import AABBCollider, Collider, SphereCollider
+from ...framework.data.component import Component
+from ...framework.data.handles import Sources
+from ...framework.data.table import Table
+from ...framework.errors import UnhandledPairError
+from ...framework.plugins.registry import Registry
+from .dispatch import half_extents_kernel, parameter_columns
+
+if TYPE_CHECKING:
+    from ..state import PhysicsState
+
+COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
+
+# Of the outer level's size, which may stick out: sizes that were computed or stored in single precision still enclose.
+TOLERANCE = 1e-6
+
+Handles = Mapping[int, Component]
+
+
+def in_order(registry: Registry, colliders: Iterable[type[Component]]) -> list[type[Component]]:
+    """These collider types, cheapest first; UnhandledPairError for one that no plugin has registered."""
+    colliders = list(colliders)
+    for collider in colliders:
+        if collider not in registry.shapes:
+            raise UnhandledPairError(
+                f"{collider.__name__} is a collider that no plugin of this world has registered: "
+                f"register it with @plugin.shape(cost=...) and give the plugin to the world"
+            )
+    return sorted(colliders, key=lambda c: (registry.shapes[c].cost, c.__name__))
+
+
+def arrange(has: np.ndarray) -> np.ndarray:
+    """(levels, n) indices of types, cheapest first, the last one repeated where a body has fewer; -1 for none.
+
+    has (types, n): who has which of the types, these being in order.
+    """
+    place = has.cumsum(axis=0) - 1  # of each type among the body's own
+    count = int(place[-1].max(initial=0)) + 1 if len(has) else 1
+    levels = np.full((count, has.shape[1]), -1, np.int8)
+    for index in range(len(has)):
+        bodies = np.flatnonzero(has[index])
+        levels[place[index, bodies], bodies] = index
+    for k in range(1, count):
+        levels[k] = np.where(levels[k] < 0, levels[k - 1], levels[k])
+    return levels
+
+
+class LevelCheck:
+    """Called before colliders are adopted: ValueError if those of one entity cannot be its levels."""
+
+    def __init__(self, table: Table, registry: Registry) -> None:
+        self._table = table
+        self._registry = registry
+
+    def __call__(
+        self,
+        fresh: Mapping[type[Component], Handles],
+        members: Mapping[type[Component], Handles],
+        gone: Mapping[type[Component], set[int]],
+    ) -> None:
+        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: who loses them."""
+        types = [c for c in dict.fromkeys((*fresh, *members)) if issubclass(c, Collider)]
+        for collider in types:
+            if fresh.get(collider) and self._table.dimensions not in collider.dimensions:
+                worlds = " and ".join(f"{d}D" for d in collider.dimensions)
+                raise ValueError(
+                    f"entity {min(fresh[collider])}: {collider.__name__} is a shape of {worlds} worlds, this world is "
+                    f"{self._table.dimensions}D"
+                )
+        holders = {c: (fresh.get(c, {}).keys(), members.get(c, {}).keys(), gone.get(c, set())) for c in types}
+        several: set[int] = set()  # entities that get a collider and have another
+        for collider, other in itertools.permutations(types, 2):
+            new, (also_new, old, lost) = holders[collider][0], holders[other]
+            several |= (new & also_new) | ((new & old) - lost)
+        if not several:
+            return
+        types = in_order(self._registry, types)
+        entities = np.array(sorted(several), np.int64)
+        has = np.zeros((len(types), len(entities)), bool)
+        for index, collider in enumerate(types):
+            new, old, lost = holders[collider]
+            has[index] = [e in new or (e in old and e not in lost) for e in entities.tolist()]
+        levels = arrange(has)
+        for k in range(1, len(levels)):
+            for outer, inner in sorted(set(zip(levels[k - 1].tolist(), levels[k].tolist(), strict=True))):
+                if outer != inner:
+                    chosen = entities[(levels[k - 1] == outer) & (levels[k] == inner)]
+                    self._check_pair(types[outer], types[inner], chosen, fresh)
+
+    def _check_pair(
+        self, outer: type[Any], inner: type[Any], entities: np.ndarray, fresh: Mapping[type[Component], Handles]
+    ) -> None:
+        one, two = (self._values(collider, entities, fresh.get(collider, {})) for collider in (outer, inner))
+        mixed = one["sensor"] != two["sensor"]
+        if mixed.any():
+            entity = int(entities[np.argmax(mixed)])
+            raise ValueError(_mixed(entity, outer, inner, bool(one["sensor"][np.argmax(mixed)])))
+        out, size = self._sticking_out(outer, inner, one, two)
+        beyond = out > TOLERANCE * size
+        if beyond.any():
+            worst = int(np.argmax(beyond))
+            more = int(beyond.sum()) - 1
+            raise ValueError(
+                f"entity {entities[worst]}: its {outer.__name__} is the cheaper level and must enclose its "
+                f"{inner.__name__}, which sticks out by {out[worst]:.4g}: make the {outer.__name__} larger, or use a "
+                f"second entity for a shape of its own" + (f" ({more} more entities likewise)" if more else "")
+            )
+
+    def _values(self, collider: type[Component], entities: np.ndarray, fresh: Handles) -> dict[str, np.ndarray]:
+        """Columns by name, of handles to adopt and of those in the table."""
+        new = np.array([entity in fresh for entity in entities.tolist()], bool)
+        sources = Sources(collider, [fresh[e] for e in entities[new].tolist()]) if new.any() else None
+        rows = self._table.rows_of(entities[~new])
+        values = {}
+        for name, column in collider.columns.items():
+            shape = column.item_shape(self._table.dimensions)
+            values[name] = np.empty((len(entities), *shape), column.dtype)
+            if sources is not None:
+                values[name][new] = sources.values(column, self._table.dimensions)
+            if len(rows):
+                values[name][~new] = self._table.arrays[column.key][rows]
+        return values
+
+    def _sticking_out(
+        self, outer: type[Any], inner: type[Any], one: dict[str, np.ndarray], two: dict[str, np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """How far the inner shape reaches beyond the outer one, unrotated, and the size to measure it by; (n,) each.
+
+        Exact for the built-in shapes. Of others the boxes around them are compared: what sticks out of those does
+        stick out, but a corner that a round shape leaves open is not found.
+        """
+        apart = np.abs(two["offset"] - one["offset"])
+        inside = self._half_extents(inner, two)
+        if outer is SphereCollider and inner is AABBCollider:
+            return np.linalg.norm(apart + inside, axis=1) - one["radius"], one["radius"]
+        outside = self._half_extents(outer, one)
+        return (apart + inside - outside).max(axis=1), outside.max(axis=1)
+
+    def _half_extents(self, collider: type[Any], values: dict[str, np.ndarray]) -> np.ndarray:
+        """(n, d) of the boxes around the shapes."""
+        count, dimensions = len(values["offset"]), self._table.dimensions
+        if collider is AABBCollider:
+            return values["half_extents"]
+        if collider is SphereCollider:
+            return np.repeat(values["radius"][:, None], dimensions, axis=1)
+        shape = self._registry.shapes[collider]
+        result = np.empty((count, dimensions))
+        unturned = np.broadcast_to(np.eye(dimensions), (count if shape.rotates else 0, dimensions, dimensions)).copy()
+        parameters = (parameter_columns(shape, values, unturned),)
+        half_extents_kernel(shape, dimensions)(parameters, result, (0.0,) * dimensions)
+        return result
+
+
+def check_sensors(state: PhysicsState) -> None:
+    """ValueError if, of the levels of some body, some are sensors by now and some are not."""
+    levels, table, slots = state.levels, state.table, state.slots
+    if len(levels) == 1:
+        return
+    sensors = table.stacks[f"{Collider.stack}.sensor"]
+    rows = np.flatnonzero(levels[0, : table.count] != levels[-1, : table.count])
+    decides = sensors[slots[levels[-1, rows]], rows]
+    for level in levels[:-1]:
+        mixed = sensors[slots[level[rows]], rows] != decides
+        if mixed.any():
+            row = rows[np.argmax(mixed)]
+            shapes = [state.code.shapes[index].component for index in (level[row], levels[-1, row])]
+            raise ValueError(_mixed(int(table.arrays["entity"][row]), *shapes, not decides[np.argmax(mixed)]))
+
+
+def _mixed(entity: int, one: type[Component], other: type[Component], one_is_sensor: bool) -> str:
+    sensor, solid = (one, other) if one_is_sensor else (other, one)
+    return (
+        f"entity {entity}: its {sensor.__name__} is a sensor and its {solid.__name__} is solid, but colliders of one "
+        f"entity are levels of one shape: use a second entity for the sensor"
+    )
