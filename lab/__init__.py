@@ -9,27 +9,27 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .geometry_measure import geometry_study
-    from .limits_sweep import limits
-    from .suggest import step_limits, suggest_dt
-    from .trade_records import Trade
-    from .trading import Only, trade
-    from .tune_check import check
-    from .tuning import NothingMeetsError, Tuning, search, tune
+    from .geometry.study import geometry_study
+    from .limits_study.step_length import step_limits, suggest_dt
+    from .limits_study.sweep import limits
+    from .trading.records import Trade
+    from .trading.trade import Only, trade
+    from .tuning.check import check
+    from .tuning.search import NothingMeetsError, Tuning, search, tune
 
 _MODULES = {
-    "NothingMeetsError": "tuning",
-    "Only": "trading",
-    "Trade": "trade_records",
-    "Tuning": "tuning",
-    "check": "tune_check",
-    "geometry_study": "geometry_measure",
-    "limits": "limits_sweep",
-    "search": "tuning",
-    "step_limits": "suggest",
-    "suggest_dt": "suggest",
-    "trade": "trading",
-    "tune": "tuning",
+    "NothingMeetsError": "tuning.search",
+    "Only": "trading.trade",
+    "Trade": "trading.records",
+    "Tuning": "tuning.search",
+    "check": "tuning.check",
+    "geometry_study": "geometry.study",
+    "limits": "limits_study.sweep",
+    "search": "tuning.search",
+    "step_limits": "limits_study.step_length",
+    "suggest_dt": "limits_study.step_length",
+    "trade": "trading.trade",
+    "tune": "tuning.search",
 }
 
 __all__ = [

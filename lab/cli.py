@@ -14,24 +14,24 @@ from rich.console import Console
 from rich.table import Table
 
 from .. import __version__, scenes
-from .bench_command import bench_command
-from .choices import parse_assignments, parse_view, preset
-from .commands import Commands
-from .geometry_command import geometry_command
-from .installed_plugins import plugin_named
-from .limits_command import limits_command
-from .loading import Loaded, load, stdout_kept_clean
-from .options import plugin_option, seed_number, seed_option, set_option, settings_option
-from .plan_command import plan_command
-from .plugins_command import plugins_command
-from .problems import Problem
-from .progress import StepProgress
-from .report import print_report
-from .run import Run, run
-from .settings_command import settings_command
-from .trade_command import trade_command
-from .tune_command import tune_command
-from .warm_up import warm_up_command
+from .bench.command import bench_command
+from .commands.choices import parse_assignments, parse_view, preset
+from .commands.group import Commands
+from .commands.loading import Loaded, load, stdout_kept_clean
+from .commands.options import plugin_option, seed_number, seed_option, set_option, settings_option
+from .commands.plan import plan_command
+from .commands.usage_errors import Problem
+from .commands.warm_up import warm_up_command
+from .geometry.command import geometry_command
+from .limits_study.command import limits_command
+from .measure.run import Run, run
+from .plugins_check.command import plugins_command
+from .plugins_check.installed import plugin_named
+from .reporting.progress import StepProgress
+from .reporting.run_report import print_report
+from .settings_study.command import settings_command
+from .trading.command import trade_command
+from .tuning.command import tune_command
 
 DEFAULT_SECONDS = 10.0  # of a file that does not say
 
@@ -149,7 +149,7 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
     if no_pictures:
         return None
     try:
-        from .pictures import draw_run, is_file
+        from .pictures.run_pictures import draw_run, is_file
     except ImportError:
         click.echo(
             "carom: no pictures, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'",

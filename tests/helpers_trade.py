@@ -6,8 +6,8 @@ import dataclasses
 import itertools
 import math
 
-from carom.lab.bench_clock import Spread
-from carom.lab.trade_records import (
+from carom.lab.measure.timing import Spread
+from carom.lab.trading.records import (
     ESCAPED,
     PYMUNK,
     SMOOTH,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from carom.framework.compilation import log
-from carom.lab import workers
+from carom.lab.jobs import workers
 
 DEADLINE = 60.0  # s; only a failing test waits so long
 

@@ -14,13 +14,25 @@ import pytest
 
 from carom import scenes
 from carom.framework.compilation import CompilationLog
-from carom.lab import bench_clock, bench_ladder, bench_report, bench_results, bench_scaling, bench_startup, peer_pymunk
-from carom.lab.bench import bench
-from carom.lab.bench_clock import Spread
-from carom.lab.bench_progress import Progress
-from carom.lab.bench_queries import QUESTIONS
-from carom.lab.bench_suite import LARGE, SUITE, Subject, Window, subjects
-from carom.lab.problems import Problem
+from carom.lab.bench import report as bench_report
+from carom.lab.bench import results as bench_results
+from carom.lab.bench.benchmarks import (
+    feature_ladder as bench_ladder,
+)
+from carom.lab.bench.benchmarks import (
+    scaling as bench_scaling,
+)
+from carom.lab.bench.benchmarks import (
+    startup as bench_startup,
+)
+from carom.lab.bench.benchmarks.against_pymunk import bench
+from carom.lab.bench.benchmarks.queries import QUESTIONS
+from carom.lab.bench.suite import LARGE, SUITE, Subject, Window, subjects
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.engines import pymunk_space as peer_pymunk
+from carom.lab.measure import timing as bench_clock
+from carom.lab.measure.timing import Spread
+from carom.lab.reporting.progress_bar import Progress
 
 carom = helpers_cli.carom  # fixture
 SHORT_GAS = Subject("gas2d", (Window("first", 2, 12), Window("later", 20, 40)), targets={("later", 30): 2.0})
@@ -128,13 +140,13 @@ def test_blocks_in_which_kernels_came_do_not_count(monkeypatch):
         number = next(calls)
         return (1000.0, False, None) if number == 0 else (3.0, True, None)
 
-    monkeypatch.setattr("carom.lab.bench.timed", timed)
+    monkeypatch.setattr("carom.lab.bench.benchmarks.against_pymunk.timed", timed)
     subject = Subject("gas2d", (Window("", 0, 10),))
     row = bench([subject], (10,), repeats=1).rows[0]
     assert row.ratio is not None
     assert row.carom_ms.median == pytest.approx(3000.0)  # blocks of one step
     assert row.ratio.median == pytest.approx(1.0)
-    monkeypatch.setattr("carom.lab.bench.timed", lambda work: (1.0, False, None))
+    monkeypatch.setattr("carom.lab.bench.benchmarks.against_pymunk.timed", lambda work: (1.0, False, None))
     with pytest.raises(Problem, match="run it once more"):
         bench([subject], (10,), repeats=1)
 
@@ -220,7 +232,7 @@ TINY = ("bench", "--scenes", "fastgas", "--repeats", "1")
 @pytest.fixture
 def tiny(monkeypatch):
     """One scene, 20 bodies, 10 steps."""
-    monkeypatch.setattr("carom.lab.bench_suite.SUITE", (Subject("fastgas", (Window("", 0, 10),), sizes=(20,)),))
+    monkeypatch.setattr("carom.lab.bench.suite.SUITE", (Subject("fastgas", (Window("", 0, 10),), sizes=(20,)),))
 
 
 def test_json_is_all_there_is_on_stdout(carom, tiny):
@@ -332,7 +344,7 @@ def test_ctrl_c_stops_with_one_line(carom, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("carom.lab.bench_command.bench", interrupted)
+    monkeypatch.setattr("carom.lab.bench.command.bench", interrupted)
     done = carom("bench")
     assert done.exit_code == 130
     assert done.stderr.strip().splitlines()[-1] == "carom: stopped"

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from carom.lab import bench_modes
-from carom.lab.bench_modes import COURSES, KINDS, ONE_SWEPT, Course, Modes, modes
+from carom.lab.bench.benchmarks import collision_modes as bench_modes
+from carom.lab.bench.benchmarks.collision_modes import COURSES, KINDS, ONE_SWEPT, Course, Modes, modes
 from carom.lab.cli import cli
-from carom.lab.problems import Problem
+from carom.lab.commands.usage_errors import Problem
 
 STEPS, REPEATS = 12, 2
 # With so few bodies the box is small: in 40 steps each of fastgas meets walls many times.
@@ -120,13 +120,13 @@ def test_blocks_in_which_kernels_came_do_not_count(monkeypatch):
         work()
         return (1000.0, False, None) if next(numbers) == 1 else (3.0, True, None)
 
-    monkeypatch.setattr("carom.lab.bench_modes.timed", timed)
+    monkeypatch.setattr("carom.lab.bench.benchmarks.collision_modes.timed", timed)
     course = dataclasses.replace(SMALL[0], kinds=KINDS)
     found = modes(10, 1, courses=[course])
     for cost in found.costs:  # blocks of one step
         assert cost.milliseconds.median == pytest.approx(3000.0)
         assert cost.ratio.median == pytest.approx(1.0)
-    monkeypatch.setattr("carom.lab.bench_modes.timed", lambda work: (1.0, False, None))
+    monkeypatch.setattr("carom.lab.bench.benchmarks.collision_modes.timed", lambda work: (1.0, False, None))
     with pytest.raises(Problem, match="gas2d 60: kernels were compiled"):
         modes(2, 1, courses=[course])
 

@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from carom.components import SphereCollider
-from carom.lab import bench_pairs
-from carom.lab.bench_pairs import DiscCollider, PairCosts, disc_sphere, pair_costs
+from carom.lab.bench.benchmarks import plugin_pairs as bench_pairs
+from carom.lab.bench.benchmarks.plugin_pairs import DiscCollider, PairCosts, disc_sphere, pair_costs
 from carom.lab.cli import cli
-from carom.lab.problems import Problem
+from carom.lab.commands.usage_errors import Problem
 from carom.plugins.standard_shapes import sphere_sphere
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together

@@ -11,13 +11,13 @@ import pytest
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
-from carom.lab import peer_pymunk
-from carom.lab.bench import CaromWorld
-from carom.lab.bench_bodies import BodyArrays, NotPlainError, moving_and_fixed
-from carom.lab.bench_quality import Quality, kinetic_energy, overlaps
-from carom.lab.bench_suite import SUITE
-from carom.lab.escape import Enclosure
-from carom.lab.peer_pymunk import PymunkSpace
+from carom.lab.bench.benchmarks.against_pymunk import CaromWorld
+from carom.lab.bench.suite import SUITE
+from carom.lab.engines import pymunk_space as peer_pymunk
+from carom.lab.engines.body_arrays import BodyArrays, NotPlainError, moving_and_fixed
+from carom.lab.engines.pymunk_space import PymunkSpace
+from carom.lab.engines.quality import Quality, kinetic_energy, overlaps
+from carom.lab.measure.escape import Enclosure
 from carom.plugins import Physics
 from carom.scenes.walls import enclose
 

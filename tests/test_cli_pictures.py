@@ -14,7 +14,7 @@ from helpers_cli import refusal, report_of
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.lab.run import FEW_BODIES, FEW_STEPS, Traces, run
+from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, Traces, run
 from carom.plugins import Physics
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures

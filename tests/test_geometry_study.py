@@ -11,14 +11,16 @@ import pytest
 from click.testing import CliRunner
 from oracles import convex_brute
 
-from carom.lab import geometry_command, geometry_measure, geometry_report
-from carom.lab.commands import Commands
-from carom.lab.geometry_measure import OPTIONS
-from carom.lab.geometry_objects import OBJECTS, Object, area, smallest_circle
-from carom.lab.geometry_picture import BY_NAME, EXAMPLES, draw_geometry
-from carom.lab.geometry_records import GeometryStudy
-from carom.lab.geometry_truth import expected_area, overlaps, placed, touching
-from carom.lab.problems import Problem
+from carom.lab.commands.group import Commands
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.geometry import command as geometry_command
+from carom.lab.geometry import report as geometry_report
+from carom.lab.geometry import study as geometry_measure
+from carom.lab.geometry.objects import OBJECTS, Object, area, smallest_circle
+from carom.lab.geometry.picture import BY_NAME, EXAMPLES, draw_geometry
+from carom.lab.geometry.records import GeometryStudy
+from carom.lab.geometry.reference import expected_area, overlaps, placed, touching
+from carom.lab.geometry.study import OPTIONS
 from carom.plugins.convex_polygon import wrong_with
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together

@@ -11,17 +11,17 @@ from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, System, World
 from carom.lab import Only, suggest_dt
-from carom.lab.cases import case_of
-from carom.lab.engines import CaromEngine, PymunkEngine
-from carom.lab.norms import NORMS
-from carom.lab.observing import Seen, observe
-from carom.lab.problems import Problem
-from carom.lab.subjects import subject_of
-from carom.lab.survey import survey
-from carom.lab.trade_records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
-from carom.lab.trade_runs import Runs, refined_reference
-from carom.lab.trade_tasks import Task
-from carom.lab.tuning import search
+from carom.lab.cases.case import case_of
+from carom.lab.cases.subjects import subject_of
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.engines.adapters import CaromEngine, PymunkEngine
+from carom.lab.jobs.runs import Runs, refined_reference
+from carom.lab.jobs.tasks import Task
+from carom.lab.measure.norms import NORMS
+from carom.lab.measure.observation import Seen, observe
+from carom.lab.measure.survey import survey
+from carom.lab.trading.records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
+from carom.lab.tuning.search import search
 from carom.plugins import Physics
 from carom.scenes import orbit
 

@@ -10,11 +10,11 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from carom.lab import limits_report
-from carom.lab.commands import Commands
-from carom.lab.limits_command import NAMES, limits_command
-from carom.lab.limits_records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method
-from carom.lab.limits_sweep import AXES, limits, measured, sweep
+from carom.lab.commands.group import Commands
+from carom.lab.limits_study import report as limits_report
+from carom.lab.limits_study.command import NAMES, limits_command
+from carom.lab.limits_study.records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method
+from carom.lab.limits_study.sweep import AXES, limits, measured, sweep
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 

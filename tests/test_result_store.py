@@ -16,9 +16,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from carom.lab.bench_progress import Bar
-from carom.lab.problems import Problem
-from carom.lab.result_store import Store
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.jobs.result_store import Store
+from carom.lab.reporting.progress_bar import Bar
 
 RECORDS = {
     "0.01/rk4": {"errors": {"energy": 1e-9}, "failure": None, "counts": {"steps": 100.0}},
@@ -230,7 +230,7 @@ def test_a_file_in_use_is_refused(path):
 def test_what_a_killed_process_added_is_there_and_its_lock_is_taken_over(path):
     """It ends within add, when the record is on its way: after ten whole ones."""
     script = (
-        "import os, sys; from carom.lab.result_store import Store\n"
+        "import os, sys; from carom.lab.jobs.result_store import Store\n"
         "store = Store.open(sys.argv[1])\n"
         "for number in range(10): store.add(str(number), {'square': number**2})\n"
         "os.fsync = lambda handle: os._exit(9)\n"
@@ -260,7 +260,7 @@ def test_of_two_that_take_an_abandoned_lock_one_gets_it(path, monkeypatch):
     """The other one removed the lock that the first had just made, and made its own."""
     lock = path.with_name("results.jsonl.lock")
     lock.write_text(f"{2**22 + 1} {platform.node()}\n")  # above what Linux numbers processes with
-    monkeypatch.setattr("carom.lab.result_store.time.sleep", lambda _: lock.write_text("1 faster\n"))
+    monkeypatch.setattr("carom.lab.jobs.result_store.time.sleep", lambda _: lock.write_text("1 faster\n"))
     with pytest.raises(Problem, match="process 1 on faster"):
         Store.open(path)
     assert lock.read_text() == "1 faster\n"

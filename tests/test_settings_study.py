@@ -13,12 +13,29 @@ import pytest
 from click.testing import CliRunner
 
 from carom.framework import Settings
-from carom.lab import games, settings_clock, settings_command, settings_report, settings_scenes, settings_study
-from carom.lab.bench_clock import Spread
-from carom.lab.commands import Commands
-from carom.lab.settings_clock import costs
-from carom.lab.settings_records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
-from carom.lab.settings_study import VARIED, measured
+from carom.lab.commands.group import Commands
+from carom.lab.measure.timing import Spread
+from carom.lab.settings_study import (
+    clock as settings_clock,
+)
+from carom.lab.settings_study import (
+    command as settings_command,
+)
+from carom.lab.settings_study import (
+    games,
+)
+from carom.lab.settings_study import (
+    report as settings_report,
+)
+from carom.lab.settings_study import (
+    scenes as settings_scenes,
+)
+from carom.lab.settings_study import (
+    study as settings_study,
+)
+from carom.lab.settings_study.clock import costs
+from carom.lab.settings_study.records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
+from carom.lab.settings_study.study import VARIED, measured
 from carom.scenes import drops, jump, stack
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together

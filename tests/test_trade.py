@@ -14,8 +14,8 @@ from helpers_trade_scenes import BALL, BULLET, CROWD, REST, SPRING, scene_file
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import World
 from carom.lab import Only, Trade, trade
-from carom.lab.problems import Problem
-from carom.lab.trade_records import (
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.trading.records import (
     BLEW_UP,
     CHAOTIC,
     ESCAPED,
@@ -27,7 +27,7 @@ from carom.lab.trade_records import (
     CaseTrade,
     Point,
 )
-from carom.lab.trade_report import ORDER_TOLERANCE, order
+from carom.lab.trading.report import ORDER_TOLERANCE, order
 from carom.plugins import Physics
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together

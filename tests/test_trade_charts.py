@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 import helpers_trade as made
 import pytest
 
-from carom.lab import published
-from carom.lab.bench_clock import Spread
-from carom.lab.problems import Problem
-from carom.lab.trade_charts import TIME, WORK, draw, figure, inline_svg, legend_text, quantities
-from carom.lab.trade_records import PYMUNK, Cell, Curve, ErrorBar, Point
-from carom.lab.trade_styles import FEW, styles
+from carom.lab.cases import published
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.measure.timing import Spread
+from carom.lab.pictures.curve_styles import FEW, styles
+from carom.lab.trading.charts import TIME, WORK, draw, figure, inline_svg, legend_text, quantities
+from carom.lab.trading.records import PYMUNK, Cell, Curve, ErrorBar, Point
 
 
 def plot(chart):

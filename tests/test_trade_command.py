@@ -13,10 +13,12 @@ import pytest
 from click.testing import CliRunner
 from helpers_trade_scenes import BALL, BULLET, CROWD, scene_file
 
-from carom.lab import Trade, cli, trade_command, trade_runs
-from carom.lab.cases import QUICK_REPEATS
-from carom.lab.norms import NORMS
-from carom.lab.trade_tasks import perform
+from carom.lab import Trade, cli
+from carom.lab.cases.case import QUICK_REPEATS
+from carom.lab.jobs import runs as trade_runs
+from carom.lab.jobs.tasks import perform
+from carom.lab.measure.norms import NORMS
+from carom.lab.trading import command as trade_command
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
@@ -180,7 +182,7 @@ def test_tables_go_into_a_page(carom, tmp_path):
 
 
 def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
-    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"] + ["carom.lab.trade_charts"]:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"] + ["carom.lab.trading.charts"]:
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     result = carom("jump", *SHORT)

@@ -10,8 +10,8 @@ from html.parser import HTMLParser
 import helpers_trade as made
 import pytest
 
-from carom.lab.problems import Problem
-from carom.lab.trade_page import write_page
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.trading.page import write_page
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 PICTURE = base64.b64decode(
@@ -154,7 +154,7 @@ def test_what_cannot_be_read_or_written_is_a_problem(tmp_path, picture):
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.delitem(sys.modules, "carom.lab.trade_charts", raising=False)
+    monkeypatch.delitem(sys.modules, "carom.lab.trading.charts", raising=False)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(Problem, match=r"carom\[plot\]"):
         write_page(made.trade(made.refused()), tmp_path / "page.html")

@@ -8,10 +8,11 @@ import os
 import pytest
 from helpers_trade_scenes import BALL, DEADLY, dies, scene_file
 
-from carom.lab import Only, Trade, trade, trade_runs
-from carom.lab.result_store import Store
-from carom.lab.trade_records import STOPPED
-from carom.lab.trade_tasks import perform
+from carom.lab import Only, Trade, trade
+from carom.lab.jobs import runs as trade_runs
+from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.tasks import perform
+from carom.lab.trading.records import STOPPED
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 

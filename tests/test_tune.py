@@ -19,10 +19,10 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Settings, World
 from carom.lab import NothingMeetsError, Only, search, tune
 from carom.lab.cli import cli
-from carom.lab.loading import load
-from carom.lab.problems import Problem
-from carom.lab.tune_check import check
-from carom.lab.tuning import Tuning
+from carom.lab.commands.loading import load
+from carom.lab.commands.usage_errors import Problem
+from carom.lab.tuning.check import check
+from carom.lab.tuning.search import Tuning
 from carom.plugins import Physics
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together

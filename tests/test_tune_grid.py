@@ -17,11 +17,11 @@ import pytest
 
 from carom.components import AABBCollider, RigidBody, Transform
 from carom.framework import ForceSystem, Settings, World
-from carom.lab.result_store import Store
-from carom.lab.trade_work import WEIGHTS
-from carom.lab.trading import trade
-from carom.lab.tune_check import check
-from carom.lab.tuning import Tuning, search
+from carom.lab.engines.cost import WEIGHTS
+from carom.lab.jobs.result_store import Store
+from carom.lab.trading.trade import trade
+from carom.lab.tuning.check import check
+from carom.lab.tuning.search import Tuning, search
 from carom.plugins import Physics
 from carom.scenes import billiards, get, jump, orbit, spring, stack, thermal_gas
 

@@ -16,8 +16,8 @@ from carom import scenes
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, ForceSystem, System, UnhandledPairError, column
 from carom.framework.jit.cache import cache_folder
-from carom.lab import warm_up
 from carom.lab.cli import cli
+from carom.lab.commands import warm_up
 
 from .worlds import ball, floor, make_world, run
 

@@ -16,8 +16,8 @@ from helpers_workers import Task, alive, marks, perform, until
 
 import carom
 from carom.framework.compilation import log
-from carom.lab import workers
-from carom.lab.workers import Lost, in_parallel
+from carom.lab.jobs import workers
+from carom.lab.jobs.workers import Lost, in_parallel
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
@@ -158,7 +158,7 @@ ENDLESS = f"""
 import sys
 sys.path.append({str(Path(__file__).parent)!r})
 from helpers_workers import Task, perform
-from carom.lab.workers import in_parallel
+from carom.lab.jobs.workers import in_parallel
 print("begins", flush=True)
 for _ in in_parallel(perform, [Task("last_for_ever", "marks", number) for number in range(4)], workers=2):
     pass
@@ -229,7 +229,7 @@ def test_kernels_that_workers_compile_are_told_to_those_who_listen_here(monkeypa
 SCRIPT = """
 import os
 import carom
-from carom.lab.workers import in_parallel
+from carom.lab.jobs.workers import in_parallel
 from own_module import where
 
 def own(number):
@@ -244,7 +244,7 @@ for task, pid in in_parallel(own, range(1), workers=2):
 
 OWN_MODULE = """
 import os
-import carom.lab.workers
+import carom.lab.jobs.workers
 
 def where(number):
     print("said by a worker\\n", end="")  # in one write, so that two processes do not mix

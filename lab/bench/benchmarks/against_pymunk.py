@@ -1,0 +1,238 @@
+"""carom against pymunk on the same bodies, in one process.
+
+Both engines start from the same world and take the same steps, in short blocks that alternate, so that a slow moment
+of the machine meets both. A repeat runs every scene once, from another seed; timing one state again and again would
+train the processor's branch prediction and flatter. What counts is the ratio within a repeat. Reading the states,
+measuring quality, building and compiling happen between the timed blocks.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from .... import scenes
+from ....framework import Settings, World
+from ....framework.compilation import log
+from ...commands.usage_errors import Problem
+from ...engines.body_arrays import moving_and_fixed
+from ...engines.pymunk_space import INDEXES, PymunkSpace
+from ...engines.quality import Quality
+from ...measure.body_shapes import Floats
+from ...measure.escape import Enclosure
+from ...measure.run import plain_settings
+from ...measure.timing import Spread, no_garbage_collection, timed
+from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ..results import Result, Row, machine
+from ..suite import Subject, Window, sizes_of
+from .queries import Question, ask_all
+
+CAROM = "carom"
+BLOCKS = 10  # of a window: the engines take turns so often
+REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the run before the first repeat that compiles
+
+
+class Engine(Protocol):
+    """A physics engine in the middle of a scene."""
+
+    def step(self, count: int) -> None: ...
+    def state(self) -> tuple[Floats, Floats]: ...
+    def close(self) -> None: ...
+
+
+class CaromWorld:
+    """carom as an engine among others."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    def step(self, count: int) -> None:
+        """Take ``count`` steps."""
+        step = self.world.step
+        for _ in range(count):
+            step()
+
+    def state(self) -> tuple[Floats, Floats]:
+        """Positions and velocities of the dynamic bodies, (n, 2) each, ascending by entity id."""
+        bodies = self.world.bodies.dynamic
+        order = np.argsort(bodies.entity, kind="stable")
+        return np.array(bodies.position)[order], np.array(bodies.linear_velocity)[order]
+
+    def close(self) -> None:
+        """Close the world."""
+        self.world.close()
+
+
+@dataclass
+class Case:
+    """A subject at one size, with what its repeats have found: by window (or question), one entry a repeat."""
+
+    subject: Subject
+    size: int
+    bodies: int = 0
+    timed: dict[str, int] = field(default_factory=dict)
+    milliseconds: dict[str, dict[str, list[float]]] = field(default_factory=dict)
+    quality: dict[str, dict[str, list[dict[str, float]]]] = field(default_factory=dict)
+    peer: str | None = None
+    compile_seconds: float = 0.0
+
+    def note(self, window: str, engine: str, milliseconds: float, figures: dict[str, float]) -> None:
+        """What one repeat found for one engine."""
+        self.milliseconds.setdefault(window, {}).setdefault(engine, []).append(milliseconds)
+        self.quality.setdefault(window, {}).setdefault(engine, []).append(figures)
+
+    def build(self, seed: int, settings: Settings | None = None) -> World:
+        """The scene's world, with the subject's settings if none are given."""
+        function: Any = scenes.get(self.subject.scene).build  # scenes take more keywords than their protocol promises
+        settings = settings or Settings(**self.subject.settings)
+        return function(settings, seed, **self.subject.build_options(self.size))
+
+    def effort(self) -> float:
+        """In steps of one body of the gas, of one engine."""
+        steps = self.subject.windows[-1].shortened(self.size).last if self.subject.windows else 100
+        size = 1275 if self.subject.size_option == "rows" else self.size
+        return max(size, 200) * steps * self.subject.effort
+
+
+def bench(
+    subjects: Iterable[Subject],
+    sizes: tuple[int, ...],
+    repeats: int = 5,
+    peer: bool = True,
+    progress: Progress = NO_PROGRESS,
+) -> Result:
+    """Measure every subject at every size, ``repeats`` times; ``peer=False``: carom alone."""
+    cases = [Case(subject, size) for subject in subjects for size in sizes_of(subject, sizes)]
+    progress.begin(sum(case.effort() for case in cases) * repeats)
+    for repeat in range(repeats):
+        for case in cases:
+            progress.say(f"{case.subject.name} {case.size:,}, repeat {repeat + 1} of {repeats}")
+            _run(case, repeat, peer, progress)
+    settings = {CAROM: {}, **({"pymunk": {}} if peer else {})}
+    if cases:
+        with contextlib.closing(cases[0].build(0, Settings())) as world:
+            settings[CAROM] = plain_settings(world)
+            if peer:
+                settings["pymunk"] = PymunkSpace(world).settings()
+    return Result(machine(), settings, repeats, [row for case in cases for row in _rows(case)])
+
+
+def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
+    """One repeat of one case, by all engines."""
+    waited = log.waited
+    if repeat == 0:
+        with contextlib.closing(CaromWorld(case.build(REHEARSAL_SEED))) as rehearsal:
+            rehearsal.step(REHEARSAL_STEPS)
+    with contextlib.ExitStack() as stack:
+        world = case.build(repeat)
+        engines: dict[str, Any] = {CAROM: stack.enter_context(contextlib.closing(CaromWorld(world)))}
+        case.bodies = len(world.bodies.dynamic)
+        indexes = [] if not peer else [case.peer] if case.peer else _indexes(world)
+        for index in indexes:
+            engines[index] = PymunkSpace(world, index)
+        before = progress.done
+        if case.subject.windows:
+            _run_windows(case, world, engines, progress)
+        else:
+            _run_questions(case, world, engines, repeat)
+        progress.advance(case.effort() - (progress.done - before))
+    if peer and case.peer is None:
+        case.peer = min(indexes, key=lambda index: sum(case.milliseconds[w][index][0] for w in case.milliseconds))
+    case.compile_seconds += log.waited - waited
+
+
+def _indexes(world: World) -> list[str]:
+    """Those of pymunk's indexes that can matter."""
+    return list(INDEXES if moving_and_fixed(world)[0].shaped.any() else INDEXES[:1])
+
+
+def _run_windows(case: Case, world: World, engines: dict[str, Engine], progress: Progress) -> None:
+    moving, fixed = moving_and_fixed(world)
+    enclosure = Enclosure.around(world)
+    quality = {name: Quality(moving, fixed, enclosure) for name in engines}
+    taken = 0
+    whole = case.subject.windows[-1].shortened(case.bodies).last
+    for window in case.subject.windows:
+        window = window.shortened(case.bodies)
+        with no_garbage_collection():
+            for engine in engines.values():
+                engine.step(window.first - taken)
+        progress.advance(case.effort() * (window.first - taken) / whole)
+        seconds = _run_window(case, window, engines, quality, progress, case.effort() / whole)
+        case.timed[window.name] = window.last - window.first
+        for name, engine in engines.items():
+            case.note(window.name, name, 1e3 * seconds[name], quality[name].figures(*engine.state()))
+        taken = window.last
+
+
+def _run_window(
+    case: Case,
+    window: Window,
+    engines: dict[str, Engine],
+    quality: dict[str, Quality],
+    progress: Progress,
+    effort_per_step: float,
+) -> dict[str, float]:
+    """Seconds per step, by engine."""
+    for seen in quality.values():
+        seen.begin()
+    totals, counted = dict.fromkeys(engines, 0.0), 0
+    ends = np.linspace(window.first, window.last, min(BLOCKS, window.last - window.first) + 1).astype(int)
+    for block, steps in enumerate(np.diff(ends).tolist()):
+        seconds, counts = {}, True
+        names = list(engines)
+        turn = block % len(names)
+        with no_garbage_collection():
+            for name in names[turn:] + names[:turn]:
+                seconds[name], undisturbed, _ = timed(partial(engines[name].step, steps))
+                counts &= undisturbed
+        for name, engine in engines.items():
+            quality[name].sample(engine.state()[0])
+        if counts:
+            counted += steps
+            for name in names:
+                totals[name] += seconds[name]
+        progress.advance(effort_per_step * steps)
+    if not counted:
+        raise Problem(f"{case.subject.name}: kernels were compiled in all blocks of steps; run it once more")
+    return {name: total / counted for name, total in totals.items()}
+
+
+def _run_questions(case: Case, world: World, engines: dict[str, Any], repeat: int) -> None:
+    for question, answers in ask_all(world, engines, case.bodies, repeat).items():
+        case.timed[question] = Question.COUNT
+        for name, (seconds, figures) in answers.items():
+            case.note(question, name, 1e3 * seconds, figures)
+
+
+def _rows(case: Case) -> list[Row]:
+    subject, rows = case.subject, []
+    unit = "step" if subject.windows else f"{Question.COUNT:,} questions"
+    for window, by_engine in case.milliseconds.items():
+        own = by_engine[CAROM]
+        row = Row(
+            subject.scene, subject.variant, case.bodies, window, unit, case.timed[window],
+            subject.target(window, case.size), subject.energy, Spread.of(own), compile_seconds=case.compile_seconds,
+            settings=dict(subject.settings),
+        )  # fmt: skip
+        row.quality[CAROM] = _together(case.quality[window][CAROM])
+        if case.peer is not None:
+            others = by_engine[case.peer]
+            row.peer_index, row.peer_ms = case.peer, Spread.of(others)
+            row.ratio = Spread.of([theirs / ours for theirs, ours in zip(others, own, strict=True)])
+            row.quality["pymunk"] = _together(case.quality[window][case.peer])
+        rows.append(row)
+    return rows
+
+
+def _together(figures: list[dict[str, float]]) -> dict[str, float]:
+    """Of all repeats: the worst of what must not be, the mean of the rest."""
+    worst = ("overlap_max", "escaped", "drift", "sink")
+    return {
+        name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]
+    }

@@ -1,0 +1,119 @@
+"""How the time per body grows with the number of bodies: the gas, from small to large.
+
+With perfect scaling the nanoseconds per body and step stay the same; caches and search trees make them grow.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, Self
+
+from ....scenes import gas
+from ...commands.usage_errors import Problem
+from ...measure.timing import Spread, no_garbage_collection, timed
+from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...reporting.text_tables import TextTable
+from ..report import digits, span
+from ..results import machine
+
+SIZES = (1000, 3000, 10_000, 30_000, 100_000)
+LARGEST = 1_000_000
+WARM_UP_STEPS = 10
+BODY_STEPS = 1_500_000  # a repeat: about as long for few bodies as for many
+FEWEST_STEPS, MOST_STEPS = 10, 1500
+TARGET = (10_000, 100_000, 2.5)  # from, to, and by how much the time per body may grow
+
+
+@dataclass
+class Point:
+    """One size: nanoseconds per body per step, and how often those of the first size."""
+
+    bodies: int
+    steps: int
+    nanoseconds: Spread
+    growth: float
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From what ``dataclasses.asdict`` and JSON made of one."""
+        return cls(**{**plain, "nanoseconds": Spread.from_dict(plain["nanoseconds"])})
+
+
+@dataclass
+class Scaling:
+    """The whole series."""
+
+    scene: str
+    machine: dict[str, str]
+    repeats: int
+    points: list[Point]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """The opposite of :meth:`as_dict`, also after JSON."""
+        return cls(**{**plain, "points": [Point.from_dict(point) for point in plain["points"]]})
+
+    def grown(self, first: int, last: int) -> float | None:
+        """The time per body at ``last`` over that at ``first``; None if either was not measured."""
+        by_size = {point.bodies: point.nanoseconds.median for point in self.points}
+        return by_size[last] / by_size[first] if first in by_size and last in by_size else None
+
+
+def scaling(
+    sizes: tuple[int, ...] = SIZES, repeats: int = 3, progress: Progress = NO_PROGRESS, body_steps: int = BODY_STEPS
+) -> Scaling:
+    """Time the gas of each size, all sizes once a repeat, each repeat from another seed."""
+    sizes = tuple(sorted(set(sizes)))
+    found: dict[int, list[float]] = {n: [] for n in sizes}
+    progress.begin(sum(_steps(n, body_steps) * n for n in sizes) * repeats)
+    for repeat in range(repeats):
+        for n in sizes:
+            progress.say(f"gas2d {n:,}, repeat {repeat + 1} of {repeats}")
+            found[n].append(_time(n, repeat, _steps(n, body_steps)))
+            progress.advance(_steps(n, body_steps) * n)
+    spreads = {n: Spread.of(values) for n, values in found.items()}
+    first = spreads[sizes[0]].median
+    points = [Point(n, _steps(n, body_steps), spread, spread.median / first) for n, spread in spreads.items()]
+    return Scaling("gas2d", machine(), repeats, points)
+
+
+def _steps(n: int, body_steps: int) -> int:
+    return min(MOST_STEPS, max(FEWEST_STEPS, body_steps // n))
+
+
+def _time(n: int, seed: int, steps: int) -> float:
+    """Nanoseconds per body and step."""
+    with contextlib.closing(gas.gas2d(seed=seed, n=n)) as world:
+
+        def take(count: int) -> None:
+            for _ in range(count):
+                world.step()
+
+        take(WARM_UP_STEPS)
+        for _ in range(2):  # a kernel that came only now is there the second time
+            with no_garbage_collection():
+                seconds, counts, _ = timed(lambda: take(steps))
+            if counts:
+                return seconds / (steps * n) * 1e9
+    raise Problem(f"gas2d {n:,}: kernels were compiled in all steps; run it once more")
+
+
+def table(result: Scaling) -> TextTable:
+    """The series as a table."""
+    cells = []
+    for point in result.points:
+        ns = point.nanoseconds
+        per_step = digits(ns.median * point.bodies * 1e-6)
+        cells.append((f"{point.bodies:,}", digits(ns.median), span(ns), per_step, f"{point.growth:.2f}"))
+    title = f"{result.scene}: ns per body per step, medians of {result.repeats}"
+    first, last, target = TARGET
+    grown = result.grown(first, last)
+    if grown is not None:
+        title += f"; from {first:,} to {last:,} bodies times {grown:.2f}, target at most {target:g}"
+    return TextTable(title, ("bodies", "ns", "from .. to", "ms per step", "growth"), cells, words=0)

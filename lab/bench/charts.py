@@ -1,0 +1,90 @@
+"""The charts of the benchmarks: ratios against pymunk, and the time per body against the number of bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from ..pictures import canvas
+from .benchmarks.scaling import Scaling
+from .results import Result
+
+BAR = "#4dabf7"
+SLOWER = "#ff6b6b"
+TARGET = "#ffd43b"
+ROW_HEIGHT = 0.42  # inches
+
+
+def draw_ratios(result: Result, folder: Path) -> Path | None:
+    """Bars of pymunk's time over carom's, on a logarithmic scale; None without a comparison."""
+    rows = [row for row in reversed(result.rows) if row.ratio is not None]
+    if not rows:
+        return None
+    axes = _axes(f"carom against pymunk {result.machine['pymunk']}", 1.8 + ROW_HEIGHT * len(rows))
+    places = range(len(rows))
+    ratios = [row.ratio for row in rows if row.ratio is not None]
+    colours = [BAR if ratio.median >= 1 else SLOWER for ratio in ratios]
+    axes.barh(places, [ratio.median - 1 for ratio in ratios], left=1, color=colours, height=0.6)
+    axes.hlines(places, [r.low for r in ratios], [r.high for r in ratios], color=canvas.TEXT, lw=1.2)
+    targets = [(place, row.target) for place, row in zip(places, rows, strict=True) if row.target]
+    axes.plot([t for _, t in targets], [p for p, _ in targets], "|", color=TARGET, ms=15, mew=2, label="target")
+    for place, ratio in zip(places, ratios, strict=True):
+        axes.text(max(ratio.high, 1) * 1.06, place, f"{ratio.median:.2g}", color=canvas.TEXT, fontsize=9, va="center")
+    axes.set_xscale("log")
+    axes.axvline(1, color=canvas.MUTED, lw=1)
+    axes.set_yticks(list(places), [row.label for row in rows])
+    shown = [r.low for r in ratios] + [r.high for r in ratios] + [t for _, t in targets] + [1.0]
+    axes.set_xlim(min(shown) / 1.3, max(shown) * 1.5)
+    axes.set_xlabel("times as fast (line: from the least to the largest repeat)", color=canvas.MUTED)
+    _plain_numbers(axes)
+    if targets:
+        axes.legend(facecolor=canvas.PANEL, edgecolor=canvas.FRAME, labelcolor=canvas.TEXT, loc="best")
+    return _save(axes, folder / "bench.png")
+
+
+def draw_scaling(result: Scaling, folder: Path) -> Path:
+    """Nanoseconds per body per step against the number of bodies, the spread as a band."""
+    axes = _axes("how the time per body grows (gas2d)", 4.5)
+    bodies = [point.bodies for point in result.points]
+    spreads = [point.nanoseconds for point in result.points]
+    axes.fill_between(bodies, [s.low for s in spreads], [s.high for s in spreads], color=BAR, alpha=0.25, lw=0)
+    axes.plot(bodies, [s.median for s in spreads], "o-", color=BAR)
+    for n, spread in zip(bodies, spreads, strict=True):
+        above: dict[str, Any] = {"xytext": (0, 8), "textcoords": "offset points", "ha": "center"}
+        axes.annotate(f"{spread.median:.0f}", (n, spread.median), color=canvas.TEXT, **above)
+    axes.set_xscale("log")
+    axes.set_ylim(0, 1.2 * max(s.high for s in spreads))
+    axes.set_xlabel("bodies", color=canvas.MUTED)
+    axes.set_ylabel("ns per body per step", color=canvas.MUTED)
+    return _save(axes, folder / "scaling.png")
+
+
+def _axes(title: str, height: float) -> Any:
+    size = (canvas.LONG_SIDE, height)
+    figure = Figure(figsize=size, dpi=canvas.DPI, facecolor=canvas.BACKGROUND, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(facecolor=canvas.PANEL)
+    axes.set_title(title, color=canvas.TEXT, fontsize=15, fontweight="bold", loc="left")
+    axes.tick_params(colors=canvas.MUTED)
+    axes.grid(axis="x", color=canvas.FRAME)
+    axes.set_axisbelow(True)
+    for spine in axes.spines.values():
+        spine.set_color(canvas.FRAME)
+    return axes
+
+
+def _plain_numbers(axes: Any) -> None:
+    """0.5 and 20 instead of powers of ten."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _save(axes: Any, path: Path) -> Path:
+    axes.figure.savefig(path, facecolor=canvas.BACKGROUND)
+    return path

@@ -1,0 +1,181 @@
+"""``carom bench`` and the commands below it, one for each benchmark: measure, and show as asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from ..commands.group import Commands
+from ..commands.options import out_option, repeats_option, shown_options
+from ..commands.usage_errors import Problem
+from ..engines.pymunk_space import pymunk_module
+from ..reporting.output import Output
+from ..reporting.progress_bar import Bar
+from . import report as bench_report
+from .benchmarks import (
+    collision_modes as bench_modes,
+)
+from .benchmarks import (
+    feature_ladder as bench_ladder,
+)
+from .benchmarks import (
+    plugin_pairs as bench_pairs,
+)
+from .benchmarks import (
+    scaling as bench_scaling,
+)
+from .benchmarks import (
+    startup as bench_startup,
+)
+from .benchmarks.against_pymunk import bench
+from .suite import LARGE, SIZES, SUITE, subjects
+
+QUICK_SIZES, QUICK_REPEATS = (1000,), 2
+REPEATS = 5
+NAMES = ", ".join(dict.fromkeys(subject.scene for subject in SUITE))
+
+RUNS = "Runs; the median counts."
+chart_option = out_option("Draw a chart into this folder.")
+
+
+@click.group("bench", cls=Commands, invoke_without_command=True, short_help="Time carom on this machine.")
+@click.option("--scenes", "scene_names", metavar="NAME,NAME", help=f"Only these of {NAMES}.")
+@click.option(
+    "--sizes", metavar="N,N",
+    help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}) of scenes that come in sizes; pyramid, "
+    "static_world, fastgas and freefall have their own.",
+)  # fmt: skip
+@click.option(
+    "--repeats", type=click.IntRange(min=1), help=f"Runs of everything; the median counts (default: {REPEATS})."
+)
+@click.option("--large", is_flag=True, help=f"{LARGE:,} bodies too: takes long, above all pile2d.")
+@click.option("--quick", is_flag=True, help=f"{QUICK_SIZES[0]:,} bodies only, {QUICK_REPEATS} repeats.")
+@click.option("--no-peer", is_flag=True, help="carom alone, without pymunk.")
+@chart_option
+@shown_options
+@click.pass_context
+def bench_command(
+    context: click.Context,
+    scene_names: str | None,
+    sizes: str | None,
+    repeats: int | None,
+    large: bool,
+    quick: bool,
+    no_peer: bool,
+    out: Path | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+) -> None:
+    """Time scenes of the library in carom and in pymunk, on the same bodies, in one process.
+
+    The commands below measure other things.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    if quick and (sizes or large):
+        raise Problem("--quick chooses the sizes: leave out --sizes and --large")
+    wanted = subjects(filter(None, (scene_names or "").replace(" ", "").split(",")))
+    asked = QUICK_SIZES if quick else _sizes(sizes) if sizes else SIZES
+    if large:
+        asked = tuple(sorted({*asked, LARGE}))
+    repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
+    output = Output.checked("carom bench", as_json, as_markdown, into, out)
+    peer = not no_peer and _peer_there()
+    with Bar(Console(stderr=True)) as bar:
+        result = bench(wanted, asked, repeats, peer, bar)
+    output.show(result, bench_report.tables(result), bench_report.remarks(result))
+    output.draw("draw_ratios", result)
+
+
+@bench_command.command("scaling", short_help="How the time per body grows with their number.")
+@click.option("--sizes", metavar="N,N", help="Numbers of bodies (default: 1,000 to 100,000).")
+@click.option("--million", is_flag=True, help=f"{bench_scaling.LARGEST:,} bodies too: needs some gigabytes.")
+@repeats_option(3, RUNS)
+@chart_option
+@shown_options
+def scaling_command(
+    sizes: str | None,
+    million: bool,
+    repeats: int,
+    out: Path | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+) -> None:
+    """Time the elastic gas from 1,000 to 100,000 bodies: nanoseconds per body per step."""
+    asked = _sizes(sizes) if sizes else bench_scaling.SIZES
+    output = Output.checked("carom bench scaling", as_json, as_markdown, into, out)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_scaling.scaling((*asked, *[bench_scaling.LARGEST] * million), repeats, bar)
+    output.show(result, [bench_scaling.table(result)], [])
+    output.draw("draw_scaling", result)
+
+
+@bench_command.command("startup", short_help="The time to the first step of a new process.")
+@repeats_option(3, RUNS)
+@shown_options
+def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time new processes up to their first step: with an empty cache of compiled kernels, then with a filled one."""
+    output = Output.checked("carom bench startup", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_startup.startup(repeats=repeats, progress=bar)
+    output.show(result, [bench_startup.table(result)], [])
+
+
+@bench_command.command("pairs", short_help="What a pair of a plugin costs, next to one written by hand.")
+@repeats_option(15, RUNS)
+@shown_options
+def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time the narrow phase with a registered pair, and with the same maths written into its kernel by hand."""
+    output = Output.checked("carom bench pairs", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_pairs.pair_costs(repeats, bar)
+    output.show(result, [bench_pairs.table(result)], [])
+
+
+@bench_command.command("ladder", short_help="What each feature costs, switched on alone.")
+@click.option("--bodies", type=click.IntRange(min=1), default=bench_ladder.BODIES, show_default=True)
+@repeats_option(5, RUNS)
+@shown_options
+def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time scenes that differ in one feature: nanoseconds per body per step beside the scene without it."""
+    output = Output.checked("carom bench ladder", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_ladder.ladder(bodies, repeats, bar)
+    output.show(result, [bench_ladder.table(result)], [])
+
+
+@bench_command.command("modes", short_help="What each kind of collision costs, and what it buys.")
+@click.option(
+    "--steps", type=click.IntRange(min=1), default=bench_modes.STEPS, show_default=True,
+    help="Steps timed of each scene; of bullets a sixth.",
+)  # fmt: skip
+@repeats_option(bench_modes.REPEATS, RUNS)
+@shown_options
+def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time the same bodies with discrete, continuous and event-driven collisions."""
+    output = Output.checked("carom bench modes", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_modes.modes(steps, repeats, bar)
+    output.show(result, bench_modes.tables(result), bench_modes.remarks(result))
+
+
+def _sizes(text: str) -> tuple[int, ...]:
+    """"1000,10000" as numbers."""
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdecimal() and int(part) > 0 for part in parts):
+        raise Problem(f"--sizes takes whole numbers from 1 with commas between them, not {text!r}")
+    return tuple(sorted({int(part) for part in parts}))
+
+
+def _peer_there() -> bool:
+    """Whether pymunk is; says so if not."""
+    try:
+        pymunk_module()
+    except Problem as problem:
+        click.echo(f"carom: timing carom alone: {problem.message}", err=True)
+        return False
+    return True

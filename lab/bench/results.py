@@ -1,0 +1,99 @@
+"""What a benchmark found, as plain records that go through JSON and back."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+import platform
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+from ..measure.timing import CLOCK, Spread
+
+PACKAGES = ("carom", "numba", "numpy", "esper", "pymunk")
+
+
+@dataclass
+class Row:
+    """One window of one scene at one size, or one kind of question.
+
+    ``unit`` says what the milliseconds are per. ``ratio`` is pymunk's time over carom's, within each repeat.
+    ``peer_index`` is the one of pymunk's indexes that was faster in the first repeat, whose times these are.
+    ``settings`` holds those of carom's that are not the default ones.
+    ``quality`` holds figures by engine and name, see :meth:`carom.lab.engines.quality.Quality.figures`.
+    """
+
+    scene: str
+    variant: str
+    bodies: int
+    window: str
+    unit: str
+    timed: int
+    target: float | None
+    energy: str
+    carom_ms: Spread
+    peer_ms: Spread | None = None
+    ratio: Spread | None = None
+    peer_index: str | None = None
+    compile_seconds: float = 0.0
+    settings: dict[str, Any] = field(default_factory=dict)
+    quality: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        return f"{self.scene}, {self.variant}" if self.variant else self.scene
+
+    @property
+    def label(self) -> str:
+        """Scene, bodies, and what tells the row apart from others."""
+        return " ".join(filter(None, (self.scene, f"{self.bodies:,}", self.variant, self.window)))
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From what ``dataclasses.asdict`` and JSON made of one."""
+        spreads = {
+            key: None if plain[key] is None else Spread.from_dict(plain[key])
+            for key in ("carom_ms", "peer_ms", "ratio")
+        }
+        return cls(**{**plain, **spreads})
+
+
+@dataclass
+class Result:
+    """A whole benchmark: where it ran, with what settings, and its rows."""
+
+    machine: dict[str, str]
+    settings: dict[str, dict[str, Any]]
+    repeats: int
+    rows: list[Row]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """The opposite of :meth:`as_dict`, also after JSON."""
+        return cls(**{**plain, "rows": [Row.from_dict(row) for row in plain["rows"]]})
+
+
+def machine() -> dict[str, str]:
+    """What the figures depend on: processor, versions, clock."""
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            versions[package] = "missing"
+    return {"processor": _processor(), "system": platform.system(), "clock": CLOCK, **versions}
+
+
+def _processor() -> str:
+    """The processor's name; on Linux the kernel knows more than Python does."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()

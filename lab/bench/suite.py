@@ -1,0 +1,132 @@
+"""What ``carom bench`` measures: scenes of the library, their sizes, and which steps of a run are timed.
+
+A window is a range of steps. What a scene is about often happens in one part of its run: discs fall, then lie. The
+target of a window is the ratio, the other engine's time over carom's, that the project aims at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from ..commands.usage_errors import Problem, did_you_mean
+
+SIZES = (1000, 10_000)
+LARGE = 100_000
+MOST_BODY_STEPS = 10_000_000  # in a window: so many bodies have fewer steps timed
+
+
+@dataclass(frozen=True)
+class Window:
+    """Steps ``first`` to ``last`` (exclusive) of a run; ``name`` is empty where there is only one."""
+
+    name: str
+    first: int
+    last: int
+
+    def shortened(self, bodies: int) -> Window:
+        """The same start, with no more steps than so many bodies are timed for."""
+        return Window(self.name, self.first, min(self.last, self.first + max(60, MOST_BODY_STEPS // bodies)))
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scene as it is measured.
+
+    ``variant``
+        tells two subjects of one scene apart; ``options`` go to the scene's build
+    ``settings``
+        fields of carom's settings that are not the default ones
+    ``windows``
+        the steps timed; none where questions are timed instead
+    ``sizes``
+        the numbers of bodies, where not those asked for
+    ``energy``
+        "kept": kinetic energy must stay, shown as a share; "left": it must go, shown in joules; "" for neither
+    ``targets``
+        by (window, bodies); bodies 0 for any number
+    ``effort``
+        roughly the time per body and step, in that of the gas: for the time left
+    """
+
+    scene: str
+    windows: tuple[Window, ...]
+    energy: str = "kept"
+    variant: str = ""
+    options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    sizes: tuple[int, ...] | None = None
+    size_option: str = "n"
+    targets: Mapping[tuple[str, int], float] = field(default_factory=lambda: MappingProxyType({}))
+    effort: float = 1.0
+
+    @property
+    def name(self) -> str:
+        return f"{self.scene}, {self.variant}" if self.variant else self.scene
+
+    def target(self, window: str, bodies: int) -> float | None:
+        """The ratio aimed at, if there is one."""
+        return self.targets.get((window, bodies), self.targets.get((window, 0)))
+
+    def build_options(self, size: int) -> dict[str, Any]:
+        """The keyword arguments of the scene's build."""
+        return {**self.options, self.size_option: size}
+
+
+AFTER_START = (Window("", 10, 600),)
+
+
+def _fastgas(collision: str, **more: Any) -> Subject:
+    settings = {} if collision == "discrete" else {"collision": collision}
+    return Subject("fastgas", AFTER_START, variant=collision, settings=settings, sizes=(1000,), **more)
+
+
+def _pyramid(friction: float) -> Subject:
+    return Subject(
+        "pyramid",
+        (Window("", 0, 500),),
+        energy="left",
+        variant=f"friction {friction:g}",
+        options={"friction": friction},
+        sizes=(50,),
+        size_option="rows",
+        targets={("", 0): 3.0},
+        effort=4.0,
+    )
+
+
+SUITE: tuple[Subject, ...] = (
+    Subject("gas2d", AFTER_START, targets={("", 1000): 2.0, ("", 10_000): 5.0, ("", LARGE): 8.0}),
+    Subject("mixed2d", AFTER_START, targets={("", 10_000): 4.0}),
+    Subject(
+        "pile2d",
+        (Window("falling", 0, 300), Window("settled", 600, 900)),
+        energy="left",
+        targets={("settled", 1000): 2.0, ("settled", 10_000): 4.0},
+        effort=6.0,
+    ),
+    _pyramid(0.6),
+    _pyramid(0.0),
+    Subject("static_world", AFTER_START, sizes=(1000,), targets={("", 0): 1.5}),
+    _fastgas("continuous", targets={("", 0): 1 / 3}, effort=12.0),
+    _fastgas("discrete"),
+    Subject("freefall", (Window("", 10, 300),), energy="", sizes=(LARGE,), targets={("", 0): 5.0}, effort=0.1),
+    Subject("player_query", (), energy="", targets={("", 0): 5.0}, effort=0.2),
+)
+
+
+def subjects(scenes: Iterable[str] = ()) -> tuple[Subject, ...]:
+    """Those of ``scenes``, in the suite's order; all for none. Problem for a name that is not measured."""
+    wanted = list(scenes)
+    known = list(dict.fromkeys(subject.scene for subject in SUITE))
+    for name in wanted:
+        if name not in known:
+            raise Problem(f"--scenes: {name!r} is not measured{did_you_mean(name, known)}")
+    return tuple(subject for subject in SUITE if not wanted or subject.scene in wanted)
+
+
+def sizes_of(subject: Subject, asked: tuple[int, ...]) -> tuple[int, ...]:
+    """The sizes to measure: the subject's own, or those asked for."""
+    return subject.sizes if subject.sizes is not None else asked

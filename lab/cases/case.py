@@ -1,0 +1,260 @@
+"""Cases: what is measured of a scene, with which norms, for how long, how often, and against what.
+
+Scenes whose answer is known have a case of their own here; any other gets one from its survey.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..commands.usage_errors import Problem
+from ..measure.norms import NORMS, OF_KIND, norm_named
+from ..measure.observation import Seen
+from ..measure.survey import Survey, survey
+from ..trading.records import CAROM, CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
+from . import grid as grids
+from .closed_forms import FORMS
+from .subjects import Subject, subject_of
+
+PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 1, CHAOTIC: 5}  # repeats; of chaotic scenes they are seeds
+BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare a run with one run
+OF_CONTACTS = ("impact_time", "count", "overlap", "overlap_mean", "pressure", "rate")
+FINER = 8  # times smaller than the smallest step are those of the own references
+FEWEST_STEPS = 3  # of a run
+MOST_REFINED = 2  # times
+QUICK_REPEATS = 8
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the library knows of a scene: anything left None comes from the survey.
+
+    orders
+        (integrator, norm, order) of methods that do better than theory promises in general, at the end of ``seconds``
+    """
+
+    seconds: float | None = None
+    norms: tuple[str, ...] = ()
+    repeats: int | None = None
+    steps: tuple[float, ...] = ()
+    options: tuple[tuple[str, Any], ...] = ()
+    orders: tuple[tuple[str, str, float], ...] = ()
+
+
+def _halved(largest: float, count: int) -> tuple[float, ...]:
+    return tuple(largest / 2**k for k in range(count))
+
+
+KNOWN: Mapping[str, Known] = {
+    "jump": Known(1.0, ("apex", "position", "energy"), steps=_halved(1 / 15, 6)),
+    "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # not at a turn, where phase errors hide
+    # Semi-implicit Euler is velocity Verlet seen half a step aside (Hairer, Lubich, Wanner: Geometric Numerical
+    # Integration, VI.3): at the perihelion, where it starts, that shift has no energy, after whole turns no length.
+    "orbit": Known(
+        20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8),
+        orders=(("semi_implicit_euler", "position", 2.0),),
+    ),
+    # As published: 49 balls, 20 s, these steps.
+    "bouncing": Known(
+        20.0, ("energy_square", "position", "energy"), 4, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
+    ),
+    "oblique": Known(3.0, ("position", "energy", "impact_time"), steps=_halved(0.8, 6)),
+    "stack": Known(5.0, ("overlap", "overlap_mean", "speed", "drift"), 1, _halved(1 / 30, 6)),
+    "billiards": Known(1.0, steps=_halved(1 / 30, 6)),
+    "thermal_gas": Known(100.0, ("pressure", "rate"), steps=_halved(0.8, 7)),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene ready to be measured.
+
+    reference
+        what a closed form gives; None: own fine runs decide
+    reference_cells
+        of the own runs: two methods, and the first with twice its step where the scene is not chaotic
+    orders
+        as in ``Known``
+    """
+
+    subject: Subject
+    survey: Survey
+    kind: str
+    why: str
+    norms: tuple[str, ...]
+    seconds: float
+    repeats: int
+    steps: tuple[float, ...]
+    form: str
+    reference: Seen | None
+    reference_cells: tuple[Cell, ...]
+    orders: tuple[tuple[str, str, float], ...] = ()
+
+    @property
+    def repeated(self) -> str:
+        return "seeds" if self.kind == CHAOTIC else "start phases"
+
+    @property
+    def repeats_told(self) -> str:
+        """For messages: 1 start phase, 64 start phases, 5 seeds."""
+        return f"{self.repeats} {self.repeated if self.repeats > 1 else self.repeated[:-1]}"
+
+    def theory(self, cell: Cell, norm: str) -> float | None:
+        """The order that the method should show in this norm, as ``grids.theory``."""
+        for integrator, name, order in self.orders:
+            if (cell.engine, cell.integrator, name) == (CAROM, integrator, norm):
+                return order
+        return grids.theory(cell, norm, self.survey)
+
+    def phase(self, repeat: int) -> float:
+        """The length of the first step of that repeat, in steps."""
+        return 1.0 if self.kind == CHAOTIC else 1.0 - repeat / self.repeats
+
+    def replace(self, **changes: Any) -> Case:
+        return dataclasses.replace(self, **changes)
+
+    def quick(self, fewer_steps: bool = True, fewer_repeats: bool = True) -> Case:
+        """Every second step, and a few repeats: a first look."""
+        steps = self.steps[::2] if fewer_steps else self.steps
+        repeats = min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats
+        return self.replace(steps=steps, repeats=repeats)._with_reference_step(steps[-1] / FINER)
+
+    def _with_reference_step(self, dt: float) -> Case:
+        """The same with other steps in its own references; those of chaotic scenes stay."""
+        if self.kind == CHAOTIC or not self.reference_cells:
+            return self
+        cells = [dataclasses.replace(cell, dt=dt) for cell in self.reference_cells[:2]]
+        return self.replace(reference_cells=with_twice_the_step(cells), reference=None)
+
+    def coarse_reference(self) -> Case:
+        """The same with the largest steps that its own references may have, where smooth motion makes them converge."""
+        coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
+        return self._with_reference_step(coarse) if self.kind == SMOOTH else self
+
+    def finer_reference(self) -> Case | None:
+        """The same with smaller steps in its own references; None where that has been tried often enough."""
+        if self.kind == CHAOTIC or not self.reference_cells:
+            return None
+        finer = self.reference_cells[0].dt / FINER
+        return self._with_reference_step(finer) if finer >= self.steps[-1] / FINER**MOST_REFINED else None
+
+
+def case_of(
+    target: Any,
+    *,
+    norms: Sequence[str] = (),
+    seconds: float | None = None,
+    repeats: int | None = None,
+    steps: Sequence[float] = (),
+    options: Mapping[str, Any] | None = None,
+    seed: int = 0,
+) -> Case:
+    """A case for a scene's name, a file, or a function build(settings, seed=0) -> World.
+
+    norms: the first decides; seconds: of each run; repeats; steps: s, from which the grid is made. What is not given
+    comes from the library or from a survey of the scene. Problem for a scene that cannot be measured.
+    """
+    check_arguments(norms, seconds, repeats, steps)
+    known = KNOWN.get(target, Known()) if isinstance(target, str) else Known()
+    subject = subject_of(target, {**dict(known.options), **(options or {})}, seed)
+    duration = seconds or known.seconds or subject.recommended[0]
+    facts = survey(subject, duration)
+    kind = facts.kind
+    chosen = tuple(norms) or known.norms or OF_KIND[kind]
+    ladder = _fitting(steps or known.steps or grids.steps_for(facts), duration)
+    form, reference = _closed_form(subject, duration, kind, chosen)
+    if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
+        form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
+    times = repeats or known.repeats or _repeats(kind, chosen)
+    found = Case(
+        subject, facts, kind, facts.why, chosen, duration, times, ladder, form, reference,
+        () if reference is not None else _own_references(facts, ladder),
+        known.orders if duration == known.seconds else (),
+    )  # fmt: skip
+    if kind == CHAOTIC and not facts.contacts:
+        raise Problem(
+            f"{subject.name} is chaotic: {facts.why}. No body can be compared with itself after {duration:g} s, and "
+            f"without contacts there is no pressure or rate to measure instead: take a shorter time"
+        )
+    idle = [name for name in chosen if name in OF_CONTACTS]
+    if idle and not facts.contacts:
+        raise Problem(f"{subject.name}: {facts.why} within {duration:g} s, so there is no {' and no '.join(idle)}")
+    chance = [name for name in chosen if name in BY_BODY]
+    if kind == CHAOTIC and chance:
+        raise Problem(
+            f"{subject.name} is chaotic: {facts.why}, so no body can be compared with itself after {duration:g} s, and "
+            f"{', '.join(chance)} would measure chance. Measure statistics (pressure, rate, kinetic), or a shorter time"
+        )
+    return found
+
+
+def check_arguments(
+    norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None, steps: Sequence[float] = ()
+) -> None:
+    """ValueError, TypeError or Problem for what no case can have."""
+    if isinstance(norms, str):
+        raise TypeError(f"norms must be a sequence of names, got {norms!r}")
+    for name in norms:
+        norm_named(name)
+    for name, numbers in (("seconds", () if seconds is None else (seconds,)), ("steps", steps)):
+        for number in numbers:
+            good = isinstance(number, (int, float)) and not isinstance(number, bool)
+            if not good or not math.isfinite(number) or number <= 0:
+                raise ValueError(f"{name} must be finite and above 0, got {number!r}")
+    if repeats is not None and (isinstance(repeats, bool) or not isinstance(repeats, int) or repeats < 1):
+        raise ValueError(f"repeats must be a whole number from 1, got {repeats!r}")
+
+
+def _fitting(steps: Sequence[float], seconds: float) -> tuple[float, ...]:
+    """From the largest to the smallest, without those that a run has no room for; Problem if none is left."""
+    largest = seconds / FEWEST_STEPS
+    fitting = tuple(sorted({dt for dt in steps if dt <= largest}, reverse=True))
+    if not fitting:
+        raise Problem(f"a run of {seconds:g} s has no room for steps of {min(steps):g} s: at most {largest:g} s")
+    return fitting
+
+
+def _repeats(kind: str, norms: Sequence[str]) -> int:
+    """Where within a step the highest point lies decides how much of it is seen: the worst of a few would flatter."""
+    return max(PHASES[kind], PHASES[IMPACTS]) if "apex" in norms else PHASES[kind]
+
+
+def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[str]) -> tuple[str, Seen | None]:
+    """The name of the closed form and what it gives, if it tells all the norms; rest needs none, for its right answer
+    is 0."""
+    form = FORMS.get(subject.target)
+    if form is None or (subject.target == "jump" and kind != SMOOTH):
+        return "", None
+    if {name for name, _ in subject.options} - set(form.options):
+        return "", None
+    world = subject.world(None)
+    seen = form.function(world, seconds)
+    world.close()
+    return (form.text, seen) if all(NORMS[name].tells(seen) for name in norms) else ("", None)
+
+
+def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
+    """Two methods that share as little as possible, with a step far below the smallest one measured; and, of what is
+    not chaotic, the first one with twice that step, for what both may get wrong together."""
+    own = facts.settings
+    fine = ladder[-1] / FINER
+    if facts.kind == CHAOTIC:  # long runs; the step does not matter where nothing bends the paths
+        fine = ladder[0] / 2 if not facts.forces and not facts.damping else ladder[-1]
+        pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
+    elif facts.force_systems and not facts.contacts:
+        pairs = (("yoshida4", own.collision), ("rk4", own.collision))
+    elif facts.force_systems:  # two kinds of sweeps: both on a bent path would be wrong together
+        pairs = (("yoshida4", "continuous"), ("velocity_verlet", "event_driven"))
+    else:
+        pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
+    cells = tuple(Cell(fine, integrator, collision, 32, "precise") for integrator, collision in pairs)
+    return cells if facts.kind == CHAOTIC else with_twice_the_step(cells)
+
+
+def with_twice_the_step(cells: Sequence[Cell]) -> tuple[Cell, ...]:
+    """Two cells, and the first with twice the step."""
+    return (*cells, dataclasses.replace(cells[0], dt=2 * cells[0].dt))

@@ -1,0 +1,133 @@
+"""Right answers on paper: what scenes of the library must show, computed without a step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...framework import World
+from ..measure.body_shapes import Floats
+from ..measure.observation import Seen
+from ..testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
+
+SAMPLES = 2000  # of a path, for its farthest point
+Path = Callable[[float], Floats]  # seconds to positions (n, d)
+
+
+def _start(world: World) -> tuple[Floats, Floats, Floats]:
+    """Positions, velocities (n, d) and masses (n,) of the dynamic bodies by entity id."""
+    dynamic = world.bodies.dynamic
+    order = np.argsort(dynamic.entity, kind="stable")
+    position, velocity, mass = dynamic.position, dynamic.linear_velocity, dynamic.mass
+    return np.array(position)[order], np.array(velocity)[order], np.array(mass)[order]
+
+
+def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[float], **found: Any) -> Seen:
+    """What the path shows. The energy stays what it is: all scenes here are conservative."""
+    start = path(0.0)
+    places = np.array([path(t) for t in np.linspace(0.0, seconds, SAMPLES)])
+    energy = world.kinetic_energy() + world.potential_energy()
+    values = {
+        "position": path(seconds),
+        "reach": float(np.linalg.norm(places - start, axis=2).max()),
+        "energy": energy,
+        "energy_start": energy,
+        "energy_scale": world.kinetic_energy(),
+        "impacts": len(times),
+        "times": times,
+        "struck": [struck] * len(start),
+        "seconds": seconds,
+    }
+    return Seen(**{**values, **found})
+
+
+def flight(world: World, seconds: float) -> Seen:
+    """Parabolas that meet nothing; the apex is v^2 / 2g."""
+    x, v, _ = _start(world)
+    gravity = np.asarray(world.gravity, float)
+    size = float(np.linalg.norm(gravity))
+    rise = float((-(v @ gravity)).max() / size) if size else 0.0  # m/s, upwards
+    apex = max(rise, 0.0) ** 2 / (2 * size) if size and rise < size * seconds else 0.0
+    return _seen(lambda t: free_flight(t, x, v, gravity)[0], seconds, world, False, [], apex=apex)
+
+
+def swinging(world: World, seconds: float) -> Seen:
+    """The undamped spring of the scene: x(t) = x0 cos(w t); all energy is kinetic in the middle."""
+    x, v, mass = _start(world)
+    stiffness = world.force_systems[0].stiffness  # type: ignore[attr-defined]
+    total = world.kinetic_energy() + world.potential_energy()
+    return _seen(
+        lambda t: spring(t, stiffness, mass[0], x, v)[0], seconds, world, False, [], energy_scale=total
+    )
+
+
+def kepler(world: World, seconds: float) -> Seen:
+    """An ellipse around the origin, GM = 1, from its perihelion on the x axis, by Kepler's equation M = E - e sin E."""
+    x, v, _ = _start(world)
+    near, speed = float(x[0, 0]), float(v[0, 1])
+    axis = 1 / (2 / near - speed**2)
+    e = 1 - near / axis
+    mean_motion = orbit_speed(1.0, axis) / axis
+
+    def path(t: float) -> Floats:
+        mean = mean_motion * t
+        anomaly = mean + e * math.sin(mean)
+        for _ in range(50):  # Newton; e < 1 converges
+            anomaly -= (anomaly - e * math.sin(anomaly) - mean) / (1 - e * math.cos(anomaly))
+        return axis * np.array([[math.cos(anomaly) - e, math.sqrt(1 - e * e) * math.sin(anomaly)]])
+
+    return _seen(path, seconds, world, False, [])
+
+
+def bounces(world: World, seconds: float) -> Seen:
+    """Elastic balls, dropped from rest: each flight is the one before, mirrored in time."""
+    x, _, mass = _start(world)
+    g = -float(np.asarray(world.gravity)[1])
+    radius = 0.1
+    fall = math.sqrt(2 * (float(x[0, 1]) - radius) / g)
+
+    def path(t: float) -> Floats:
+        since = math.remainder(t, 2 * fall)  # from an apex, between -fall and fall
+        return x + np.array([0.0, -0.5 * g * since**2])
+
+    times = [float(t) for t in bounce_times(float(x[0, 1]) - radius, g, 1.0, 1 + int(seconds / fall)) if t < seconds]
+    scale = float(mass.sum()) * g * (float(x[0, 1]) - radius)
+    every = sorted(times * len(x))
+    return _seen(path, seconds, world, True, every, energy_scale=scale)
+
+
+def one_impact(world: World, seconds: float) -> Seen:
+    """Two discs of radius 1/2, equal and elastic as the scene has them: straight lines with one corner each."""
+    x, v, mass = _start(world)
+    when = impact_time(x[0], v[0], x[1], v[1], 1.0)
+    touch = x + when * v
+    normal = touch[1] - touch[0]
+    after = np.array(collide(mass[0], v[0], mass[1], v[1], 1.0, normal))
+
+    def path(t: float) -> Floats:
+        return x + t * v if t < when else touch + (t - when) * after
+
+    return _seen(path, seconds, world, True, [when])
+
+
+@dataclass(frozen=True)
+class Form:
+    """``options``: keywords of the scene that it knows how to follow."""
+
+    text: str
+    function: Callable[[World, float], Seen]
+    options: tuple[str, ...] = ()
+
+
+FORMS: Mapping[str, Form] = {
+    "jump": Form("the parabola, apex v²/2g", flight),
+    "freefall": Form("parabolas", flight, ("n",)),
+    "spring": Form("x(t) = cos(ωt)", swinging, ("stiffness",)),
+    "orbit": Form("Kepler's ellipse", kepler, ("eccentricity",)),
+    "bouncing": Form("parabolas between elastic bounces", bounces, ("n", "height")),
+    "oblique": Form("momentum and energy of one oblique impact", one_impact, ("mass",)),
+}

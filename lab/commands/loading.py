@@ -1,0 +1,257 @@
+"""What is to be run: a scene of the library by name, or a file that defines build(settings, seed=0)."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import importlib.machinery
+import importlib.util
+import inspect
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ... import scenes
+from ...framework import Plugin, Settings, World
+from .choices import apply
+from .usage_errors import Problem, did_you_mean, one_line
+
+Bounds = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Something that builds worlds; ``seconds`` and ``view`` are None where nobody says."""
+
+    name: str
+    function: Any
+    file: Path | None = None
+    seconds: float | None = None
+    view: Bounds | None = None
+
+    def build(
+        self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
+    ) -> World:
+        """A world with ``settings`` (None: the scene's own, for a file the default), and with plugins besides its own;
+        Problem if it fails."""
+        if settings is None and self.file is not None:
+            settings = Settings()
+        brought = {name for plugin in plugins for name in _names_for_settings(plugin)}
+        late = {field: value for field, value in changes.items() if value in brought}
+        early = {field: value for field, value in changes.items() if field not in late}
+        world = self._call(settings, seed)
+        if early:  # the scene's own settings are known only once it is built
+            changed = apply(world.settings, early)
+            world.close()
+            world = self._call(changed, seed)
+        for plugin in plugins:
+            try:
+                with stdout_kept_clean():
+                    world.add_plugin(plugin)
+            except Exception as error:  # its systems are made there: somebody else's code
+                raise Problem(f"--plugin {plugin.name}: {one_line(error)}") from error
+        if late:
+            with self.blame():
+                world.settings = apply(world.settings, late)
+        return world
+
+    def _call(self, settings: Settings | None, seed: int) -> World:
+        with self.blame(), stdout_kept_clean():
+            world = self.function(settings, seed=seed)
+        if not isinstance(world, World):
+            raise Problem(f"{self.name}: build returned {_a(world)}, not a World")
+        if world.dimensions is None:
+            raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
+        return world
+
+    @contextmanager
+    def blame(self) -> Iterator[None]:
+        """Turns what is raised inside into a Problem that names the line of the user's file it came from."""
+        try:
+            yield
+        except (Exception, SystemExit) as error:
+            if isinstance(error, Problem):
+                raise
+            raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
+
+
+def _names_for_settings(plugin: Plugin) -> list[str]:
+    """What a world's settings can name once it has the plugin."""
+    return [*plugin.integrators, *plugin.broad_phases, *plugin.mixing_rules]
+
+
+def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
+    """What a user's code prints goes to stderr: stdout holds the result and nothing else."""
+    return contextlib.redirect_stdout(sys.stderr)
+
+
+def load(target: str) -> Loaded:
+    """The scene named ``target``, or the file at that path; Problem if there is neither."""
+    if target in scenes.names():
+        scene = scenes.get(target)
+        return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view)
+    path = Path(target)
+    if path.is_dir():
+        raise Problem(f"{target!r} is a folder, not a scene or a file")
+    if path.is_file() and path.suffix != ".py":
+        raise Problem(f"{target!r} is not a Python file: a file of one's own ends in .py")
+    if path.suffix == ".py":
+        return _load_file(path)
+    if path.parent != Path():
+        raise Problem(f"no file {target!r}: a file of one's own ends in .py")
+    raise Problem(
+        f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)"
+    )
+
+
+def import_file(path: Path) -> ModuleType:
+    """The module in that file, imported; Problem if there is none or it raises."""
+    _must_exist(path)
+    return _execute(path)
+
+
+def _must_exist(path: Path) -> None:
+    if not path.exists():
+        siblings = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
+        hint = did_you_mean(path.name, siblings) if siblings else ""
+        raise Problem(f"no file {str(path)!r}{hint if 'mean' in hint else ''}")
+    if not path.is_file():
+        raise Problem(f"{str(path)!r} is not a file")
+
+
+def _load_file(path: Path) -> Loaded:
+    _must_exist(path)
+    _check_source(path)
+    module = _execute(path)
+    function = getattr(module, "build", None)
+    if not callable(function):
+        raise Problem(f"{path.name} defines no build(settings, seed=0)")
+    _check_signature(path, function)
+    return Loaded(path.name, function, path.resolve(), _seconds_of(path, module), _view_of(path, module))
+
+
+def _check_source(path: Path) -> None:
+    """A file without a build is not executed: it may be a whole game."""
+    try:
+        tree = ast.parse(path.read_bytes(), str(path))
+    except SyntaxError as error:
+        raise Problem(f"{path.name}, line {error.lineno}: {error.msg}") from error
+    except (OSError, ValueError) as error:
+        raise Problem(f"{path.name}: {one_line(error)}") from error
+    functions, names = [], set()
+    for node in _top_level(tree.body):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            functions.append(node.name)
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            names |= {alias.asname or alias.name for alias in node.names}
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            names |= {name.id for name in ast.walk(node) if isinstance(name, ast.Name)}
+    if not {"build", "*"} & {*functions, *names}:
+        hint = did_you_mean("build", functions) if functions else ""
+        raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
+
+
+def _top_level(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """The statements of a module, with those under its ``if``, ``try`` and ``with``."""
+    for node in body:
+        yield node
+        if isinstance(node, (ast.If, ast.Try, ast.With)):
+            inner = [getattr(node, part, []) for part in ("body", "orelse", "finalbody")]
+            inner += [handler.body for handler in getattr(node, "handlers", [])]
+            for part in inner:
+                yield from _top_level(part)
+
+
+def _seconds_of(path: Path, module: Any) -> float | None:
+    """What the file recommends, as ``seconds`` or ``SECONDS``."""
+    value = getattr(module, "seconds", getattr(module, "SECONDS", None))
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < float("inf"):
+        raise Problem(f"{path.name}: seconds must be a number of at least 0, not {value!r}")
+    return float(value)
+
+
+def _view_of(path: Path, module: Any) -> Bounds | None:
+    """The file's ``view``: its lower and its upper corner."""
+    value = getattr(module, "view", getattr(module, "VIEW", None))
+    if value is None or callable(value):
+        return None
+    try:
+        lower, upper = (tuple(float(x) for x in end) for end in value)
+    except (TypeError, ValueError):
+        lower, upper = (), ()
+    good = len(lower) == len(upper) in (2, 3) and np.isfinite([lower, upper]).all()
+    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+        raise Problem(f"{path.name}: view must be (lower corner, upper corner), not {value!r}")
+    return lower, upper
+
+
+def _execute(path: Path) -> Any:
+    """Import the file under a name of its own; its folder goes on the path, for its neighbours."""
+    name = f"carom_file_{path.stem}"
+    loader = _SourceLoader(name, str(path))
+    module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
+    module.__file__ = str(path)
+    sys.modules[name] = module  # dataclasses and pickle look here
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    try:
+        with stdout_kept_clean():
+            loader.exec_module(module)
+    except SyntaxError as error:
+        file = Path(error.filename).name if error.filename else path.name
+        raise Problem(f"{file}, line {error.lineno}: {error.msg}") from error
+    except (Exception, SystemExit) as error:
+        raise Problem(f"{path.name}{_line_in(path.resolve(), error)}: {one_line(error)}") from error
+    return module
+
+
+class _SourceLoader(importlib.machinery.SourceFileLoader):
+    """Reads the file as it is now and leaves no byte code beside it."""
+
+    def get_code(self, fullname: str) -> Any:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
+def _check_signature(path: Path, function: Any) -> None:
+    try:
+        inspect.signature(function).bind(None, seed=0)
+    except TypeError:
+        line = getattr(getattr(function, "__code__", None), "co_firstlineno", None)
+        where = f", line {line}" if line else ""
+        raise Problem(f"{path.name}{where}: build must take (settings, seed=0)") from None
+
+
+def _line_in(file: Path | None, error: BaseException) -> str:
+    """`, line 12`: the last line of the user's file on the way to the error or to its cause; else nothing."""
+    if file is None:
+        return ""
+    seen: set[int] = set()
+    chain: list[BaseException] = []
+    step: BaseException | None = error
+    while step is not None and id(step) not in seen:
+        seen.add(id(step))
+        chain.append(step)
+        step = step.__cause__ or step.__context__
+    for link in reversed(chain):  # the first cause knows best
+        lines = [
+            frame.lineno
+            for frame in traceback.extract_tb(link.__traceback__)
+            if frame.filename and Path(frame.filename).resolve() == file
+        ]
+        if lines:
+            return f", line {lines[-1]}"
+    return ""
+
+
+def _a(value: Any) -> str:
+    return "nothing (None)" if value is None else f"a {type(value).__name__}"

@@ -1,0 +1,228 @@
+"""Options that several commands take, read and checked as they are parsed."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..cases.grid import COLLISIONS
+from ..measure.norms import norm_named
+from .choices import parse_assignments
+from .usage_errors import Problem, did_you_mean
+
+GEOMETRIES = ("precise", "bounds")
+WORDS = "carom.words"  # where the words of a command line stay: see KeepsWords
+
+Option = Callable[[Any], Any]
+
+
+def together(*options: Option) -> Option:
+    """Several options as one decorator; the help shows them in this order."""
+
+    def decorated(function: Any) -> Any:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorated
+
+
+class KeepsWords(click.Command):
+    """A command that remembers the words it was called with: ``context.meta[WORDS]``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        ctx.meta[WORDS] = list(args)
+        return super().parse_args(ctx, args)
+
+
+def _read(read: Callable[[Any], Any]) -> Callable[[click.Context, click.Parameter, Any], Any]:
+    """A callback for click: what was given goes through ``read``; what was left out stays as it is."""
+    return lambda context, parameter, given: read(given) if given is not None else None
+
+
+def seed_number(text: str) -> int:
+    if not text.strip().isdecimal():
+        raise Problem(f"--seed takes a whole number of at least 0, not {text!r}")
+    return int(text)
+
+
+# -- worlds -----------------------------------------------------------------------------------------------------
+
+settings_option = click.option(
+    "--settings", "preset_name", metavar="fast|balanced|accurate", help="Default: what the scene recommends."
+)
+set_option = click.option(
+    "--set", "assignments", multiple=True, metavar="FIELD=VALUE", help="Set one field of Settings; repeatable."
+)
+seed_option = click.option(
+    "--seed", default="0", show_default=True, metavar="NUMBER", help="Which variant of the scene: 0, 1, 2, ..."
+)
+plugin_option = click.option(
+    "--plugin", "plugins", multiple=True, metavar="NAME", help="Add an installed plugin to the world; repeatable."
+)
+
+# -- results ----------------------------------------------------------------------------------------------------
+
+shown_options = together(
+    click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."),
+    click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown."),
+    click.option(
+        "--into",
+        type=click.Path(path_type=Path, dir_okay=False),
+        help="Also put the tables between the marks of this page.",
+    ),
+)
+
+
+def out_option(help_text: str, default: Path | None = None) -> Option:
+    """``--out FOLDER``."""
+    return click.option(
+        "--out",
+        type=click.Path(path_type=Path, file_okay=False),
+        metavar="FOLDER",
+        default=default,
+        show_default=default is not None,
+        help=help_text,
+    )
+
+
+def repeats_option(default: int, help_text: str) -> Option:
+    """``--repeats N``, from 1."""
+    return click.option(
+        "--repeats", type=click.IntRange(min=1), metavar="N", default=default, show_default=True, help=help_text
+    )
+
+
+def writable_folder(folder: Path, option: Path | None = None) -> None:
+    """Make it if it is not there; Problem if nothing can be written to it. option: what --out was, if not that."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Problem(f"--out {option or folder}: {error.strerror or error}") from error
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise Problem(f"--out {option or folder}: no permission to write there")
+
+
+# -- what is measured -------------------------------------------------------------------------------------------
+
+
+def _norm(name: str) -> str:
+    return norm_named(name).name
+
+
+def _seconds(value: float) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise Problem(f"--seconds takes a number above 0, not {value:g}")
+    return value
+
+
+def _steps(text: str) -> tuple[float, ...]:
+    """"1/60,1/120" as seconds, each once."""
+    steps: dict[float, None] = {}
+    for part in text.split(","):
+        try:
+            step = float(parse_assignments([f"dt={part}"])["dt"])
+        except Problem:
+            step = math.nan
+        if not (math.isfinite(step) and step > 0):
+            raise Problem(f"--dt takes steps above 0 s with commas between them, as in 1/60,1/120, not {text!r}")
+        steps[step] = None
+    return tuple(steps)
+
+
+def _build_options(assignments: tuple[str, ...]) -> dict[str, Any]:
+    """["n=100", "height=2.5"] as keywords; a number where it is one, else a word."""
+    found: dict[str, Any] = {}
+    for assignment in assignments:
+        name, equals, text = (part.strip() for part in assignment.partition("="))
+        if not equals or not name.isidentifier():
+            raise Problem(f"--option takes NAME=VALUE, a keyword of the scene's build, not {assignment!r}")
+        if name in ("settings", "seed"):
+            raise Problem(f"--option cannot set {name}: the command does")
+        if name in found:
+            raise Problem(f"--option gives {name} twice")
+        found[name] = _number_or_word(text)
+    return found
+
+
+def _number_or_word(text: str) -> int | float | str:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+case_options = together(
+    click.option(
+        "--norm", "norms", multiple=True, metavar="NAME", callback=lambda c, p, names: tuple(map(_norm, names)),
+        help="What the error is the error of; repeatable, the first counts (default: what suits the scene).",
+    ),
+    click.option(
+        "--seconds", type=float, metavar="S", callback=_read(_seconds), help="Simulated time of each run."
+    ),
+    click.option(
+        "--repeats", type=click.IntRange(min=1), metavar="N", help="Runs of each setting: start phases or seeds."
+    ),
+    click.option(
+        "--dt", "steps", metavar="S,S", default=None, callback=_read(_steps),
+        help="The steps, as in 1/60,1/120 (default: what suits the scene).",
+    ),
+    click.option(
+        "--option", "options", multiple=True, metavar="NAME=VALUE", callback=_read(_build_options),
+        help="A keyword of the scene's build, as in n=100; repeatable.",
+    ),
+    seed_option,
+)  # fmt: skip
+
+
+def _listed(option: str, known: tuple[str, ...] = ()) -> Callable[[str], tuple[str, ...]]:
+    """"a,b" as words; Problem for one that is not among the ``known``, if they are."""
+
+    def read(text: str) -> tuple[str, ...]:
+        words = tuple(dict.fromkeys(filter(None, (word.strip() for word in text.split(",")))))
+        if not words:
+            raise Problem(f"{option} takes names with commas between them, not {text!r}")
+        for word in words:
+            if known and word not in known:
+                raise Problem(f"{option}: no {word!r}{did_you_mean(word, known)}")
+        return words
+
+    return read
+
+
+def _substeps(text: str) -> tuple[int, ...]:
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdecimal() and int(part) > 0 for part in parts):
+        raise Problem(f"--substeps takes whole numbers from 1 with commas between them, not {text!r}")
+    return tuple(dict.fromkeys(int(part) for part in parts))
+
+
+only_options = together(
+    click.option(
+        "--integrators", metavar="NAME,NAME", callback=_read(_listed("--integrators")),
+        help="Only these (default: all that differ in the scene; so for the next three).",
+    ),
+    click.option(
+        "--collisions", metavar="NAME,NAME", callback=_read(_listed("--collisions", COLLISIONS)),
+        help=f"Only these of {', '.join(COLLISIONS)}.",
+    ),
+    click.option("--substeps", metavar="N,N", callback=_read(_substeps), help="Only these of the solver."),
+    click.option(
+        "--geometry", "geometries", metavar="NAME,NAME", callback=_read(_listed("--geometry", GEOMETRIES)),
+        help=f"Only these of {', '.join(GEOMETRIES)}.",
+    ),
+)  # fmt: skip
+
+# -- how long runs are performed --------------------------------------------------------------------------------
+
+runs_options = together(
+    click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
+    click.option("--resume", is_flag=True, help="Go on with the finished runs that the folder holds."),
+)

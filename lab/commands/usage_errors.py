@@ -1,0 +1,43 @@
+"""How the command line says no: one clear line, with what was probably meant, and exit code 2."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+import click
+
+from ...framework import CaromError
+
+LONGEST = 400  # characters of an error's own message
+
+
+class Problem(click.ClickException):
+    """Something the user can mend; the command line prints it as one line and exits with code 2."""
+
+    exit_code = 2
+
+
+def did_you_mean(wrong: str, known: Iterable[str]) -> str:
+    """`; did you mean 'gas2d'?` for a near miss, else the known names (as long as they fit in a line)."""
+    names = list(known)
+    by_lower_case = {name.lower(): name for name in names}
+    near = difflib.get_close_matches(wrong.lower(), by_lower_case, n=3, cutoff=0.55)
+    if near:
+        return f"; did you mean {' or '.join(repr(by_lower_case[name]) for name in near)}?"
+    return f"; there are: {', '.join(names)}" if names else ""
+
+
+def one_line(error: BaseException) -> str:
+    """The error's message in one line, with its type where the message alone would say little."""
+    text = _shortened(" ".join(str(error).split()))
+    if isinstance(error, KeyError) and len(error.args) == 1 and isinstance(error.args[0], str):
+        text = " ".join(error.args[0].split())
+    if isinstance(error, (ValueError, CaromError, Problem)) and text:
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _shortened(text: str) -> str:
+    """Compilers write pages; their beginning and the option that shows the rest have to do."""
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ... (--traceback shows all of it)"

@@ -1,0 +1,152 @@
+"""``carom warm-up``: compile ahead what scenes, or worlds of the built-in shapes, will need."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from ... import scenes
+from ...components import AABBCollider, SphereCollider
+from ...framework import Settings, World
+from ...framework.compilation import log
+from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
+from ...plugins import Physics
+from ..reporting.progress import CompileStatus
+from .loading import Loaded, load, stdout_kept_clean
+from .usage_errors import Problem
+
+SHAPE_SETS = ((SphereCollider,), (AABBCollider,), (SphereCollider, AABBCollider))  # each has kernels of its own
+STEPS = 10  # of a scene, for what its own systems call
+
+Work = tuple[str, Callable[[], None]]
+
+
+@dataclass
+class Row:
+    """What one target needed that the targets before it had not needed yet.
+
+    compiled: kernels and their seconds; found: how many were in the cache already.
+    """
+
+    target: str
+    compiled: list[tuple[str, float]] = field(default_factory=list)
+    found: int = 0
+    seconds: float = 0.0  # everything: imports, building and stepping too
+
+
+@click.command("warm-up", short_help="Compile ahead, so that the first run does not wait.")
+@click.argument("targets", metavar="[SCENE|FILE.py]...", nargs=-1)
+@click.option("--all", "everything", is_flag=True, help="The built-in shapes and every scene of the library.")
+@click.option("--dimensions", type=click.Choice(["2", "3"]), help="Only worlds of so many dimensions.")
+@click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+def warm_up_command(
+    targets: tuple[str, ...], everything: bool, dimensions: str | None, clear: bool, as_json: bool, traceback: bool
+) -> None:
+    """Compile what the scenes or files need; without any: what worlds of spheres and boxes need."""
+    del traceback  # seen by Commands.main
+    if clear and (targets or everything or dimensions):
+        raise Problem("--clear goes alone: it compiles nothing")
+    if targets and (everything or dimensions):
+        option = "--all" if everything else "--dimensions"
+        raise Problem(f"{option} and scenes exclude each other: name scenes, or choose with --all and --dimensions")
+    folder = cache_folder()
+    if folder is None:
+        raise Problem(f"no folder can be written to keep kernels in; {CACHE_FOLDER_VARIABLE} names one")
+    if clear:
+        _clear(folder, as_json)
+        return
+    wanted = {int(dimensions)} if dimensions else {2, 3}
+    before = cache_contents()
+    with CompileStatus(Console(stderr=True)) as status:
+        rows = warm_up(_work(targets, everything, wanted), status.say)
+    after = cache_contents()
+    if as_json:
+        cache = {"folder": str(folder), "kernels_before": before[0], "kernels": after[0], "bytes": after[1]}
+        click.echo(json.dumps({"cache": cache, "targets": [dataclasses.asdict(row) for row in rows]}, indent=2))
+        return
+    _print(rows, folder, before, after)
+
+
+def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
+    """Do the work, piece by piece, ``say`` its name, and note what compiled."""
+    rows = []
+    for name, action in work:
+        say(name)
+        compiled, loaded, started = len(log.compiled), log.loaded, time.perf_counter()
+        with stdout_kept_clean():
+            action()
+        new = [(kernel.rpartition(".")[2], seconds) for kernel, seconds in log.compiled[compiled:]]
+        rows.append(Row(name, new, log.loaded - loaded, time.perf_counter() - started))
+    return rows
+
+
+def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> Iterator[Work]:
+    if not targets:
+        for d in sorted(dimensions):
+            yield f"spheres and boxes, {d}D", lambda d=d: prepare_built_in(d)
+    names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
+    for loaded in [load(name) for name in names]:  # what cannot be found is said before anything compiles
+        yield loaded.name, lambda loaded=loaded: _prepare_scene(loaded)
+
+
+def prepare_built_in(dimensions: int) -> None:
+    """Worlds of spheres, of boxes and of both, and every integrator of the standard physics."""
+    for shapes in SHAPE_SETS:
+        with closing(World(Physics(dimensions=dimensions))) as world:
+            world.prepare(*shapes)
+    for name in sorted(Physics(dimensions=dimensions).integrators):
+        with closing(World(Physics(dimensions=dimensions), settings=Settings(integrator=name))) as world:
+            world.prepare()
+
+
+def _prepare_scene(loaded: Loaded) -> None:
+    with closing(loaded.build(None, {}, 0)) as world, loaded.blame():
+        world.prepare()
+        for _ in range(STEPS):
+            world.step()
+
+
+def _clear(folder: Path, as_json: bool) -> None:
+    count, size = clear_cache()
+    if as_json:
+        click.echo(json.dumps({"cache": {"folder": str(folder), "kernels_before": count, "kernels": 0, "bytes": 0}}))
+        return
+    click.echo(f"{count:,} kernels deleted from {folder} ({_megabytes(size)})")
+
+
+def _print(rows: list[Row], folder: Path, before: tuple[int, int], after: tuple[int, int]) -> None:
+    console = Console()
+    table = Table(box=None, pad_edge=False)
+    table.add_column("needed by", style="bold")
+    for heading in ("compiled", "in the cache already", "seconds"):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        table.add_row(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}")
+    console.print(table)
+    variants: dict[str, list[float]] = {}  # of the same kernel: for other shapes, for 2D and for 3D
+    for kernel, seconds in (item for row in rows for item in row.compiled):
+        variants.setdefault(kernel, []).append(seconds)
+    if variants:
+        slowest = sorted(variants.items(), key=lambda item: -sum(item[1]))
+        words = (f"{kernel}{f' x{len(s)}' if len(s) > 1 else ''} {sum(s):.1f}" for kernel, s in slowest)
+        console.print(f"compiled, with seconds: {', '.join(words)}", highlight=False)
+    console.print(
+        f"cache: {folder}, {after[0]:,} kernels, {_megabytes(after[1])} ({before[0]:,} kernels before)",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"

@@ -1,0 +1,271 @@
+"""carom and pymunk behind one face, so that one eye sees both: the same scene, the same norms, the same axes."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...framework import World
+from ...systems.forces.accumulation import ForceAccumulation
+from ..measure.body_shapes import Floats, sensor_entities, shapes_of
+from ..measure.escape import Enclosure
+from ..trading.records import PYMUNK
+from .body_arrays import NotPlainError, moving_and_fixed
+from .cost import counts_of
+from .pymunk_space import PymunkSpace
+from .quality import overlaps
+
+
+class ComesAndGoesError(ValueError):
+    """Bodies were created or deleted on the way."""
+
+
+class Engine(ABC):
+    """A scene under way. Bodies are the dynamic ones, ascending by entity id.
+
+    After a step: ``impulse`` N s on what stands still, ``times`` s of its impacts, ``struck`` which bodies (n,) had
+    one or a contact so far.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        dynamic = world.bodies.dynamic
+        self._order = np.argsort(dynamic.entity, kind="stable")
+        self.ids = np.array(dynamic.entity)[self._order]
+        self.enclosure = Enclosure.around(world)
+        self.impulse = 0.0
+        self.times: list[float] = []
+        self.struck = np.zeros(len(self.ids), bool)
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start."""
+        return self.world.time
+
+    @abstractmethod
+    def step(self, dt: float) -> None:
+        """One step of ``dt`` seconds."""
+
+    @abstractmethod
+    def advance(self, count: int, dt: float) -> None:
+        """``count`` steps without looking at anything: what a game would wait for."""
+
+    @property
+    def position(self) -> Floats:
+        """A copy, (n, d); ComesAndGoesError if there are other bodies than at the start."""
+        dynamic = self.world.bodies.dynamic
+        order = self._order
+        if len(dynamic) != len(order) or (np.asarray(dynamic.entity)[order] != self.ids).any():
+            order = self._order = np.argsort(dynamic.entity, kind="stable")
+            if len(order) != len(self.ids) or (np.asarray(dynamic.entity)[order] != self.ids).any():
+                raise ComesAndGoesError("bodies come and go in this scene, so there is no body to compare with itself")
+        return np.array(dynamic.position)[order]
+
+    @property
+    def velocity(self) -> Floats:
+        """A copy, (n, d), of the bodies whose position was asked for last."""
+        return np.array(self.world.bodies.dynamic.linear_velocity)[self._order]
+
+    @property
+    def energy(self) -> float:
+        """Kinetic and potential, J; without the parts of force systems that do not tell theirs."""
+        return self.world.kinetic_energy() + self.world.potential_energy()
+
+    @property
+    def kinetic(self) -> float:
+        """J."""
+        return self.world.kinetic_energy()
+
+    def overlaps(self) -> Floats:
+        """Of the pairs that overlap, in sizes of the smaller body, (k,)."""
+        if self._plain is None:
+            return self._overlaps_of_contacts()
+        moving, fixed = self._plain
+        return overlaps(moving, self.position, fixed)
+
+    def _overlaps_of_contacts(self) -> Floats:
+        raise NotPlainError("bodies other than plain discs and boxes")
+
+    @cached_property
+    def _plain(self) -> Any:
+        try:
+            return moving_and_fixed(self.world)
+        except NotPlainError:
+            return None
+
+    @cached_property
+    def sizes(self) -> dict[int, float]:
+        """The smallest extent of each entity that has a built-in shape."""
+        shapes = shapes_of(self.world)
+        return dict(zip(shapes.entity.tolist(), (2 * shapes.half.min(axis=1)).tolist(), strict=True))
+
+    @cached_property
+    def size(self) -> float:
+        """The smallest dynamic body's extent; where none has a shape, how far from the origin they are, else 1."""
+        known = [self.sizes[e] for e in self.ids.tolist() if e in self.sizes]
+        return min(known, default=0.0) or float(np.abs(self.position).max(initial=0.0)) or 1.0
+
+    @abstractmethod
+    def counts(self) -> dict[str, float]:
+        """Machine-free counts since the start."""
+
+    def close(self) -> None:
+        """Give the world back."""
+        self.world.close()
+
+
+class CaromEngine(Engine):
+    """A world of carom."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._solver_loops = 0.0
+        self._resting = 0
+        self._sensors = np.array(sorted(sensor_entities(world)), np.int64)
+
+    def step(self, dt: float) -> None:
+        world = self.world
+        if world.settings.dt != dt:
+            world.settings = world.settings.replace(dt=dt)
+        before = world.time
+        world.step()
+        resting = world.stats().counters.get("resting_contacts", 0)
+        self._solver_loops += (resting - self._resting) * world.settings.substeps
+        self._resting = resting
+        contacts = world.contacts
+        self.impulse, self.times = 0.0, []
+        if len(contacts):
+            a, b = self._rows(contacts.entity_a), self._rows(contacts.entity_b)
+            solid = self._solid()
+            self.struck[a[(a >= 0) & solid]] = True
+            self.struck[b[(b >= 0) & solid]] = True
+            self.impulse = float(contacts.normal_impulse[(a < 0) | (b < 0)].sum())
+        impacts = contacts.impacts
+        if len(impacts):
+            self.times = (before + np.sort(impacts.time_of_impact)).tolist()
+
+    def advance(self, count: int, dt: float) -> None:
+        world = self.world
+        if world.settings.dt != dt:
+            world.settings = world.settings.replace(dt=dt)
+        for _ in range(count):
+            world.step()
+
+    def _rows(self, entities: Any) -> np.ndarray:
+        """The places of the entities among the bodies; -1 for what stands still."""
+        if not len(self.ids):
+            return np.full(len(entities), -1)
+        places = np.searchsorted(self.ids, entities)
+        places[places == len(self.ids)] = 0
+        return np.where(self.ids[places] == entities, places, -1)
+
+    def _solid(self) -> np.ndarray:
+        """Which contacts are none of a sensor."""
+        contacts = self.world.contacts
+        return ~(np.isin(contacts.entity_a, self._sensors) | np.isin(contacts.entity_b, self._sensors))
+
+    def _overlaps_of_contacts(self) -> Floats:
+        contacts, sizes = self.world.contacts, self.sizes
+        rows = zip(contacts.entity_a.tolist(), contacts.entity_b.tolist(), contacts.depth, self._solid(), strict=True)
+        return np.array([
+            depth / min(sizes.get(a, math.inf), sizes.get(b, math.inf))
+            for a, b, depth, solid in rows
+            if solid and depth > 0 and (a in sizes or b in sizes)
+        ])  # fmt: skip
+
+    def counts(self) -> dict[str, float]:
+        return counts_of(self.world, self._solver_loops)
+
+
+class PymunkEngine(Engine):
+    """pymunk on the bodies of a world of carom, which goes along: it sums the forces and the energies.
+
+    Force systems act as pymunk's manual says: their force is given to each body before the step. substeps: iterations
+    of its solver. NotPlainError for scenes that do not translate.
+    """
+
+    def __init__(self, world: World, iterations: int) -> None:
+        super().__init__(world)
+        if self._plain is None:
+            moving_and_fixed(world)  # says what is in the way
+        self.space = PymunkSpace(world)
+        self.space.space.iterations = iterations
+        self._iterations = iterations
+        [self._sums] = [system for system in world.systems if isinstance(system, ForceAccumulation)]
+        self._time, self._steps, self._forces, self._pairs = 0.0, 0, 0, 0
+        self._dt = 0.0
+        self._impacts = 0
+        handler = self.space.space
+        bodies = {body: row for row, body in enumerate(self.space.bodies)}
+        handler.on_collision(None, None, begin=self._begin, post_solve=self._solved, data=bodies)
+
+    @property
+    def time(self) -> float:
+        return self._time
+
+    def _begin(self, arbiter: Any, space: Any, bodies: dict[Any, int]) -> None:
+        del space
+        self._impacts += 1
+        self.times.append(self._time + self._dt)
+        for body in arbiter.bodies:
+            if body in bodies:
+                self.struck[bodies[body]] = True
+
+    def _solved(self, arbiter: Any, space: Any, bodies: dict[Any, int]) -> None:
+        del space
+        self._pairs += 1
+        if not all(body in bodies for body in arbiter.bodies):
+            self.impulse += arbiter.total_impulse.length
+
+    def step(self, dt: float) -> None:
+        self.impulse, self.times, self._dt = 0.0, [], dt
+        if self.world.force_systems:
+            self._push()
+        self.space.dt = dt
+        self.space.step(1)
+        self._time += dt
+        self._steps += 1
+        self._mirror()
+
+    def advance(self, count: int, dt: float) -> None:
+        if self.world.force_systems:
+            for _ in range(count):
+                self.step(dt)
+            return
+        self.space.dt = dt
+        self.space.step(count)
+
+    def _push(self) -> None:
+        """The forces of the force systems at this state, for one step; gravity is pymunk's own."""
+        self._forces += 1
+        self._sums.evaluate(self._time)
+        dynamic = self.world.bodies.dynamic
+        weight = (dynamic.mass * dynamic.gravity_scale)[:, None] * np.asarray(self.world.gravity)
+        force = (np.array(dynamic.force) - weight)[self._order]
+        for body, (x, y) in zip(self.space.bodies, force.tolist(), strict=True):
+            body.apply_force_at_world_point((x, y), body.position)
+
+    def _mirror(self) -> None:
+        position, velocity = self.space.state()
+        dynamic = self.world.bodies.dynamic
+        dynamic.position[self._order] = position
+        dynamic.linear_velocity[self._order] = velocity
+
+    def counts(self) -> dict[str, float]:
+        return {
+            "steps": float(self._steps),
+            "force_evaluations": float(max(self._forces, self._steps)),
+            "body_steps": float(self._steps * len(self.ids)),
+            "pairs": float(self._pairs),
+            "impacts": float(self._impacts),
+            "solver_loops": float(self._pairs * self._iterations),
+        }
+
+
+def engine_for(world: World, engine: str, iterations: int) -> Engine:
+    """The engine of that name on ``world``, which it takes over; iterations: of pymunk's solver."""
+    return PymunkEngine(world, iterations) if engine == PYMUNK else CaromEngine(world)

@@ -1,0 +1,48 @@
+"""What a run cost, in counts that are the same on every machine, and one number for all of them.
+
+The number is a weighted sum. Its weights are nanoseconds, measured once on one machine (``carom bench`` and
+``carom run --profile`` tell them for another) and fixed since: so it ranks settings in the same way everywhere, which a
+clock does not. For few bodies the step itself counts most, for many what is done for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...framework import World
+
+# ns each. A step is Python between kernels; an evaluation of forces calls each force system once.
+WEIGHTS: Mapping[str, float] = {
+    "steps": 50_000.0,
+    "force_evaluations": 10_000.0,
+    "body_steps": 10.0,
+    "candidates": 5.0,
+    "pairs": 10.0,
+    "impacts": 1_000.0,
+    "rounds": 50_000.0,
+    "solver_loops": 4.0,
+}
+
+
+def counts_of(world: World, solver_loops: float) -> dict[str, float]:
+    """The counts of a world since it began; solver_loops: contacts at rest times substeps, which settings may change.
+
+    steps, force_evaluations (sums over all bodies), body_steps, candidates of the broad phase, pairs tested, impacts,
+    rounds of candidates made anew within a step.
+    """
+    counters = world.stats().counters
+    return {
+        "steps": float(world.step_count),
+        "force_evaluations": float(counters.get("force_evaluations", 0)),
+        "body_steps": float(counters.get("bodies", 0)),
+        "candidates": float(counters.get("candidates", 0)),
+        "pairs": float(counters.get("pairs", 0)),
+        "impacts": float(counters.get("impacts", 0)),
+        "rounds": float(counters.get("rounds", 0)),
+        "solver_loops": float(solver_loops),
+    }
+
+
+def work_of(counts: Mapping[str, float]) -> float:
+    """The weighted sum of counts; per simulated second if they are."""
+    return sum(WEIGHTS[name] * count for name, count in counts.items() if name in WEIGHTS)

@@ -1,0 +1,141 @@
+"""pymunk on the same bodies: a world of carom translated once, as pymunk's manual would have it built.
+
+Static shapes hang on the space's own static body, moments of inertia are infinite (nothing turns), sleeping stays off.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ...framework import World
+from ..commands.usage_errors import Problem
+from ..measure.body_shapes import Floats
+from .body_arrays import BodyArrays, NotPlainError, moving_and_fixed
+
+INDEXES = ("tree", "hash")  # pymunk's two ways to find pairs: a tree of bounding boxes, or a spatial hash
+ITERATIONS = 10
+HASH_CELL = 2.0  # of the largest moving body's size; measured: 1.5 times as fast as cells of one size (gas2d 10k)
+HASH_CELLS_PER_BODY = 2  # and no slower than the 10 that pymunk's manual starts from
+
+
+def pymunk_module() -> ModuleType:
+    """pymunk; Problem, with the name of the extra, where it is missing."""
+    try:
+        return importlib.import_module("pymunk")
+    except ImportError as error:
+        raise Problem("pymunk is missing; it comes with the extra: pip install 'carom[bench]'") from error
+
+
+class PymunkSpace:
+    """A pymunk space with the bodies of ``world`` as they stand now; ``index`` is one of INDEXES.
+
+    NotPlainError for what does not translate: pymunk multiplies the restitutions of two bodies and carom takes the
+    larger one, so only one value for all moving bodies can be meant in the same way.
+    """
+
+    def __init__(self, world: World, index: str = "tree") -> None:
+        pymunk = pymunk_module()
+        moving, fixed = moving_and_fixed(world)
+        restitution, friction, fixed_friction = _materials(world, moving, fixed)
+        self.space: Any = pymunk.Space()
+        self.space.iterations = ITERATIONS
+        self.space.gravity = tuple(map(float, world.gravity))
+        self.dt = world.settings.dt
+        self.bodies: list[Any] = []
+        for k in range(len(moving)):
+            body = pymunk.Body(float(moving.mass[k]), float("inf"))
+            body.position = tuple(map(float, moving.position[k]))
+            body.velocity = tuple(map(float, moving.velocity[k]))
+            self.bodies.append(body)
+            self.space.add(body)
+            if moving.shaped[k]:
+                self._add_shape(pymunk, body, moving, k, (0.0, 0.0), restitution, float(friction[k]))
+        for k in np.flatnonzero(fixed.shaped).tolist():
+            place = tuple(map(float, fixed.position[k]))
+            self._add_shape(pymunk, self.space.static_body, fixed, k, place, restitution, float(fixed_friction[k]))
+        if index == "hash":
+            size = HASH_CELL * 2 * float(moving.half.max())
+            self.space.use_spatial_hash(size, HASH_CELLS_PER_BODY * (len(moving) + len(fixed)))
+
+    def _add_shape(
+        self, pymunk: ModuleType, body: Any, rows: BodyArrays, k: int, offset: tuple[float, ...], e: float, f: float
+    ) -> None:
+        if rows.round[k]:
+            shape = pymunk.Circle(body, float(rows.half[k, 0]), offset)
+        else:
+            (x, y), (w, h) = offset, map(float, rows.half[k])
+            shape = pymunk.Poly(body, [(x - w, y - h), (x + w, y - h), (x + w, y + h), (x - w, y + h)])
+        shape.elasticity, shape.friction = e, f
+        self.space.add(shape)
+
+    def step(self, count: int) -> None:
+        """Take ``count`` steps."""
+        step, dt = self.space.step, self.dt
+        for _ in range(count):
+            step(dt)
+
+    def state(self) -> tuple[Floats, Floats]:
+        """Positions and velocities, (n, 2) each, in the order of the world's entity ids."""
+        position = np.array([tuple(body.position) for body in self.bodies], float).reshape(-1, 2)
+        velocity = np.array([tuple(body.velocity) for body in self.bodies], float).reshape(-1, 2)
+        return position, velocity
+
+    def settings(self) -> dict[str, Any]:
+        """The space's settings, as they are."""
+        names = ("iterations", "collision_slop", "collision_bias", "damping", "threads")
+        sleeping = math.isfinite(self.space.sleep_time_threshold)
+        return {**{name: getattr(self.space, name) for name in names}, "sleeping": sleeping}
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+    # -- questions, one by one as pymunk takes them ----------------------------------------------------
+
+    def boxes(self, lower: Floats, upper: Floats) -> int:
+        """How many bounding boxes all the boxes meet, corners (m, 2)."""
+        pymunk = pymunk_module()
+        everything, query, box = pymunk.ShapeFilter(), self.space.bb_query, pymunk.BB
+        corners = np.concatenate([lower, upper], axis=1).tolist()
+        return sum([len(query(box(*four), everything)) for four in corners])
+
+    def spheres(self, centres: Floats, radius: float) -> int:
+        """How many shapes all the discs meet, centres (m, 2)."""
+        everything, query = pymunk_module().ShapeFilter(), self.space.point_query
+        return sum([len(query((x, y), radius, everything)) for x, y in centres.tolist()])
+
+    def nearest(self, points: Floats, reach: float) -> Floats:
+        """The distance of the nearest shape to each point (m, 2); negative inside, inf beyond ``reach``."""
+        everything, query = pymunk_module().ShapeFilter(), self.space.point_query_nearest
+        hits = [query((x, y), reach, everything) for x, y in points.tolist()]
+        return np.array([math.inf if hit is None else hit.distance for hit in hits])
+
+    def rays(self, starts: Floats, ends: Floats) -> Floats:
+        """The fraction of its way that each ray has gone at its first hit; 1 where there is none."""
+        everything, query = pymunk_module().ShapeFilter(), self.space.segment_query_first
+        ways = np.concatenate([starts, ends], axis=1).tolist()
+        hits = [query((a, b), (c, d), 0.0, everything) for a, b, c, d in ways]
+        return np.array([1.0 if hit is None else hit.alpha for hit in hits])
+
+
+def _materials(world: World, moving: BodyArrays, fixed: BodyArrays) -> tuple[float, Floats, Floats]:
+    """The restitution for all shapes and the friction of each, so that products give what carom's rules give."""
+    shaped, fixed_shaped = moving.restitution[moving.shaped], fixed.restitution[fixed.shaped]
+    largest = float(shaped.max(initial=0.0))
+    if (shaped != largest).any() or (fixed_shaped > largest).any():
+        raise NotPlainError("restitutions that differ")
+    if world.settings.restitution_mixing != "max" or world.settings.friction_mixing != "geometric_mean":
+        raise NotPlainError("other rules of mixing than the default ones")
+    own, others = moving.friction, fixed.friction
+    values = own[moving.shaped]
+    if np.isnan(values).any() and not (np.isnan(values).all() and np.isnan(others).all()):
+        raise NotPlainError("friction that is the partner's")
+    partner = float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
+    if len(np.unique(values[~np.isnan(values)])) > 1 and np.isnan(others[fixed.shaped]).any():
+        raise NotPlainError("friction that is the partner's")
+    own, others = np.where(np.isnan(own), 0.0, own), np.where(np.isnan(others), partner, others)
+    return largest**0.5, np.sqrt(own), np.sqrt(others)

@@ -1,0 +1,182 @@
+"""Runs tasks on all cores and keeps what they show, so that nothing runs twice."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from ..cases.case import Case
+from ..commands.usage_errors import Problem
+from ..engines.cost import work_of
+from ..measure.norms import NORMS, OF_KIND, conserves, errors_of
+from ..measure.observation import Seen
+from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..trading.records import CHAOTIC, STOPPED, Cell, ErrorBar, Outcome, Point, Reference
+from .result_store import Store
+from .tasks import Task, mean_of, perform
+from .workers import Lost, in_parallel
+
+FEW_STEPS = 20_000  # together: they take less time than workers need to start
+WORTH_IT = 4.0  # times better must references agree with a step 8 times smaller: else it is rounding or chance
+ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
+
+
+class Runs:
+    """Performs tasks with ``workers`` processes; a store remembers them over an interruption."""
+
+    def __init__(
+        self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS
+    ) -> None:
+        if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+            raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
+        self.workers, self.progress = workers, progress
+        self._store = store
+        self._kept: dict[str, dict[str, Any]] = {}
+        self.performed = 0
+
+    def get(self, task: Task) -> dict[str, Any] | None:
+        """What is known of the task already."""
+        known = self._kept.get(task.key)
+        return known if known is not None or self._store is None else self._store.get(task.key)
+
+    def all(self, tasks: Iterable[Task], what: str) -> list[dict[str, Any]]:
+        """The records of all tasks, in their order."""
+        tasks = list(tasks)
+        missing = [task for task in tasks if self.get(task) is None]
+        total = sum(task.cost for task in tasks)
+        self.progress.begin(total, total - sum(task.cost for task in missing))
+        self.progress.say(what)
+        missing.sort(key=lambda task: -task.cost)  # the long ones first: no core idles in the end
+        few = sum(task.cost for task in missing) < FEW_STEPS
+        with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers)) as results:
+            for task, record in results:
+                self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
+                self.progress.advance(task.cost)
+        return [self._kept.get(task.key) or self.get(task) or {} for task in tasks]
+
+    def _keep(self, task: Task, record: dict[str, Any]) -> None:
+        self.performed += 1
+        if self._store is None:
+            self._kept[task.key] = record
+        else:
+            self._store.add(task.key, record)
+
+
+def _lost(task: Task, lost: Lost) -> dict[str, Any]:
+    """A run whose process died twice is a failed run; a reference cannot fail."""
+    if task.reference:
+        raise Problem(f"{task.case.subject.name}: the reference run with {task.cell} was lost: {lost.reason}")
+    return dataclasses.asdict(Outcome(task.cell, task.repeat, {}, STOPPED, {}, task.case.seconds, lost.reason))
+
+
+def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
+    """The case with what its errors are measured against: a closed form, or two own runs and how far they agree."""
+    if case.reference is not None:
+        return case, Reference(f"closed form: {case.form}" if case.kind != "resting" else case.form)
+    tasks = reference_tasks(case)
+    seens = [Seen.from_dict(record) for record in runs.all(tasks, f"{case.subject.name}: references")]
+    half = len(seens) // 2
+    for task, seen in zip(tasks, seens, strict=True):
+        if seen.failure:
+            raise Problem(
+                f"{case.subject.name} has no reference: the run with {task.cell} failed: {seen.failure}"
+            )
+    if case.kind == CHAOTIC:
+        return _with_statistics(case, seens, half)
+    first, *others = seens
+    case = _told(case, first)
+    apart = [errors_of(other, first, NORMS) for other in others]
+    agreement = {name: max(abs(errors[name]) for errors in apart) for name in NORMS}
+    if conserves(first):
+        agreement["energy"] = 0.0  # what is conserved is known without a reference
+    a, b, _ = case.reference_cells
+    text = f"own runs with {_words(a)} and with {_words(b)}, steps of {a.dt:.3g} s, and twice that"
+    return case.replace(reference=first), Reference(text, {n: agreement[n] for n in case.norms})
+
+
+def refined_reference(
+    case: Case, runs: Runs, enough: Callable[[Case, Reference], bool]
+) -> tuple[Case, Reference, bool]:
+    """The case with its reference, whose steps are made smaller until it is ``enough`` or nothing is gained any more;
+    and whether it is enough."""
+    before, case = math.inf, case.coarse_reference()
+    while True:
+        with_own, reference = with_reference(case, runs)
+        if enough(with_own, reference):
+            return with_own, reference, True
+        agreement = reference.agreement.get(case.norms[0], 0.0)
+        finer = case.finer_reference() if agreement < before / WORTH_IT else None
+        if finer is None:
+            return with_own, reference, False
+        before, case = agreement, finer
+
+
+def reference_tasks(case: Case) -> list[Task]:
+    """Those of the first method, then as many of the second."""
+    repeats = ENSEMBLE if case.kind == CHAOTIC else 1
+    return [Task(case, cell, repeat, True) for cell in case.reference_cells for repeat in range(repeats)]
+
+
+def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Reference]:
+    """Two ensembles: their means differ by noise if both are right."""
+    means = mean_of(seens[:half]), mean_of(seens[half:])
+    both = mean_of(seens)
+    case = _told(case, both)
+    agreement, spread = {}, {}
+    for name in case.norms:
+        values = [NORMS[name].measure(seen, both) for seen in seens]
+        agreement[name] = max(abs(NORMS[name].measure(mean, both)) for mean in means)
+        if NORMS[name].signed:
+            bar = ErrorBar.of(values, signed=True)
+            agreement[name] = max(agreement[name], bar.uncertainty)
+            spread[name] = bar.uncertainty * len(values) ** 0.5
+    a, b = case.reference_cells
+    text = (
+        f"statistics of {half} own runs with {_words(a)} and of {half} with {_words(b)}, other seeds, steps of "
+        f"{a.dt:.3g} s"
+    )
+    return case.replace(reference=both), Reference(text, agreement, spread)
+
+
+def _told(case: Case, reference: Seen) -> Case:
+    """The case with the norms that the reference tells; Problem if there are none."""
+    told = tuple(name for name in case.norms if NORMS[name].tells(reference))
+    if not told:
+        others = ", ".join(name for name in OF_KIND[case.kind] if NORMS[name].tells(reference))
+        raise Problem(
+            f"{case.subject.name}: {' and '.join(case.norms)} {'are' if len(case.norms) > 1 else 'is'} 0 throughout, "
+            f"nothing can be relative to that; what can be measured here: {others}"
+        )
+    return case.replace(norms=told)
+
+
+def _words(cell: Cell) -> str:
+    return cell.collision if cell.collision == "event_driven" else f"{cell.integrator}, {cell.collision}"
+
+
+def run_tasks(case: Case, cells: Iterable[Cell]) -> list[Task]:
+    """Every repeat of every cell."""
+    return [Task(case, cell, repeat) for cell in cells for repeat in range(case.repeats)]
+
+
+def point_of(outcomes: list[Outcome]) -> Point:
+    """One cell from its repeats."""
+    good = [outcome for outcome in outcomes if outcome.failure is None]
+    failures: dict[str, int] = {}
+    for outcome in outcomes:
+        if outcome.failure is not None:
+            failures[outcome.failure] = failures.get(outcome.failure, 0) + 1
+    names = list(good[0].errors) if good else []
+    errors = {
+        name: ErrorBar.of([outcome.errors[name] for outcome in good], NORMS[name].signed) for name in names
+    }
+    counted = [outcome for outcome in outcomes if outcome.counts]
+    counts = {
+        name: sum(outcome.counts.get(name, 0.0) / outcome.seconds for outcome in counted) / len(counted)
+        for name in (counted[0].counts if counted else ())
+    }
+    return Point(outcomes[0].cell, len(outcomes), errors, failures, counts, work_of(counts))
+

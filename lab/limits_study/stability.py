@@ -1,0 +1,146 @@
+"""Limits of stability: the longest step at which an integrator does not make a linear world grow.
+
+What is asked is x'' = -K x - C x' - G x', K stiffness and C drag by forces, G linear damping, which integrators take in
+on a road of their own. One step of the integrator is applied to states that span all others, which gives the matrix of
+the step; while no eigenvalue of it lies outside the unit circle the step is stable. So an integrator that a plugin
+brings has its limit found like the others.
+
+For one oscillator (k = w^2, c) the limits are known: w h = 2 for semi-implicit Euler and velocity Verlet, 2 sqrt 2 for
+Runge-Kutta 4, none for explicit Euler; c h = 2, 2 and 2.785 for drag alone (Hairer & Wanner, Solving Ordinary
+Differential Equations II, section IV.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...systems import Integrator
+from ...systems.integration.motion import Motion
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+ROUNDING = 1e-12  # growth per step that is none
+SHORTEST, LONGEST = 1e-5, 30.0  # steps that are looked at, in units of the oscillator's own time
+RATIO = 1.02  # of neighbouring steps
+HALVINGS = 50
+# A growth that begins at h = 0 with a power of h comes out of the rounding at a short step, and doubling the step makes
+# it larger by no more than this power of two.
+SHORT, STEEPEST = 0.05, 2.0**8
+
+
+def advanced(
+    integrator: Integrator, position: Floats, velocity: Floats, damping: Floats, force: Callable[..., Floats]
+) -> tuple[Floats, Floats]:
+    """One step of one second of bodies of one kilogram: position and velocity (n, 2), damping (n,).
+
+    force(position, velocity) gives (n, 2).
+    """
+    motion = Motion(
+        position.copy(), velocity.copy(), force(position, velocity), np.ones(len(position)), damping.copy(),
+        position.copy(), velocity.copy(), None,
+    )  # fmt: skip
+
+    def evaluate(_: float) -> None:
+        motion.force[:] = force(motion.position, motion.velocity)
+
+    motion.evaluator = evaluate
+    integrator.advance(motion, 1.0)
+    return motion.position, motion.velocity
+
+
+def growth(
+    integrator: Integrator, stiffness: ArrayLike, drag: ArrayLike = 0.0, damping: ArrayLike = 0.0, h: ArrayLike = 1.0
+) -> Floats:
+    """The largest eigenvalue, by size, of one step of each oscillator x'' = -stiffness x - (drag + damping) x'.
+
+    stiffness 1/s^2, drag and damping 1/s, h s: arrays of one length or numbers. Stiffness and drag may be complex: x is
+    the x + i y of a plane then, which forces that turn the velocity need. Above 1 the step grows.
+    """
+    k, c, g, step = (np.atleast_1d(np.asarray(a)) for a in (stiffness, drag, damping, h))
+    k, c, g, step = np.broadcast_arrays(k, c, g, step)
+    # In units of its own step every oscillator takes a step of one second.
+    k, c, g = np.tile(k * step * step + 0j, 2), np.tile(c * step + 0j, 2), np.tile(np.real(g * step) + 0.0, 2)
+    half = len(k) // 2
+    start = np.zeros((2, 2 * half), complex)
+    start[0, :half] = start[1, half:] = 1.0
+
+    def force(position: Floats, velocity: Floats) -> Floats:
+        x, v = position.view(complex)[:, 0], velocity.view(complex)[:, 0]
+        return (-(k * x) - c * v)[:, None].view(float)
+
+    position, velocity = advanced(integrator, start[0][:, None].view(float), start[1][:, None].view(float), g, force)
+    x, v = position.view(complex)[:, 0], velocity.view(complex)[:, 0]
+    a, b, d, e = x[:half], x[half:], v[:half], v[half:]
+    a, e = a - 1, e - 1  # of the change in a step: short steps leave nearly the unit matrix, whose digits would be lost
+    middle = 1 + (a + e) / 2
+    root = np.sqrt((a + e) ** 2 / 4 - (a * e - b * d))
+    return np.maximum(np.abs(middle + root), np.abs(middle - root))
+
+
+def stability_limits(
+    integrator: Integrator, stiffness: ArrayLike, drag: ArrayLike = 0.0, damping: ArrayLike = 0.0
+) -> Floats:
+    """Seconds, for each oscillator (see :func:`growth`): the step at which it begins to grow.
+
+    0 if it grows at any step, inf if at none; inf too for what grows by itself, whatever the step.
+    """
+    k, c, g = (np.atleast_1d(np.asarray(a)) for a in (stiffness, drag, damping))
+    k, c, g = np.broadcast_arrays(k + 0j, c + 0j, np.real(g) + 0.0)
+    limits = np.full(len(k), np.inf)
+    scale = np.maximum(np.sqrt(np.abs(k)), np.abs(c))
+    asked = np.flatnonzero((scale > 0) & ~grows_by_itself(k, c, g))
+    if not len(asked):
+        return limits
+    k, c, g, scale = k[asked], c[asked], g[asked], scale[asked]
+    low = np.zeros(len(asked))
+    high = np.full(len(asked), np.inf)
+    longest = LONGEST * (1.0 + g / scale) / scale
+    h = SHORTEST / scale
+    while (looking := np.isinf(high) & (h <= longest)).any():
+        stable = growth(integrator, k, c, g, h) <= 1 + ROUNDING
+        high[looking & ~stable] = h[looking & ~stable]
+        low[looking & stable] = h[looking & stable]
+        h = h * RATIO
+    found = np.isfinite(high)
+    for _ in range(HALVINGS if found.any() else 0):
+        middle = np.where(found, (low + np.where(found, high, low)) / 2, low)
+        stable = growth(integrator, k, c, g, middle) <= 1 + ROUNDING
+        low, high = np.where(found & stable, middle, low), np.where(found & ~stable, middle, high)
+    beyond = growth(integrator, k, c, g, 2 * low) - 1
+    from_nothing = (low * scale <= SHORTEST) | ((low * scale < SHORT) & (beyond < STEEPEST * ROUNDING))
+    limits[asked[found]] = np.where(from_nothing, 0.0, low)[found]
+    return limits
+
+
+def grows_by_itself(stiffness: Any, drag: Any, damping: Any) -> NDArray[np.bool_]:
+    """Whether the true solution of x'' = -stiffness x - (drag + damping) x' grows: no step could prevent it."""
+    c = drag + damping
+    root = np.sqrt(c * c / 4 - stiffness + 0j)
+    fastest = np.maximum((-c / 2 + root).real, (-c / 2 - root).real)
+    return fastest > 1e-9 * np.maximum(np.sqrt(np.abs(stiffness)), np.abs(c))
+
+
+def growth_of_system(integrator: Integrator, stiffness: Floats, drag: Floats, damping: Floats, h: float) -> float:
+    """The largest eigenvalue, by size, of one step of a coupled system: stiffness and drag (n, n), damping (n,).
+
+    Needed where stiffness and drag do not share their modes: then no oscillator alone tells the whole.
+    """
+    n = len(damping)
+    k, c = stiffness * h * h, drag * h
+
+    def force(position: Floats, velocity: Floats) -> Floats:
+        x, v = (array[:, 0].reshape(2 * n, n) for array in (position, velocity))
+        out = np.zeros_like(position)
+        out[:, 0] = (-(x @ k.T) - v @ c.T).ravel()
+        return out
+
+    start = np.zeros((2, 2 * n * n, 2))
+    start[0, : n * n, 0] = start[1, n * n :, 0] = np.eye(n).ravel()
+    ends = advanced(integrator, start[0], start[1], np.tile(damping * h, 2 * n), force)
+    matrix = np.concatenate([end[:, 0].reshape(2 * n, n) for end in ends], axis=1)
+    return float(np.abs(np.linalg.eigvals(matrix)).max())

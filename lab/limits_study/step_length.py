@@ -1,0 +1,286 @@
+"""How long a world's step may be: by the stability of its integrator, and by what would fly through what.
+
+    limits = step_limits(world)         # why; prints as sentences
+    world.settings = world.settings.replace(dt=min(1 / 60, suggest_dt(world)))
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ...framework import CaromError, NoPhysicsError, World
+from ...systems import Integrator
+from .stability import growth_of_system, stability_limits
+from .stiffness import Modes, modes_of
+
+SAFETY = 0.9  # of the limit that is suggested
+EXACT = 60  # numbers that place bodies which hang together, up to which their whole step is looked at
+COUPLED_GROWTH = 1e-7  # per step, that is none: eigenvalues of large matrices that are equal come out so far apart
+SHORTEST, STEPS = 1e-3, 60  # of the limit that single oscillators have, where the whole is looked at
+HALVINGS = 20
+ROUNDS = 50  # more than it takes to find the first pair that tunnels
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """What limits stability: the oscillation x'' = -frequency^2 x - (drag + damping) x' of a body or of several.
+
+    entity
+        the body that swings most
+    frequency
+        rad/s; 0: drag alone
+    drag, damping
+        1/s, by forces and by linear_damping
+    limit
+        s; 0 if the integrator makes it grow at any step
+    """
+
+    entity: int
+    frequency: float
+    drag: float
+    damping: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What flies through what first: two bodies that are sure to meet while speed * dt <= size.
+
+    speed
+        m/s, the sum of both speeds
+    size
+        m, the sum of the smallest extents of both: w + 2 r for a ball and a wall
+    limit
+        s
+    """
+
+    entity: int
+    other: int
+    speed: float
+    size: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """What limits the step of a world in its present state; None where nothing does.
+
+    dt
+        s, the step it has now
+    integrator
+        as its settings say; "flight" if all is driven by events
+    """
+
+    dt: float
+    integrator: str
+    collision: str
+    oscillation: Oscillation | None
+    passage: Passage | None
+
+    @property
+    def stability(self) -> float:
+        """s: at longer steps oscillations grow; 0 if they do at any, inf if at none."""
+        return math.inf if self.oscillation is None else self.oscillation.limit
+
+    @property
+    def tunnelling(self) -> float:
+        """s: at longer steps the fastest bodies may pass through what they should meet."""
+        return math.inf if self.passage is None else self.passage.limit
+
+    @property
+    def suggested(self) -> float:
+        """s: SAFETY times the smaller of both limits; 0 if no step is stable, inf if nothing limits it."""
+        return SAFETY * min(self.stability, self.tunnelling)
+
+    def sentences(self) -> list[str]:
+        """What limits the step, and what follows from it."""
+        if self.suggested == math.inf:
+            last = "Nothing limits the step: choose it by the accuracy you need."
+        elif self.suggested == 0.0:
+            last = f"No step is stable: choose another integrator than {self.integrator}."
+        else:
+            fits = "fits" if self.dt <= self.suggested else "is too long"
+            last = f"Suggested: dt = {self.suggested:.4g} s, {SAFETY:g} of the limit."
+            last += f" The step of {self.dt:.4g} s {fits}."
+        return [self._on_stability(), self._on_passage(), last]
+
+    def _on_stability(self) -> str:
+        found = self.oscillation
+        if found is None:
+            return f"Stability ({self.integrator}): no force makes a body swing, or brakes it."
+        parts = [f"swings at {found.frequency:.4g} rad/s"] * bool(found.frequency)
+        parts += [f"is braked at {found.drag:.4g} /s"] * bool(found.drag)
+        parts += [f"is damped at {found.damping:.4g} /s"] * bool(found.damping)
+        what = f"entity {found.entity} {' and '.join(parts)}"
+        if found.limit == 0.0:
+            return f"Stability: {what}, and {self.integrator} makes that grow at any step."
+        return f"Stability: {what}; {self.integrator} holds it up to dt = {found.limit:.4g} s."
+
+    def _on_passage(self) -> str:
+        found = self.passage
+        if found is None:
+            swept = self.collision != "discrete"
+            return "Tunnelling: none, what is fast is swept." if swept else "Tunnelling: nothing that moves can meet."
+        return (
+            f"Tunnelling: entities {found.entity} and {found.other} may meet at {found.speed:.4g} m/s and overlap on a "
+            f"way of {found.size:.4g} m; they are sure to be caught up to dt = {found.limit:.4g} s."
+        )
+
+    def __str__(self) -> str:
+        return "\n".join(self.sentences())
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, which has no infinity: None means that nothing limits."""
+        numbers = {name: getattr(self, name) for name in ("stability", "tunnelling", "suggested")}
+        return {**asdict(self), **{name: None if v == math.inf else v for name, v in numbers.items()}}
+
+
+def suggest_dt(world: World) -> float:
+    """The longest step, in seconds, that is safe for ``world`` as it is now; see :func:`step_limits` for the reasons.
+
+    At most the limits of stability of its integrator, which are known (Hairer & Wanner, Solving Ordinary Differential
+    Equations II): w dt = 2 for a spring of frequency w with semi-implicit Euler, for instance. SAFETY is taken off. In
+    a world with discrete collisions also at most what keeps the fastest bodies from tunnelling.
+
+    0.0: no step is stable, as with explicit Euler and a spring without damping. inf: nothing limits the step.
+    """
+    return step_limits(world).suggested
+
+
+def step_limits(world: World) -> StepLimits:
+    """What limits the step of ``world`` at its present state: positions, velocities, forces, bodies.
+
+    A spring that stiffens as it is stretched, or a ball that will fall, may set another limit later. What systems of
+    the game do in a step besides force systems is not seen. The world is left bit for bit as it was.
+
+    ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError inside a step, TypeError
+    for what is no World.
+    """
+    if not isinstance(world, World):
+        raise TypeError(f"world must be a World, got {world!r}")
+    if world.physics is None:
+        raise NoPhysicsError("no physics in this world: World(Physics(...))")
+    services: Any = world.physics
+    if services.table.in_step:
+        raise CaromError("the limits of a step can be asked for between steps only, not inside one")
+    modes = modes_of(world)
+    integrator = type(services.integrator())()
+    settings = world.settings
+    passage = first_passage(world) if settings.collision == "discrete" else None
+    return StepLimits(
+        settings.dt, services.integrator_name, settings.collision, _first_to_grow(integrator, modes), passage
+    )
+
+
+def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
+    """The mode with the shortest limit; the stiffest of several."""
+    if not len(modes.entity):
+        return None
+    limits = stability_limits(integrator, modes.stiffness, modes.drag, modes.damping)
+    stiffest = np.lexsort((modes.entity, -np.abs(modes.drag), -np.abs(modes.stiffness), limits))[0]
+    limit = float(limits[stiffest])
+    for k, c, damping in modes.coupled:
+        if limit > 0.0 and len(damping) <= EXACT:
+            limit = _limit_of_system(integrator, k, c, damping, limit)
+    if limit == math.inf:
+        return None
+    return Oscillation(
+        entity=int(modes.entity[stiffest]),
+        frequency=float(np.sqrt(np.abs(modes.stiffness[stiffest]))),
+        drag=float(np.abs(modes.drag[stiffest])),
+        damping=float(modes.damping[stiffest]),
+        limit=limit,
+    )
+
+
+def _limit_of_system(integrator: Integrator, k: Any, c: Any, damping: Any, limit: float) -> float:
+    """At most ``limit``; less if bodies whose stiffness and drag do not share their modes grow before it."""
+    if limit == math.inf:
+        return limit
+
+    def stable(h: float) -> bool:
+        return growth_of_system(integrator, k, c, damping, h) <= 1 + COUPLED_GROWTH
+
+    steps = np.geomspace(SHORTEST * limit, limit, STEPS).tolist()
+    first = next((place for place, h in enumerate(steps) if not stable(h)), None)
+    if first is None:
+        return limit
+    low, high = steps[first - 1] if first else 0.0, steps[first]
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return low
+
+
+def first_passage(world: World) -> Passage | None:
+    """The pair of bodies that may fly through each other at the shortest step, if collisions are discrete.
+
+    The way on which they overlap is the sum of their smallest extents; their speed that at which they may meet, the
+    sum of both. Left out: sensors, bodies with ``ccd``, pairs whose layers do not meet or of which none is dynamic. A
+    map of tiles counts as a whole. None if no pair is left, or nothing moves.
+    """
+    bodies, services = world.bodies, world.physics
+    size, solid, group = _sizes(services)
+    speed = np.zeros(len(bodies))
+    moving = slice(0, bodies.kinematic.rows.stop)
+    speed[moving] = np.linalg.norm(bodies.linear_velocity[moving], axis=1)
+    solid &= ~np.asarray(bodies.ccd, bool) & np.isfinite(speed) & np.isfinite(size)
+    if not solid.any() or not speed[solid].any():
+        return None
+    dynamic = np.arange(len(bodies)) < bodies.dynamic.rows.stop
+    layers = np.unique(np.column_stack((group, dynamic))[solid], axis=0)
+    members = [np.flatnonzero(solid & (group == g[:2]).all(axis=1) & (dynamic == g[2])) for g in layers]
+    pairs = [
+        (i, j)
+        for i, one in enumerate(layers)
+        for j, other in enumerate(layers[: i + 1])
+        if (one[2] or other[2]) and one[0] & other[1] and other[0] & one[1]
+    ]
+    best: tuple[float, int, int] | None = None
+    limit = 4 * float(size[solid].max()) / float(speed[solid].max())  # more than any
+    for _ in range(ROUNDS):  # Dinkelbach's method for the least ratio of two sums
+        room = size - limit * speed
+        firsts = [rows[np.argsort(room[rows], kind="stable")[:2]] for rows in members]
+        found = None
+        for i, j in pairs:
+            a, b = (firsts[i][0], firsts[j][0]) if i != j else (*firsts[i], -1)[:2]
+            if b >= 0 and speed[a] + speed[b] > 0:
+                candidate = (float(room[a] + room[b]), int(a), int(b))
+                found = candidate if found is None or candidate < found else found
+        if found is None:
+            return None
+        _, a, b = found
+        shorter = float((size[a] + size[b]) / (speed[a] + speed[b]))
+        if best is not None and shorter >= best[0]:
+            break
+        best = (shorter, a, b)
+        limit = shorter
+    assert best is not None
+    limit, a, b = best
+    fast, slow = (a, b) if speed[a] >= speed[b] else (b, a)
+    entity = bodies.entity
+    return Passage(int(entity[fast]), int(entity[slow]), float(speed[a] + speed[b]), float(size[a] + size[b]), limit)
+
+
+def _sizes(services: Any) -> tuple[Any, Any, Any]:
+    """Of every row: its smallest extent (m; inf for what has no end), whether it is solid, and (layer, mask)."""
+    table = services.table
+    count = table.count
+    services.refresh_structure()
+    size, solid, group = np.zeros(count), np.zeros(count, bool), np.zeros((count, 2), np.int64)
+    if services.code is None:
+        return size, solid, group
+    services.refresh_rotation()
+    services.broad_phase.trees_now()
+    services.queries.forget()
+    scratch, stacks, rows = services.scratch, table.stacks, np.arange(count)
+    material = scratch["material"][:count]
+    endless = np.isinf(scratch["upper"][:count] - scratch["lower"][:count]).all(axis=1)
+    size = np.where(endless, np.inf, scratch["size"][:count])
+    solid = (services.levels[0, :count] >= 0) & ~stacks["collider.sensor"][material, rows].astype(bool)
+    group = np.column_stack([stacks[f"collider.{name}"][material, rows] for name in ("layer", "mask")])
+    return size, solid, group

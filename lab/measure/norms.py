@@ -1,0 +1,175 @@
+"""Norms: how wrong a run was, each a number relative to a stated scale, by what the reference run shows.
+
+Which norm suits which kind of scene: smooth motion is compared in position and energy; impacts in the state at a fixed
+time, in their times and their number; rest in overlap, residual speed and drift, where the right answer is 0; chaos in
+statistics alone, whose errors keep their sign here so that noise averages out over the seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..commands.usage_errors import Problem, did_you_mean
+from ..trading.records import BLEW_UP, CHAOTIC, IMPACTS, NOT_FINITE, RESTING, SMOOTH, TUNNELLED
+from .observation import Seen
+
+FAR = 1e3  # times the reference's reach: a body so far away has blown up, and its error is no error
+CONSERVED = 1e-6  # a reference that keeps its energy so well says that it is conserved
+NO_ENERGY = 1e-3  # of the largest kinetic energy: a total below it is nothing to be relative to
+Measure = Callable[[Seen, Seen], float]
+
+
+@dataclass(frozen=True)
+class Norm:
+    """``text`` says what it is and what it is relative to; ``scale`` gives that in the scene's units.
+
+    signed: a statistic, single runs of which are noise; absolute: in units of its own, relative to nothing;
+    relative_to: what of ``Seen`` it is relative to, if it is 1 that is right.
+    """
+
+    name: str
+    text: str
+    measure: Measure
+    scale: Measure
+    signed: bool = False
+    absolute: bool = False
+    relative_to: str = ""
+
+    def tells(self, reference: Seen) -> bool:
+        """Whether runs can be compared by it: nothing is relative to 0."""
+        return not self.relative_to or getattr(reference, self.relative_to) != 0
+
+
+def _one(seen: Seen, reference: Seen) -> float:
+    del seen, reference
+    return 1.0
+
+
+def _reach(seen: Seen, reference: Seen) -> float:
+    return reference.reach or seen.reach or 1.0
+
+
+def _position(seen: Seen, reference: Seen) -> float:
+    apart = np.sqrt(((seen.position - reference.position) ** 2).sum(axis=1))
+    return float(apart.max(initial=0.0)) / _reach(seen, reference)
+
+
+def _energy_scale(seen: Seen, reference: Seen) -> float:
+    """The largest kinetic energy, or that at the start if it is smaller: where zero is, is a matter of taste."""
+    kinetic = reference.energy_scale or seen.energy_scale or 1.0
+    total = abs(reference.energy_start)
+    return min(kinetic, total) if total > NO_ENERGY * kinetic else kinetic
+
+
+def conserves(reference: Seen) -> bool:
+    """Whether the scene keeps its energy, as far as the reference tells."""
+    return reference.energy_worst <= CONSERVED * (reference.energy_scale or 1.0)
+
+
+def _energy(seen: Seen, reference: Seen) -> float:
+    if conserves(reference):
+        return seen.energy_worst / _energy_scale(seen, reference)
+    return abs(seen.energy - reference.energy) / _energy_scale(seen, reference)
+
+
+def _impact_time(seen: Seen, reference: Seen) -> float:
+    """An impact that only one of the two has counts as if the other had it at the end of the run."""
+    count = max(len(seen.times), len(reference.times))
+    mine, right = (times + [reference.seconds] * (count - len(times)) for times in (seen.times, reference.times))
+    return float(np.abs(np.subtract(mine, right)).max(initial=0.0)) / reference.seconds
+
+
+def _relative(name: str, text: str, attribute: str = "", signed: bool = False) -> Norm:
+    """A quantity whose right value is 1; attribute: of ``Seen``, if it has another name."""
+    attribute = attribute or name
+
+    def scale(seen: Seen, reference: Seen) -> float:
+        return abs(getattr(reference, attribute)) or abs(getattr(seen, attribute)) or 1.0
+
+    def measure(seen: Seen, reference: Seen) -> float:
+        error = (getattr(seen, attribute) - getattr(reference, attribute)) / scale(seen, reference)
+        return error if signed else abs(error)
+
+    return Norm(name, text, measure, scale, signed, relative_to=attribute)
+
+
+def _own(name: str) -> tuple[Measure, Measure]:
+    return (lambda seen, reference: getattr(seen, name)), _one
+
+
+NORMS: Mapping[str, Norm] = {
+    norm.name: norm
+    for norm in (
+        Norm(
+            "position",
+            "largest distance of a body from where it should be in the end; 1 is the longest way a body gets from its "
+            "start",
+            _position,
+            _reach,
+        ),
+        Norm(
+            "energy",
+            "largest departure of the energy on the way (in the end, where it is not conserved); 1 is the energy at "
+            "the start, or the largest kinetic energy if that is smaller",
+            _energy,
+            _energy_scale,
+        ),
+        _relative("apex", "height of the highest point reached, at steps; 1 is the right height"),
+        Norm("impact_time", "largest error of an impact's time, a missing one being at the end; 1 is the whole run",
+             _impact_time, lambda seen, reference: reference.seconds),
+        _relative("count", "number of impacts; 1 is the right number", "impacts"),
+        Norm("energy_square", "mean square of the departure of the energy, in J²: not relative to anything",
+             *_own("energy_square"), absolute=True),
+        Norm("overlap", "deepest overlap in the second half, in sizes of the smaller body", *_own("overlap")),
+        Norm("overlap_mean", "overlap per body in the second half, in sizes of the smaller body",
+             *_own("overlap_mean")),
+        Norm("speed", "largest speed in the end, in sizes of the smallest body per second", *_own("speed")),
+        Norm("drift", "largest distance that a body gets in the second half, in sizes of the smallest body",
+             *_own("drift")),
+        _relative("pressure", "mean force on all that stands still, after the first fifth; 1 is the right one",
+                  signed=True),
+        _relative("rate", "impacts per second, after the first fifth; 1 is the right rate", signed=True),
+        _relative("kinetic", "kinetic energy in the end; 1 is the right one", signed=True),
+    )
+}  # fmt: skip
+
+OF_KIND: Mapping[str, tuple[str, ...]] = {
+    SMOOTH: ("position", "energy"),
+    IMPACTS: ("position", "energy", "impact_time", "count"),
+    RESTING: ("overlap", "overlap_mean", "speed", "drift"),
+    CHAOTIC: ("pressure", "rate", "kinetic"),
+}
+
+
+def norm_named(name: str) -> Norm:
+    """The norm; Problem for an unknown one."""
+    try:
+        return NORMS[name]
+    except KeyError:
+        raise Problem(f"no norm {name!r}{did_you_mean(name, NORMS)}") from None
+
+
+def failure_of(seen: Seen, reference: Seen | None) -> str | None:
+    """Why the run has no error, or None.
+
+    Tunnelled: a body that touches something in the reference has touched nothing.
+    """
+    if seen.failure:
+        return seen.failure
+    if not np.isfinite(seen.position).all():
+        return NOT_FINITE
+    if reference is None:
+        return None
+    if seen.reach > FAR * max(reference.reach, 1e-300):
+        return BLEW_UP
+    if any(should and not did for did, should in zip(seen.struck, reference.struck, strict=False)):
+        return TUNNELLED
+    return None
+
+
+def errors_of(seen: Seen, reference: Seen, names: Iterable[str]) -> dict[str, float]:
+    """By name; those of statistics keep their sign."""
+    return {name: NORMS[name].measure(seen, reference) for name in names}

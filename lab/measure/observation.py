@@ -1,0 +1,194 @@
+"""One run watched from outside: what the norms need to know of it, whatever the engine.
+
+A run of T seconds takes a first step of a part of dt, its start phase, then whole steps, then what is left: so it ends
+at T exactly, whatever dt, and the phase says where within a step things happen.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
+
+from ..engines.adapters import Engine
+from ..trading.records import ESCAPED, NOT_FINITE
+from .body_shapes import Floats
+
+SETTLED = 0.5  # of the run: contacts at rest are looked at after it
+EARLY = 0.2  # of the run: statistics begin after it
+MOST_TIMES = 200  # impacts whose times are kept
+SAMPLES = 400  # of the overlaps, which cost more than a step
+
+
+@dataclass
+class Seen:
+    """What one run showed. Lengths in the scene's units, energies in J, times in s.
+
+    position (n, d)
+        at the end, by entity id
+    reach
+        the largest distance of a body from its start, over the run
+    apex
+        the greatest height that a body gains over its own start, against gravity; 0 without gravity
+    energy, kinetic
+        at the end; energy_start at the start; energy_worst: the largest departure from the start;
+        energy_square: its mean square, J^2; energy_scale: the largest kinetic energy
+    impacts, times
+        how many, and when the first ones were
+    pressure
+        mean force on what stands still, N, after the first part of the run; rate: impacts per second there
+    overlap, overlap_mean
+        after half of the run, the worst and the mean over samples of the sum per body, in sizes of the smaller body
+    speed
+        the largest at the end, sizes per second; drift: the largest way since half of the run, sizes
+    struck (n,)
+        which bodies touched anything
+    failure
+        None, or why the run says nothing
+    seconds
+        that it should last; simulated: that it did, which is less if it failed
+    """
+
+    position: Floats
+    reach: float = 0.0
+    apex: float = 0.0
+    energy: float = 0.0
+    energy_start: float = 0.0
+    energy_worst: float = 0.0
+    energy_square: float = 0.0
+    energy_scale: float = 0.0
+    kinetic: float = 0.0
+    impacts: int = 0
+    times: list[float] = field(default_factory=list)
+    pressure: float = 0.0
+    rate: float = 0.0
+    overlap: float = 0.0
+    overlap_mean: float = 0.0
+    speed: float = 0.0
+    drift: float = 0.0
+    struck: list[bool] = field(default_factory=list)
+    failure: str | None = None
+    counts: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+    simulated: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {**dataclasses.asdict(self), "position": self.position.tolist()}
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """The opposite of :meth:`as_dict`."""
+        return cls(**{**plain, "position": np.array(plain["position"], float)})
+
+
+def observe(
+    engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True
+) -> Seen:
+    """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
+
+    whole_steps: leave out the last part of a step; contacts at rest are solved for the length of the step before, and
+    another one stirs them. walled: a body that gets beyond the walls around all bodies has escaped.
+    """
+    watch = _Watch(engine, seconds, walled)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for step in _steps(seconds, dt, phase, whole_steps):
+            engine.step(step)
+            watch.look()
+            if watch.failure:
+                break
+        return watch.seen()
+
+
+def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[float]:
+    """Their lengths. What would be left below a millionth of a step is rounding, and left out."""
+    first = min(phase * dt, seconds)
+    rest = seconds - first
+    whole = int(rest / dt * (1 + 1e-12) + 1e-9)
+    last = rest - whole * dt
+    return [first, *[dt] * whole, *([last] if last > 1e-6 * dt and not whole_steps else [])]
+
+
+class _Watch:
+    """Looks at the engine after each step."""
+
+    def __init__(self, engine: Engine, seconds: float, walled: bool) -> None:
+        self.engine, self.seconds, self.walled = engine, seconds, walled
+        self.failure: str | None = None
+        self.start = engine.position
+        self.settled = self.start
+        self.energy_start, self.scale = engine.energy, engine.kinetic
+        self.reach = self.apex = self.worst = self.square = self.impulse = 0.0
+        self.steps = self.impacts = self.late_impacts = 0
+        self.times: list[float] = []
+        self.deepest, self.mean_overlaps = 0.0, [0.0]
+        self.next_sample = SETTLED * seconds
+        gravity = np.asarray(engine.world.gravity, float)
+        size = float(np.linalg.norm(gravity))
+        self.up = -gravity / size if size else None
+
+    def look(self) -> None:
+        engine = self.engine
+        position = engine.position
+        energy, kinetic = engine.energy, engine.kinetic
+        self.steps += 1
+        if not (np.isfinite(position).all() and math.isfinite(kinetic)):
+            self.failure = NOT_FINITE
+            return
+        way = position - self.start
+        self.reach = max(self.reach, float(np.sqrt((way * way).sum(axis=1).max(initial=0.0))))
+        if self.up is not None and len(way):
+            self.apex = max(self.apex, float((way @ self.up).max()))
+        departure = abs(energy - self.energy_start)
+        self.worst = max(self.worst, departure)
+        self.square += departure * departure
+        self.scale = max(self.scale, kinetic)
+        self.impacts += len(engine.times)
+        if len(self.times) < MOST_TIMES:
+            self.times += engine.times
+        if engine.time > EARLY * self.seconds:
+            self.impulse += engine.impulse
+            self.late_impacts += len(engine.times)
+        if engine.time <= SETTLED * self.seconds:
+            self.settled = position
+        if engine.time >= self.next_sample:
+            self.next_sample += self.seconds * (1 - SETTLED) / SAMPLES
+            depths = engine.overlaps()
+            self.deepest = max(self.deepest, float(depths.max(initial=0.0)))
+            self.mean_overlaps.append(float(depths.sum()) / max(len(position), 1))
+        if self.walled and engine.enclosure.outside(position):
+            self.failure = ESCAPED
+
+    def seen(self) -> Seen:
+        engine = self.engine
+        position, velocity = engine.position, engine.velocity
+        late = (1 - EARLY) * self.seconds
+        speeds = np.sqrt((velocity * velocity).sum(axis=1))
+        way = np.sqrt(((position - self.settled) ** 2).sum(axis=1))
+        return Seen(
+            position=position,
+            reach=self.reach,
+            apex=self.apex,
+            energy=engine.energy,
+            energy_start=self.energy_start,
+            energy_worst=self.worst,
+            energy_square=self.square / max(self.steps, 1),
+            energy_scale=self.scale,
+            kinetic=engine.kinetic,
+            impacts=self.impacts,
+            times=sorted(self.times)[:MOST_TIMES],
+            pressure=self.impulse / late,
+            rate=self.late_impacts / late,
+            overlap=self.deepest,
+            overlap_mean=float(np.mean(self.mean_overlaps)),
+            speed=float(speeds.max(initial=0.0)) / engine.size,
+            drift=float(way.max(initial=0.0)) / engine.size,
+            struck=engine.struck.tolist(),
+            failure=self.failure,
+            counts=engine.counts(),
+            seconds=self.seconds,
+            simulated=engine.time,
+        )

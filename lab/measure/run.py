@@ -1,0 +1,400 @@
+"""Runs a world for a number of steps and measures it: what reports and pictures show."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import itertools
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...components import AABBCollider, SphereCollider
+from ...framework import World
+from ...framework.compilation import log
+from ...framework.schedule.profile_report import Stats, Totals
+from ..reporting.profile import profile_of
+from .body_shapes import dimensions_of, sensor_entities
+from .escape import Enclosure
+from .impacts import Blow, blows_of, with_corners
+
+TRACED_BODIES = 200  # in a picture
+CANDIDATES = 12_000  # bodies that are followed, to choose from
+QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported, not warned about
+SAMPLES = 600  # of the energy, at most; of a path if there are many
+FEW_STEPS, FEW_BODIES = 12, 60  # a run of no more is shown step by step, with all its impacts
+PATH_POINTS = 80_000  # of all paths; as long as they do, paths are sampled in every step, so that corners stay
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A conserved quantity at the start and at the end, and the largest departure seen (sampled, in units of
+    ``scale``).
+
+    ``relative`` is the change over the run, ``worst`` the largest departure from the start on the way.
+    """
+
+    start: float | list[float]
+    end: float | list[float]
+    relative: float
+    worst: float
+    scale: float
+
+
+@dataclass
+class RunReport:
+    """What a run was and what it showed; times as named, everything else in the scene's units."""
+
+    scene: str
+    seed: int
+    dimensions: int
+    settings: dict[str, Any]
+    steps: int = 0
+    simulated_seconds: float = 0.0
+    wall_seconds: float = 0.0
+    compile_seconds: float = 0.0  # what the steps took that compiled kernels, or loaded compiled ones
+    kernels_compiled: int = 0
+    kernels_loaded: int = 0
+    bodies: dict[str, int] = field(default_factory=dict)
+    contacts: dict[str, float] = field(
+        default_factory=dict
+    )  # at the end, mean and most per step, impacts in total
+    step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
+    step_milliseconds_mean: float = math.nan
+    system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, compiling left out
+    profile: dict[str, Any] | None = None  # see profile_of; None unless asked for
+    energy: Drift | None = None
+    energy_changes: list[str] = field(default_factory=list)  # why the scene does not keep its energy
+    momentum: Drift | None = None
+    momentum_conserved: bool = True  # whether the scene lets it be: nothing fixed, no force from outside
+    deepest_overlap: float = 0.0
+    deepest_overlap_step: int | None = None
+    escaped: dict[str, int] = field(default_factory=dict)  # outside, non_finite
+    counters: dict[str, int] = field(default_factory=dict)  # the world's own, totals
+    faults: list[str] = field(default_factory=list)  # what went wrong without stopping the world
+    state_hash: str = ""
+    pictures: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain dicts, lists and numbers, ready for json.dumps; what is not finite becomes None."""
+        return _jsonable(dataclasses.asdict(self))
+
+
+@dataclass
+class Traces:
+    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending.
+
+    ``blows``: the impacts on the way, if all the steps are shown, else None.
+    """
+
+    entities: NDArray[np.int64]
+    samples: list[NDArray[np.float32]] = field(default_factory=list)
+    moved: int = 0  # how many bodies did, these among them
+    blows: list[Blow] | None = None
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """All finite points of all paths, (n, d)."""
+        points = self.positions.reshape(-1, self.samples[0].shape[1])
+        return points[np.isfinite(points).all(axis=1)]
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        return np.array(self.samples, np.float64)
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """The positions, with those at the impacts between them."""
+        return with_corners(self.entities, self.positions, self.blows or [])
+
+    @QUIET
+    def farthest(self, count: int) -> Traces:
+        """The ``count`` bodies that travelled farthest, of those that moved; ``moved`` stays what it is."""
+        travelled = np.zeros(len(self.entities))
+        for before, after in itertools.pairwise(self.corners if self.blows else self.samples):
+            travelled += np.nan_to_num(np.linalg.norm(after - before, axis=1))
+        moved = int((travelled > 0).sum())
+        chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
+        samples = [sample[chosen] for sample in self.samples]
+        return Traces(self.entities[chosen], samples, moved, self.blows)
+
+
+class Recorder:
+    """Follows what moves, those created on the way too, up to CANDIDATES bodies."""
+
+    def __init__(self, world: World, step_by_step: bool = False) -> None:
+        self.world = world
+        self.blows: list[Blow] | None = [] if step_by_step else None
+        self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they were met
+        self.samples: list[NDArray[np.float32]] = []  # of those known then
+
+    @QUIET
+    def record(self) -> None:
+        """Add a sample."""
+        if self.blows is not None and self.samples:
+            self.blows += blows_of(self.world, len(self.samples))
+        bodies = self.world.bodies
+        ids = np.asarray(bodies.entity)
+        moving = np.concatenate([bodies.dynamic.entity, bodies.kinematic.entity])
+        new = np.setdiff1d(moving, self.entities)
+        room = CANDIDATES - len(self.entities)
+        if len(new) > room:
+            new = np.sort(np.random.default_rng(0).choice(new, room, replace=False))
+        self.entities = np.concatenate([self.entities, new])
+        sample = np.full((len(self.entities), dimensions_of(self.world)), np.nan, np.float32)
+        if len(ids):
+            order = np.argsort(ids, kind="stable")
+            row = order[np.minimum(np.searchsorted(ids, self.entities, sorter=order), len(ids) - 1)]
+            there = ids[row] == self.entities
+            sample[there] = bodies.position[row[there]]
+        self.samples.append(sample)
+
+    def traces(self) -> Traces:
+        """What was recorded, NaN where a body was not there."""
+        order = np.argsort(self.entities, kind="stable")
+        filled = []
+        for sample in self.samples:
+            whole = np.full((len(self.entities), sample.shape[1]), np.nan, np.float32)
+            whole[: len(sample)] = sample
+            filled.append(whole[order])
+        return Traces(self.entities[order], filled, blows=self.blows)
+
+
+@dataclass
+class Run:
+    """A finished run: the report, the paths, and the world as it stands at the end."""
+
+    report: RunReport
+    traces: Traces
+    world: World
+
+
+class Meter:
+    """Looks at a world between its steps; nothing here is inside the measured time of a step."""
+
+    def __init__(self, world: World, every: int, path_every: int, step_by_step: bool) -> None:
+        self.world, self.every, self.path_every = world, every, path_every
+        self.recorder = Recorder(world, step_by_step)
+        self.came_or_went = False
+        self._entities = np.sort(np.asarray(world.bodies.entity))
+        self.enclosure = Enclosure.around(world)
+        self.step_seconds: list[float] = []
+        self.contact_counts: list[int] = []
+        self.impacts = 0
+        self.deepest, self.deepest_step = 0.0, None
+        self.energies: list[float] = []
+        self.kinetic_most = 0.0
+        self.momenta: list[NDArray[np.float64]] = []
+        self.momentum_scale = 0.0
+        self.measured = Totals()  # of the steps in step_seconds
+        self._kernels_seen = _kernels()
+        started = time.perf_counter()
+        self.recorder.record()
+        self.sample()
+        self.compile_seconds = time.perf_counter() - started if _kernels() != self._kernels_seen else 0.0
+        self._kernels_seen = _kernels()
+
+    @QUIET
+    def sample(self) -> None:
+        """Energy and momentum: every few steps."""
+        world = self.world
+        self.came_or_went |= not np.array_equal(np.sort(np.asarray(world.bodies.entity)), self._entities)
+        kinetic = float(world.kinetic_energy())
+        self.kinetic_most = max(self.kinetic_most, kinetic)
+        self.energies.append(kinetic + float(world.potential_energy()))
+        self.momenta.append(np.array(world.momentum(), float))
+        dynamic = world.bodies.dynamic
+        speed = np.linalg.norm(dynamic.linear_velocity, axis=1)
+        self.momentum_scale = max(self.momentum_scale, float(np.dot(np.asarray(dynamic.mass), speed)))
+
+    def step(self) -> None:
+        """One step, timed; then what must be seen after every step."""
+        world = self.world
+        before = world.stats().totals
+        started = time.perf_counter()
+        world.step()
+        seconds = time.perf_counter() - started
+        if _kernels() != self._kernels_seen:  # this step compiled or loaded kernels: its time says nothing
+            self._kernels_seen = _kernels()
+            self.compile_seconds += seconds
+        else:
+            self.step_seconds.append(seconds)
+            self.measured += world.stats().totals - before
+        depth = np.asarray(world.contacts.depth)
+        self.contact_counts.append(len(depth))
+        self.impacts += len(world.contacts.impacts)
+        if len(depth) and float(depth.max()) > self.deepest:
+            deepest = self._deepest_of_solids(depth)
+            if deepest > self.deepest:
+                self.deepest, self.deepest_step = deepest, world.step_count
+        if world.step_count % self.path_every == 0:
+            self.recorder.record()
+        if world.step_count % self.every == 0:
+            self.sample()
+
+    @QUIET
+    def fill(self, report: RunReport) -> None:
+        """Write what was seen into ``report``."""
+        world = self.world
+        report.compile_seconds = self.compile_seconds
+        report.steps, report.simulated_seconds = world.step_count, world.time
+        bodies = world.bodies
+        report.bodies = {
+            "total": len(bodies),
+            "dynamic": len(bodies.dynamic),
+            "kinematic": len(bodies.kinematic),
+            "static": len(bodies.static),
+        }
+        counts = self.contact_counts or [0]
+        report.contacts = {
+            "end": counts[-1],
+            "mean": round(float(np.mean(counts)), 3),
+            "most": max(counts),
+            "impacts": self.impacts,
+        }
+        if self.step_seconds:
+            report.step_milliseconds = 1e3 * float(np.median(self.step_seconds))
+            report.step_milliseconds_mean = 1e3 * float(np.mean(self.step_seconds))
+        stats = self.stats()
+        report.system_milliseconds = {
+            name: mean if self.step_seconds else math.nan for name, mean in stats.milliseconds.items()
+        }
+        report.energy = self._energy_drift()
+        report.energy_changes = self._energy_changes()
+        report.momentum = self._momentum_drift()
+        report.momentum_conserved = not (len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity))
+        report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
+        positions = np.asarray(bodies.dynamic.position)
+        finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
+        report.escaped = {
+            "outside": self.enclosure.outside(positions[finite]),
+            "non_finite": int((~finite).sum()),
+        }
+        report.counters = dict(world.stats().counters)
+        report.faults = list(world.faults)
+        report.state_hash = world.state_hash()
+
+    def stats(self) -> Stats:
+        """Of the steps that neither compiled nor loaded kernels."""
+        return Stats(self.measured, self.measured, self.world.stats().units)
+
+    def _deepest_of_solids(self, depth: NDArray[np.float64]) -> float:
+        """Sensors are there to be overlapped."""
+        sensors, contacts = sensor_entities(self.world), self.world.contacts
+        if len(sensors):
+            depth = depth[~(np.isin(contacts.entity_a, sensors) | np.isin(contacts.entity_b, sensors))]
+        return float(depth.max()) if len(depth) else 0.0
+
+    def _energy_changes(self) -> list[str]:
+        """What in this world, as it stands, adds energy or takes it away."""
+        bodies = self.world.bodies
+        dynamic, reasons = bodies.dynamic, []
+        any_pair = self.world.settings.restitution_mixing != "max"  # the larger of two: a body's own is the least
+        touched = bodies if any_pair else dynamic
+        met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
+        if met and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
+            reasons.append("restitution below 1")
+        if np.any(dynamic.linear_damping):
+            reasons.append("damping")
+        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force):
+            reasons.append("forces")
+        if np.any(bodies.kinematic.linear_velocity):
+            reasons.append("kinematic bodies that move")
+        if self.came_or_went:
+            reasons.append("bodies that came or went")
+        return reasons
+
+    def _energy_drift(self) -> Drift:
+        """In units of the largest kinetic energy seen: a potential has no natural zero to compare with."""
+        energies = np.array(self.energies)
+        scale = self.kinetic_most or 1.0
+        departure = (energies - energies[0]) / scale
+        return Drift(
+            float(energies[0]),
+            float(energies[-1]),
+            float(departure[-1]),
+            float(np.abs(departure).max()),
+            scale,
+        )
+
+    def _momentum_drift(self) -> Drift:
+        """The length of the change, in units of the largest sum of mass times speed seen."""
+        momenta = np.array(self.momenta)
+        scale = self.momentum_scale or 1.0
+        departure = np.linalg.norm(momenta - momenta[0], axis=1) / scale
+        return Drift(
+            momenta[0].tolist(), momenta[-1].tolist(), float(departure[-1]), float(departure.max()), scale
+        )
+
+
+def run(
+    world: World,
+    steps: int,
+    *,
+    scene: str = "",
+    seed: int = 0,
+    after_step: Callable[[int], None] | None = None,
+    profile: bool = False,
+) -> Run:
+    """Take ``steps`` steps of ``world`` and measure them; ``after_step`` is told how many are done.
+
+    ``profile``: kernels too, one by one, which makes each call of one a little slower.
+    """
+    report = RunReport(scene, seed, dimensions_of(world), plain_settings(world))
+    compiled, loaded = _kernels()
+    started = time.perf_counter()
+    every = max(1, math.ceil(steps / SAMPLES))
+    moving = len(world.bodies.dynamic) + len(world.bodies.kinematic)
+    path_every = max(1, min(every, math.ceil(steps * max(moving, 1) / PATH_POINTS)))
+    meter = Meter(world, every, path_every, steps <= FEW_STEPS and moving <= FEW_BODIES)
+    with world.profile() if profile else contextlib.nullcontext():
+        for done in range(1, steps + 1):
+            meter.step()
+            if after_step is not None:
+                after_step(done)
+    if world.step_count % meter.every:
+        meter.sample()
+    if world.step_count % meter.path_every:
+        meter.recorder.record()
+    report.wall_seconds = time.perf_counter() - started
+    report.kernels_compiled, report.kernels_loaded = _kernels()[0] - compiled, _kernels()[1] - loaded
+    meter.fill(report)
+    if profile:
+        report.profile = profile_of(meter.stats(), report.step_milliseconds_mean, meter.compile_seconds)
+    return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world)
+
+
+def plain_settings(world: World) -> dict[str, Any]:
+    """The settings' fields with values that JSON knows; anything else by its name."""
+    plain = (bool, int, float, str, type(None))
+    values = {f.name: getattr(world.settings, f.name) for f in dataclasses.fields(world.settings)}
+    return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
+
+
+def _restitutions(bodies: Any) -> list[NDArray[np.float64]]:
+    """The restitutions of those of ``bodies`` that have the collider, by collider."""
+    found = []
+    for collider in (SphereCollider, AABBCollider):
+        has = np.asarray(bodies.has(collider), bool)
+        if has.any():
+            fields = bodies.sphere_collider if collider is SphereCollider else bodies.aabb_collider
+            found.append(np.asarray(fields.restitution)[has])
+    return found
+
+
+def _kernels() -> tuple[int, int]:
+    return len(log.compiled), log.loaded
+
+
+def _jsonable(value: Any) -> Any:
+    """JSON has no word for infinity and for what is not a number."""
+    if isinstance(value, dict):
+        return {key: _jsonable(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_jsonable(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

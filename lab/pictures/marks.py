@@ -1,0 +1,230 @@
+"""How walls, bodies, contacts, arrows and paths are drawn into a panel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
+from matplotlib.colors import to_rgba_array
+
+from ..measure.body_shapes import Floats, Shapes
+from . import canvas
+from .canvas import Panel
+from .projection import Projection, corners, edges, faces
+
+MOST_ARROWS = 1500  # in 2D; more could not be told apart
+MOST_ARROWS_3D = 400  # the nearest
+MOST_SEGMENTS = 160_000
+MOST_CONTACTS_3D = 200  # more only hide the bodies
+ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+FACE_SHADE = (0.3, 0.0, 0.5)  # of boxes, by the axis of the face's normal: light from above
+OUTLINED = 6.0  # points: smaller bodies have no outline
+
+
+def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
+    """Static geometry: filled in 2D, the edges in 3D; sensors dashed."""
+    draw_sensors(panel, walls.where(walls.sensor), projection, canvas.SENSOR, zorder=1.2)
+    walls = walls.where(~walls.sensor)
+    if projection.flat:
+        colours = np.tile(to_rgba_array(canvas.WALL), (len(walls.entity), 1))
+        _draw_flat(panel, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
+        return
+    segments, filled = [], []
+    for low, high in zip(walls.lower, walls.upper, strict=True):
+        seen = np.maximum(low, projection.lower), np.minimum(high, projection.upper)
+        places, _, _ = projection.plane(corners(*seen))
+        segments += [places[list(edge)] for edge in edges()]
+        filled += [places[rows] for _, _, rows in faces()]
+    panel.axes.add_collection(
+        PolyCollection(filled, facecolors=canvas.WALL, alpha=0.13, linewidths=0, zorder=1)
+    )
+    _lines(panel, segments, colors=canvas.WALL_EDGE, linewidths=0.6, alpha=0.7, zorder=1.1)
+
+
+def draw_bodies(
+    panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3
+) -> None:
+    """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors dashed."""
+    if bodies.sensor.any():
+        draw_sensors(panel, bodies.where(bodies.sensor), projection, colours[bodies.sensor], zorder)
+        colours, bodies = colours[~bodies.sensor], bodies.where(~bodies.sensor)
+    if not len(bodies.entity):
+        return
+    outline = 0.7 if bodies.typical_diameter * panel.points > OUTLINED else 0.0
+    if projection.flat:
+        _draw_flat(panel, bodies, colours, canvas.PANEL, outline, zorder)
+    elif bodies.round.all():
+        _draw_balls(panel, bodies, colours, projection, outline, zorder)
+    else:
+        _draw_solids(panel, bodies, colours, projection, outline, zorder)
+
+
+def draw_sensors(panel: Panel, sensors: Shapes, projection: Projection, colour: Any, zorder: float) -> None:
+    """Hollow, with a dashed edge, in one ``colour`` or (n, 4) of them."""
+    if not len(sensors.entity):
+        return
+    colours = np.broadcast_to(to_rgba_array(colour), (len(sensors.entity), 4))
+    dashed: dict[str, Any] = {"linewidths": 1.1, "linestyles": "--", "zorder": zorder}
+    discs, boxes = sensors.where(sensors.round), sensors.where(~sensors.round)
+    if len(discs.entity):
+        places, magnification, _ = projection.plane(discs.centre)
+        widths = 2 * discs.half[:, 0] * magnification
+        _ellipses(panel, places, widths, facecolors="none", edgecolors=colours[sensors.round], **dashed)
+    segments, edge_colours = [], []
+    ends_of_edges = [(0, 1), (1, 3), (3, 2), (2, 0)] if projection.flat else edges()
+    for low, high, edge_colour in zip(boxes.lower, boxes.upper, colours[~sensors.round], strict=True):
+        places, _, _ = projection.plane(corners(low, high))
+        segments += [places[list(edge)] for edge in ends_of_edges]
+        edge_colours += [edge_colour] * len(ends_of_edges)
+    if segments:
+        _lines(panel, segments, colors=edge_colours, **dashed)
+
+
+def _draw_balls(
+    panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
+) -> None:
+    places, magnification, depth = projection.plane(bodies.centre)
+    order = np.argsort(depth, kind="stable")
+    size = bodies.half.max(axis=1) * magnification
+    shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
+    light = canvas.mixed(shade, "#ffffff", np.full(len(shade), 0.35))
+    edge = canvas.mixed(shade, canvas.BACKGROUND, np.full(len(shade), 0.6))
+    # Each ball and then its highlight, so that a nearer ball covers both.
+    highlight = places + size[:, None] * (-0.3, 0.33)
+    width = np.stack([2 * size, 0.7 * size], axis=1)[order].reshape(-1)
+    _ellipses(
+        panel,
+        np.stack([places, highlight], axis=1)[order].reshape(-1, 2),
+        width,
+        facecolors=np.stack([shade, light], axis=1)[order].reshape(-1, 4),
+        edgecolors=np.stack([edge, light], axis=1)[order].reshape(-1, 4),
+        linewidths=0.4 if outline else 0.15,
+        zorder=zorder,
+    )
+
+
+def _draw_solids(
+    panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
+) -> None:
+    """Balls and boxes together: all as polygons, so that they can be painted in one order, far to near."""
+    places, magnification, depth = projection.plane(bodies.centre)
+    shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
+    circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    polygons, fill, edge = [], [], []
+    dark = to_rgba_array(canvas.BACKGROUND)[0]
+    for k in np.argsort(depth, kind="stable"):
+        if bodies.round[k]:
+            size = bodies.half[k, 0] * magnification[k]
+            polygons += [places[k] + size * circle, places[k] + size * (0.35 * circle + (-0.3, 0.33))]
+            light = canvas.mixed(shade[k : k + 1], "#ffffff", np.array([0.35]))[0]
+            fill += [shade[k], light]
+            edge += [dark, light]
+            continue
+        ends, _, _ = projection.plane(corners(bodies.lower[k], bodies.upper[k]))
+        for axis, direction, rows in faces():
+            seen_from = direction * (projection.camera[axis] - bodies.centre[k, axis])
+            if seen_from > bodies.half[k, axis]:  # the camera is on this face's side
+                polygons.append(ends[rows])
+                dimmed = np.array([FACE_SHADE[axis]])
+                fill.append(canvas.mixed(shade[k : k + 1], canvas.BACKGROUND, dimmed)[0])
+                edge.append(dark)
+    style: dict[str, Any] = {"linewidths": 0.6 * outline, "zorder": zorder}
+    panel.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
+
+
+def draw_contacts(
+    panel: Panel, points: Floats, normals: Floats, diameter: float, projection: Projection
+) -> None:
+    """A dot at each contact point, with a stroke along its normal; ``diameter`` is a typical body's."""
+    if not len(points) or (not projection.flat and len(points) > MOST_CONTACTS_3D):
+        return
+    size = float(np.clip(0.16 * diameter * panel.points, 1.6, 5.0))
+    length = float(np.clip(0.28 * diameter * panel.points, 2.5, 12.0)) / panel.points
+    places, _, _ = projection.plane(points)
+    ends, _, _ = projection.plane(np.stack([points - length * normals, points + length * normals], axis=1))
+    _lines(panel, list(ends), colors=canvas.CONTACT, linewidths=0.9, alpha=0.9, zorder=5)
+    style = {"color": canvas.CONTACT, "ms": size, "mec": canvas.PANEL, "mew": 0.4}
+    panel.axes.plot(places[:, 0], places[:, 1], "o", **style, zorder=6)
+
+
+def draw_arrows(
+    panel: Panel, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float
+) -> float:
+    """Velocity arrows of the bodies in sight; returns how many seconds an arrow stands for (0: none)."""
+    start, _, depth = projection.plane(bodies.centre)
+    x, y = panel.axes.get_xlim(), panel.axes.get_ylim()
+    visible = (start[:, 0] > x[0]) & (start[:, 0] < x[1]) & (start[:, 1] > y[0]) & (start[:, 1] < y[1])
+    chosen = np.flatnonzero(visible & (bodies.speed > 0.02 * top_speed) & np.isfinite(bodies.speed))
+    if not len(chosen):
+        return 0.0
+    if projection.flat:
+        chosen = chosen[:: len(chosen) // MOST_ARROWS + 1]
+    else:
+        chosen = chosen[np.argsort(-depth[chosen], kind="stable")[:MOST_ARROWS_3D]]
+    extent = max(x[1] - x[0], y[1] - y[0])
+    wanted = float(np.clip(1.6 * bodies.typical_diameter, 0.018 * extent, 0.07 * extent))
+    seconds = _round_number(wanted / top_speed)
+    end, _, _ = projection.plane(bodies.centre[chosen] + seconds * velocity[chosen])
+    way = end - start[chosen]
+    panel.axes.quiver(
+        start[chosen, 0], start[chosen, 1], way[:, 0], way[:, 1], angles="xy", scale_units="xy", scale=1,
+        units="dots", width=1.5, headwidth=4, headlength=4.5, headaxislength=4, minlength=0.5,
+        color=canvas.TEXT, alpha=0.85, zorder=4,
+    )  # fmt: skip
+    return seconds
+
+
+def draw_paths(panel: Panel, positions: Floats, colours: Floats, projection: Projection) -> None:
+    """Paths (samples, bodies, d) that fade into the past; a jump across a third of the view is no path."""
+    stride = max(1, positions.shape[0] * positions.shape[1] // MOST_SEGMENTS)
+    positions = np.concatenate([positions[:-1:stride], positions[-1:]])
+    steps, bodies = len(positions) - 1, positions.shape[1]
+    places, _, depth = projection.plane(positions)
+    ways = np.linalg.norm(np.diff(positions, axis=0), axis=2)
+    drawn = np.isfinite(ways) & (ways < 0.33 * np.linalg.norm(projection.upper - projection.lower))
+    segments = np.stack([places[:-1], places[1:]], axis=2)  # (steps, bodies, two ends, 2)
+    age = np.linspace(0, 1, steps)[:, None] * np.ones(bodies)  # 0: the oldest
+    rgba = np.broadcast_to(colours, (steps, bodies, 4)).copy()
+    if bodies > 40:
+        opacity, width = 0.05 + 0.75 * age**2.2, 0.5 + 0.9 * age
+    else:
+        opacity, width = 0.25 + 0.75 * age**1.2, 0.9 + 1.3 * age
+    rgba[..., 3] = opacity if projection.flat else opacity * (0.25 + 0.75 * depth[1:])
+    _lines(
+        panel, list(segments[drawn]), colors=rgba[drawn], linewidths=width[drawn], capstyle="butt", zorder=2.5
+    )
+
+
+def _draw_flat(
+    panel: Panel, shapes: Shapes, colours: Floats, edge: str, outline: float, zorder: float
+) -> None:
+    discs, boxes = shapes.where(shapes.round), shapes.where(~shapes.round)
+    style: dict[str, Any] = {"edgecolors": edge, "linewidths": outline, "zorder": zorder}
+    if len(discs.entity):
+        _ellipses(panel, discs.centre, 2 * discs.half[:, 0], facecolors=colours[shapes.round], **style)
+    if len(boxes.entity):
+        signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        polygons = list(boxes.centre[:, None] + signs * boxes.half[:, None])
+        panel.axes.add_collection(PolyCollection(polygons, facecolors=colours[~shapes.round], **style))
+
+
+def _ellipses(panel: Panel, centres: Floats, widths: Floats, **style: Any) -> None:
+    """Circles to scale."""
+    transform = panel.axes.transData
+    angles = np.zeros(len(widths))
+    panel.axes.add_collection(
+        EllipseCollection(
+            widths, widths, angles, units="xy", offsets=centres, offset_transform=transform, **style
+        )
+    )
+
+
+def _lines(panel: Panel, segments: list[Floats], **style: Any) -> None:
+    panel.axes.add_collection(LineCollection(segments, **style))
+
+
+def _round_number(value: float) -> float:
+    """The nearest of 1, 2, 5 times a power of ten."""
+    options = np.array([1, 2, 5, 10]) * 10.0 ** np.floor(np.log10(value))
+    return float(options[np.argmin(np.abs(np.log(options / value)))])

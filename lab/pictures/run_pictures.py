@@ -1,0 +1,269 @@
+"""The two pictures of a run: how things stand at the end, and the paths they took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgba_array
+
+from ..measure.body_shapes import Floats, Shapes, shapes_of
+from ..measure.run import QUIET, Run, RunReport, Traces
+from . import canvas
+from .canvas import Panel, Sheet
+from .marks import MOST_CONTACTS_3D, draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
+from .projection import Projection, corners
+
+SMALLEST_LEGIBLE = 5.0  # points: below this typical diameter a second panel magnifies a part
+MAGNIFIED_DIAMETER = 20.0  # points
+CROWD_3D = 500  # untraced bodies that would hide the paths behind them
+SOME = 60  # bodies whose beginnings are shown
+FEW = 3  # bodies whose shapes are repeated along their path, however long
+GHOSTS = 14  # times that they are
+DRAWABLE = 1e30  # farther out there is no picture
+UNTRACED = "#1b2431"
+HUGE = 5.0  # times the extent of everything smaller: such static bodies are cut off by the view
+
+
+@dataclass(frozen=True)
+class Still:
+    """What is drawn, as arrays: all colliders, their velocities (n, d), contact points and normals (m, d)."""
+
+    shapes: Shapes
+    velocity: Floats
+    points: Floats
+    normals: Floats
+
+    @classmethod
+    def of(cls, run: Run) -> Still:
+        """The world as it stands at the end of ``run``."""
+        world, d = run.world, run.report.dimensions
+        shapes = shapes_of(world)
+        ids = np.asarray(world.bodies.entity)
+        order = np.argsort(ids, kind="stable")
+        row = order[np.minimum(np.searchsorted(ids, shapes.entity, sorter=order), max(len(ids) - 1, 0))]
+        velocity = np.asarray(world.bodies.linear_velocity)[row] if len(ids) else np.zeros((0, d))
+        contacts = world.contacts
+        points, normals = (np.array(c, float).reshape(-1, d) for c in (contacts.point, contacts.normal))
+        return cls(shapes, velocity, points, normals)
+
+    @property
+    def moving(self) -> np.ndarray:
+        """Which shapes can be drawn as bodies."""
+        return ~self.shapes.static & (np.abs(self.shapes.centre) < DRAWABLE).all(axis=1)
+
+
+@QUIET
+def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
+    """Draw ``run`` into the folder ``out``; returns the files. ``view``: two corners, None to find them.
+
+    An ``out`` that ends in .png is a file for the paths alone.
+    """
+    still = Still.of(run)
+    ends = find_view(still, run.traces) if view is None else view
+    projection = Projection.of(*(np.asarray(end, float) for end in ends))
+    frame = (
+        projection.frame()
+        if view is not None or projection.flat
+        else _tight_frame(still, run.traces, projection)
+    )
+    if is_file(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        return [draw_traces(run, still, projection, frame).save(out)]
+    stem = Path(run.report.scene).stem
+    out.mkdir(parents=True, exist_ok=True)
+    return [
+        draw_final(run, still, projection, frame).save(out / f"{stem}-final.png"),
+        draw_traces(run, still, projection, frame).save(out / f"{stem}-traces.png"),
+    ]
+
+
+def is_file(out: Path) -> bool:
+    """Whether it is the name of one picture, not that of a folder."""
+    return out.suffix.lower() == ".png"
+
+
+def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
+    """Where the bodies have been, and what stands; of what is huge, the part that is close by."""
+    shapes, moving = still.shapes, still.shapes.where(still.moving)
+    d = shapes.centre.shape[1]
+    lows, highs = [moving.lower], [moving.upper]
+    if len(traces.samples):
+        paths = traces.places
+        size = moving.half.max(axis=0) if len(moving.entity) else np.zeros(d)
+        lows.append(paths - size)
+        highs.append(paths + size)
+    low, high = np.concatenate(lows), np.concatenate(highs)
+    if not len(low):
+        low, high = (
+            _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
+        )
+    lower, upper = low.min(axis=0), high.max(axis=0)
+    fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
+    for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # the smaller ones first
+        if 2 * fixed.half[k].max() <= HUGE * float((upper - lower).max()):
+            lower, upper = np.minimum(lower, fixed.lower[k]), np.maximum(upper, fixed.upper[k])
+    room = 0.12 * max(float((upper - lower).max()), 1e-9)
+    near_low, near_high = lower - 2 * room, upper + 2 * room
+    close = fixed.where(np.all((fixed.upper >= near_low) & (fixed.lower <= near_high), axis=1))
+    for box_low, box_high in zip(close.lower, close.upper, strict=True):
+        lower = np.minimum(lower, np.maximum(box_low, near_low))
+        upper = np.maximum(upper, np.minimum(box_high, near_high))
+    return lower - room / 2, upper + room / 2
+
+
+def _smallest(shapes: Shapes) -> tuple[Floats, Floats]:
+    """The lower and the upper corner (1, d each) of the smallest shape."""
+    k = int(np.argmin(shapes.half.max(axis=1)))
+    return shapes.lower[k : k + 1], shapes.upper[k : k + 1]
+
+
+def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas.View:
+    """3D: what the bodies, their paths and the walls near them take up in the plane, with a margin."""
+    bodies, walls = still.shapes.where(still.moving), still.shapes.where(still.shapes.static)
+    near = walls.where(np.all((walls.upper >= projection.lower) & (walls.lower <= projection.upper), axis=1))
+    boxes = [
+        *zip(bodies.lower, bodies.upper, strict=True),
+        *zip(np.maximum(near.lower, projection.lower), np.minimum(near.upper, projection.upper), strict=True),
+    ]
+    points = [corners(low, high) for low, high in boxes]
+    if len(traces.samples):
+        points.append(traces.places)
+    lower, upper = projection.frame(np.concatenate(points) if points else None)
+    margin = 0.06 * (upper - lower).max()
+    return lower - margin, upper + margin
+
+
+def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
+    """All shapes to scale, coloured by speed, with velocities and contacts; crowds get a magnified part."""
+    report, shapes = run.report, still.shapes
+    bodies, velocity = shapes.where(still.moving), still.velocity[still.moving]
+    norm = canvas.speed_norm(bodies.speed)
+    part = _magnified(bodies, projection)
+    subtitle = (
+        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({_counted(report.steps, 'step')})"
+        f"   ·   {_counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
+    )
+    views = [frame, *([part] if part else [])]
+    sheet = Sheet.new(report.scene, subtitle, views, numbered=projection.flat)
+    colours = canvas.SPEED(norm(bodies.speed))
+    for panel in sheet.panels:
+        draw_walls(panel, shapes.where(shapes.static), projection)
+        draw_bodies(panel, bodies, colours, projection)
+    detail = sheet.panels[-1]
+    draw_contacts(detail, still.points, still.normals, bodies.typical_diameter, projection)
+    seconds = draw_arrows(detail, bodies, velocity, projection, float(norm.vmax or 1.0))
+    if part:
+        sheet.panels[0].outline(*part)
+
+    legend = [("->", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
+    if len(still.points) > 0 and (projection.flat or len(still.points) <= MOST_CONTACTS_3D):
+        legend.append(("o", canvas.CONTACT, "contact"))
+    sheet.legend(legend)
+    sheet.speed_scale(norm)
+    return sheet
+
+
+def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
+    """The paths, each body in its colour, the past fading; the traced bodies where they are now."""
+    traces, shapes, report = run.traces, still.shapes, run.report
+    count, moved = len(traces.entities), traces.moved
+    over = f"{report.simulated_seconds:.4g} s"
+    if traces.blows is not None:
+        over = f"{_counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
+    if not report.bodies["total"] and not count:
+        subtitle = "no bodies"
+    elif not count:
+        subtitle = f"nothing moved in {over}"
+    elif count < moved:
+        subtitle = f"paths of {count:,} of the {moved:,} bodies that moved, those that went farthest, over {over}"
+    else:
+        subtitle = f"{'path' if count == 1 else 'paths'} of {_that_moved(count)}, over {over}"
+    subtitle += ", fading into the past" if count else ""
+    if traces.blows is not None:
+        subtitle += f"   ·   {report.settings['collision']}"
+    sheet = Sheet.new(report.scene, subtitle, [frame], numbered=projection.flat)
+    panel = sheet.panels[0]
+    draw_walls(panel, shapes.where(shapes.static), projection)
+
+    traced = np.isin(shapes.entity, traces.entities)
+    others, followed = shapes.where(still.moving & ~traced), shapes.where(still.moving & traced)
+    if projection.flat or len(others.entity) <= CROWD_3D:
+        faint = np.tile(to_rgba_array(UNTRACED), (len(others.entity), 1))
+        draw_bodies(panel, others, faint, projection, zorder=2)
+    palette = to_rgba_array(canvas.BODY_COLOURS)
+    colours = palette[np.arange(count) * 5 % len(palette)]  # neighbours by id get different ones
+    if count and len(traces.samples) > 1:
+        draw_paths(panel, traces.corners, colours, projection)
+    own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
+    if 0 < count <= SOME:
+        _draw_starts(panel, traces, followed, own, projection)
+    if 0 < count <= FEW or (count and traces.blows is not None):
+        _draw_ghosts(panel, traces, followed, own, projection)
+    draw_bodies(panel, followed, own, projection)
+    if traces.blows:
+        points, normals = (np.array([getattr(blow, name) for blow in traces.blows]) for name in ("point", "normal"))
+        draw_contacts(panel, points, normals, followed.typical_diameter, projection)
+        sheet.legend([("o", canvas.CONTACT, "impact")])
+    return sheet
+
+
+def _counted(count: int, what: str, plural: str = "") -> str:
+    return f"{count:,} {what if count == 1 else plural or what + 's'}"
+
+
+def _that_moved(count: int) -> str:
+    return "the one body that moved" if count == 1 else f"the {count:,} bodies that moved"
+
+
+def _moving_bodies(report: RunReport) -> str:
+    """`12 bodies and 2 kinematic ones`, static ones apart."""
+    dynamic, kinematic = report.bodies["dynamic"], report.bodies["kinematic"]
+    if not dynamic and not kinematic:
+        return "no bodies" if not report.bodies["total"] else "only static bodies"
+    parts = [_counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
+    parts += [_counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
+    return " and ".join(parts)
+
+
+def _draw_starts(
+    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
+) -> None:
+    """Where the bodies began, faintly."""
+    paths = traces.positions[:, np.searchsorted(traces.entities, followed.entity)]
+    first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have come later
+    places = paths[first, np.arange(len(first))]
+    faint = colours.copy()
+    faint[:, 3] = 0.16
+    draw_bodies(panel, replace(followed, centre=places), faint, projection, zorder=2.2)
+
+
+def _draw_ghosts(
+    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
+) -> None:
+    """The shapes at even times along the path, as under a stroboscope."""
+    positions = traces.positions
+    when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]
+    for row, entity in enumerate(followed.entity):
+        places = positions[when, np.searchsorted(traces.entities, entity)]
+        places = places[np.isfinite(places).all(axis=1)]
+        repeated = np.tile(colours[row], (len(places), 1))
+        repeated[:, 3] = np.linspace(0.12, 0.4, len(places))
+        draw_bodies(panel, followed.row(row).at(places), repeated, projection, zorder=2.7)
+
+
+def _magnified(bodies: Shapes, projection: Projection) -> tuple[Floats, Floats] | None:
+    """2D, bodies too small to be seen: the part around the fastest one, for a second panel to show."""
+    if not projection.flat or not len(bodies.entity):
+        return None
+    lower, upper = projection.lower, projection.upper
+    per_unit = 72 * canvas.LONG_SIDE_OF_TWO / float((upper - lower).max())
+    diameter = bodies.typical_diameter * per_unit
+    if not 0 < diameter < SMALLEST_LEGIBLE:
+        return None
+    half = (upper - lower) * diameter / MAGNIFIED_DIAMETER / 2
+    middle = bodies.centre[int(np.argmax(bodies.speed))]
+    middle = np.clip(middle, lower + half, upper - half)
+    return middle - half, middle + half

@@ -1,0 +1,105 @@
+"""``carom plugins``: what installed packages offer; ``carom plugins check``: whether a plugin does what it must."""
+
+from __future__ import annotations
+
+import click
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ...framework import Plugin
+from ...framework.plugins.discovery import offers
+from ..commands.group import Commands
+from ..commands.loading import stdout_kept_clean
+from ..reporting.progress import CompileStatus
+from .check import check_plugin
+from .findings import Report, Subject
+from .installed import needed_by, plugins_of
+
+FOUND = 1  # exit code of a check that found something
+
+
+@click.group("plugins", cls=Commands, invoke_without_command=True, short_help="List plugins, or check one.")
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@click.pass_context
+def plugins_command(context: click.Context, traceback: bool) -> None:
+    """List the plugins that installed packages offer: name, version, package, what each adds."""
+    del traceback  # seen by Commands.main
+    if context.invoked_subcommand is not None:
+        return
+    with stdout_kept_clean():
+        on_offer = offers()
+    if not on_offer:
+        click.echo("no installed package offers a plugin")
+        return
+    table = Table(box=None, pad_edge=False)
+    for title, style in (("plugin", "bold"), ("version", ""), ("package", ""), ("adds", "")):
+        table.add_column(title, style=style, no_wrap=title in ("plugin", "version"))
+    for offer in on_offer:
+        version, adds = offer.version, f"broken: {offer.problem}"
+        if offer.plugin is not None:
+            version = offer.plugin.version or offer.version
+            adds = _adds(offer.plugin)
+        if offer.plugin is not None and offer.problem:
+            adds = f"{offer.problem}; {adds}"
+        table.add_row(*map(escape, (offer.name, version, offer.package, adds)))
+    Console().print(table)
+
+
+@plugins_command.command("check", short_help="Try a plugin with thousands of random and extreme inputs.")
+@click.argument("target", metavar="NAME|MODULE|FILE.py")
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+def check_command(target: str, traceback: bool) -> int:
+    """Check what a plugin brings, compiled as worlds compile it; exit code 1 if something is wrong.
+
+    TARGET: the name of an installed plugin, a module, or a file; all plugins that it defines are checked.
+    """
+    del traceback  # seen by Commands.main
+    found = plugins_of(target)
+    console, findings = Console(), 0
+    with CompileStatus(Console(stderr=True)) as status:
+        for plugin in found:
+            with stdout_kept_clean():
+                report = check_plugin(plugin, needed_by(plugin), lambda what, p=plugin: status.say(f"{p.name}: {what}"))
+            findings += report.findings
+            _print(report, console)
+    return FOUND if findings else 0
+
+
+def _adds(plugin: Plugin) -> str:
+    adds = plugin.adds()
+    return "; ".join(f"{kind} {', '.join(names)}" for kind, names in adds.items()) or "nothing"
+
+
+def _print(report: Report, console: Console) -> None:
+    table = Table(box=None, pad_edge=False, title=f"plugin {escape(report.plugin)}", title_justify="left")
+    table.add_column("checked")
+    table.add_column("", justify="right")
+    table.add_column("inputs", justify="right")
+    table.add_column("result")
+    for subject in report.subjects:
+        table.add_row(
+            escape(f"{subject.kind} {subject.name}"),
+            f"{subject.dimensions}D" if subject.dimensions else "",
+            f"{subject.inputs:,}" if subject.inputs else "",
+            escape(_result(subject)),
+        )
+    console.print(table)
+    number = 0
+    for subject in report.subjects:
+        for finding in subject.findings:
+            number += 1
+            share = f" ({finding.share})" if finding.share else ""
+            place = f"{subject.kind} {subject.name}{f', {subject.dimensions}D' if subject.dimensions else ''}"
+            title = f"{number}. {place}{share}: {finding.what}"
+            for line in (title, f"   for {finding.example}", f"   cure: {finding.cure}"):
+                console.print(line, markup=False, highlight=False, soft_wrap=True)
+    count = report.findings
+    said = "nothing found" if not count else f"{count} finding{'s' if count > 1 else ''}"
+    console.print(f"plugin {report.plugin}: {said}", markup=False, highlight=False)
+
+
+def _result(subject: Subject) -> str:
+    count = len(subject.findings)
+    result = f"{count} finding{'s' if count > 1 else ''}" if count else "ok" if subject.inputs else ""
+    return "; ".join(part for part in (result, subject.note) if part)

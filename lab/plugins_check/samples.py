@@ -1,0 +1,198 @@
+"""Random shapes and poses for ``carom plugins check``: parameters within the columns' rules, ordinary and extreme."""
+
+from __future__ import annotations
+
+import collections
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...components import Collider
+from ...framework.data.array_columns import ArrayColumn
+from ...framework.data.columns import REQUIRED, Column
+from ...framework.plugins.registry import Shape
+from ...systems.shapes.dispatch import half_extents_kernel, parameter_columns
+from ...systems.shapes.rotation import axes_of
+
+ORDINARY = 10_000  # poses of a pair
+EXTREME = 300  # of each of the kinds below
+VARIANTS = 8  # of an array, stretched
+# Kinds of poses: (name, size of a, size of b, how far apart, in their sizes), in metres; the first are checked first.
+KINDS = (
+    ("ordinary", 1.0, 1.0, "near"), ("along the axes", 1.0, 1.0, "axes"),
+    ("coincident centres", 1.0, 1.0, "coincident"), ("centres 1e-9 apart", 1.0, 1.0, "close"),
+    ("far apart", 1.0, 1.0, "far"), ("of size 1e-9", 1e-9, 1e-9, "near"), ("of size 1e9", 1e9, 1e9, "near"),
+    ("first 1e12 larger", 1e6, 1e-6, "near"), ("second 1e12 larger", 1e-6, 1e6, "near"),
+)  # fmt: skip
+
+
+@dataclass
+class Rows:
+    """Parameters of n colliders of one shape, as kernels take them, with half the size of the boxes around them."""
+
+    shape: Shape
+    arrays: dict[str, np.ndarray]
+    axes: np.ndarray
+    half: np.ndarray
+
+    @property
+    def columns(self) -> tuple[Any, ...]:
+        return parameter_columns(self.shape, self.arrays, self.axes)
+
+    def at(self, row: int) -> Any:
+        """The parameters of one, as a plain Python function gets them."""
+        values: dict[str, Any] = {}
+        for name in self.shape.columns:
+            column, value = self.shape.component.columns[name], self.arrays[name][row]
+            if isinstance(column, ArrayColumn):
+                values[name] = column.shown(value)
+            else:
+                values[name] = tuple(value) if column.item == "vector" else value
+        if self.shape.rotates:
+            values["axes"] = tuple(tuple(axis) for axis in self.axes[row].T)
+        return collections.namedtuple(self.shape.component.__name__, values)(**values)
+
+    def take(self, rows: np.ndarray) -> Rows:
+        return Rows(self.shape, {n: array[rows] for n, array in self.arrays.items()}, self.axes[rows], self.half[rows])
+
+    def size(self) -> np.ndarray:
+        """(n,) the largest half extent that is finite; 0 for what has no end anywhere."""
+        return np.where(np.isfinite(self.half), self.half, 0.0).max(axis=1)
+
+
+@dataclass
+class Poses:
+    """n pairs to look at: a, b, d (n, dimensions) from a's centre to b's, and of which kind each is."""
+
+    a: Rows
+    b: Rows
+    d: np.ndarray
+    kind: np.ndarray  # (n,) index into KINDS
+
+    def take(self, rows: np.ndarray) -> Poses:
+        return Poses(self.a.take(rows), self.b.take(rows), self.d[rows], self.kind[rows])
+
+    def scale(self) -> np.ndarray:
+        """(n,) the length by which rounding is judged: distance and both sizes."""
+        return np.sqrt((self.d * self.d).sum(axis=1)) + self.a.size() + self.b.size()
+
+
+def poses(first: Shape, second: Shape, dimensions: int, seed: int) -> Poses:
+    """Pairs of the two shapes, the same in every run."""
+    rng = np.random.default_rng((seed, dimensions))
+    counts = [ORDINARY] + [EXTREME] * (len(KINDS) - 1)
+    kind = np.repeat(np.arange(len(KINDS)), counts)
+    upright = rng.random(len(kind)) < np.where(kind == 0, 0.1, 0.5)
+    a = rows(first, np.array([k[1] for k in KINDS])[kind], upright, dimensions, rng)
+    b = rows(second, np.array([k[2] for k in KINDS])[kind], upright, dimensions, rng)
+    return Poses(a, b, _apart(a, b, kind, rng), kind)
+
+
+def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, rng: np.random.Generator) -> Rows:
+    """Colliders of that shape, their lengths around ``scale`` (n,); ``upright`` ones are not turned."""
+    count = len(scale)
+    own_sample = shape.component.sample.__func__ is not Collider.sample.__func__  # type: ignore[attr-defined]
+    sample = shape.component.sample()  # type: ignore[attr-defined]
+    common = scale * 10.0 ** rng.uniform(-1, 1, count)
+    arrays = {}
+    for name in shape.columns:
+        column, value = shape.component.columns[name], getattr(sample, name)
+        if isinstance(column, ArrayColumn):
+            arrays[name] = _array_numbers(column, value, common, rng)
+        else:
+            arrays[name] = _numbers(column, value, common, own_sample, dimensions, rng)
+            if type(column) is not Column:  # it has rules of its own
+                _keep_rules(column, value, arrays[name])
+    axes = np.eye(dimensions) * np.ones((count, 1, 1)) if not shape.rotates else _axes(count, dimensions, rng)
+    axes[upright] = np.eye(dimensions)
+    half = np.zeros((count, dimensions))
+    made = Rows(shape, arrays, axes, half)
+    half_extents_kernel(shape, dimensions)((made.columns,), half, (0.0,) * dimensions)
+    return made
+
+
+def _numbers(
+    column: Column, value: Any, common: np.ndarray, own_sample: bool, dimensions: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Values of a field; lengths are what the constructor demands, and vectors."""
+    count = len(common)
+    shape = (count, *column.item_shape(dimensions))
+    stored = np.asarray(column.checked(value))
+    result = np.empty(shape, column.dtype)
+    result[...] = stored
+    if column.dtype is not float:
+        if column.choices and not own_sample:
+            result[...] = rng.integers(len(column.choices), size=shape)
+        elif column.dtype is bool and not own_sample:
+            result[...] = rng.random(shape) < 0.5
+        return result
+    if column.default is REQUIRED or column.item == "vector":
+        factor = common.reshape((count,) + (1,) * (len(shape) - 1))
+        if own_sample:  # its numbers belong together
+            return result * factor
+        signs = -1.0 if column.minimum is None and not column.positive and column.item == "vector" else 0.0
+        low = max(column.minimum or 0.0, 0.0)
+        result = low + factor * np.abs(result) * 10.0 ** rng.uniform(-0.5, 0.5, shape)
+        if signs:
+            result *= rng.choice((-1.0, 1.0), shape)
+        if not column.positive:  # a point, a plate
+            result[rng.random(shape) < 0.03] = low
+    elif not own_sample and (column.positive or column.minimum is not None):
+        other = rng.random(count) < 0.5
+        result[other] = (column.minimum or 0.0) + 1.0 - rng.random(int(other.sum()))
+    return result
+
+
+def _keep_rules(column: Column, value: Any, array: np.ndarray) -> None:
+    """Make of every row what the column stores for it; of one that it refuses, the sample's value."""
+    for row, wanted in enumerate(array.tolist()):
+        try:
+            array[row] = column.checked(tuple(wanted) if isinstance(wanted, list) else wanted)
+        except ValueError:
+            array[row] = column.checked(value)
+
+
+def _array_numbers(column: ArrayColumn, value: Any, common: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The sample's array, and it stretched along its columns, as far as the field's own check lets it."""
+    factors = np.exp(np.linspace(np.log(common.min()), np.log(common.max()), VARIANTS))
+    known = [column.checked(value)]
+    scaled = []
+    for factor in factors:
+        for stretch in (np.ones(column.width), 10.0 ** rng.uniform(-0.5, 0.5, column.width)):
+            try:
+                scaled.append((factor, column.checked(np.asarray(value) * factor * stretch)))
+            except ValueError:
+                continue
+    if not scaled:
+        return np.full(len(common), known[0], np.int64)
+    sizes, numbers = np.log([size for size, _ in scaled]), np.array([number for _, number in scaled])
+    wanted = np.log(common) + rng.uniform(-0.5, 0.5, len(common))
+    order = np.argsort(np.abs(sizes[None, :] - wanted[:, None]), axis=1, kind="stable")
+    return numbers[order[np.arange(len(common)), rng.integers(0, min(2, len(scaled)), len(common))]].astype(np.int64)
+
+
+def _axes(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
+    """(count, d, d) rotation matrices; their columns are the bodies' axes in the world."""
+    return axes_of(rng.uniform(-np.pi, np.pi, count) if dimensions == 2 else rng.normal(size=(count, 4)), dimensions)
+
+
+def directions(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
+    """(count, d) unit vectors, everywhere alike."""
+    vectors = rng.normal(size=(count, dimensions))
+    return vectors / np.sqrt((vectors * vectors).sum(axis=1, keepdims=True))
+
+
+def _apart(a: Rows, b: Rows, kind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Where b is, seen from a: mostly so near that their boxes touch or nearly do."""
+    count, dimensions = len(kind), a.half.shape[1]
+    sizes = a.size() + b.size()
+    reach = sum(np.where(np.isfinite(each.half), each.half, sizes[:, None]) for each in (a, b))
+    d = reach * rng.uniform(-1.3, 1.3, (count, dimensions))
+    how = np.array([k[3] for k in KINDS])[kind]
+    axis = np.eye(dimensions)[rng.integers(dimensions, size=count)] * rng.choice((-1.0, 1.0), (count, 1))
+    d = np.where((how == "axes")[:, None], reach * axis * rng.choice((0.5, 1.0, 1.5), (count, 1)), d)
+    d[how == "coincident"] = 0.0
+    anywhere = directions(count, dimensions, rng)
+    d = np.where((how == "close")[:, None], 1e-9 * sizes[:, None] * anywhere, d)
+    return np.where((how == "far")[:, None], 10.0 ** rng.uniform(2, 9, (count, 1)) * sizes[:, None] * anywhere, d)

@@ -1,0 +1,89 @@
+"""Where a benchmark's result goes: the terminal, JSON, Markdown, a page, a chart."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from ..commands.usage_errors import Problem
+from .text_tables import TextTable, between_marks, replace_between_marks
+
+
+@dataclass(frozen=True)
+class Output:
+    """``mark`` names the place in the page; ``charts`` is the module that draws, or None."""
+
+    mark: str
+    as_json: bool
+    as_markdown: bool
+    into: Path | None
+    out: Path | None
+    charts: Any
+
+    @classmethod
+    def checked(
+        cls,
+        mark: str,
+        as_json: bool,
+        as_markdown: bool,
+        into: Path | None,
+        out: Path | None,
+        charts: str = "bench.charts",
+    ) -> Output:
+        """Problem for what cannot be: said before the long run, not after it. charts: the lab's module that draws."""
+        if as_json and as_markdown:
+            raise Problem("--json and --markdown exclude each other")
+        if into is not None:
+            between_marks(into, mark)
+        return cls(mark, as_json, as_markdown, into, out, None if out is None else _charts(out, charts))
+
+    def show(
+        self, result: Any, tables: list[TextTable], remarks: list[str], page: list[TextTable] | None = None
+    ) -> None:
+        """Print the result, and put the tables into the page; ``page``: others go there."""
+        markdown = _markdown(tables, remarks)
+        if self.as_json:
+            click.echo(json.dumps(result.as_dict(), indent=2))
+        elif self.as_markdown:
+            click.echo(markdown)
+        else:
+            console = Console()
+            for table in tables:
+                table.show(console)
+            for remark in remarks:
+                console.print(remark, style="dim", highlight=False)
+        if self.into is not None:
+            replace_between_marks(self.into, self.mark, markdown if page is None else _markdown(page, remarks))
+            click.echo(f"tables: {self.into}", err=True)
+
+    def draw(self, function: str, result: Any) -> None:
+        """Draw the chart, if one was asked for, and say where it is."""
+        if self.charts is None:
+            return
+        picture = getattr(self.charts, function)(result, self.out)
+        click.echo(f"chart: {picture}" if picture is not None else "no chart: nothing is compared", err=True)
+
+
+def _markdown(tables: list[TextTable], remarks: list[str]) -> str:
+    return "\n\n".join([*(table.markdown() for table in tables), *remarks])
+
+
+def _charts(out: Path, module: str) -> Any:
+    try:
+        charts = importlib.import_module(f"..{module}", __package__)
+    except ImportError as error:
+        raise Problem("--out: matplotlib is missing; it comes with the extra: pip install 'carom[bench]'") from error
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Problem(f"--out {out}: {error.strerror or error}") from error
+    if not os.access(out, os.W_OK | os.X_OK):
+        raise Problem(f"--out {out}: no permission to write there")
+    return charts

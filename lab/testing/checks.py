@@ -1,0 +1,283 @@
+"""Assertions about worlds. Each says which entity, at which step, which value and which limit."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...framework import Contact, World
+from ..measure.body_shapes import Floats, shapes_of
+
+
+class Conserved:
+    """What held when this was made, to be checked later: energy, momentum, the number of bodies, finite numbers.
+
+    Energy is kinetic and potential energy together. ``relative`` is of what is summed: of the energy at the start and
+    of sum(m |v|); rounding stays below 1e-12.
+    """
+
+    def __init__(self, world: World, relative: float = 1e-12) -> None:
+        self.world, self.relative = world, relative
+        self.bodies = len(world.bodies)
+        self.momentum = world.momentum()
+        self.energy = energy(world)
+        self.kinetic = world.kinetic_energy()
+        self.momentum_scale = self._sum_of_momenta()
+
+    def _sum_of_momenta(self) -> float:
+        moving = self.world.bodies.dynamic
+        return float(np.abs(moving.mass[:, None] * moving.linear_velocity).sum())
+
+    def assert_finite(self) -> None:
+        """No body was lost, every position and velocity is finite."""
+        bodies, step = self.world.bodies, self.world.step_count
+        assert len(bodies) == self.bodies, f"step {step}: {len(bodies)} bodies, there were {self.bodies}"
+        for name in ("position", "linear_velocity"):
+            column = getattr(bodies, name)
+            for row in np.flatnonzero(~np.isfinite(column).all(axis=1))[:1]:
+                raise AssertionError(f"entity {bodies.entity[row]}, step {step}: {name} is {column[row].tolist()}")
+
+    def assert_momentum(self) -> None:
+        """As it was: right without forces and without bodies that nothing can move."""
+        off = float(np.abs(self.world.momentum() - self.momentum).max())
+        limit = self.relative * max(self.momentum_scale, self._sum_of_momenta())
+        assert off <= limit, (
+            f"step {self.world.step_count}: momentum is {self.world.momentum().tolist()}, it was "
+            f"{self.momentum.tolist()}: {off:.3g} kg m/s apart, limit {limit:.3g}"
+        )
+
+    def assert_energy(self) -> None:
+        """As it was."""
+        self._energy(abs)
+
+    def assert_energy_not_raised(self) -> None:
+        """As it was, or less."""
+        self._energy(float)
+
+    def _energy(self, measure: Callable[[float], float]) -> None:
+        now = energy(self.world)
+        limit = self.relative * max(abs(self.energy), self.kinetic)
+        assert measure(now - self.energy) <= limit, (
+            f"step {self.world.step_count}: energy is {now:.12g} J, it was {self.energy:.12g} J: "
+            f"{now - self.energy:+.3g} J, limit {limit:.3g}"
+        )
+
+
+def energy(world: World) -> float:
+    """Kinetic and potential, J."""
+    return world.kinetic_energy() + world.potential_energy()
+
+
+# -- where and how fast -----------------------------------------------------------------------------
+
+
+def assert_position(world: World, entity: int, expected: Any, within: float = 1e-9) -> None:
+    """The entity is there, to ``within`` metres on every axis."""
+    _assert_vector(world, entity, "position", "m", expected, within)
+
+
+def assert_velocity(world: World, entity: int, expected: Any, within: float = 1e-9) -> None:
+    """The entity has that velocity, to ``within`` m/s on every axis."""
+    _assert_vector(world, entity, "linear_velocity", "m/s", expected, within)
+
+
+def _assert_vector(world: World, entity: int, name: str, unit: str, expected: Any, within: float) -> None:
+    got = np.asarray(getattr(world.bodies, name)[world.bodies.row_of(entity)])
+    off = float(np.abs(got - np.asarray(expected, float)).max())
+    assert off <= within, (
+        f"entity {entity}, step {world.step_count}: {name} is {got.tolist()}, expected "
+        f"{np.asarray(expected, float).tolist()}: {off:.3g} {unit} apart, limit {within:.3g}"
+    )
+
+
+def assert_inside(world: World, lower: Any, upper: Any) -> None:
+    """No dynamic body's position is outside of these bounds, (d,) or one number for all axes."""
+    moving = world.bodies.dynamic
+    inside = ((moving.position >= lower) & (moving.position <= upper)).all(axis=1)
+    for row in np.flatnonzero(~inside)[:1]:
+        raise AssertionError(
+            f"entity {moving.entity[row]}, step {world.step_count}: position {moving.position[row].tolist()} is "
+            f"outside of {lower} to {upper}; {int((~inside).sum())} of {len(moving)} bodies are"
+        )
+
+
+def assert_at_rest(world: World, steps: int = 60, speed: float = 1e-3, drift: float = 1e-3) -> None:
+    """Take so many steps: no dynamic body is ever faster than ``speed`` sizes per second or moves by ``drift`` sizes.
+
+    The size of a body is that of the least extent of its collider; of one without collider a metre.
+    """
+    sizes = _sizes(world)
+    start = np.array(world.bodies.dynamic.position)
+    for _ in range(steps):
+        world.step()
+        moving = world.bodies.dynamic
+        speeds = np.linalg.norm(moving.linear_velocity, axis=1) / sizes
+        _assert_largest(world, speeds, speed, "moves at", "sizes per second")
+        moved = np.linalg.norm(moving.position - start, axis=1) / sizes
+        _assert_largest(world, moved, drift, "has drifted by", "sizes")
+
+
+def _sizes(world: World) -> Floats:
+    shapes = shapes_of(world)
+    smallest: dict[int, float] = {}
+    for entity, half in zip(shapes.entity.tolist(), shapes.half.min(axis=1).tolist(), strict=True):
+        smallest[entity] = 2 * half
+    return np.array([smallest.get(entity, 1.0) or 1.0 for entity in world.bodies.dynamic.entity.tolist()])
+
+
+def _assert_largest(world: World, values: Floats, limit: float, verb: str, unit: str) -> None:
+    if len(values) and not values.max() <= limit:
+        row = int(np.argmax(values))
+        raise AssertionError(
+            f"entity {world.bodies.dynamic.entity[row]}, step {world.step_count}: {verb} {values[row]:.3g} {unit}, "
+            f"limit {limit:.3g}"
+        )
+
+
+# -- contacts ---------------------------------------------------------------------------------------
+
+
+def touching(world: World, a: int, b: int) -> bool:
+    """Whether the two touched in the last step (a contact that was disabled does not count)."""
+    return any(contact.entity_b == b for contact in world.contacts.of(a))
+
+
+def assert_touching(world: World, a: int, b: int) -> None:
+    """They touched in the last step."""
+    others = sorted({contact.entity_b for contact in world.contacts.of(a)})
+    assert touching(world, a, b), f"step {world.step_count}: {a} does not touch {b}; it touches {others or 'nothing'}"
+
+
+def assert_apart(world: World, a: int, b: int) -> None:
+    """They did not touch in the last step."""
+    for contact in world.contacts.of(a):
+        if contact.entity_b == b:
+            raise AssertionError(f"step {world.step_count}: {a} touches {b}, overlapping by {contact.depth:.3g} m")
+
+
+class ContactLog:
+    """Counts what happens between pairs from now on, however the world is stepped. Close it, or forget the world."""
+
+    EVENTS = ("contact_begin", "contact_end", "impact")
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._counts: Counter[tuple[str, int, int]] = Counter()
+        self._handlers = {name: world.on(name, self._counter(name)) for name in self.EVENTS}
+
+    def _counter(self, name: str) -> Callable[[Contact], None]:
+        def count(contact: Contact) -> None:
+            self._counts[name, contact.entity_a, contact.entity_b] += 1
+
+        return count
+
+    def close(self) -> None:
+        """Stop counting."""
+        for name, handler in self._handlers.items():
+            self.world.off(name, handler)
+        self._handlers.clear()
+
+    def count(self, event: str, a: int, b: int) -> int:
+        """How often; event: contact_begin, contact_end or impact."""
+        return self._counts[event, min(a, b), max(a, b)]
+
+    def assert_began(self, a: int, b: int, times: int = 1) -> None:
+        """They began to touch exactly so often."""
+        self._assert("contact_begin", "began to touch", a, b, times)
+
+    def assert_ended(self, a: int, b: int, times: int = 1) -> None:
+        """They ceased to touch exactly so often."""
+        self._assert("contact_end", "ceased to touch", a, b, times)
+
+    def assert_struck(self, a: int, b: int, times: int = 1) -> None:
+        """They had exactly so many impacts."""
+        self._assert("impact", "struck each other", a, b, times)
+
+    def _assert(self, event: str, verb: str, a: int, b: int, times: int) -> None:
+        got = self.count(event, a, b)
+        assert got == times, f"step {self.world.step_count}: {a} and {b} {verb} {got} times, expected {times}"
+
+
+def assert_no_overlap(world: World, sizes: float = 0.01) -> None:
+    """No two solid built-in shapes overlap by more than that part of the smaller one, as measured from the geometry.
+
+    Pairs that layers keep apart count too; pairs that nothing can move do not.
+    """
+    shapes = shapes_of(world)
+    solid = shapes.where(~shapes.sensor)
+    order = np.flatnonzero(~solid.static).tolist()
+    for index in order:
+        one = solid.row(index)
+        for other_index in range(len(solid.entity)):
+            if other_index == index or (other_index < index and other_index in order):
+                continue
+            other = solid.row(other_index)
+            if (one.lower > other.upper).any() or (other.lower > one.upper).any():
+                continue
+            depth = _overlap(one, other)
+            assert depth <= sizes, (
+                f"step {world.step_count}: {int(one.entity[0])} and {int(other.entity[0])} overlap by {depth:.3g} of "
+                f"the smaller one's size, limit {sizes:.3g}"
+            )
+
+
+def _overlap(one: Any, other: Any) -> float:
+    a, b = ((s.centre[0], s.half[0], bool(s.round[0])) for s in (one, other))
+    between = np.abs(b[0] - a[0])
+    if a[2] and b[2]:
+        depth = a[1][0] + b[1][0] - np.linalg.norm(between)
+    elif a[2] or b[2]:
+        radius, half = (a[1][0], b[1]) if a[2] else (b[1][0], a[1])
+        outside = float(np.linalg.norm(np.maximum(between - half, 0.0)))
+        depth = radius - outside if outside > 0 else radius + (half - between).min()
+    else:
+        depth = (a[1] + b[1] - between).min()
+    return float(depth / (2 * min(a[1].min(), b[1].min())))
+
+
+# -- the same bits ----------------------------------------------------------------------------------
+
+
+def assert_same_bits(one: World, other: World) -> None:
+    """Equal ids, equal bits of all bodies' columns; says which entity and column differ first."""
+    if one.state_hash() == other.state_hash():
+        return
+    bodies, others = one.bodies, other.bodies
+    ids = np.sort(bodies.entity)
+    assert np.array_equal(ids, np.sort(others.entity)), (
+        f"step {one.step_count}: the worlds have different bodies, {len(bodies)} and {len(others)}"
+    )
+    for entity in ids.tolist():
+        row, other_row = bodies.row_of(entity), others.row_of(entity)
+        for name in bodies.column_names():
+            if name not in others.column_names():
+                continue
+            mine, theirs = getattr(bodies, name)[row], getattr(others, name)[other_row]
+            assert np.array_equal(mine, theirs, equal_nan=np.asarray(mine).dtype.kind == "f"), (
+                f"entity {entity}, step {one.step_count} and {other.step_count}: {name} is "
+                f"{np.asarray(mine).tolist()} and {np.asarray(theirs).tolist()}"
+            )
+    raise AssertionError(f"step {one.step_count}: the worlds' components differ")
+
+
+def assert_frame_rate_free(build: Callable[[], World], seconds: float = 2.0, rates: Any = (30, 60, 144)) -> None:
+    """Worlds from ``build`` come to the same bits after ``seconds``, whatever frames they are advanced by."""
+    worlds = []
+    for rate in rates:
+        world = build()
+        steps = round(seconds / world.settings.dt)
+        most = int(1 / rate / world.settings.dt) + 2  # that one frame may take
+        while world.step_count + most <= steps:
+            world.advance(1 / rate)
+        while world.step_count < steps:
+            world.step()
+        worlds.append(world)
+    try:
+        for world in worlds[1:]:
+            assert_same_bits(worlds[0], world)
+    finally:
+        for world in worlds:
+            world.close()

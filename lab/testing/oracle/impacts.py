@@ -1,0 +1,260 @@
+"""The oracle's impacts: bounces at their time on the path, in the order of time, and a new look after each.
+
+A blow at time t changes a body's velocity by dv. It goes on as if it had travelled with dv all along and had come from
+dv t behind, so that its path stays one polynomial.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ....framework import Settings
+from ...measure.body_shapes import Floats
+from .bodies import FAST, Body, Cluster, Pair, Touch, only_corners, touch
+from .sweeps import ROUNDING, Meeting, Way, is_swept, slides_over, sweep, way_of
+
+HALVINGS = 60  # of a step: below the rounding of its time
+QUICK = 1e-3  # of the step: what has lost energy and is struck again so soon goes on like that
+STUCK = 1 << 30  # impacts that no cap allows: whoever has stuck once goes on to stick
+
+
+@dataclass(frozen=True, eq=False)
+class Impact:
+    """A bounce that lies ahead. ``slide``: the change of sliding speed that friction brings, (d,).
+
+    kind: bounce; free, if no cap counts it; stick and stop, beyond the cap; cross, of what does not push
+    """
+
+    pair: Pair
+    time: float
+    speed: float  # that the bounce changes: (1 + e) times the approach
+    normal: Floats
+    slide: Floats
+    struck: tuple[int, int]  # how often its two bodies had been struck when this was foreseen
+    kind: str
+    impulse: float = field(init=False)  # N s, along the normal
+
+    def __post_init__(self) -> None:
+        one, two = (body.cluster if self.kind == "stick" else body for body in self.pair.bodies)
+        light = one.inverse_mass + two.inverse_mass
+        object.__setattr__(self, "impulse", self.speed / light if light else 0.0)
+
+    @property
+    def stale(self) -> bool:
+        return self.struck != (self.pair.a.struck, self.pair.b.struck)
+
+
+class Impacts:
+    """Lets bounce what bounces. sweeping: some pairs are looked at on their whole way, and what crosses is noted."""
+
+    def __init__(self, pairs: Sequence[Pair], settings: Settings, curved: bool, sweeping: bool) -> None:
+        self.done: list[Impact] = []  # the bounces, in order
+        self.capped = 0  # what the cap has kept from bouncing
+        self._pairs, self._settings, self._curved, self._sweeping = pairs, settings, curved, sweeping
+        self._queue: list[tuple[float, int, int, int, Impact]] = []
+        self._number = itertools.count()
+
+    def run(self) -> None:
+        """First those that may have met in the prediction."""
+
+        def may_have_met(p: Pair) -> bool:
+            return self._sweeping or p.near or p.a.support is not None or p.b.support is not None
+
+        self._look([p for p in self._pairs if may_have_met(p)], 0.0)
+        while self._queue:
+            impact = heapq.heappop(self._queue)[-1]
+            if impact.stale:
+                continue
+            if impact.kind == "cross":
+                impact.pair.crossed = True
+                continue
+            moved = [body for body in impact.pair.bodies if body.inverse_mass > 0.0]
+            if impact.kind == "stop":
+                self.capped += 1
+                impact.pair.crossed = impact.pair.involved = True
+                for body in moved:
+                    if not body.stopped:
+                        _stop(body, impact.time)
+            elif impact.kind == "stick":
+                self.capped += 1
+                moved = self._stick(impact)
+                self.done.append(impact)
+            else:
+                self._strike(impact)
+                self.done.append(impact)
+            self._look([p for p in self._pairs if p.a in moved or p.b in moved], impact.time)
+        for body in {body: None for pair in self._pairs for body in pair.bodies}:
+            body.aside = body.stopped or (self._sweeping and body.struck > 0 and _is_thrown(body))
+
+    def _look(self, chosen: Sequence[Pair], since: float) -> None:
+        for pair in chosen:
+            impact = self._foresee(pair, since) if pair.pushes or self._sweeping else None
+            if impact is not None:
+                heapq.heappush(self._queue, (impact.time, *pair.key, next(self._number), impact))
+
+    def _foresee(self, pair: Pair, since: float) -> Impact | None:
+        """The pair's next impact: a touch, and an approach above the threshold; without restitution if swept only."""
+        a, b, settings, dt = pair.a, pair.b, self._settings, self._settings.dt
+        e, way = pair.restitution(settings), way_of(pair)
+        swept = self._sweeping and is_swept(pair, way, settings)
+        if not (pair.pushes or (swept and not pair.crossed)):
+            return None
+        met = sweep(pair, way, since, settings) if swept else None
+        if swept and met is None:
+            return None
+        if met is None or met.at_corner:
+            if e <= 0.0 and not swept:
+                return None
+            met, last = _overlap(pair, since, settings)
+            if met is None:
+                return None
+            swept = False
+            if only_corners(a, b, met.apart, pair.slop(settings)):  # from one thing onto the next
+                met = replace(met, touch=last)
+        normal = met.touch.normal
+        time, approach = met.time, way.velocity(met.time)
+        speed = float(np.linalg.norm(approach))
+        if not met.apart.any() and speed > 0.0:  # no direction between the centres: they part the way they came
+            if pair.impulse > 0.0:
+                return None
+            normal = -approach / speed
+        along, nothing = float(approach @ normal), 0.0
+        if self._sweeping:
+            nothing = ROUNDING * sum(float(np.linalg.norm(body.path[0])) for body in pair.bodies)
+        gain, left = 0.0, dt - time
+        if not along < -pair.threshold(settings) - nothing and pair.pushes:
+            # Too slow to bounce, but what is fast must not end far past the surface: it goes there and stays.
+            curve = float(way.bend @ normal)
+            fast = swept and way.length(left) > FAST * pair.size
+            if not (fast and -(along + curve * left) * left > pair.slop(settings)):
+                return None
+            e, gain = 0.0, max(0.0, -curve * left)
+        supported = a.support is not None or b.support is not None
+        if swept and pair.pushes and supported and slides_over(pair, way, met, normal, settings):
+            return None
+        if not self._curved and e != 1.0:  # a straight path has the true speed in its middle only
+            bend = (b.velocity - b.first_velocity) - (a.velocity - a.first_velocity)
+            along = min(0.0, along + float(bend @ normal) * (time / dt - 0.5))
+            if self._sweeping and pair.pushes and not along < -nothing:
+                return None  # the flight does not have it
+        kind = self._kind(pair, e, time, along, way)
+        if kind is None:
+            self.capped += 1
+            return None
+        if kind == "stick":
+            return Impact(pair, time, -along, normal, np.zeros_like(normal), (a.struck, b.struck), kind)
+        slide = np.zeros_like(normal)
+        sliding = approach - normal * float(approach @ normal)
+        fast, mu = float(np.linalg.norm(sliding)), pair.friction(settings)
+        if mu > 0.0 and fast > 0.0:  # Coulomb: at most mu times the normal impulse
+            slide = -sliding * min(1.0, -mu * (1.0 + e) * along / fast)
+        return Impact(pair, time, gain - (1.0 + e) * along, normal, slide, (a.struck, b.struck), kind)
+
+    def _strike(self, impact: Impact) -> None:
+        """Both bodies get their impulse at the time of impact and make the rest of the step with new velocities."""
+        pair = impact.pair
+        change = pair.mass * (impact.speed * impact.normal + impact.slide)
+        for body, sign in ((pair.a, -1.0), (pair.b, 1.0)):
+            if body.inverse_mass > 0.0:
+                self._push(body, sign * body.inverse_mass * change, impact.time)
+                body.spent += impact.kind == "bounce"
+        _note(impact)
+
+    def _stick(self, impact: Impact) -> list[Body]:
+        """A plastic impact of two clusters, which are one from then on; who is in it."""
+        one, two = impact.pair.a.cluster, impact.pair.b.cluster
+        for cluster, sign in ((one, -1.0), (two, 1.0)):
+            dv = sign * cluster.inverse_mass * impact.impulse * impact.normal
+            for body in cluster.members:
+                if body.inverse_mass > 0.0:
+                    self._push(body, dv, impact.time)
+                    body.spent |= STUCK
+        _note(impact)
+        members = [body for body in (*one.members, *two.members) if body.inverse_mass > 0.0]
+        grown = Cluster(members, one.fixed or two.fixed)
+        for body in members:
+            body.cluster = grown
+        return members
+
+    def _push(self, body: Body, dv: Floats, time: float) -> None:
+        """Damping acts on what a blow gives: in the last half kick; all the time; not at all where a straight path has
+        the velocity of the step's end already."""
+        dt = self._settings.dt
+        fading = 0.5 * dt if self._settings.collision == "event_driven" else dt - time if self._curved else 0.0
+        body.struck, body.last = body.struck + 1, time
+        body.first_velocity = body.first_velocity + dv
+        body.velocity = body.velocity + dv * math.exp(-body.damping * fading)
+        body.position = body.position + dv * (dt - time)
+        body.seems_from = body.seems_from - dv * time
+        body.path = body.path[0] + dv, body.path[1]
+
+    def _kind(self, pair: Pair, e: float, time: float, along: float, way: Way) -> str | None:
+        """None for what is left to the contacts at rest, being beyond the cap, and too slow to get past them."""
+        if not pair.pushes:
+            return "cross"
+        a, b, left = pair.a, pair.b, self._settings.dt - time
+        since = time - max(a.last, b.last)
+        events = self._settings.collision == "event_driven" and self._sweeping
+        if not any(body.stopped or body.spent >= self._settings.impact_cap for body in pair.bodies):
+            driven = any(body.inverse_mass == 0.0 and body.path[0].any() for body in pair.bodies)
+            return "free" if events and e == 1.0 and not driven and since > 0.0 else "bounce"
+        moves = any(body.inverse_mass > 0.0 and not body.stopped for body in pair.bodies)
+        fast = way.length(left) > FAST * pair.size or any(map(_is_thrown, pair.bodies))
+        if not (self._sweeping and moves and fast and -along * left > pair.slop(self._settings)):
+            return None
+        ends_up = e <= 0.0 or (e < 1.0 and since <= QUICK * self._settings.dt) or (events and since <= 0.0)
+        one, two = a.cluster, b.cluster
+        return "stick" if ends_up and one is not two and not (one.fixed and two.fixed) else "stop"
+
+
+def _overlap(pair: Pair, since: float, settings: Settings) -> tuple[Meeting | None, Touch]:
+    """Of those that overlap at the end of the step: when they begin to, ``since`` if they do then already; and how
+    they touch at the end."""
+    a, b, dt = pair.a, pair.b, settings.dt
+
+    def at(time: float) -> tuple[float, Floats, Touch]:
+        apart = pair.between(a.at(time), b.at(time))
+        return time, apart, touch(a, b, apart)
+
+    found = at(dt)
+    _, apart, last = found
+    if last.depth < 0.0 or only_corners(a, b, apart, pair.slop(settings)):
+        return None, last
+    early = at(since)
+    if early[-1].depth >= 0.0:
+        found = early
+    else:
+        low, high = since, dt
+        for _ in range(HALVINGS):
+            middle = at(0.5 * (low + high))
+            if middle[-1].depth >= 0.0:
+                high, found = middle[0], middle
+            else:
+                low = middle[0]
+    time, apart, met = found
+    return Meeting(time, met, apart), last
+
+
+def _is_thrown(body: Body) -> bool:
+    """Whether blows have changed its way so much that it seems to come from far off its start."""
+    return float(np.linalg.norm(body.seems_from - body.start)) > FAST * body.size
+
+
+def _note(impact: Impact) -> None:
+    pair = impact.pair
+    pair.impulse += impact.impulse
+    pair.normal, pair.involved = impact.normal, True
+
+
+def _stop(body: Body, time: float) -> None:
+    """It stays there until the step ends, whatever sticks to it, and keeps its velocity."""
+    body.stopped, body.struck, body.cluster.fixed = True, body.struck + 1, True
+    body.velocity = body.velocity_at(time)
+    body.position = body.seems_from = body.at(time)
+    body.path = np.zeros_like(body.velocity), np.zeros_like(body.velocity)

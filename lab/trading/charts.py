@@ -1,0 +1,359 @@
+"""Work-precision charts of a trade: the error to the right, what it costs upwards, a curve per method.
+
+Failed repeats have a cost and no error: they are crosses in a strip of their own, at the right edge, one column a kind.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import textwrap
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..cases.published import SOURCE, published
+from ..commands.usage_errors import Problem
+from ..pictures import canvas
+from ..pictures.curve_styles import Style, styles
+from ..reporting.run_report import number
+from .records import FAILURES, NOT_FINITE, TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
+from .report import check_norm, compact, error_heading, is_statistic, measured, norm_of, order
+
+WORK, TIME = "work", "time"
+AXIS = {
+    WORK: "work per simulated second (weighted counts)",
+    TIME: "wall time per simulated second, ms",
+}
+
+PUBLISHED_MARKERS = "12+|"
+PUBLISHED_COLOURS = ("#9aa7b6", "#c2a878", "#8fb59b", "#b79ac2")
+
+WIDTH, PLOT = 10.0, 5.2  # inches
+LEFT, RIGHT, TOP, AXIS_LABEL = 0.85, 0.3, 0.9, 0.75
+STRIP, STRIP_GAP = 0.72, 0.12  # inches: a column of the strip of failures, and what is left of it
+ROW, SMALL = 0.176, 7.5  # inches between rows of the legend; points of small print
+NOTE = 0.17  # inches between lines of small print
+LEAST_ERROR = 1e-17  # where an axis begins on which all errors are 0
+APART = (0.075, 0.035)  # shares of the axes that two labels of steps stay apart
+
+
+@dataclass
+class Sheet:
+    """A chart that is being made: its axes, its limits, and the small print below it."""
+
+    case: CaseTrade
+    norm: str
+    quantity: str
+    axes: Any = None
+    strip: Any = None
+    kinds: list[str] = field(default_factory=list)
+    errors: tuple[float, float] = (LEAST_ERROR, 1.0)
+    notes: list[str] = field(default_factory=list)
+
+    def height(self, point: Point) -> float | None:
+        """What the point costs; None where that is not known, or nothing that a logarithm could show."""
+        cost = point.work if self.quantity == WORK else point.milliseconds and point.milliseconds.median
+        return cost if cost and math.isfinite(cost) and cost > 0 else None
+
+
+def draw(trade: Trade, folder: Path, norm: str | None = None) -> list[Path]:
+    """Charts of all measured cases as PNG and SVG in ``folder``: by work and, where it was timed, by wall time.
+
+    ``norm``: the one to show, where a case has it; else its first. Problem if no case has it, or for the folder.
+    """
+    check_norm(trade, norm)
+    made: list[Path] = []
+    for case in measured(trade):
+        chosen = norm_of(case, norm)
+        for quantity in quantities(case):
+            name = "-".join(filter(None, ("trade", _slug(case.scene), _slug(chosen), quantity)))
+            name = name if folder / f"{name}.png" not in made else f"{name}-{len(made)}"
+            chart = figure(case, quantity, chosen)
+            for suffix in ("png", "svg"):
+                path = folder / f"{name}.{suffix}"
+                try:
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(_saved(chart, suffix))
+                except OSError as error:
+                    raise Problem(f"{path}: {error.strerror or error}") from error
+                made.append(path)
+    return made
+
+
+def quantities(case: CaseTrade) -> list[str]:
+    """WORK, and TIME if a point was timed."""
+    timed = any(point.milliseconds for curve in case.curves for point in curve.points)
+    return [WORK, TIME] if timed else [WORK]
+
+
+def inline_svg(case: CaseTrade, quantity: str, norm: str | None, prefix: str) -> str:
+    """The chart as an element of a page: no header of its own, no addresses, every id begins with ``prefix``."""
+    text = _saved(figure(case, quantity, norm), "svg").decode("utf-8")
+    head, inside = text[text.index("<svg") :].split(">", 1)
+    box = re.search(r'viewBox="[^"]*"', head)
+    inside = re.sub(r"<metadata>.*?</metadata>\s*", "", inside, flags=re.DOTALL)
+    for before in (r'\bid="', r'href="#', r"url\(#"):
+        inside = re.sub(before, lambda found: found.group() + prefix, inside)
+    label = escape(f"{case.scene}: {AXIS[quantity]}, over the error", quote=True)
+    return f'<svg role="img" aria-label="{label}" {box.group() if box else ""}>{inside}'
+
+
+def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Figure:
+    """One chart: WORK or TIME over the error of ``norm``, the case's first if it does not have it."""
+    sheet = Sheet(case, norm_of(case, norm), quantity)
+    sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in _points(case))]
+    drawn = list(zip(case.curves, styles(case.curves), strict=True))
+    entries = [_entry(curve, style, sheet.norm) for curve, style in drawn] + _published_entries(sheet)
+    sheet.notes = _notes(sheet)
+    notes = [line for note in sheet.notes for line in textwrap.wrap(note, 135)]
+    columns = 3 if max((len(str(entry.get_label())) for entry in entries), default=0) < 34 else 2
+    rows = -(-len(entries) // columns)
+    below = AXIS_LABEL + ROW * rows + 0.15 + NOTE * len(notes) + 0.15
+    size = (WIDTH, TOP + PLOT + below)
+    made = Figure(figsize=size, dpi=canvas.DPI, facecolor=canvas.BACKGROUND)
+    FigureCanvasAgg(made)
+    share = STRIP * len(sheet.kinds) + STRIP_GAP if sheet.kinds else 0.0
+    plot = WIDTH - LEFT - RIGHT - share
+    sheet.axes = _axes(made, (LEFT, below, plot, PLOT))
+    if sheet.kinds:
+        sheet.strip = _axes(made, (LEFT + plot + STRIP_GAP, below, share - STRIP_GAP, PLOT))
+    _set_limits(sheet)
+    _draw_published(sheet)
+    for curve, style in drawn:
+        _draw_curve(sheet, curve, style)
+    _draw_failures(sheet, drawn)
+    _label_steps(sheet, drawn)
+    made.text(LEFT / WIDTH, 1 - 0.36 / size[1], case.scene, color=canvas.TEXT, fontsize=16, fontweight="bold")
+    what = textwrap.shorten(f"{sheet.norm}: {case.norms[sheet.norm]}", 120, placeholder=" ...")
+    made.text(LEFT / WIDTH, 1 - 0.66 / size[1], what, color=canvas.MUTED, fontsize=9.5)
+    made.legend(
+        handles=entries, ncols=columns, loc="upper left", bbox_to_anchor=(LEFT / WIDTH, (below - 0.62) / size[1]),
+        bbox_transform=made.transFigure, borderaxespad=0, frameon=False, labelcolor=canvas.TEXT, fontsize=8.5,
+        handlelength=2.6, labelspacing=0.45, borderpad=0,
+    )  # fmt: skip
+    for place, note in enumerate(notes):
+        y = (0.12 + NOTE * (len(notes) - 1 - place)) / size[1]
+        made.text(LEFT / WIDTH, y, note, color=canvas.MUTED, fontsize=SMALL)
+    return made
+
+
+def legend_text(curve: Curve, norm: str) -> str:
+    """`velocity Verlet, order 2.0 (2)`, or `exact`, or the label alone where no order is known."""
+    found, theory = curve.orders.get(norm), curve.theory.get(norm)
+    if theory == math.inf:
+        return f"{curve.label}, exact"
+    if found is None:
+        return curve.label
+    return f"{curve.label}, order {order(curve, norm)}"
+
+
+def _entry(curve: Curve, style: Style, norm: str) -> Line2D:
+    look: dict[str, Any] = {"color": style.colour, "ls": style.line, "marker": style.marker, "ms": 5.5, "lw": 1.6}
+    return Line2D([], [], label=legend_text(curve, norm), **look)
+
+
+def _points(case: CaseTrade) -> list[Point]:
+    return [point for curve in case.curves for point in curve.points]
+
+
+def _bar(point: Point, norm: str) -> ErrorBar | None:
+    """The point's error, if there is one and it is a number."""
+    bar = point.errors.get(norm)
+    return bar if bar is not None and math.isfinite(bar.mean) else None
+
+
+def _failures(point: Point, norm: str) -> dict[str, int]:
+    """How many repeats failed; an error that is no number counts as one kind of it."""
+    failures = {kind: count for kind, count in point.failures.items() if count}
+    if norm in point.errors and _bar(point, norm) is None and NOT_FINITE not in failures:
+        failures[NOT_FINITE] = point.repeats
+    return failures
+
+
+def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
+    """Axes at a place in inches from the lower left corner."""
+    width, height = made.get_size_inches()
+    left, bottom, across, up = place
+    axes = made.add_axes((left / width, bottom / height, across / width, up / height), facecolor=canvas.PANEL)
+    axes.tick_params(which="both", colors=canvas.MUTED, labelsize=8.5)
+    axes.set_axisbelow(True)
+    for spine in axes.spines.values():
+        spine.set_color(canvas.FRAME)
+    return axes
+
+
+def _set_limits(sheet: Sheet) -> None:
+    """Both axes around all that is drawn, and a place at the left edge for errors of 0."""
+    axes, norm = sheet.axes, sheet.norm
+    bars = [bar for point in _points(sheet.case) if (bar := _bar(point, norm))]
+    others = published(sheet.case.scene, norm) if sheet.quantity == TIME else []
+    errors = [e for bar in bars for e in (bar.low, bar.mean, bar.high) if 0 < e < math.inf]
+    errors += [point.error for point in others]
+    costs = [cost for point in _points(sheet.case) if (cost := sheet.height(point))]
+    costs += [point.milliseconds for point in others]
+    least, most = (min(errors), max(errors)) if errors else (10 * LEAST_ERROR, 1.0)
+    if any(bar.mean <= 0 for bar in bars):
+        least /= 10
+    sheet.errors = _widened(least, most)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(*sheet.errors)
+    axes.set_ylim(*_widened(min(costs, default=1.0), max(costs, default=1.0)))
+    axes.grid(color=canvas.FRAME, lw=0.7)
+    axes.set_xlabel(error_heading(norm), color=canvas.MUTED, fontsize=9.5)
+    axes.set_ylabel(AXIS[sheet.quantity], color=canvas.MUTED, fontsize=9.5)
+    if sheet.strip is not None:
+        strip = sheet.strip
+        strip.set_yscale("log")
+        strip.set_ylim(*axes.get_ylim())
+        strip.set_xlim(0, len(sheet.kinds))
+        strip.tick_params(which="both", left=False, labelleft=False, bottom=False, labelbottom=False)
+        strip.set_title("failed", color=canvas.MUTED, fontsize=9, pad=4)
+        for column, kind in enumerate(sheet.kinds):
+            label = strip.text(column + 0.5, -0.02, kind, color=canvas.MUTED, fontsize=8, ha="center", va="top")
+            label.set_transform(strip.get_xaxis_transform())
+            if column:
+                strip.axvline(column, color=canvas.FRAME, lw=0.8)
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """At least one decade, with a margin; on a logarithmic axis."""
+    middle, half = (math.log10(low) + math.log10(high)) / 2, (math.log10(high) - math.log10(low)) / 2
+    half = max(half * 1.08, half + 0.06, 0.5)
+    return 10 ** (middle - half), 10 ** (middle + half)
+
+
+def _place(sheet: Sheet, point: Point) -> tuple[float, float] | None:
+    """Where a point is drawn; an error of 0 at the left edge; None without an error or a cost."""
+    bar, cost = _bar(point, sheet.norm), sheet.height(point)
+    return None if bar is None or cost is None else (max(bar.mean, sheet.errors[0]), cost)
+
+
+def _draw_curve(sheet: Sheet, curve: Curve, style: Style) -> None:
+    placed = [(point, place) for point in curve.points if (place := _place(sheet, point))]
+    xs, ys = [x for _, (x, _) in placed], [y for _, (_, y) in placed]
+    look: dict[str, Any] = {"color": style.colour, "clip_on": False}
+    sheet.axes.plot(xs, ys, ls=style.line, lw=style.width, label=curve.label, zorder=3, color=style.colour)
+    for point, (x, y) in placed:
+        bar = point.errors[sheet.norm]
+        if bar.high > bar.low:
+            sheet.axes.hlines(y, max(bar.low, sheet.errors[0]), bar.high, color=style.colour, lw=1.0, alpha=0.45)
+        zero = bar.mean <= 0
+        trusted = sheet.case.reference.trusts(sheet.norm, bar.mean)
+        marker, label = ("<", "zero") if zero else (style.marker, "trusted" if trusted else "untrusted")
+        inside = style.colour if trusted else canvas.PANEL
+        sheet.axes.plot([x], [y], ls="none", marker=marker, ms=style.size, mfc=inside, label=label, zorder=4, **look)
+
+
+def _draw_failures(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
+    """A cross for each point and kind, at the point's cost; without one at the upper edge."""
+    for column, kind in enumerate(sheet.kinds):
+        found = [(p, style) for curve, style in drawn for p in curve.points if kind in _failures(p, sheet.norm)]
+        bottom, top = sheet.axes.get_ylim()
+        for place, (point, style) in enumerate(found):
+            x = column + (place + 1) / (len(found) + 1)
+            y = sheet.height(point) or bottom * (top / bottom) ** 0.97
+            sheet.strip.plot([x], [y], ls="none", marker="x", ms=6.5, mew=1.8, color=style.colour, label=kind)
+            count = _failures(point, sheet.norm)[kind]
+            if count < point.repeats:
+                beside: dict[str, Any] = {"xytext": (0, 5), "textcoords": "offset points", "ha": "center"}
+                text = f"{count}/{point.repeats}"
+                sheet.strip.annotate(text, (x, y), color=canvas.MUTED, fontsize=6, **beside)
+
+
+def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
+    """The step beside the ends and middles of curves, as far as there is room."""
+    kept: list[tuple[float, float]] = []
+    to_share = sheet.axes.transAxes.inverted()
+    wanted: list[tuple[Point, Style]] = []
+    for pick in (lambda n: n - 1, lambda n: 0, lambda n: n // 2):
+        for curve, style in drawn:
+            seen = [point for point in curve.points if _place(sheet, point)]
+            if seen:
+                wanted.append((seen[pick(len(seen))], style))
+    for point, style in wanted:
+        x, y = _place(sheet, point) or (0.0, 0.0)
+        across, up = to_share.transform(sheet.axes.transData.transform((x, y)))
+        beside: dict[str, Any] = {"xytext": (6, 5), "textcoords": "offset points"}
+        middle = across + APART[0] / 2
+        if across > 0.93:
+            beside.update(xytext=(-6, 5), ha="right")
+            middle = across - APART[0] / 2
+        if any(abs(middle - a) < APART[0] and abs(up - b) < APART[1] for a, b in kept):
+            continue
+        kept.append((middle, up))
+        text = f"{number(point.cell.dt)} s"
+        sheet.axes.annotate(text, (x, y), color=style.colour, fontsize=7, zorder=5, **beside)
+
+
+def _published_entries(sheet: Sheet) -> list[Line2D]:
+    """The other engines in the legend of the chart they stand on."""
+    return [
+        Line2D([], [], ls=":", lw=1, color=colour, marker=marker, ms=8, mew=1.6, label=f"{engine}, published")
+        for engine, colour, marker in _published_styles(sheet)
+    ]
+
+
+def _published_styles(sheet: Sheet) -> list[tuple[str, str, str]]:
+    points = published(sheet.case.scene, sheet.norm) if sheet.quantity == TIME else []
+    engines = dict.fromkeys(point.engine for point in points)
+    return list(zip(engines, PUBLISHED_COLOURS, PUBLISHED_MARKERS, strict=False))
+
+
+def _draw_published(sheet: Sheet) -> None:
+    points = published(sheet.case.scene, sheet.norm)
+    for engine, colour, marker in _published_styles(sheet):
+        xs, ys = zip(*((p.error, p.milliseconds) for p in points if p.engine == engine), strict=True)
+        look: dict[str, Any] = {"ls": ":", "lw": 1.0, "marker": marker, "ms": 8, "mew": 1.6, "zorder": 2}
+        sheet.axes.plot(xs, ys, color=colour, label=f"{engine}, published", **look)
+
+
+def _notes(sheet: Sheet) -> list[str]:
+    """What the marks mean, of those that are there, and what could not be drawn."""
+    case, norm, points = sheet.case, sheet.norm, _points(sheet.case)
+    bars = [bar for point in points if (bar := _bar(point, norm))]
+    what = {WORK: "work", TIME: "wall time"}[sheet.quantity]
+    lines = []
+    if any(known is not None for curve in case.curves for known in (curve.orders.get(norm), curve.theory.get(norm))):
+        lines.append("Order: of the error in the step, observed; in brackets what theory says.")
+    if any(bar.high > bar.low for bar in bars):
+        span = "two standard errors either way" if is_statistic(case, norm) else "from the least to the largest error"
+        lines.append(f"Point: mean over the {case.repeated}; the line across it: {span}.")
+    if any(not case.reference.trusts(norm, bar.mean) for bar in bars):
+        apart = compact(case.reference.agreement[norm])
+        lines.append(f"Hollow: an error below {TRUSTED:g} times what the references differ by ({apart}) says little.")
+    if any(bar.mean <= 0 for bar in bars):
+        lines.append("Triangle at the left edge: no error at all.")
+    if sheet.kinds:
+        lines.append("Cross: failed, at what it cost; a count beside it: so many repeats, the others have an error.")
+    costless = [point for point in points if sheet.height(point) is None]
+    failed = sum(point.failed for point in costless)
+    if failed:
+        lines.append(f"The {what} of {failed} that failed is not known: their crosses are at the upper edge.")
+    if len(costless) > failed:
+        lines.append(f"The {what} of {len(costless) - failed} points is not known: they are not here.")
+    if published(case.scene, norm):
+        lines.append(f"{SOURCE}." if sheet.quantity == TIME else "What others published is in the chart of wall times.")
+    return lines
+
+
+def _saved(chart: Figure, suffix: str) -> bytes:
+    """The same bytes for the same chart, as far as matplotlib can."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "carom", "svg.fonttype": "path"}):
+        extra: dict[str, Any] = {"metadata": {"Date": None}} if suffix == "svg" else {"dpi": canvas.DPI}
+        chart.savefig(buffer, format=suffix, facecolor=canvas.BACKGROUND, **extra)
+    return buffer.getvalue()
+
+
+def _slug(name: str) -> str:
+    """A name of a file."""
+    return re.sub(r"[^A-Za-z0-9_]+", "-", name).strip("-")

@@ -1,0 +1,206 @@
+"""``carom trade``: what speed costs in accuracy, measured over a grid of settings."""
+
+from __future__ import annotations
+
+import dataclasses
+import shlex
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from ..cases.grid import ALL_METHODS
+from ..cases.subjects import Subject, subject_of
+from ..commands.group import STOPPED
+from ..commands.loading import stdout_kept_clean
+from ..commands.options import (
+    WORDS,
+    KeepsWords,
+    case_options,
+    only_options,
+    out_option,
+    runs_options,
+    seed_number,
+    shown_options,
+    together,
+    writable_folder,
+)
+from ..commands.usage_errors import Problem
+from ..engines.pymunk_space import pymunk_module
+from ..jobs.result_store import Store
+from ..measure.run import run
+from ..reporting.output import Output
+from ..reporting.progress_bar import Bar, Progress
+from ..reporting.text_tables import TextTable
+from .files import write_csv, write_json
+from .page import chart_module, write_page
+from .records import PYMUNK, Trade
+from .report import COUNTS, cheapest, choice_lines, measured, remarks, tables
+from .summary import summaries
+from .trade import Only, trade
+
+MARK = "carom trade"
+RESULTS = "results.jsonl"
+MOST_STEPS = 3000  # of the run that pictures show
+
+
+@click.command("trade", cls=KeepsWords, short_help="What speed costs in accuracy, measured.")
+@click.argument("targets", metavar="SCENE|FILE.py...", nargs=-1, required=True)
+@case_options
+@only_options
+@together(
+    click.option("--against", type=click.Choice([PYMUNK]), help="The same scenes in this engine, on the same axes."),
+    click.option("--no-timing", is_flag=True, help="Counts only; nothing is timed."),
+    click.option("--quick", is_flag=True, help="Every second step, and 8 repeats at most."),
+)
+@runs_options
+@out_option("Where results, tables, charts and the page go.", Path("out/trade"))
+@shown_options
+@click.option("--no-pictures", is_flag=True, help="No pictures of the scenes on the page.")
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@click.pass_context
+def trade_command(
+    context: click.Context,
+    targets: tuple[str, ...],
+    norms: tuple[str, ...],
+    seconds: float | None,
+    repeats: int | None,
+    steps: tuple[float, ...] | None,
+    options: dict[str, Any],
+    seed: str,
+    integrators: tuple[str, ...] | None,
+    collisions: tuple[str, ...] | None,
+    substeps: tuple[int, ...] | None,
+    geometries: tuple[str, ...] | None,
+    against: str | None,
+    no_timing: bool,
+    quick: bool,
+    workers: int | None,
+    resume: bool,
+    out: Path,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+    no_pictures: bool,
+    traceback: bool,
+) -> None:
+    """Run scenes with all settings that matter in them: how large is the error, and what does it cost?
+
+    Scenes of the library, or files that define build(settings, seed=0). Each is measured by a norm that suits it,
+    against a closed form or runs of its own; finished runs are kept as they come.
+    """
+    del traceback  # seen by Commands.main
+    targets = tuple(dict.fromkeys(targets))
+    subjects = [subject_of(target, options, seed_number(seed)) for target in targets]
+    only = Only(integrators or (), collisions or (), substeps or (), geometries or ())
+    _check_integrators(subjects, only.integrators)
+    if against == PYMUNK:
+        pymunk_module()
+    output = Output.checked(" ".join((MARK, *targets)), as_json, as_markdown, into, None)
+    writable_folder(out)
+    charts = _charts_there()
+    arguments = {
+        "norms": norms, "seconds": seconds, "repeats": repeats, "steps": steps or (), "only": only,
+        "against_pymunk": against == PYMUNK, "timing": not no_timing, "quick": quick, "options": options,
+        "seed": seed_number(seed), "workers": workers, "command": _command_line(context),
+    }  # fmt: skip
+    with Store.open(out / RESULTS, resume) as store:
+        if resume:
+            click.echo(f"carom: {_results(store)} in {store.path}: those that fit are taken over", err=True)
+        try:
+            with Bar(Console(stderr=True)) as bar:
+                result = trade(*targets, **arguments, store=store, progress=bar)
+                files = _write(result, out)
+                pictures: dict[str, list[Path]] = {}
+                if charts:
+                    bar.say("charts")
+                    files += [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
+                    pictures = {} if no_pictures else _pictures(result, subjects, out, bar)
+                    files += [path for drawn in pictures.values() for path in drawn]
+                files.append(write_page(result, out / "trade.html", pictures, charts=charts))
+        except KeyboardInterrupt:
+            click.echo(f"carom: stopped; {_results(store)} kept in {store.path}, --resume goes on", err=True)
+            raise click.exceptions.Exit(STOPPED) from None
+    choices = [cheapest(case) for case in measured(result)]
+    page = [*summaries(result), *choices]
+    output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)], page)
+    for path in files:
+        click.echo(f"written: {path}", err=True)
+
+
+def _check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> None:
+    """Problem, with what was probably meant, for an integrator that a scene does not have; plugins bring their own."""
+    for subject in subjects:
+        for name in names:
+            if name not in ALL_METHODS:
+                with closing(subject.world(None)) as world:
+                    settings = world.settings.replace(integrator=name)
+                subject.world(settings).close()
+
+
+def _charts_there() -> bool:
+    """Whether matplotlib is; says so at once if not."""
+    try:
+        chart_module()
+    except Problem as problem:
+        click.echo(f"carom: no pictures: {problem.message}", err=True)
+        return False
+    return True
+
+
+def _command_line(context: click.Context) -> str:
+    """What measures it all again, from the beginning."""
+    return shlex.join([*MARK.split(), *(word for word in context.meta[WORDS] if word != "--resume")])
+
+
+def _results(store: Store) -> str:
+    return f"{len(store):,} result{'s' * (len(store) != 1)}"
+
+
+def _tables(result: Trade, norms: Sequence[str]) -> list[TextTable]:
+    """Of each norm that was asked for; of each case's first one if none was."""
+    return [_narrow(table) for norm in norms or [None] for table in tables(result, norm)]
+
+
+def _narrow(table: TextTable) -> TextTable:
+    """Without the single counts, which the page and the CSV file have: a terminal is not so wide."""
+    kept = [place for place, heading in enumerate(table.headings) if heading not in COUNTS.values()]
+    rows = [tuple(row[place] for place in kept) for row in table.rows]
+    return dataclasses.replace(table, headings=tuple(table.headings[place] for place in kept), rows=rows)
+
+
+def _lines(result: Trade) -> list[str]:
+    """The settings to paste."""
+    return [f"{case.scene}, {target}: {line}" for case in measured(result) for target, line in choice_lines(case)]
+
+
+def _write(result: Trade, out: Path) -> list[Path]:
+    return [write_json(result, out / "trade.json"), write_csv(result, out / "trade.csv")]
+
+
+def _pictures(
+    result: Trade, subjects: Sequence[Subject], out: Path, progress: Progress
+) -> dict[str, list[Path]]:
+    """By scene, of what was measured."""
+    seconds = {case.target: case.seconds for case in measured(result)}
+    found = {}
+    for subject in subjects:
+        if subject.target in seconds:
+            progress.say(f"{subject.name}: pictures")
+            found[subject.name] = draw_scene(subject, seconds[subject.target], out)
+    return found
+
+
+def draw_scene(subject: Subject, seconds: float, out: Path) -> list[Path]:
+    """The pictures of ``carom run``: a run of ``seconds``, if not too long, with the settings that the scene
+    recommends."""
+    from ..pictures.run_pictures import draw_run
+
+    with closing(subject.world(None)) as world:
+        steps = min(max(round(seconds / world.settings.dt), 1), MOST_STEPS)
+        with subject.blamed(), stdout_kept_clean():
+            finished = run(world, steps, scene=subject.name, seed=subject.seed)
+        return draw_run(finished, out, subject.recommended[1])

@@ -1,0 +1,103 @@
+"""A trade as files for other programs: JSON, which goes back into records, and a table of values."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..commands.usage_errors import Problem
+from ..engines.cost import WEIGHTS
+from .records import CaseTrade, Curve, Point, Trade
+
+COLUMNS: dict[str, str] = {
+    "scene": "its name, or the file's",
+    "target": "what the command line called it",
+    "kind": "smooth, impacts, resting or chaotic",
+    "seconds": "simulated, s",
+    "method": "the curve's label",
+    "engine": "carom or pymunk",
+    "integrator": "",
+    "collision": "",
+    "substeps": "of the solver; of pymunk its iterations",
+    "geometry": "",
+    "dt": "step, s",
+    "norm": "what the error is the error of",
+    "error": "mean over the repeats that did not fail; relative, but for norms with a unit; empty if all failed",
+    "error_low": "the least of them",
+    "error_high": "the largest of them",
+    "error_uncertainty": "standard error of the mean",
+    "trusted": "1 if the reference is exact enough to tell this error, else 0",
+    "order": "observed, of the whole curve; empty if there is none",
+    "theory": "the order that theory gives; exact: rounding only; empty if nobody knows",
+    "repeats": "how many there were",
+    "failed": "kind and number of those that failed, as tunnelled 3; escaped 1",
+    "work": "weighted sum of the counts, per simulated second",
+    **dict.fromkeys(WEIGHTS, "per simulated second"),
+    "wall_ms": "median wall time per simulated second, ms; empty if it was not timed",
+    "wall_ms_low": "the least",
+    "wall_ms_high": "the largest",
+}
+
+
+def write_json(trade: Trade, path: Path) -> Path:
+    """All of it; ``Trade.from_dict(json.loads(...))`` is the way back. Problem if the file cannot be written."""
+    return _write(path, json.dumps(trade.as_dict(), indent=1, allow_nan=False) + "\n")
+
+
+def write_csv(trade: Trade, path: Path) -> Path:
+    """A row for each point and norm, with COLUMNS. Problem if the file cannot be written."""
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, list(COLUMNS), lineterminator="\n")
+    writer.writeheader()
+    for case in trade.cases:
+        for curve in case.curves:
+            for point in curve.points:
+                writer.writerows(_rows(case, curve, point))
+    return _write(path, buffer.getvalue())
+
+
+def _rows(case: CaseTrade, curve: Curve, point: Point) -> Iterator[dict[str, object]]:
+    cell, time = point.cell, point.milliseconds
+    for norm in case.norms:
+        bar, theory = point.errors.get(norm), curve.theory.get(norm)
+        yield {
+            "scene": case.scene,
+            "target": case.target,
+            "kind": case.kind,
+            "seconds": case.seconds,
+            "method": curve.label,
+            "engine": cell.engine,
+            "integrator": cell.integrator,
+            "collision": cell.collision,
+            "substeps": cell.substeps,
+            "geometry": cell.geometry,
+            "dt": cell.dt,
+            "norm": norm,
+            "error": bar.mean if bar else None,
+            "error_low": bar.low if bar else None,
+            "error_high": bar.high if bar else None,
+            "error_uncertainty": bar.uncertainty if bar else None,
+            "trusted": int(case.reference.trusts(norm, bar.mean)) if bar else None,
+            "order": curve.orders.get(norm),
+            "theory": "exact" if theory == math.inf else theory,
+            "repeats": point.repeats,
+            "failed": "; ".join(f"{kind} {count}" for kind, count in point.failures.items() if count),
+            "work": point.work,
+            **{name: point.counts.get(name) for name in WEIGHTS},
+            "wall_ms": time.median if time else None,
+            "wall_ms_low": time.low if time else None,
+            "wall_ms_high": time.high if time else None,
+        }
+
+
+def _write(path: Path, text: str) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise Problem(f"{path}: {error.strerror or error}") from error
+    return path

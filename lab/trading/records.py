@@ -1,0 +1,287 @@
+"""What a trade of accuracy for speed consists of: the settings tried, what a run of them showed, what it comes to.
+
+Everything here is plain data that goes through JSON and back.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+from ...framework import Settings
+from ..measure.timing import Spread
+
+CAROM, PYMUNK = "carom", "pymunk"
+SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  # kinds of scenes
+
+NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
+FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: an error ended it
+TRUSTED = 10.0  # an error counts as measured if the references agree so many times better
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One point of the grid of settings.
+
+    For pymunk, ``substeps`` are the iterations of its solver and ``integrator`` is its own.
+    """
+
+    dt: float
+    integrator: str = "semi_implicit_euler"
+    collision: str = "discrete"
+    substeps: int = 4
+    geometry: str = "precise"
+    engine: str = CAROM
+
+    def settings(self, base: Settings) -> Settings:
+        """``base`` with these dials; ValueError where Settings refuses one."""
+        return base.replace(
+            dt=self.dt,
+            integrator=self.integrator,
+            collision=self.collision,
+            substeps=self.substeps,
+            geometry=self.geometry,
+        )
+
+    @property
+    def method(self) -> Cell:
+        """The curve this point lies on: the same dials, and a step of one second for all."""
+        return dataclasses.replace(self, dt=1.0)
+
+    @property
+    def key(self) -> str:
+        """One word that names the cell, and no other."""
+        return "/".join(str(value) for value in dataclasses.astuple(self))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run of one cell.
+
+    repeat
+        which start phase or seed it was
+    errors
+        by norm; empty if the run failed
+    failure
+        None, or one of FAILURES; ``detail`` says more
+    counts
+        of the whole run, the same on every machine: steps, force_evaluations, candidates, pairs, impacts, solver_loops
+    seconds
+        simulated
+    """
+
+    cell: Cell
+    repeat: int
+    errors: dict[str, float]
+    failure: str | None
+    counts: dict[str, float]
+    seconds: float
+    detail: str = ""
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From what ``dataclasses.asdict`` and JSON made of one."""
+        return cls(**{**plain, "cell": Cell(**plain["cell"])})
+
+
+@dataclass(frozen=True)
+class ErrorBar:
+    """An error over all repeats: mean, least, largest, and the standard error of the mean.
+
+    For statistics, where single repeats are noise: low and high are two standard errors beside the mean.
+    """
+
+    mean: float
+    low: float
+    high: float
+    uncertainty: float
+
+    @classmethod
+    def of(cls, values: Sequence[float], signed: bool = False) -> Self:
+        """Of at least one value; a single one has no uncertainty that could be told: 0. signed: of statistics."""
+        spread = statistics.stdev(values) if len(values) > 1 else 0.0
+        mean, uncertainty = statistics.fmean(values), spread / math.sqrt(len(values))
+        if not signed:
+            return cls(mean, min(values), max(values), uncertainty)
+        return cls(abs(mean), max(abs(mean) - 2 * uncertainty, 0.0), abs(mean) + 2 * uncertainty, uncertainty)
+
+
+@dataclass
+class Point:
+    """One cell over all its repeats.
+
+    errors
+        by norm, of the repeats that did not fail
+    failures
+        how many repeats failed, by kind
+    counts
+        per simulated second, means over the repeats
+    work
+        one number for them: see :mod:`carom.lab.engines.cost`; per simulated second
+    milliseconds
+        wall time per simulated second; None if it was not timed
+    """
+
+    cell: Cell
+    repeats: int
+    errors: dict[str, ErrorBar]
+    failures: dict[str, int]
+    counts: dict[str, float]
+    work: float
+    milliseconds: Spread | None = None
+
+    @property
+    def failed(self) -> bool:
+        return bool(self.failures)
+
+    def meets(self, norm: str, target: float) -> bool:
+        """Whether no repeat failed and the worst of them keeps the target."""
+        return not self.failed and norm in self.errors and self.errors[norm].high <= target
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From what ``dataclasses.asdict`` and JSON made of one."""
+        spread = plain["milliseconds"]
+        return cls(**{
+            **plain,
+            "cell": Cell(**plain["cell"]),
+            "errors": {norm: ErrorBar(**bar) for norm, bar in plain["errors"].items()},
+            "milliseconds": None if spread is None else Spread.from_dict(spread),
+        })  # fmt: skip
+
+
+@dataclass
+class Curve:
+    """One method: its points from the largest step to the smallest.
+
+    label
+        what tells it from the other curves of its case
+    orders
+        by norm: the observed order in dt, a line through the logarithms of the errors that count; None if there is none
+    theory
+        by norm: the order that theory gives; inf for exact (rounding only); None if nobody knows
+    """
+
+    label: str
+    points: list[Point]
+    orders: dict[str, float | None] = field(default_factory=dict)
+    theory: dict[str, float | None] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From what ``dataclasses.asdict`` and JSON made of one."""
+        return cls(**{**plain, "points": [Point.from_dict(point) for point in plain["points"]]})
+
+
+@dataclass
+class Reference:
+    """What the errors are measured against.
+
+    text
+        one sentence: a closed form by name, or own runs and how well they agree
+    agreement
+        by norm: how far two methods are apart; 0 for a closed form. Smaller errors than TRUSTED times this say nothing
+    spread
+        by norm, of statistics: the standard deviation of a single run
+    """
+
+    text: str
+    agreement: dict[str, float] = field(default_factory=dict)
+    spread: dict[str, float] = field(default_factory=dict)
+
+    def trusts(self, norm: str, error: float) -> bool:
+        """Whether an error of that size can be told from that of the reference."""
+        return error >= TRUSTED * self.agreement.get(norm, 0.0)
+
+
+@dataclass
+class CaseTrade:
+    """One scene with all its curves.
+
+    scene
+        its name, or the file's; ``target`` is what the command line called it
+    kind
+        SMOOTH, IMPACTS, RESTING or CHAOTIC; ``why`` says how that was found
+    norms
+        what each is and what it is relative to, by name; the first is the one that charts and tuning use
+    repeated
+        what differs between repeats: "start phases" or "seeds"
+    refused
+        why nothing was measured, else ""
+    whole
+        repeats that it takes to trust the worst of them: a quick look has fewer
+    """
+
+    scene: str
+    target: str
+    description: str
+    kind: str
+    why: str
+    norms: dict[str, str]
+    seconds: float
+    repeats: int
+    repeated: str
+    reference: Reference
+    curves: list[Curve]
+    refused: str = ""
+    whole: int = 0
+
+    @property
+    def norm(self) -> str:
+        return next(iter(self.norms))
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From what ``dataclasses.asdict`` and JSON made of one."""
+        curves = [Curve.from_dict(curve) for curve in plain["curves"]]
+        return cls(**{**plain, "reference": Reference(**plain["reference"]), "curves": curves})
+
+
+@dataclass
+class Trade:
+    """All cases of one call, on one machine; ``command`` makes it again."""
+
+    machine: dict[str, str]
+    command: str
+    cases: list[CaseTrade]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, which has no word for infinity: theory's inf becomes the string "exact"."""
+        plain = dataclasses.asdict(self)
+        for case in plain["cases"]:
+            for curve in case["curves"]:
+                curve["theory"] = {k: "exact" if v == math.inf else v for k, v in curve["theory"].items()}
+        return plain
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """The opposite of :meth:`as_dict`, also after JSON."""
+        cases = [CaseTrade.from_dict(case) for case in plain["cases"]]
+        for case in cases:
+            for curve in case.curves:
+                curve.theory = {k: math.inf if v == "exact" else v for k, v in curve.theory.items()}
+        return cls(**{**plain, "cases": cases})
+
+
+def observed_order(steps: Sequence[float], errors: Sequence[float]) -> float | None:
+    """The slope of log error over log dt by least squares; None for fewer than two usable points.
+
+    dt s; errors of any unit. Both Euler methods give 1, velocity Verlet 2, Runge-Kutta 4 gives 4.
+    """
+    usable = [(math.log(dt), math.log(e)) for dt, e in zip(steps, errors, strict=True) if e > 0 and math.isfinite(e)]
+    if len(usable) < 2:
+        return None
+    x, y = zip(*usable, strict=True)
+    return statistics.linear_regression(x, y).slope
+
+
+def by_method(points: Iterable[Point]) -> Mapping[Cell, list[Point]]:
+    """The points of each curve, from the largest step to the smallest."""
+    curves: dict[Cell, list[Point]] = {}
+    for point in points:
+        curves.setdefault(point.cell.method, []).append(point)
+    return {method: sorted(found, key=lambda point: -point.cell.dt) for method, found in curves.items()}

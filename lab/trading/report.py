@@ -1,0 +1,289 @@
+"""A trade of accuracy for speed as tables and sentences: every point, what it cost, and what to choose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ..cases.published import ERROR_UNIT, SOURCE, published
+from ..cases.published import NORM as ENERGY_SQUARE
+from ..commands.usage_errors import Problem, did_you_mean
+from ..reporting.run_report import number
+from ..reporting.text_tables import TextTable
+from ..settings_study.code_line import python_line
+from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
+
+NOTHING = "-"
+DOUBTED = "*"  # beside an error that is too close to the reference's own
+TARGETS = (0.1, 0.01, 0.001, 1e-6)
+ORDER_TOLERANCE = 0.3  # an observed order that is farther from the theory's is no accident
+COUNTS = {
+    "steps": "steps",
+    "force_evaluations": "force evaluations",
+    "candidates": "candidates",
+    "pairs": "pair tests",
+    "impacts": "impacts",
+    "solver_loops": "solver loops",
+}
+
+
+def tables(trade: Trade, norm: str | None = None) -> list[TextTable]:
+    """A table of all points for each case, and one of what others published where there is any.
+
+    ``norm``: the one to show, where a case has it; else its first. Problem if no case has it.
+    """
+    check_norm(trade, norm)
+    made = []
+    for case in measured(trade):
+        chosen = norm_of(case, norm)
+        made.append(points_table(case, chosen))
+        if published(case.scene, chosen):
+            made.append(published_table(case.scene, chosen))
+    return made
+
+
+def measured(trade: Trade) -> list[CaseTrade]:
+    """The cases that were not refused."""
+    return [case for case in trade.cases if not case.refused]
+
+
+def check_norm(trade: Trade, norm: str | None) -> None:
+    """Problem for a norm that no case has."""
+    known = list(dict.fromkeys(name for case in trade.cases for name in case.norms))
+    if norm is not None and norm not in known:
+        raise Problem(f"no case here has the norm {norm!r}{did_you_mean(norm, known)}")
+
+
+def norm_of(case: CaseTrade, norm: str | None) -> str:
+    """``norm`` if the case has it, else its first."""
+    return norm if norm in case.norms and norm is not None else case.norm
+
+
+def points_table(case: CaseTrade, norm: str) -> TextTable:
+    """One row per point; columns that say nothing are left out."""
+    points = [point for curve in case.curves for point in curve.points]
+    counts = [name for name in COUNTS if any(point.counts.get(name) for point in points)]
+    bars = [point.errors[norm] for point in points if norm in point.errors]
+    worst = any(bar.high > bar.mean for bar in bars)
+    timed = any(point.milliseconds for point in points)
+    failing = any(point.failed for point in points)
+    headings = ["method", "order", "step, s", error_heading(norm)]
+    headings += [worst_heading(case, norm)] * worst + ["work"] + [COUNTS[name] for name in counts]
+    headings += ["wall ms"] * timed + ["failed"] * failing
+    rows = []
+    for curve in case.curves:
+        for place, point in enumerate(curve.points):
+            bar = point.errors.get(norm)
+            row = [curve.label, "" if place else order(curve, norm), number(point.cell.dt), _error(case, norm, bar)]
+            row += [compact(bar.high) if bar else NOTHING] * worst
+            row += [compact(point.work), *(counted(point.counts.get(name, 0.0)) for name in counts)]
+            row += [compact(point.milliseconds.median) if point.milliseconds else NOTHING] * timed
+            row += [failures(point)] * failing
+            rows.append(tuple(row))
+    title = f"{case.scene}: {norm}, and work per simulated second"
+    return TextTable(title, tuple(headings), rows)
+
+
+def published_table(scene: str, norm: str) -> TextTable:
+    """What others published for this scene."""
+    rows = [
+        (point.engine, number(point.dt), compact(point.error), compact(point.milliseconds))
+        for point in published(scene, norm)
+    ]
+    return TextTable(f"{scene}: published", ("engine", "step, s", error_heading(norm), "ms on their machine"), rows)
+
+
+def error_heading(norm: str) -> str:
+    return f"error, {ERROR_UNIT}" if norm == ENERGY_SQUARE else "error"
+
+
+def is_statistic(case: CaseTrade, norm: str) -> bool:
+    """Whether single repeats are noise, so that what counts is two standard errors beyond the mean."""
+    return norm in case.reference.spread
+
+
+def worst_heading(case: CaseTrade, norm: str) -> str:
+    return "mean + 2 s.e." if is_statistic(case, norm) else "worst"
+
+
+def _error(case: CaseTrade, norm: str, bar: ErrorBar | None) -> str:
+    """The mean, its standard error where there is one, and a mark where the reference is no better."""
+    if bar is None:
+        return NOTHING
+    text = f"{compact(bar.mean)} ± {compact(bar.uncertainty, 1)}" if bar.uncertainty else compact(bar.mean)
+    return text if case.reference.trusts(norm, bar.mean) else f"{text} {DOUBTED}"
+
+
+def order(curve: Curve, norm: str) -> str:
+    """The observed order and, in brackets, the theory's: `2.01 (2)`; `(exact)` where only rounding is left."""
+    found, theory = curve.orders.get(norm), curve.theory.get(norm)
+    if theory == math.inf:
+        return "(exact)"
+    text = NOTHING if found is None else f"{found:.2f}"
+    return text if theory is None else f"{text} ({theory:g})"
+
+
+def off_theory(curve: Curve, norm: str) -> bool:
+    """Whether the observed order is too far from the theory's to be an accident."""
+    found, theory = curve.orders.get(norm), curve.theory.get(norm)
+    if found is None or theory is None or theory == math.inf:
+        return False
+    return abs(found - theory) > ORDER_TOLERANCE
+
+
+def failures(point: Point) -> str:
+    """`tunnelled` if all repeats did, else `3 of 64 tunnelled`; empty if none failed."""
+    words = [
+        kind if count == point.repeats else f"{count} of {point.repeats} {kind}"
+        for kind, count in point.failures.items()
+        if count
+    ]
+    return ", ".join(words)
+
+
+def failure_lines(case: CaseTrade) -> list[str]:
+    """A sentence for each point of which some repeat failed."""
+    return [
+        f"{curve.label}, step {number(point.cell.dt)} s: {failures(point)}"
+        for curve in case.curves
+        for point in curve.points
+        if point.failed
+    ]
+
+
+def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None) -> TextTable:
+    """For each target and engine, the setting of least work that keeps it on all repeats."""
+    chosen = norm_of(case, norm)
+    rows = []
+    for target, engine, found in choices(case, targets, chosen):
+        words = (target_text(target, chosen), engine)
+        if found is None:
+            reason = "none" if case.reference.trusts(chosen, target) else "the reference is not exact enough to tell"
+            rows.append((*words, reason, *[NOTHING] * 4))
+            continue
+        curve, point = found
+        time = compact(point.milliseconds.median) if point.milliseconds else NOTHING
+        error = compact(point.errors[chosen].high)
+        rows.append((*words, curve.label, number(point.cell.dt), error, compact(point.work), time))
+    headings = ("target", "engine", "method", "step, s", worst_heading(case, chosen), "work", "wall ms")
+    kept = "two standard errors beyond the mean" if is_statistic(case, chosen) else "in every repeat"
+    title = f"{case.scene}: the least work per simulated second that keeps {chosen} below the target {kept}"
+    return TextTable(title, headings, rows, words=3)
+
+
+def choices(
+    case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None
+) -> list[tuple[float, str, tuple[Curve, Point] | None]]:
+    """Target, engine, and the curve and point of least work that meets it; None if none does or nobody could tell.
+
+    Engines apart: their counts do not mean the same.
+    """
+    chosen = norm_of(case, norm)
+    engines = dict.fromkeys(point.cell.engine for curve in case.curves for point in curve.points)
+    made: list[tuple[float, str, tuple[Curve, Point] | None]] = []
+    for target in targets:
+        for engine in engines:
+            meeting = [
+                (curve, point)
+                for curve in case.curves
+                for point in curve.points
+                if point.cell.engine == engine and point.meets(chosen, target)
+            ]
+            told = meeting and case.reference.trusts(chosen, target)
+            made.append((target, engine, min(meeting, key=lambda found: found[1].work) if told else None))
+    return made
+
+
+def choice_lines(case: CaseTrade, norm: str | None = None) -> list[tuple[str, str]]:
+    """For each target that can be met: what it is, and the line of Python that meets it."""
+    chosen = norm_of(case, norm)
+    return [
+        (f"{target_text(target, chosen)}, {engine}", python_line(found[1].cell))
+        for target, engine, found in choices(case, norm=chosen)
+        if found is not None
+    ]
+
+
+def target_text(target: float, norm: str) -> str:
+    """`0.1 %` of a relative error; a norm with a unit has it."""
+    if norm != ENERGY_SQUARE and target >= 1e-3:
+        return f"{100 * target:g} %"
+    short = f"{target:g}".replace("e-0", "e-").replace("e+", "e")
+    return f"{short} {ERROR_UNIT}" if norm == ENERGY_SQUARE else short
+
+
+def remarks(trade: Trade, norm: str | None = None) -> list[str]:
+    """Where it ran and, for each case, what was measured, against what, and what to make of it."""
+    lines = [machine_line(trade.machine), trade.command]
+    for case in trade.cases:
+        lines += [f"{case.scene}: {line}" for line in case_remarks(case, norm_of(case, norm))]
+    return lines
+
+
+def machine_line(machine: dict[str, str]) -> str:
+    """Processor and system, then versions."""
+    rest = dict(machine)
+    place = [rest.pop(key) for key in ("processor", "system") if key in rest]
+    clock = [rest.pop("clock")] if "clock" in rest else []
+    versions = ", ".join(f"{name} {version}" for name, version in rest.items())
+    return "; ".join(filter(None, (", ".join(place), versions, *clock)))
+
+
+def case_remarks(case: CaseTrade, norm: str) -> list[str]:
+    """Sentences about one case, for the norm that its table shows."""
+    lines = [f"{case.kind}: {case.why}"]
+    if case.refused:
+        return [*lines, f"not measured: {case.refused}"]
+    repeated = f", {case.repeats} {case.repeated}" if case.repeats > 1 else ""
+    lines.append(f"{number(case.seconds)} s simulated{repeated}")
+    if case.repeats < case.whole:
+        lines.append(
+            f"a quick look at {case.repeats} of {case.whole} {case.repeated}: others may be worse, and what is exact "
+            "here may not be; leave out --quick to know"
+        )
+    lines.append(f"{norm}: {case.norms[norm]}")
+    lines.append(f"reference: {reference_line(case, norm)}")
+    doubted = untrusted(case, norm)
+    if doubted:
+        limit = TRUSTED * case.reference.agreement[norm]
+        lines.append(
+            f"{DOUBTED} {len(doubted)} of the errors {'is' if len(doubted) == 1 else 'are'} below {compact(limit)},"
+            f" {TRUSTED:g} times what the references differ by: too small to be told from the reference's own"
+        )
+    off = [f"{curve.label} {order(curve, norm)}" for curve in case.curves if off_theory(curve, norm)]
+    if off:
+        lines.append(f"observed orders more than {ORDER_TOLERANCE:g} from the theory's: {', '.join(off)}")
+    if published(case.scene, norm):
+        lines.append(SOURCE)
+    return lines
+
+
+def reference_line(case: CaseTrade, norm: str) -> str:
+    """What the errors are measured against, and how far that can be trusted."""
+    agreement = case.reference.agreement.get(norm, 0.0)
+    return f"{case.reference.text} ({norm}: {compact(agreement)} apart)" if agreement else case.reference.text
+
+
+def untrusted(case: CaseTrade, norm: str) -> list[Point]:
+    """The points whose error is too small for the reference."""
+    points = [point for curve in case.curves for point in curve.points if norm in point.errors]
+    return [point for point in points if not case.reference.trusts(norm, point.errors[norm].mean)]
+
+
+def compact(value: float, digits: int = 3) -> str:
+    """So many digits: 0.0123, 1,230, 1.23e-5, 4.56e7."""
+    if not math.isfinite(value):
+        return f"{value:g}"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    power = int(exponent)
+    if value == 0:
+        return "0"
+    if power < -3 or power > 5:
+        return f"{mantissa}e{power}"
+    return f"{float(f'{mantissa}e{power}'):,.{max(digits - 1 - power, 0)}f}"
+
+
+def counted(value: float) -> str:
+    """A mean of counts: whole where it is."""
+    whole = abs(value) < 1e6 and math.isclose(value, round(value), rel_tol=1e-9)
+    return f"{value:,.0f}" if whole else compact(value)

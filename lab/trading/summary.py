@@ -1,0 +1,54 @@
+"""A trade in one short table for each scene: a row per method, with its orders and the step that each target takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..reporting.run_report import number
+from ..reporting.text_tables import TextTable
+from .records import CaseTrade, Curve, Point, Trade
+from .report import NOTHING, TARGETS, compact, failures, measured, norm_of, order, target_text
+
+
+def summaries(trade: Trade, norm: str | None = None) -> list[TextTable]:
+    """One table for each case that was measured; ``norm`` as in :func:`carom.lab.trading.report.tables`."""
+    return [summary(case, norm_of(case, norm)) for case in measured(trade)]
+
+
+def summary(case: CaseTrade, norm: str, targets: Sequence[float] = TARGETS) -> TextTable:
+    """By method: the observed order of each norm with the theory's, and for each target the largest step that keeps it
+    in all repeats, with its work per simulated second; the best error of ``norm``, and what failed."""
+    told = [target for target in targets if case.reference.trusts(norm, target)]
+    headings = ["method", *(f"{name}, order" for name in case.norms), *(target_text(t, norm) for t in told), "best"]
+    failing = any(point.failed for curve in case.curves for point in curve.points)
+    rows = []
+    for curve in case.curves:
+        row = [curve.label, *(order(curve, name) for name in case.norms)]
+        row += [_step(curve, norm, target) for target in told]
+        row += [_best(curve, norm), *[_failed(curve)] * failing]
+        rows.append(tuple(row))
+    title = (
+        f"{case.scene}: orders observed (and in theory); the largest step, s, that keeps {norm} below the target, and "
+        f"its work per simulated second"
+    )
+    return TextTable(title, (*headings, *["failed"] * failing), rows)
+
+
+def _step(curve: Curve, norm: str, target: float) -> str:
+    """The largest step from which on all smaller ones keep the target too."""
+    kept: Point | None = None
+    for point in reversed(curve.points):
+        if not point.meets(norm, target):
+            break
+        kept = point
+    return NOTHING if kept is None else f"{number(kept.cell.dt)}: {compact(kept.work, 2)}"
+
+
+def _best(curve: Curve, norm: str) -> str:
+    errors = [point.errors[norm].high for point in curve.points if not point.failed and norm in point.errors]
+    return compact(min(errors), 2) if errors else NOTHING
+
+
+def _failed(curve: Curve) -> str:
+    """The steps that failed, in words."""
+    return "; ".join(f"{number(point.cell.dt)}: {failures(point)}" for point in curve.points if point.failed) or NOTHING

@@ -1,0 +1,111 @@
+"""Whether a promise holds elsewhere: the settings that a search found, run on scenes that it has not seen."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...framework import Settings
+from ..cases.case import Case, case_of
+from ..jobs.result_store import Store
+from ..jobs.runs import Runs, point_of, run_tasks
+from ..measure.norms import NORMS
+from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..trading.records import CAROM, Cell, Outcome, Point, Reference
+from .search import Tuning, enough_repeats, exact_enough
+
+TOLERATED = 2.0  # times the promise: beyond it, it is said clearly
+
+
+@dataclass
+class Check:
+    """What the settings of a search do on another scene.
+
+    promise
+        the error that was promised, and ``scale`` what it is part of, in the scene's units; refused: why nothing was
+        measured, else ""
+    """
+
+    scene: str
+    norm: str
+    promise: float
+    scale: float = 1.0
+    seconds: float = 0.0
+    repeated: str = ""
+    reference: Reference = dataclasses.field(default_factory=lambda: Reference(""))
+    point: Point | None = None
+    refused: str = ""
+
+    @property
+    def error(self) -> float:
+        """The worst of all repeats, parts of the scale; inf where one failed or nothing was measured."""
+        if self.point is None or self.point.failed:
+            return math.inf
+        return self.point.errors[self.norm].high
+
+    @property
+    def times(self) -> float:
+        """How many times the promise that is."""
+        return self.error / self.promise
+
+    @property
+    def tolerated(self) -> bool:
+        """Whether it is at most twice the promise."""
+        return self.times <= TOLERATED
+
+
+def check(
+    tuning: Tuning,
+    target: Any,
+    *,
+    absolute: bool = False,
+    seconds: float | None = None,
+    repeats: int | None = None,
+    options: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    store: Store | None = None,
+    progress: Progress = NO_PROGRESS,
+) -> Check:
+    """The error of the settings that ``tuning`` chose on a scene that they were not tuned on, by the same norm.
+
+    target, options, seed, workers, store: as of :func:`carom.lab.trade`. seconds, repeats: as of the search if None.
+    absolute: the promise is meant in the scene's units, else in parts of the new scene's scale. All of the settings
+    count, whatever the scene recommends. NothingMeetsError if the search found none; Problem for a scene that cannot be
+    measured so.
+    """
+    settings = tuning.settings
+    runs = Runs(workers, store, progress)
+    case = case_of(
+        target, norms=(tuning.norm,), seconds=tuning.seconds if seconds is None else seconds,
+        repeats=tuning.repeats if repeats is None else repeats, options=options, seed=seed,
+    )  # fmt: skip
+    case = case.replace(survey=dataclasses.replace(case.survey, settings=settings))
+    promise = tuning.target * tuning.scale if absolute else tuning.target
+    case, reference = exact_enough(case, tuning.norm, promise, absolute, runs)
+    seen = case.reference
+    assert seen is not None
+    scale = NORMS[tuning.norm].scale(seen, seen)
+    promise = promise / scale if absolute else promise
+    case = enough_repeats(case, tuning.norm, reference.spread.get(tuning.norm, 0.0), promise)
+    return Check(
+        case.subject.name, tuning.norm, promise, scale, case.seconds, case.repeated, reference,
+        measured_with(case, settings, runs),
+    )  # fmt: skip
+
+
+def measured_with(case: Case, settings: Settings, runs: Runs) -> Point:
+    """The point of these settings over all repeats of a case; dials that no cell has stay the scene's."""
+    cell = cell_of(settings)
+    records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats_told}")
+    return point_of([Outcome.from_dict(record) for record in records])
+
+
+def cell_of(settings: Settings) -> Cell:
+    """The point of the grid that these settings are."""
+    return Cell(
+        settings.dt, settings.integrator, settings.collision, settings.substeps, settings.geometry, CAROM
+    )

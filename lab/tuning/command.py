@@ -1,0 +1,151 @@
+"""``carom tune``: the cheapest settings that keep an error, and the line of code that sets them."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import shlex
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+
+from ...framework import Settings
+from ..cases.subjects import subject_of
+from ..commands.group import STOPPED
+from ..commands.options import (
+    WORDS,
+    KeepsWords,
+    case_options,
+    only_options,
+    out_option,
+    runs_options,
+    seed_number,
+    shown_options,
+    together,
+    writable_folder,
+)
+from ..commands.usage_errors import Problem
+from ..jobs.result_store import Store
+from ..jobs.runs import Runs
+from ..reporting.output import Output
+from ..reporting.progress_bar import Bar
+from ..trading.trade import Only
+from .check import Check, check, measured_with
+from .report import TuneResult, sentences, tables
+from .search import Tuning, search
+
+MARK = "carom tune"
+RESULTS = "tune.jsonl"
+NONE_MEETS = 1  # exit code
+
+
+def _above_zero(context: click.Context, parameter: click.Parameter, value: float) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise Problem(f"--max-error takes a number above 0, not {value:g}")
+    return value
+
+
+@click.command("tune", cls=KeepsWords, short_help="The cheapest settings that keep an error.")
+@click.argument("target", metavar="SCENE|FILE.py")
+@together(
+    click.option(
+        "--max-error", type=float, metavar="E", default=1e-3, show_default=True, callback=_above_zero,
+        help="The largest error allowed, as a part of what the norm is relative to.",
+    ),
+    click.option("--absolute", is_flag=True, help="--max-error is in the scene's own units."),
+)  # fmt: skip
+@case_options
+@only_options
+@click.option(
+    "--check", "checked", multiple=True, metavar="SCENE|FILE.py",
+    help="Also measure the choice on this scene, which it was not tuned on; repeatable.",
+)  # fmt: skip
+@runs_options
+@out_option("Keep finished runs here, for --resume (default: nothing is kept).")
+@shown_options
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@click.pass_context
+def tune_command(
+    context: click.Context,
+    target: str,
+    max_error: float,
+    absolute: bool,
+    norms: tuple[str, ...],
+    seconds: float | None,
+    repeats: int | None,
+    steps: tuple[float, ...] | None,
+    options: dict[str, Any],
+    seed: str,
+    integrators: tuple[str, ...] | None,
+    collisions: tuple[str, ...] | None,
+    substeps: tuple[int, ...] | None,
+    geometries: tuple[str, ...] | None,
+    checked: tuple[str, ...],
+    workers: int | None,
+    resume: bool,
+    out: Path | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+    traceback: bool,
+) -> None:
+    """Find the settings of least work that keep the error of a scene below --max-error in all repeats.
+
+    A scene of the library, or a file that defines build(settings, seed=0). It is searched, not the whole grid: the
+    cheapest settings are tried first. The last line of what is printed is the Python to paste. The exit code is 1 if no
+    settings keep the error.
+    """
+    del traceback  # seen by Commands.main
+    if len(norms) > 1:
+        raise Problem(f"--norm: settings are tuned for one error, not for {' and '.join(norms)}")
+    if resume and out is None:
+        raise Problem("--resume goes on with the runs that --out FOLDER holds: say which folder")
+    command = shlex.join([*MARK.split(), *(word for word in context.meta[WORDS] if word != "--resume")])
+    output = Output.checked(" ".join((MARK, target)), as_json, as_markdown, into, None)
+    for other in checked:
+        subject_of(other)
+    arguments = {
+        "absolute": absolute, "seconds": seconds, "repeats": repeats, "steps": steps or (), "options": options,
+        "only": Only(integrators or (), collisions or (), substeps or (), geometries or ()), "seed": seed_number(seed),
+        "workers": workers,
+    }  # fmt: skip
+    if out is not None:
+        writable_folder(out)
+    with _store(out, resume) as store, Bar(Console(stderr=True)) as bar:
+        try:
+            tuning = search(target, max_error, norms[0] if norms else None, store=store, progress=bar, **arguments)
+            balanced = measured_with(tuning.case, Settings.balanced(), Runs(workers, store, bar))
+            found = []
+            for other in checked if tuning.choice is not None else ():
+                found.append(_checked(tuning, other, absolute=absolute, workers=workers, store=store, progress=bar))
+        except KeyboardInterrupt:
+            kept = f"; --resume goes on with what {store.path} holds" if store is not None else ""
+            click.echo(f"carom: stopped{kept}", err=True)
+            raise click.exceptions.Exit(STOPPED) from None
+    _show(TuneResult(command, tuning, balanced, found), output)
+    if tuning.choice is None:
+        raise click.exceptions.Exit(NONE_MEETS)
+
+
+def _store(out: Path | None, resume: bool) -> contextlib.AbstractContextManager[Store | None]:
+    return contextlib.nullcontext() if out is None else Store.open(out / RESULTS, resume)
+
+
+def _checked(tuning: Tuning, target: str, **options: Any) -> Check:
+    """A scene that cannot be measured so takes nothing from what was found before."""
+    try:
+        return check(tuning, target, **options)
+    except Problem as problem:
+        return Check(subject_of(target).name, tuning.norm, tuning.target, refused=problem.message)
+
+
+def _show(result: TuneResult, output: Output) -> None:
+    """Tables and sentences; last, where the eye is, the line to paste."""
+    words, tuning = sentences(result), result.tuning
+    pasted = [] if tuning.choice is None else [f"`{tuning.line}`"]
+    plain = not output.as_json and not output.as_markdown
+    output.show(result, tables(result), words if plain and output.into is None else [*words, *pasted])
+    if plain and tuning.choice is not None:
+        click.echo(f"\n{tuning.line}")

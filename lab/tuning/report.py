@@ -1,0 +1,268 @@
+"""What a search for settings found, as tables and sentences: the choice, why, what else was tried, what it is not."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ..reporting.run_report import number
+from ..reporting.text_tables import TextTable
+from ..trading.records import Cell, ErrorBar, Point
+from ..trading.report import NOTHING, compact, target_text
+from ..trading.trade import label_of
+from .check import TOLERATED, Check
+from .search import FAR_DEARER, Trial, Tuning
+
+
+@dataclass
+class TuneResult:
+    """All that one command has to say.
+
+    balanced
+        ``Settings.balanced()`` on the same scene, for comparison
+    """
+
+    command: str
+    tuning: Tuning
+    balanced: Point
+    checks: list[Check]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, which has no word for infinity: the error of a run that failed is null."""
+        tuning = self.tuning
+        return {
+            "command": self.command,
+            "scene": tuning.scene,
+            "norm": tuning.norm,
+            "text": tuning.text,
+            "target": tuning.target,
+            "scale": tuning.scale,
+            "seconds": tuning.seconds,
+            "repeats": tuning.repeats,
+            "repeated": tuning.repeated,
+            "reference": dataclasses.asdict(tuning.reference),
+            "methods": tuning.methods,
+            "settings": None if tuning.choice is None else dataclasses.asdict(tuning.settings),
+            "line": None if tuning.choice is None else tuning.line,
+            "why_not": tuning.why_not if tuning.choice is None else "",
+            "error": _finite(tuning.error),
+            "margin": _finite(tuning.margin) if tuning.choice is not None else None,
+            "choice": _plain(tuning.choice),
+            "runner_up": _plain(tuning.runner_up),
+            "balanced": _plain(self.balanced),
+            "trials": [{**dataclasses.asdict(trial), "error": _finite(trial.error)} for trial in tuning.trials],
+            "checks": [
+                {
+                    "scene": check.scene, "norm": check.norm, "promise": check.promise, "scale": check.scale,
+                    "seconds": check.seconds, "reference": dataclasses.asdict(check.reference),
+                    "point": _plain(check.point), "error": _finite(check.error), "times": _finite(check.times),
+                    "tolerated": check.tolerated, "refused": check.refused,
+                }
+                for check in self.checks
+            ],
+        }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _plain(point: Point | None) -> dict[str, Any] | None:
+    return None if point is None else dataclasses.asdict(point)
+
+
+# -- tables -----------------------------------------------------------------------------------------------------
+
+
+def tables(result: TuneResult) -> list[TextTable]:
+    """What was tried, what the choice compares with, and what it does elsewhere."""
+    made = [tried_table(result.tuning), compared_table(result)]
+    return [*made, checks_table(result)] if result.checks else made
+
+
+def tried_table(tuning: Tuning) -> TextTable:
+    """Each trial, in the order of the search."""
+    cells = {trial.cell.method for trial in tuning.trials}
+    rows = [
+        (
+            label_of(trial.cell.method, cells), number(trial.cell.dt), f"{trial.repeats:,}", _error(trial.error),
+            compact(trial.work), _verdict(trial, tuning),
+        )
+        for trial in tuning.trials
+    ]  # fmt: skip
+    headings = ("method", "step, s", "runs", tuning.norm, "work", "")
+    return TextTable(f"{tuning.scene}: what was tried, in this order", headings, rows)
+
+
+def _verdict(trial: Trial, tuning: Tuning) -> str:
+    if trial.failure:
+        return trial.failure
+    if trial.met:
+        return "holds" if trial.repeats == tuning.repeats else "holds once"
+    times = trial.error / tuning.target
+    if times <= 1:
+        return "misses with the reference's own error"
+    return f"misses, {compact(times, 2 if times >= 2 else 3)} times"
+
+
+def compared_table(result: TuneResult) -> TextTable:
+    """The choice, the runner-up and ``Settings.balanced()``."""
+    tuning = result.tuning
+    named = [("choice", tuning.choice), ("runner-up", tuning.runner_up), ("balanced", result.balanced)]
+    points = [(name, point) for name, point in named if point is not None]
+    cells = {point.cell.method for _, point in points} | {trial.cell.method for trial in tuning.trials}
+    rows = []
+    for name, point in points:
+        bar = None if point.failed else point.errors[tuning.norm]
+        work = NOTHING if tuning.choice is None else compact(point.work / tuning.choice.work)
+        rows.append((
+            name, label_of(point.cell.method, cells), number(point.cell.dt), _worst(bar), _part(bar, tuning.target),
+            compact(point.work), work,
+        ))  # fmt: skip
+    headings = ("", "method", "step, s", worst_heading(tuning), "of target", "work", "of choice's")
+    title = f"{tuning.scene}: {tuning.norm}, and work per simulated second"
+    return TextTable(title, headings, rows, words=2)
+
+
+def worst_heading(tuning: Tuning) -> str:
+    return "mean + 2 s.e." if is_statistic(tuning) else "worst"
+
+
+def is_statistic(tuning: Tuning) -> bool:
+    """Whether single repeats are noise, so that what counts is two standard errors beyond the mean."""
+    return tuning.norm in tuning.reference.spread
+
+
+def checks_table(result: TuneResult) -> TextTable:
+    """The choice on scenes that it was not tuned on."""
+    rows = []
+    for check in result.checks:
+        if check.refused:
+            rows.append((check.scene, NOTHING, NOTHING, NOTHING, NOTHING, "not measured"))
+            continue
+        times = compact(check.times) if math.isfinite(check.times) else NOTHING
+        rows.append((
+            check.scene, number(check.seconds), _worst(_bar(check)), compact(check.promise), times, _kept(check),
+        ))  # fmt: skip
+    headings = ("scene", "over, s", worst_heading(result.tuning), "promise", "times the promise", "")
+    return TextTable("on scenes that it was not tuned on", headings, rows)
+
+
+def _bar(check: Check) -> ErrorBar | None:
+    return None if check.point is None or check.point.failed else check.point.errors[check.norm]
+
+
+def _kept(check: Check) -> str:
+    if check.point is not None and check.point.failed:
+        return ", ".join(check.point.failures)
+    if check.times <= 1:
+        return "kept"
+    return f"within {TOLERATED:g} times" if check.tolerated else "BROKEN"
+
+
+def _worst(bar: ErrorBar | None) -> str:
+    return NOTHING if bar is None else compact(bar.high)
+
+
+def _part(bar: ErrorBar | None, target: float) -> str:
+    return NOTHING if bar is None else compact(bar.high / target)
+
+
+def _error(error: float) -> str:
+    return compact(error) if math.isfinite(error) else NOTHING
+
+
+# -- sentences --------------------------------------------------------------------------------------------------
+
+
+def sentences(result: TuneResult) -> list[str]:
+    """What was chosen and why; or that nothing was."""
+    tuning = result.tuning
+    lines = [result.command, *_about(tuning)]
+    if tuning.choice is None:
+        return [*lines, f"{tuning.why_not}."]
+    lines += [_chosen(tuning, tuning.choice), _second(tuning, tuning.choice), _against_balanced(result, tuning.choice)]
+    lines += [line for check in result.checks if (line := check_line(check))]
+    return [*lines, _limits(tuning)]
+
+
+def _about(tuning: Tuning) -> list[str]:
+    agreement = tuning.reference.agreement.get(tuning.norm, 0.0)
+    apart = ""
+    if agreement:
+        apart = f" ({tuning.norm}: {compact(agreement)} apart, which what was tried and the margin add to their errors)"
+    units = "" if tuning.scale == 1 else f", {compact(tuning.target * tuning.scale)} in the scene's units"
+    repeated = f" in {tuning.repeats} {tuning.repeated}" if tuning.repeats > 1 else ""
+    return [
+        f"{tuning.norm}: {tuning.text}",
+        f"reference: {tuning.reference.text}{apart}",
+        f"target: {target_text(tuning.target, tuning.norm)}{units}, over {number(tuning.seconds)} s{repeated}",
+        f"{tuning.methods} {_plural('method', tuning.methods)} to choose from,"
+        f" {len(tuning.trials)} {_plural('trial', len(tuning.trials))}; the cheapest first",
+    ]
+
+
+def _chosen(tuning: Tuning, choice: Point) -> str:
+    bar = choice.errors[tuning.norm]
+    if is_statistic(tuning):
+        error = f"{compact(bar.high)}, two standard errors beyond the mean of {tuning.repeats} {tuning.repeated}"
+    elif tuning.repeats > 1:
+        error = f"{compact(bar.high)} in the worst of {tuning.repeats} {tuning.repeated}"
+    else:
+        error = f"{compact(bar.high)} in the one run"
+    margin = "an exact result" if math.isinf(tuning.margin) else f"a margin of {compact(tuning.margin)}"
+    return f"choice: {_words(choice.cell, tuning)}: {tuning.norm} {error}: {margin}; work {compact(choice.work)}"
+
+
+def _second(tuning: Tuning, choice: Point) -> str:
+    second = tuning.runner_up
+    if second is None:
+        return f"runner-up: no other method holds within {FAR_DEARER:g} times the work"
+    error, work = compact(second.errors[tuning.norm].high), compact(second.work / choice.work)
+    return f"runner-up: {_words(second.cell, tuning)}: {tuning.norm} {error} with {work} times the work"
+
+
+def _against_balanced(result: TuneResult, choice: Point) -> str:
+    point, tuning = result.balanced, result.tuning
+    ratio = point.work / choice.work
+    work = (
+        f"{compact(ratio)} times the work of the choice" if ratio >= 1
+        else f"1/{compact(1 / ratio)} of the work of the choice"
+    )  # fmt: skip
+    if point.failed:
+        return f"Settings.balanced(): {work}, and it fails: {', '.join(point.failures)}"
+    error = point.errors[tuning.norm].high
+    kept = "keeps the target" if error <= tuning.target else f"misses the target {compact(error / tuning.target)} times"
+    return f"Settings.balanced(): {work}; it {kept}"
+
+
+def check_line(check: Check) -> str:
+    """What has to be said clearly of a scene that was not tuned on; empty if the promise was kept well enough."""
+    if check.refused:
+        return f"{check.scene}: not measured: {check.refused}"
+    if check.tolerated:
+        return ""
+    if math.isinf(check.error):
+        return f"{check.scene}: THE PROMISE IS BROKEN: the choice fails there"
+    return (
+        f"{check.scene}: THE PROMISE IS BROKEN: {check.norm} {compact(check.error)}, {compact(check.times)} times what"
+        " was promised: the choice does not carry over, tune on that scene too"
+    )
+
+
+def _limits(tuning: Tuning) -> str:
+    return (
+        f"measured on {tuning.scene} over {number(tuning.seconds)} s and nowhere else: larger speeds, stronger forces, "
+        "other sizes or longer runs change the error; --check SCENE measures it there"
+    )
+
+
+def _words(cell: Cell, tuning: Tuning) -> str:
+    label = label_of(cell.method, {trial.cell.method for trial in tuning.trials} | {cell.method})
+    return f"{label}, {number(cell.dt)} s"
+
+
+def _plural(word: str, count: int) -> str:
+    return word + "s" * (count != 1)

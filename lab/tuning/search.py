@@ -1,0 +1,344 @@
+"""``tune()``: the cheapest settings that keep an error, found by search instead of by the whole grid.
+
+All methods wait in one queue, each with the step it would try next and the work that step is expected to need. The
+cheapest is tried with a single run; what misses the target goes back into the queue with a smaller step, as many
+halvings away as the order of its errors promises; what meets it has to do so in all repeats. So the first that holds is
+the cheapest of the grid, and nothing dearer was run. Between its step and the next larger one, which failed, the search
+then goes on in finer strides.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import heapq
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ...framework import CaromError, Settings
+from ..cases import grid as grids
+from ..cases.case import Case, case_of
+from ..commands.usage_errors import Problem
+from ..engines.cost import WEIGHTS
+from ..jobs.result_store import Store
+from ..jobs.runs import Runs, point_of, refined_reference, run_tasks
+from ..jobs.tasks import Task
+from ..measure.norms import NORMS
+from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..settings_study.code_line import settings_line
+from ..trading.records import TRUSTED, Cell, Outcome, Point, Reference
+from ..trading.trade import Only
+
+BELOW = 16  # times the smallest step of the case: no method is driven further
+MOST_REPEATS = 400  # of a noisy statistic
+NOISE = 4.0  # times smaller than the target must the standard error of a statistic be
+LONGEST_JUMP = 4  # halvings at once
+FINE = (1.5, 1.25, 1.75)  # times the step that holds: tried in this order, the last two as the first turns out
+ROUNDING = 1e-9  # of a step
+SMALLEST = 1e-13  # of the scale: what own runs can tell at best, ten times the rounding of some hundred steps
+FAR_DEARER = 4.0  # times the choice's work: no runner-up is looked for beyond it
+STUCK = 3  # smaller steps in a row that bring nothing: an error that steps do not cure
+
+
+class NothingMeetsError(CaromError, ValueError):
+    """No settings keep the error; the message names the best that was found."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One cell as it was tried: ``error`` inf where it failed; ``repeats``: 1 for a first look."""
+
+    cell: Cell
+    error: float
+    work: float
+    repeats: int
+    met: bool
+    failure: str = ""
+
+
+@dataclass
+class Tuning:
+    """What the search found.
+
+    target
+        parts of the norm's scale, which is ``scale`` in the scene's units
+    choice, runner_up
+        the cheapest point that holds, and the cheapest of another method; None if there is none
+    base
+        the scene's own settings, whose other dials stay
+    case
+        as it was searched: with its reference and repeats
+    """
+
+    scene: str
+    norm: str
+    text: str
+    target: float
+    scale: float
+    seconds: float
+    repeats: int
+    repeated: str
+    reference: Reference
+    base: Settings
+    methods: int
+    case: Case = field(repr=False)
+    choice: Point | None = None
+    runner_up: Point | None = None
+    trials: list[Trial] = field(default_factory=list)
+
+    @property
+    def settings(self) -> Settings:
+        """Those to take; NothingMeetsError if there are none."""
+        if self.choice is None:
+            raise NothingMeetsError(self.why_not)
+        return self.choice.cell.settings(self.base)
+
+    @property
+    def line(self) -> str:
+        """The Python to paste."""
+        if self.choice is None:
+            raise NothingMeetsError(self.why_not)
+        return settings_line(self.choice.cell, self.base)
+
+    @property
+    def error(self) -> float:
+        """Of the choice, the worst of all repeats and the reference's own; inf without a choice."""
+        if self.choice is None:
+            return math.inf
+        return self.choice.errors[self.norm].high + self.reference.agreement.get(self.norm, 0.0)
+
+    @property
+    def margin(self) -> float:
+        """How many times smaller than the target that is."""
+        return self.target / self.error if self.error > 0 else math.inf
+
+    @property
+    def why_not(self) -> str:
+        """A sentence for the case that nothing meets the target."""
+        best = min(self.trials, key=lambda trial: trial.error, default=None)
+        text = f"{self.scene}: no settings keep the {self.norm} error below {self.target:.3g}"
+        if best is None or not math.isfinite(best.error):
+            return f"{text}: every run failed"
+        line = settings_line(best.cell, self.base)
+        return f"{text}: the best of {len(self.trials)} trials has {best.error:.3g}, {line}"
+
+
+def tune(build: Any, max_error: float = 1e-3, norm: str | None = None, **options: Any) -> Settings:
+    """The cheapest Settings that keep the error of a scene below ``max_error`` in all repeats.
+
+    build: a function build(settings, seed=0) -> World, a scene's name or a file; norm: see docs/trade.md, None for the
+    one that suits the scene; options: as of :func:`search`. NothingMeetsError if there are none.
+    """
+    return search(build, max_error, norm, **options).settings
+
+
+def search(
+    target: Any,
+    max_error: float = 1e-3,
+    norm: str | None = None,
+    *,
+    absolute: bool = False,
+    seconds: float | None = None,
+    repeats: int | None = None,
+    steps: Sequence[float] = (),
+    only: Only | None = None,
+    options: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    store: Store | None = None,
+    progress: Progress = NO_PROGRESS,
+) -> Tuning:
+    """What :func:`tune` finds, with all that was tried on the way.
+
+    max_error: parts of the norm's scale, or with ``absolute`` in the scene's units. The rest as in
+    :func:`carom.lab.trade`. ValueError for a target that is no positive number; Problem for a scene that cannot be
+    measured, or not so exactly.
+    """
+    number = isinstance(max_error, (int, float)) and not isinstance(max_error, bool)
+    if not (number and math.isfinite(max_error) and max_error > 0):
+        raise ValueError(f"max_error must be a number above 0, got {max_error!r}")
+    progress.say("survey")
+    case = case_of(
+        target, norms=(norm,) if norm else (), seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed
+    )
+    runs = Runs(workers, store, progress)
+    return _Search(case, float(max_error), absolute, only or Only(), runs).result()
+
+
+class _Search:
+    def __init__(self, case: Case, max_error: float, absolute: bool, only: Only, runs: Runs) -> None:
+        self.runs = runs
+        self.norm = NORMS[case.norms[0]]
+        self.methods = only.of(case)
+        self.case, self.reference = exact_enough(case, self.norm.name, max_error, absolute, runs)
+        seen = self.case.reference
+        assert seen is not None
+        self.scale = self.norm.scale(seen, seen)
+        self.target = max_error / self.scale if absolute else max_error
+        self.noise = self.reference.spread.get(self.norm.name, 0.0)
+        self.case = enough_repeats(self.case, self.norm.name, self.noise, self.target)
+        self.own = self.reference.agreement.get(self.norm.name, 0.0)
+        self.trials: list[Trial] = []
+        self.looks: dict[Cell, tuple[float, float]] = {}  # error and work of single runs
+        self.whole: dict[Cell, Point] = {}
+
+    def result(self) -> Tuning:
+        held = self._cheapest_two()
+        held = [self._refined(held[0]), *held[1:]] if held else []
+        held.sort(key=lambda point: point.work)
+        case = self.case
+        return Tuning(
+            case.subject.name, self.norm.name, self.norm.text, self.target, self.scale, case.seconds, case.repeats,
+            case.repeated, self.reference, case.survey.settings, len(self.methods), case, held[0] if held else None,
+            held[1] if len(held) > 1 else None, self.trials,
+        )  # fmt: skip
+
+    def _cheapest_two(self) -> list[Point]:
+        """The first two methods that hold, the cheapest first."""
+        queue: list[tuple[float, int, Cell]] = []
+        for number, method in enumerate(self.methods):
+            cell = dataclasses.replace(method, dt=self.case.steps[0])
+            heapq.heappush(queue, (_expected(cell), number, cell))
+        held: list[Point] = []
+        while queue and len(held) < 2:
+            expected, number, cell = heapq.heappop(queue)
+            if held and expected > FAR_DEARER * held[0].work:
+                break
+            error, work = self._look(cell)
+            if queue and work > expected and work > queue[0][0]:  # dearer than it promised: others come first
+                heapq.heappush(queue, (work, number, cell))
+                continue
+            if error <= self.target + 3 * self.noise:
+                point = self._hold(cell)
+                if point is not None:
+                    held.append(self._walked_back(point))
+                    continue
+                error = max(error, self._worst(cell))
+            smaller = self._next(cell, error)
+            if smaller is not None:
+                heapq.heappush(queue, (work * cell.dt / smaller.dt, number, smaller))
+        return held
+
+    def _walked_back(self, point: Point) -> Point:
+        """The largest step of the grid down from which all hold: a jump may have gone too far."""
+        while True:
+            larger = dataclasses.replace(point.cell, dt=2 * point.cell.dt)
+            if larger in self.looks or larger.dt > self.case.steps[0] * (1 + ROUNDING):
+                return point
+            error, _ = self._look(larger)
+            found = self._hold(larger) if error <= self.target + 3 * self.noise else None
+            if found is None:
+                return point
+            point = found
+
+    def _look(self, cell: Cell) -> tuple[float, float]:
+        """Error and work of a single run, at the first start phase or seed."""
+        if cell not in self.looks:
+            outcome = Outcome.from_dict(self.runs.all([Task(self.case, cell, 0)], _words(self.case, cell))[0])
+            point = point_of([outcome])
+            error = abs(outcome.errors[self.norm.name]) if outcome.failure is None else math.inf
+            self.looks[cell] = error, point.work or _expected(cell)
+            met = error <= self.target
+            self.trials.append(Trial(cell, error, point.work, 1, met, outcome.failure or ""))
+        return self.looks[cell]
+
+    def _hold(self, cell: Cell) -> Point | None:
+        """The point over all repeats if it meets the target, the reference's own error included."""
+        records = self.runs.all(run_tasks(self.case, [cell]), f"{_words(self.case, cell)}, all repeats")
+        point = point_of([Outcome.from_dict(record) for record in records])
+        self.whole[cell] = point
+        error = self._worst(cell)
+        met = error <= self.target
+        if self.case.repeats > 1 or cell not in self.looks:  # else the look has said it all
+            self.trials.append(Trial(cell, error, point.work, point.repeats, met, ", ".join(point.failures)))
+        return point if met else None
+
+    def _worst(self, cell: Cell) -> float:
+        point = self.whole[cell]
+        return math.inf if point.failed else point.errors[self.norm.name].high + self.own
+
+    def _next(self, cell: Cell, error: float) -> Cell | None:
+        """The same method with the step at which its order promises the target; None to give it up."""
+        history = sorted(
+            (dt, e) for (dt, e) in ((c.dt, looked[0]) for c, looked in self.looks.items() if c.method == cell.method)
+        )
+        halvings = 1
+        if math.isfinite(error) and error > self.target and not self.noise:
+            order = self.case.theory(cell, self.norm.name) or float(grids.ORDER.get(cell.integrator, 1))
+            if len(history) > 1 and all(math.isfinite(e) and e > 0 for _, e in history[:2]):
+                (small, fine), (large, coarse) = history[:2]
+                order = math.log(coarse / fine) / math.log(large / small)
+            if order > 0 and math.isfinite(order):
+                halvings = max(1, min(LONGEST_JUMP, int(math.log2(error / self.target) / order)))
+        finite = [e for _, e in history if math.isfinite(e)]
+        if len(finite) > STUCK and min(finite[:STUCK]) >= 0.9 * max(finite[: STUCK + 1]):
+            return None
+        dt = cell.dt / 2**halvings
+        return dataclasses.replace(cell, dt=dt) if dt >= self.case.steps[-1] / BELOW else None
+
+    def _refined(self, point: Point) -> Point:
+        """A larger step of the same method that holds too, between this one and the next of the grid."""
+        cell = point.cell
+        if cell.dt >= self.case.steps[0]:
+            return point
+        first, *others = FINE
+        middle = self._hold(dataclasses.replace(cell, dt=first * cell.dt))
+        last = self._hold(dataclasses.replace(cell, dt=(others[1] if middle else others[0]) * cell.dt))
+        return min((p for p in (point, middle, last) if p is not None), key=lambda found: found.work)
+
+
+def enough_repeats(case: Case, norm: str, noise: float, target: float) -> Case:
+    """Enough seeds for a statistic to be known far better than the target; Problem where that takes too many.
+
+    noise: the standard deviation of a single run; 0 for what is no statistic.
+    """
+    wanted = max(case.repeats, math.ceil((NOISE * noise / target) ** 2))
+    if wanted > MOST_REPEATS:
+        raise Problem(
+            f"{case.subject.name}: the {norm} of one run of {case.seconds:g} s scatters by {noise:.2g}, {target:.2g} "
+            f"cannot be told from chance by {MOST_REPEATS} runs: take a larger error or longer runs (--seconds)"
+        )
+    return case.replace(repeats=wanted)
+
+
+def exact_enough(
+    case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
+) -> tuple[Case, Reference]:
+    """The case with a reference that knows the target: Problem if own runs cannot be brought to agree so well."""
+    def told(known: Case, reference: Reference) -> float:
+        """The target over what the reference knows."""
+        seen = known.reference
+        assert seen is not None
+        target = max_error / NORMS[norm].scale(seen, seen) if absolute else max_error
+        if case.reference is None and target < SMALLEST:
+            raise Problem(
+                f"{case.subject.name}: a {norm} error of {target:.3g} is below rounding, no own runs can tell it: take "
+                f"{SMALLEST:g} or more"
+            )
+        return target / max(reference.agreement.get(norm, 0.0), 1e-300)
+
+    wanted = NOISE if NORMS[norm].signed else TRUSTED
+    known, reference, enough = refined_reference(case, runs, lambda case, found: told(case, found) >= wanted)
+    if norm not in known.norms:
+        others = " or ".join(f"--norm {name}" for name in known.norms)
+        raise Problem(f"{case.subject.name}: its {norm} is 0 throughout, nothing can be relative to it: take {others}")
+    if enough:
+        return known, reference
+    agreement = reference.agreement[norm]
+    target = told(known, reference) * agreement
+    raise Problem(
+        f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
+        f"{reference.text} agree to {agreement:.2g} only. Take a larger error"
+        + (" or longer runs" if NORMS[norm].signed else " or a shorter time")
+    )
+
+
+def _expected(cell: Cell) -> float:
+    """Work per simulated second before anything is known of the scene."""
+    evaluations = {"rk4": 4, "yoshida4": 4, "velocity_verlet": 2}.get(cell.integrator, 1)
+    return (WEIGHTS["steps"] + evaluations * WEIGHTS["force_evaluations"]) / cell.dt
+
+
+def _words(case: Case, cell: Cell) -> str:
+    return f"{case.subject.name}: {cell.integrator}, {cell.collision}, {cell.dt:.4g} s"
