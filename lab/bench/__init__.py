@@ -1,4 +1,4 @@
-"""``carom bench``: the scenes that are timed, the records of the results, their tables and charts.
+"""``carom bench``: the timed scenes, the records of the results, their tables and charts.
 
-Reads the library of scenes. The benchmarks themselves are in the folder ``benchmarks``, one in each file.
+Reads the scene library. The benchmarks are in the folder ``benchmarks``, one per file.
 """

@@ -19,7 +19,7 @@ ROW_HEIGHT = 0.42  # inches
 
 
 def draw_ratios(result: Result, folder: Path) -> Path | None:
-    """Bars of pymunk's time over carom's, on a logarithmic scale; None without a comparison."""
+    """Draw bars of pymunk's time over carom's on a logarithmic scale; None if nothing was compared."""
     rows = [row for row in reversed(result.rows) if row.ratio is not None]
     if not rows:
         return None
@@ -77,7 +77,7 @@ def _axes(title: str, height: float) -> Any:
 
 
 def _plain_numbers(axes: Any) -> None:
-    """0.5 and 20 instead of powers of ten."""
+    """Format ticks as 0.5 and 20 instead of powers of ten."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))

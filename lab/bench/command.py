@@ -1,4 +1,4 @@
-"""``carom bench`` and the commands below it, one for each benchmark: measure, and show as asked for."""
+"""``carom bench`` and its subcommands, one per benchmark: measure, then print as requested."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def _sizes(text: str) -> tuple[int, ...]:
 
 
 def _peer_there() -> bool:
-    """Whether pymunk is; says so if not."""
+    """True if pymunk is installed; prints a note if not."""
     try:
         pymunk_module()
     except Problem as problem:

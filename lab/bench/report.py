@@ -1,4 +1,4 @@
-"""The tables of ``carom bench``: times and ratios, quality beside them, and what both engines were set to."""
+"""The tables of ``carom bench``: times and ratios, quality figures, and the settings of both engines."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ PYMUNK_SETTINGS = ("iterations", "collision_slop", "collision_bias", "damping", 
 
 
 def tables(result: Result) -> list[TextTable]:
-    """What there is to show."""
+    """All tables of the result."""
     steps = [row for row in result.rows if row.energy]
     stacks = [row for row in steps if row.energy == "left"]
-    questions = [row for row in result.rows if row.unit != "step"]
+    queries = [row for row in result.rows if row.unit != "step"]
     made = [times(result.rows, result.repeats)]
     if steps:
         made.append(quality(steps))
     if stacks:
         made.append(motion(stacks))
-    if questions:
-        made.append(answers(questions))
+    if queries:
+        made.append(answers(queries))
     return made
 
 
@@ -53,7 +53,7 @@ def times(rows: list[Row], repeats: int) -> TextTable:
 
 
 def quality(rows: list[Row]) -> TextTable:
-    """What the times bought, carom first."""
+    """Quality of the states reached in the timed steps, carom first."""
     engines = list(rows[0].quality)
     cells = []
     for row in rows:
@@ -66,7 +66,7 @@ def quality(rows: list[Row]) -> TextTable:
 
 
 def motion(rows: list[Row]) -> TextTable:
-    """How far bodies that should come to rest have gone."""
+    """The largest displacement of bodies that should come to rest."""
     engines = list(rows[0].quality)
     cells = [
         (row.label, *(both([digits(row.quality[engine][name]) for engine in engines]) for name in ("drift", "sink")))
@@ -77,7 +77,7 @@ def motion(rows: list[Row]) -> TextTable:
 
 
 def answers(rows: list[Row]) -> TextTable:
-    """The answers to the questions: that both engines were asked the same."""
+    """The figures of the queries, which show that both engines ran the same ones."""
     engines = list(rows[0].quality)
     cells = []
     for row in rows:
@@ -88,7 +88,7 @@ def answers(rows: list[Row]) -> TextTable:
 
 
 def remarks(result: Result) -> list[str]:
-    """Where it ran and what both engines were set to, one line each."""
+    """Machine and engine settings, one line each."""
     compiling = sum({(row.name, row.bodies): row.compile_seconds for row in result.rows}.values())
     versions = {**result.machine}
     place = ", ".join(versions.pop(key) for key in ("processor", "system"))
@@ -110,7 +110,7 @@ def remarks(result: Result) -> list[str]:
 
 
 def _other_settings(rows: list[Row]) -> dict[str, str]:
-    """What was not the default, by the name of the scene."""
+    """Non-default settings by scene name."""
     return {
         row.name: ", ".join(f"{name} {_value(value)}" for name, value in row.settings.items())
         for row in rows
@@ -119,24 +119,24 @@ def _other_settings(rows: list[Row]) -> dict[str, str]:
 
 
 def energy(kind: str, of: list[dict[str, float]]) -> str:
-    """Kinetic energy: a share of the start's where it must be kept, joules where it must go."""
+    """Kinetic energy: a percentage of the start's if it must be kept, joules if it must be dissipated."""
     if kind == "kept":
         return both([f"{100 * one['kinetic_end'] / one['kinetic_start']:.3f}" for one in of]) + " %"
     return both([digits(one["kinetic_end"]) for one in of]) + " J"
 
 
 def both(cells: list[str]) -> str:
-    """The engines' figures in one cell."""
+    """Both engines' figures in one cell."""
     return " / ".join(cells)
 
 
 def span(spread: Spread) -> str:
-    """From the least to the largest."""
+    """The range from least to largest."""
     return f"{digits(spread.low)} .. {digits(spread.high)}"
 
 
 def digits(value: float) -> str:
-    """Three digits, without an exponent where that is short."""
+    """Three significant digits, without an exponent where that is short."""
     if value == 0 or not math.isfinite(value):
         return f"{value:g}"
     places = 2 - math.floor(math.log10(abs(value)))
@@ -146,7 +146,7 @@ def digits(value: float) -> str:
 
 
 def percent(value: float) -> str:
-    """Of a diameter, two digits."""
+    """A percentage of a diameter, two digits."""
     return f"{100 * value:.2g}" if value < 1 else f"{100 * value:.0f}"
 
 

@@ -1,4 +1,4 @@
-"""What a benchmark found, as plain records that go through JSON and back."""
+"""Results of a benchmark, as plain records that convert to JSON and back."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ PACKAGES = ("carom", "numba", "numpy", "esper", "pymunk")
 
 @dataclass
 class Row:
-    """One window of one scene at one size, or one kind of question.
+    """One window of one scene at one size, or one kind of query.
 
-    ``unit`` says what the milliseconds are per. ``ratio`` is pymunk's time over carom's, within each repeat.
-    ``peer_index`` is the one of pymunk's indexes that was faster in the first repeat, whose times these are.
-    ``settings`` holds those of carom's that are not the default ones.
-    ``quality`` holds figures by engine and name, see :meth:`carom.lab.engines.quality.Quality.figures`.
+    ``unit``: what the milliseconds are per. ``ratio``: pymunk's time over carom's, within each repeat.
+    ``peer_index``: the pymunk index that was faster in the first repeat; the times are those with it.
+    ``settings``: carom's settings that differ from the default.
+    ``quality``: figures by engine and name, see :meth:`carom.lab.engines.quality.Quality.figures`.
     """
 
     scene: str
@@ -46,12 +46,12 @@ class Row:
 
     @property
     def label(self) -> str:
-        """Scene, bodies, and what tells the row apart from others."""
+        """Scene, bodies, and the variant that distinguishes the row."""
         return " ".join(filter(None, (self.scene, f"{self.bodies:,}", self.variant, self.window)))
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         spreads = {
             key: None if plain[key] is None else Spread.from_dict(plain[key])
             for key in ("carom_ms", "peer_ms", "ratio")
@@ -61,7 +61,7 @@ class Row:
 
 @dataclass
 class Result:
-    """A whole benchmark: where it ran, with what settings, and its rows."""
+    """A whole benchmark: machine, settings and rows."""
 
     machine: dict[str, str]
     settings: dict[str, dict[str, Any]]
@@ -74,12 +74,12 @@ class Result:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "rows": [Row.from_dict(row) for row in plain["rows"]]})
 
 
 def machine() -> dict[str, str]:
-    """What the figures depend on: processor, versions, clock."""
+    """The environment of the measurement: processor, versions, clock."""
     versions = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
@@ -90,7 +90,7 @@ def machine() -> dict[str, str]:
 
 
 def _processor() -> str:
-    """The processor's name; on Linux the kernel knows more than Python does."""
+    """The processor's name; on Linux from /proc, because Python does not provide it."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

@@ -1,7 +1,7 @@
-"""What ``carom bench`` measures: scenes of the library, their sizes, and which steps of a run are timed.
+"""The subjects of ``carom bench``: scenes of the library, their sizes, and the timed steps of a run.
 
-A window is a range of steps. What a scene is about often happens in one part of its run: discs fall, then lie. The
-target of a window is the ratio, the other engine's time over carom's, that the project aims at.
+A window is a range of steps. Many scenes have distinct stages: discs fall, then rest. The target of a window is the
+ratio that the project aims at: the other engine's time over carom's.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ..commands.usage_errors import Problem, did_you_mean
 
 SIZES = (1000, 10_000)
 LARGE = 100_000
-MOST_BODY_STEPS = 10_000_000  # in a window: so many bodies have fewer steps timed
+MOST_BODY_STEPS = 10_000_000  # limit per window: with more bodies fewer steps are timed
 
 
 @dataclass(frozen=True)
@@ -27,28 +27,29 @@ class Window:
     last: int
 
     def shortened(self, bodies: int) -> Window:
-        """The same start, with no more steps than so many bodies are timed for."""
+        """The same start, with the number of steps limited for this number of bodies."""
         return Window(self.name, self.first, min(self.last, self.first + max(60, MOST_BODY_STEPS // bodies)))
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A scene as it is measured.
+    """One measured scene.
 
     ``variant``
-        tells two subjects of one scene apart; ``options`` go to the scene's build
+        distinguishes two subjects of one scene; ``options`` are passed to the scene's build
     ``settings``
-        fields of carom's settings that are not the default ones
+        carom settings that differ from the default
     ``windows``
-        the steps timed; none where questions are timed instead
+        the timed steps; empty if queries are timed instead
     ``sizes``
-        the numbers of bodies, where not those asked for
+        the numbers of bodies, if they differ from the requested ones
     ``energy``
-        "kept": kinetic energy must stay, shown as a share; "left": it must go, shown in joules; "" for neither
+        "kept": kinetic energy must be conserved, shown as a percentage; "left": it must be dissipated, shown in joules;
+        "": neither
     ``targets``
-        by (window, bodies); bodies 0 for any number
+        by (window, bodies); bodies 0 means any number
     ``effort``
-        roughly the time per body and step, in that of the gas: for the time left
+        approximate time per body and step relative to the gas; used for the remaining time
     """
 
     scene: str
@@ -67,7 +68,7 @@ class Subject:
         return f"{self.scene}, {self.variant}" if self.variant else self.scene
 
     def target(self, window: str, bodies: int) -> float | None:
-        """The ratio aimed at, if there is one."""
+        """The target ratio, or None."""
         return self.targets.get((window, bodies), self.targets.get((window, 0)))
 
     def build_options(self, size: int) -> dict[str, Any]:
@@ -118,7 +119,7 @@ SUITE: tuple[Subject, ...] = (
 
 
 def subjects(scenes: Iterable[str] = ()) -> tuple[Subject, ...]:
-    """Those of ``scenes``, in the suite's order; all for none. Problem for a name that is not measured."""
+    """The subjects of ``scenes`` in suite order; all if none are named. Problem for a scene that is not measured."""
     wanted = list(scenes)
     known = list(dict.fromkeys(subject.scene for subject in SUITE))
     for name in wanted:
@@ -128,5 +129,5 @@ def subjects(scenes: Iterable[str] = ()) -> tuple[Subject, ...]:
 
 
 def sizes_of(subject: Subject, asked: tuple[int, ...]) -> tuple[int, ...]:
-    """The sizes to measure: the subject's own, or those asked for."""
+    """The sizes to measure: the subject's own, or the requested ones."""
     return subject.sizes if subject.sizes is not None else asked

@@ -1,8 +1,8 @@
 """carom against pymunk on the same bodies, in one process.
 
-Both engines start from the same world and take the same steps, in short blocks that alternate, so that a slow moment
-of the machine meets both. A repeat runs every scene once, from another seed; timing one state again and again would
-train the processor's branch prediction and flatter. What counts is the ratio within a repeat. Reading the states,
+Both engines start from the same world and take the same steps, in short blocks that alternate, so that background
+load affects both equally. Each repeat runs every scene once, with another seed: timing one state repeatedly would train
+the branch predictor and give times that are too short. The result is the ratio within a repeat. Reading states,
 measuring quality, building and compiling happen between the timed blocks.
 """
 
@@ -30,15 +30,15 @@ from ...measure.timing import Spread, no_garbage_collection, timed
 from ...reporting.progress_bar import NO_PROGRESS, Progress
 from ..results import Result, Row, machine
 from ..suite import Subject, Window, sizes_of
-from .queries import Question, ask_all
+from .queries import Query, time_queries
 
 CAROM = "carom"
-BLOCKS = 10  # of a window: the engines take turns so often
-REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the run before the first repeat that compiles
+BLOCKS = 10  # per window: the engines alternate this many times
+REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the untimed run before the first repeat, which compiles the kernels
 
 
 class Engine(Protocol):
-    """A physics engine in the middle of a scene."""
+    """A physics engine with a scene loaded."""
 
     def step(self, count: int) -> None: ...
     def state(self) -> tuple[Floats, Floats]: ...
@@ -46,7 +46,7 @@ class Engine(Protocol):
 
 
 class CaromWorld:
-    """carom as an engine among others."""
+    """The Engine interface for carom."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -70,7 +70,7 @@ class CaromWorld:
 
 @dataclass
 class Case:
-    """A subject at one size, with what its repeats have found: by window (or question), one entry a repeat."""
+    """A subject at one size with its results: by window (or query), one entry per repeat."""
 
     subject: Subject
     size: int
@@ -82,7 +82,7 @@ class Case:
     compile_seconds: float = 0.0
 
     def note(self, window: str, engine: str, milliseconds: float, figures: dict[str, float]) -> None:
-        """What one repeat found for one engine."""
+        """Record the result of one repeat for one engine."""
         self.milliseconds.setdefault(window, {}).setdefault(engine, []).append(milliseconds)
         self.quality.setdefault(window, {}).setdefault(engine, []).append(figures)
 
@@ -93,7 +93,7 @@ class Case:
         return function(settings, seed, **self.subject.build_options(self.size))
 
     def effort(self) -> float:
-        """In steps of one body of the gas, of one engine."""
+        """Estimated cost for one engine, in steps of one gas body."""
         steps = self.subject.windows[-1].shortened(self.size).last if self.subject.windows else 100
         size = 1275 if self.subject.size_option == "rows" else self.size
         return max(size, 200) * steps * self.subject.effort
@@ -106,7 +106,7 @@ def bench(
     peer: bool = True,
     progress: Progress = NO_PROGRESS,
 ) -> Result:
-    """Measure every subject at every size, ``repeats`` times; ``peer=False``: carom alone."""
+    """Measure every subject at every size, ``repeats`` times; with ``peer=False`` only carom."""
     cases = [Case(subject, size) for subject in subjects for size in sizes_of(subject, sizes)]
     progress.begin(sum(case.effort() for case in cases) * repeats)
     for repeat in range(repeats):
@@ -139,7 +139,7 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
         if case.subject.windows:
             _run_windows(case, world, engines, progress)
         else:
-            _run_questions(case, world, engines, repeat)
+            _run_queries(case, world, engines, repeat)
         progress.advance(case.effort() - (progress.done - before))
     if peer and case.peer is None:
         case.peer = min(indexes, key=lambda index: sum(case.milliseconds[w][index][0] for w in case.milliseconds))
@@ -147,7 +147,7 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
 
 
 def _indexes(world: World) -> list[str]:
-    """Those of pymunk's indexes that can matter."""
+    """The pymunk indexes that can affect the time of this world."""
     return list(INDEXES if moving_and_fixed(world)[0].shaped.any() else INDEXES[:1])
 
 
@@ -203,16 +203,16 @@ def _run_window(
     return {name: total / counted for name, total in totals.items()}
 
 
-def _run_questions(case: Case, world: World, engines: dict[str, Any], repeat: int) -> None:
-    for question, answers in ask_all(world, engines, case.bodies, repeat).items():
-        case.timed[question] = Question.COUNT
+def _run_queries(case: Case, world: World, engines: dict[str, Any], repeat: int) -> None:
+    for query, answers in time_queries(world, engines, case.bodies, repeat).items():
+        case.timed[query] = Query.COUNT
         for name, (seconds, figures) in answers.items():
-            case.note(question, name, 1e3 * seconds, figures)
+            case.note(query, name, 1e3 * seconds, figures)
 
 
 def _rows(case: Case) -> list[Row]:
     subject, rows = case.subject, []
-    unit = "step" if subject.windows else f"{Question.COUNT:,} questions"
+    unit = "step" if subject.windows else f"{Query.COUNT:,} questions"
     for window, by_engine in case.milliseconds.items():
         own = by_engine[CAROM]
         row = Row(
@@ -231,7 +231,7 @@ def _rows(case: Case) -> list[Row]:
 
 
 def _together(figures: list[dict[str, float]]) -> dict[str, float]:
-    """Of all repeats: the worst of what must not be, the mean of the rest."""
+    """Combine the repeats: the maximum of error figures, the mean of the others."""
     worst = ("overlap_max", "escaped", "drift", "sink")
     return {
         name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]

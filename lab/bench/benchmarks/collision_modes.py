@@ -1,8 +1,8 @@
-"""What each kind of collision costs, and what it buys: the same bodies, discrete, continuous and driven by events.
+"""Cost and benefit of each collision mode: the same bodies, discrete, continuous and event-driven.
 
-All kinds of a scene start from the same bodies and take turns in short blocks, another one first each time; a repeat
-runs every scene once, from another one on and from another seed. After each block as many steps run inside a profile,
-which tells the share that the loop over the impacts has of the step.
+All modes of a scene start from the same bodies and alternate in short blocks, with a different one first each time.
+Each repeat runs every scene once, in a different order and with a different seed. After each block the same number of
+steps runs inside a profile, which gives the fraction of the step spent in the impact loop.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from ..results import machine
 
 STEPS = 60
 REPEATS = 5
-BLOCKS = 10  # of the timed steps: the kinds take turns so often
+BLOCKS = 10  # of the timed steps: the modes alternate this many times
 WARM_UP_STEPS = 10
-IMPACT_LOOP = "resolve_impacts"  # the kernel that takes the impacts one after the other
+IMPACT_LOOP = "resolve_impacts"  # the kernel that resolves impacts one by one
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = "discrete", "continuous", "event_driven"
-ONE_SWEPT = "discrete, one ccd"  # body
+ONE_SWEPT = "discrete, one ccd"  # one body with ccd
 KINDS = (DISCRETE, CONTINUOUS, EVENT_DRIVEN)
 
 RATIO, PER_IMPACT, ESCAPED, CAPPED = "ratio", "µs per impact", "escaped", "capped"
@@ -51,18 +51,18 @@ def _limits(**of: Limits) -> Mapping[str, Limits]:
 
 @dataclass(frozen=True)
 class Course:
-    """A scene as it is measured.
+    """One measured scene.
 
     ``part``
-        tells two courses of one scene apart
+        distinguishes two courses of one scene
     ``first``
-        the steps before those that are timed
+        number of untimed steps at the start
     ``energy``
-        "kept": kinetic energy must stay, "left": it must go
+        "kept": kinetic energy must be conserved; "left": it must be dissipated
     ``share``
-        of the steps asked for, those that are taken here
+        fraction of the requested steps that is timed
     ``limits``
-        by kind of collision, what should not be exceeded
+        by collision mode: upper limits of the figures
     """
 
     scene: str
@@ -79,7 +79,7 @@ class Course:
         return " ".join(filter(None, (self.scene, f"{self.bodies:,}", self.part)))
 
     def build(self, kind: str, seed: int) -> World:
-        """The world; scenes take more keywords than their protocol promises."""
+        """Build the world; scenes accept more keywords than their protocol declares."""
         function: Any = scenes.get(self.scene).build
         mode = DISCRETE if kind == ONE_SWEPT else kind
         world: World = function(Settings(collision=mode), seed, n=self.bodies)
@@ -88,11 +88,11 @@ class Course:
         return world
 
     def steps(self, asked: int) -> int:
-        """How many are timed."""
+        """The number of timed steps."""
         return max(1, round(self.share * asked))
 
 
-SLOW: Limits = {RATIO: 1.5}  # where nothing is fast, sweeping finds nothing to do
+SLOW: Limits = {RATIO: 1.5}  # no fast bodies: sweeping finds nothing to do
 SAFE: Limits = {ESCAPED: 0, CAPPED: 0}
 
 COURSES: tuple[Course, ...] = (
@@ -111,21 +111,21 @@ COURSES: tuple[Course, ...] = (
 
 
 def outer_box(world: World) -> Enclosure:
-    """The box around all that stands still. Walls stand around each scene here: who leaves it got out."""
+    """The box around all static shapes. Walls surround every scene here, so a body outside it has escaped."""
     shapes = shapes_of(world)
     fixed = shapes.where(shapes.static)
     return Enclosure(fixed.lower.min(axis=0), fixed.upper.max(axis=0))
 
 
 class Run:
-    """One world under way: seconds, impacts and rounds of its timed steps, and the loop's share of others."""
+    """A world being measured: seconds, impacts and rounds of the timed steps, loop shares of the profiled steps."""
 
     def __init__(self, world: World, first: int) -> None:
         self.world = world
         self.bin = outer_box(world)
         self.energy_at_start = world.kinetic_energy()
         self.steps, self.seconds, self.impacts, self.rounds = 0, 0.0, 0, 0
-        self.shares: list[float] = []  # of the time, by block
+        self.shares: list[float] = []  # by block: fraction of the time spent in the impact loop
         self.take(first)
         self.capped_before = self.counters()["capped_impacts"]
 
@@ -136,11 +136,11 @@ class Run:
             step()
 
     def counters(self) -> dict[str, int]:
-        """Those of the world since it began."""
+        """The world's counters since its creation."""
         return self.world.stats().counters
 
     def note(self, seconds: float, count: int, before: dict[str, int]) -> None:
-        """A block of ``count`` steps counts; before: the counters at its start."""
+        """Add a timed block of ``count`` steps; before: the counters at its start."""
         after = self.counters()
         self.steps += count
         self.seconds += seconds
@@ -151,7 +151,7 @@ class Run:
         """Take ``count`` steps inside a profile."""
         before = self.world.stats().profiled
         with self.world.profile(), no_garbage_collection():
-            started = time.perf_counter()  # the clock of profiles: other programs disturb both alike
+            started = time.perf_counter()  # the clock that profiles use: background load affects both alike
             self.take(count)
             seconds = time.perf_counter() - started
         block = self.world.stats().profiled - before
@@ -159,9 +159,9 @@ class Run:
         self.shares.append(loop / seconds)
 
     def found(self) -> Found:
-        """What this run has found."""
+        """The figures of this run."""
         impacts = self.impacts / self.steps
-        microseconds = 1e6 * self.seconds / self.impacts if impacts >= 1 else None  # of a few: that of looking for them
+        microseconds = 1e6 * self.seconds / self.impacts if impacts >= 1 else None  # with fewer: the search's time
         energy = self.world.kinetic_energy()
         position = np.array(self.world.bodies.dynamic.position)
         finite = np.isfinite(position).all(axis=1)
@@ -180,7 +180,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Found:
-    """What one run of one kind found; impacts and rounds per step, energies at its end."""
+    """Figures of one run in one mode: impacts and rounds per step, energies at the end."""
 
     milliseconds: float
     impacts: float
@@ -195,12 +195,12 @@ class Found:
 
 @dataclass
 class ModeCost:
-    """One kind of collision in one scene.
+    """One collision mode in one scene.
 
     ``milliseconds`` per step; ``ratio``: to discrete, within each repeat; ``impacts`` and ``rounds`` per step, means;
-    ``step_us`` and ``loop_us``: microseconds per impact, of the whole step and of the loop over the impacts alone, None
-    where not every step has one. The worst of the repeats, at the end: ``change`` of the kinetic energy, a share of the
-    start's, the bodies ``escaped``, and the impacts ``capped`` since the timing began; ``joules`` left, the mean.
+    ``step_us`` and ``loop_us``: microseconds per impact, of the whole step and of the impact loop alone, None if there
+    is less than one impact per step. Worst of the repeats, at the end: ``change`` of the kinetic energy as a fraction
+    of the start's, bodies ``escaped``, impacts ``capped`` since timing began; ``joules`` left, the mean.
     """
 
     scene: str
@@ -222,7 +222,7 @@ class ModeCost:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         names = ("milliseconds", "ratio", "step_us", "loop_us")
         spreads = {name: None if plain[name] is None else Spread.from_dict(plain[name]) for name in names}
         return cls(**{**plain, **spreads})
@@ -230,7 +230,7 @@ class ModeCost:
 
 @dataclass
 class Modes:
-    """All scenes with all their kinds. ``steps``: those asked for."""
+    """All scenes with all their modes. ``steps``: the number requested."""
 
     steps: int
     repeats: int
@@ -244,14 +244,14 @@ class Modes:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "costs": [ModeCost.from_dict(cost) for cost in plain["costs"]]})
 
 
 def modes(
     steps: int = STEPS, repeats: int = REPEATS, progress: Progress = NO_PROGRESS, courses: Iterable[Course] = COURSES
 ) -> Modes:
-    """Run every course with all its kinds once a repeat, each time from another course on."""
+    """Run every course in all its modes once per repeat, each time starting with another course."""
     courses = list(courses)
     found: dict[tuple[str, str], list[Found]] = {(c.label, kind): [] for c in courses for kind in c.kinds}
     waited = log.waited
@@ -268,7 +268,7 @@ def modes(
 
 
 def _repeat(course: Course, repeat: int, steps: int) -> dict[str, Found]:
-    """All kinds of one course, in turns."""
+    """All modes of one course, alternating."""
     with contextlib.ExitStack() as stack:
         runs = {}
         for kind in course.kinds:
@@ -295,7 +295,7 @@ def _repeat(course: Course, repeat: int, steps: int) -> dict[str, Found]:
 
 
 def _cost(course: Course, kind: str, steps: int, found: dict[tuple[str, str], list[Found]]) -> ModeCost:
-    """Of all repeats."""
+    """Combine all repeats."""
     own, plain = found[course.label, kind], found[course.label, DISCRETE]
     ratios = [one.milliseconds / other.milliseconds for one, other in zip(own, plain, strict=True)]
 
@@ -318,18 +318,18 @@ def _cost(course: Course, kind: str, steps: int, found: dict[tuple[str, str], li
 
 
 def _spread(values: list[float | None]) -> Spread | None:
-    """None unless every repeat has a value."""
+    """None if any repeat has no value."""
     known = [value for value in values if value is not None]
     return Spread.of(known) if len(known) == len(values) else None
 
 
 def tables(result: Modes) -> list[TextTable]:
-    """What it takes, and what that buys."""
+    """The tables of cost and benefit."""
     return [_times(result), _quality(result)]
 
 
 def remarks(result: Modes) -> list[str]:
-    """What is in no figure."""
+    """Notes below the tables."""
     return [f"compiling and loading kernels: {result.compile_seconds:.1f} s, not counted"]
 
 
@@ -372,6 +372,6 @@ def _quality(result: Modes) -> TextTable:
 
 
 def _at_most(cost: ModeCost, *names: str) -> str:
-    """The limits of these names in one cell."""
+    """The limits with these names as one table cell."""
     named = [f"{name} {cost.limits[name]:g}" for name in names if name in cost.limits]
     return ", ".join(named) or NOTHING

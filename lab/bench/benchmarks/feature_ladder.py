@@ -1,6 +1,6 @@
-"""What each feature costs: scenes that differ in one thing, nanoseconds per body per step beside the scene without it.
+"""The cost of each feature: nanoseconds per body per step of a scene with the feature and of the same scene without it.
 
-A scene pays only for what it has: ``world.plan()`` says what that is, and here is what it takes.
+A scene pays only for the features it uses. ``world.plan()`` lists them; this benchmark measures their cost.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from ..results import machine
 
 BODIES = 10_000
 WARM_UP_STEPS = 10
-STEPS = 60  # a repeat
-SPACING = 3.0  # m between bodies that never meet; they are a metre wide and all have the same velocity
+STEPS = 60  # per repeat
+SPACING = 3.0  # m between bodies that never meet: they are 1 m wide and all have the same velocity
 
 
 class Drag(ForceSystem):
@@ -40,7 +40,7 @@ class Drag(ForceSystem):
 
 
 class Idle(System):
-    """A system of the game that does nothing. carom cannot know that, and keeps copies for going back."""
+    """A user system that does nothing. carom cannot know that, and keeps copies to roll the step back."""
 
     def process(self, dt: float) -> None:
         pass
@@ -81,7 +81,7 @@ def _walled(n: int) -> World:
 
 
 def _resting(n: int, handler: bool = False, **collider: Any) -> World:
-    """Spheres on a floor, side by side and apart."""
+    """Spheres at rest on a floor, side by side without contact to each other."""
     world = World(Physics(gravity=(0.0, -9.81)))
     places = np.stack((1.5 * np.arange(n), np.full(n, 0.5)), axis=1)
     world.create_entities(n, Transform.many(places), RigidBody.many(mass=1.0), _spheres(**collider))
@@ -97,7 +97,7 @@ def _ignore(contact: Any) -> None:
 
 @dataclass(frozen=True)
 class Rung:
-    """A scene with one thing more than the one it stands ``beside``; build(bodies, seed) makes it."""
+    """A scene with one feature more than the scene named ``beside``; build(bodies, seed) creates it."""
 
     feature: str
     beside: str
@@ -131,9 +131,9 @@ RUNGS: tuple[Rung, ...] = (
 
 @dataclass
 class Cost:
-    """One rung. nanoseconds: per body and step; extra: those above the scene beside it, within each repeat.
+    """One rung. nanoseconds: per body and step; extra: difference to the scene beside it, within each repeat.
 
-    ``bytes``: of the columns, per body; ``kernels``: those called that the scene beside it does not call.
+    ``bytes``: of the columns, per body; ``kernels``: those called here but not by the scene beside it.
     """
 
     feature: str
@@ -145,7 +145,7 @@ class Cost:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         extra = None if plain["extra"] is None else Spread.from_dict(plain["extra"])
         return cls(**{**plain, "nanoseconds": Spread.from_dict(plain["nanoseconds"]), "extra": extra})
 
@@ -166,12 +166,12 @@ class Ladder:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "costs": [Cost.from_dict(cost) for cost in plain["costs"]]})
 
 
 def ladder(bodies: int = BODIES, repeats: int = 5, progress: Progress = NO_PROGRESS, steps: int = STEPS) -> Ladder:
-    """Time every rung once a repeat, each time from another one on."""
+    """Time every rung once per repeat, each time starting with another rung."""
     found: dict[str, list[float]] = {rung.feature: [] for rung in RUNGS}
     calls: dict[str, list[str]] = {"": []}
     sizes: dict[str, int] = {}
@@ -202,7 +202,7 @@ def _time(world: World, feature: str, steps: int) -> float:
             world.step()
 
     take(WARM_UP_STEPS)
-    for _ in range(2):  # a kernel that came only now is there the second time
+    for _ in range(2):  # kernels loaded during the first try are ready in the second
         with no_garbage_collection():
             seconds, counts, _ = timed(lambda: take(steps))
         if counts:
@@ -211,7 +211,7 @@ def _time(world: World, feature: str, steps: int) -> float:
 
 
 def _called(world: World) -> list[str]:
-    """The kernels that a step calls, in order of the systems."""
+    """The kernels that a step calls, in system order."""
     with world.profile():
         world.step()
     return list(dict.fromkeys(row.kernel for row in world.stats().kernels))

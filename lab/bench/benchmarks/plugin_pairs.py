@@ -1,9 +1,8 @@
-"""What a pair costs that is registered with a plugin, next to the same maths written into the kernel by hand.
+"""The cost of a pair function registered by a plugin, compared with the same maths written into the kernel by hand.
 
-Both are the kernel of the narrow phase, on the same candidates: one as it is generated from the registered functions,
-with all that this brings (which shape meets which, their order, the watch for what is no contact), the other over a
-function that knows nothing but radii. Bodies lie anew in each state, since a loop over one state teaches the processor
-its branches.
+Both are narrow phase kernels on the same candidates. One is generated from the registered functions and includes all
+their overhead: shape dispatch, argument order, the check of the result. The other calls a function that only knows
+radii. Each state has new random positions, because repeating one state would train the branch predictor.
 """
 
 from __future__ import annotations
@@ -33,8 +32,8 @@ from ..results import machine
 
 BODIES = 4000
 STATES = 8
-CALLS = 5  # of one kernel on one state at a time; then it is the other's turn
-DENSITY = {2: 0.4, 3: 0.1}  # bodies per unit of volume, their radii being 1: about 4 candidates a body
+CALLS = 5  # consecutive calls of one kernel on one state; then the other kernel runs
+DENSITY = {2: 0.4, 3: 0.1}  # bodies of radius 1 per unit of volume: about 4 candidates per body
 TARGET = 1.3
 
 plugin = Plugin("bench pairs")
@@ -42,7 +41,7 @@ plugin = Plugin("bench pairs")
 
 @plugin.shape(cost=1)
 class DiscCollider(Collider):
-    """A sphere once more, as a plugin's author would write it."""
+    """A copy of the sphere collider, as a plugin author would write it."""
 
     reach = column(positive=True)
 
@@ -55,7 +54,7 @@ class DiscCollider(Collider):
 
 @plugin.kernel
 def round_round(one, two, d):
-    """Two round shapes: their distance against both radii."""
+    """Contact of two round shapes: centre distance against the sum of the radii."""
     distance = length(d)
     depth = one + two - distance
     normal = divided(d, distance) if distance > 0.0 else first_axis(d)
@@ -81,13 +80,13 @@ def disc_sphere(a, b, d):
 
 @inlined
 def one_shape_by_hand(shape_a, a, shape_b, b, d, shapes, like):
-    """The same for a world of discs."""
+    """The narrow phase function for a world of discs, by hand."""
     return round_round(shapes[0][0][a], shapes[0][0][b], d)
 
 
 @inlined
 def two_shapes_by_hand(shape_a, a, shape_b, b, d, shapes, like):
-    """The same for discs and spheres."""
+    """The narrow phase function for discs and spheres, by hand."""
     one = shapes[0][0][a] if shape_a == 0 else shapes[1][0][a]
     two = shapes[0][0][b] if shape_b == 0 else shapes[1][0][b]
     return round_round(one, two, d)
@@ -98,7 +97,7 @@ BY_HAND = {"discs": one_shape_by_hand, "discs and spheres": two_shapes_by_hand}
 
 @dataclass
 class PairCost:
-    """One scene: nanoseconds per candidate of both kernels, and how many times the one takes as long as the other."""
+    """One scene: nanoseconds per candidate of both kernels, and the ratio of their times."""
 
     scene: str
     dimensions: int
@@ -109,7 +108,7 @@ class PairCost:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         spreads = {name: Spread.from_dict(plain[name]) for name in ("registered", "by_hand", "ratio")}
         return cls(**{**plain, **spreads})
 
@@ -128,7 +127,7 @@ class PairCosts:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "costs": [PairCost.from_dict(cost) for cost in plain["costs"]]})
 
 
@@ -187,7 +186,7 @@ def _world(scene: str, dimensions: int, seed: int, bodies: int) -> World:
 
 
 def _recorded(world: World) -> tuple[Any, tuple[Any, ...]]:
-    """The kernel that the world's narrow phase calls for its candidates, and the arguments."""
+    """The kernel that the world's narrow phase calls for its candidates, and its arguments."""
     state: Any = world.physics
     world.run(Phase.INTEGRATION)
     world.run(Phase.BROAD)
@@ -205,12 +204,12 @@ def _recorded(world: World) -> tuple[Any, tuple[Any, ...]]:
     (arguments,) = calls
     names = list(inspect.signature(getattr(kernel, "py_func", kernel)).parameters)
     arguments = list(arguments)
-    arguments[names.index("dt")] = world.settings.dt  # phase by phase nothing moves, and then it looks for less
+    arguments[names.index("dt")] = world.settings.dt  # outside a step nothing moves: the search is smaller
     return kernel, tuple(arguments)
 
 
 def _same(registered: Any, by_hand: Any, states: list[tuple[Any, ...]]) -> None:
-    """Compile both, and see that they find the same; Problem if not."""
+    """Compile both kernels and check that they find the same contacts; Problem if not."""
     for arguments in states:
         if registered(*arguments) != by_hand(*arguments):
             raise Problem("the pair written by hand finds other contacts than the registered one")

@@ -1,4 +1,4 @@
-"""Questions timed: a thousand at once as carom takes them in an array, against one by one as pymunk takes them."""
+"""Times of queries: carom answers 1,000 in one array call, pymunk answers them one by one."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ...engines.pymunk_space import PymunkSpace
 from ...measure.body_shapes import Floats
 from ...measure.timing import no_garbage_collection, timed
 
-ROUNDS = 5  # of 1,000 questions each, from other places; the engines take turns
+ROUNDS = 5  # of 1,000 queries each, at different places; the engines alternate
 BOX_SIDE, REACH = 4.0, 2.0  # m
 EDGE = 0.02  # m from the wall: the discs at rest start farther away
 
 
 @dataclass(frozen=True)
-class Question:
-    """One kind: ``own`` asks a World, ``peer`` a PymunkSpace, about places (m, 2) in a box of that side.
+class Query:
+    """One kind of query: ``own`` runs it on a World, ``peer`` on a PymunkSpace, at places (m, 2) in a box of that side.
 
-    Both return one number about all the answers, which shows that they mean the same; ``figure`` is its name.
+    Both return one number over all results, which must agree between the engines; ``figure`` is its name.
     """
 
     COUNT: ClassVar[int] = player_query.QUERIES
@@ -59,7 +59,7 @@ def _peer_nearest(space: PymunkSpace, places: Floats, side: float) -> float:
 
 
 def _rays(places: Floats, side: float) -> tuple[Floats, Floats]:
-    """From one side of the box to the other, at heights that the places give; both ends (m, 2), outside all discs."""
+    """Rays from one side of the box to the other at the heights of the places; both ends (m, 2), outside all discs."""
     ends = np.full((2, *places.shape), EDGE)
     ends[:, :, 1] = places.T
     ends[1, :, 0] = side - EDGE
@@ -77,41 +77,41 @@ def _peer_rays(space: PymunkSpace, places: Floats, side: float) -> float:
     return float(np.mean(space.rays(starts, ends)))
 
 
-QUESTIONS = (
-    Question("box 4 x 4", "hits", _own_boxes, _peer_boxes),
-    Question("disc r = 2", "hits", _own_spheres, _peer_spheres),
-    Question("nearest within 2", "mean distance", _own_nearest, _peer_nearest),
-    Question("ray across", "share of the way", _own_rays, _peer_rays),
+QUERIES = (
+    Query("box 4 x 4", "hits", _own_boxes, _peer_boxes),
+    Query("disc r = 2", "hits", _own_spheres, _peer_spheres),
+    Query("nearest within 2", "mean distance", _own_nearest, _peer_nearest),
+    Query("ray across", "share of the way", _own_rays, _peer_rays),
 )
 
 
-def ask_all(
+def time_queries(
     world: World, engines: dict[str, Any], bodies: int, seed: int
 ) -> dict[str, dict[str, tuple[float, dict[str, float]]]]:
-    """By question and engine: seconds per 1,000, and the answers' figure, both as means of the rounds.
+    """By query and engine: seconds per 1,000, and the figure of the results; both are means over the rounds.
 
-    ``engines``: "carom" and pymunk spaces. Each round follows a step of all engines, as in a game, so what carom
-    builds for the first question after a step is part of its time; pymunk has built its tree in the step.
+    ``engines``: "carom" and pymunk spaces. Each round follows a step of all engines, as in a game, so the time includes
+    what carom builds for the first query after a step; pymunk has built its tree in the step.
     """
     side = gas.side(bodies, 2)
-    return {question.name: _ask(question, world, engines, bodies, side, seed) for question in QUESTIONS}
+    return {query.name: _time_query(query, world, engines, bodies, side, seed) for query in QUERIES}
 
 
-def _ask(
-    question: Question, world: World, engines: dict[str, Any], bodies: int, side: float, seed: int
+def _time_query(
+    query: Query, world: World, engines: dict[str, Any], bodies: int, side: float, seed: int
 ) -> dict[str, tuple[float, dict[str, float]]]:
     names = list(engines)
     seconds, figures = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0)
-    for number in range(ROUNDS + 1):  # the first one compiles and is not counted
-        places = player_query.places(bodies, Question.COUNT, seed * (ROUNDS + 1) + number)
+    for number in range(ROUNDS + 1):  # the first round compiles and is not counted
+        places = player_query.places(bodies, Query.COUNT, seed * (ROUNDS + 1) + number)
         for engine in engines.values():
             engine.step(1)
         turn = number % len(names)
         for name in names[turn:] + names[:turn]:
-            work = partial(question.own, world) if name == "carom" else partial(question.peer, engines[name])
+            work = partial(query.own, world) if name == "carom" else partial(query.peer, engines[name])
             with no_garbage_collection():
                 took, _, answer = timed(partial(work, places, side))
             if number:
                 seconds[name] += took / ROUNDS
                 figures[name] += answer / ROUNDS
-    return {name: (seconds[name], {question.figure: figures[name]}) for name in names}
+    return {name: (seconds[name], {query.figure: figures[name]}) for name in names}

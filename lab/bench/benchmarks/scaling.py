@@ -1,6 +1,6 @@
-"""How the time per body grows with the number of bodies: the gas, from small to large.
+"""Growth of the time per body with the number of bodies, measured with the gas.
 
-With perfect scaling the nanoseconds per body and step stay the same; caches and search trees make them grow.
+With perfect scaling the nanoseconds per body and step are constant; cache misses and deeper trees increase them.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from ..results import machine
 SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 LARGEST = 1_000_000
 WARM_UP_STEPS = 10
-BODY_STEPS = 1_500_000  # a repeat: about as long for few bodies as for many
+BODY_STEPS = 1_500_000  # per repeat: about the same time at every size
 FEWEST_STEPS, MOST_STEPS = 10, 1500
-TARGET = (10_000, 100_000, 2.5)  # from, to, and by how much the time per body may grow
+TARGET = (10_000, 100_000, 2.5)  # from, to, largest allowed growth of the time per body
 
 
 @dataclass
 class Point:
-    """One size: nanoseconds per body per step, and how often those of the first size."""
+    """One size: nanoseconds per body per step, and the ratio to the first size."""
 
     bodies: int
     steps: int
@@ -37,7 +37,7 @@ class Point:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "nanoseconds": Spread.from_dict(plain["nanoseconds"])})
 
 
@@ -56,7 +56,7 @@ class Scaling:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "points": [Point.from_dict(point) for point in plain["points"]]})
 
     def grown(self, first: int, last: int) -> float | None:
@@ -68,7 +68,7 @@ class Scaling:
 def scaling(
     sizes: tuple[int, ...] = SIZES, repeats: int = 3, progress: Progress = NO_PROGRESS, body_steps: int = BODY_STEPS
 ) -> Scaling:
-    """Time the gas of each size, all sizes once a repeat, each repeat from another seed."""
+    """Time the gas at each size, all sizes once per repeat, with another seed in each repeat."""
     sizes = tuple(sorted(set(sizes)))
     found: dict[int, list[float]] = {n: [] for n in sizes}
     progress.begin(sum(_steps(n, body_steps) * n for n in sizes) * repeats)
@@ -96,7 +96,7 @@ def _time(n: int, seed: int, steps: int) -> float:
                 world.step()
 
         take(WARM_UP_STEPS)
-        for _ in range(2):  # a kernel that came only now is there the second time
+        for _ in range(2):  # kernels loaded during the first try are ready in the second
             with no_garbage_collection():
                 seconds, counts, _ = timed(lambda: take(steps))
             if counts:

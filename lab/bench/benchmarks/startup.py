@@ -1,4 +1,4 @@
-"""How long a new process takes to its first step: with an empty cache of machine code, and with a filled one."""
+"""Time from the start of a new process to the end of its first step, with an empty and with a filled kernel cache."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ class Startup:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "seconds": {name: Spread.from_dict(s) for name, s in plain["seconds"].items()}})
 
 
 def startup(scene: str = "gas2d", repeats: int = 3, progress: Progress = NO_PROGRESS) -> Startup:
-    """Start processes that build ``scene`` and take one step; each repeat begins with an empty cache folder."""
+    """Start processes that build ``scene`` and take one step; each repeat starts with an empty cache folder."""
     program = PROGRAM.format(scene=scene)
     found: dict[str, list[float]] = {"empty cache": [], "warm cache": [], "import alone": []}
     progress.begin(repeats)
