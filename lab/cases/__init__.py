@@ -1,4 +1,4 @@
-"""What is to be measured: scenes as subjects, their norms and reference results, and the grid of settings to try.
+"""What to measure: scenes as subjects, their norms and reference results, and the grid of settings to try.
 
-Reads the library of scenes, files of the user, closed forms and published results. Writes the case that jobs run.
+Reads the scene library, user files, closed forms and published results. Writes the case that jobs run.
 """

@@ -1,6 +1,6 @@
-"""Cases: what is measured of a scene, with which norms, for how long, how often, and against what.
+"""Cases: a scene with its norms, duration, repeats, steps and reference.
 
-Scenes whose answer is known have a case of their own here; any other gets one from its survey.
+Scenes with a known answer have a case defined here; any other scene gets one from its survey.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from . import grid as grids
 from .closed_forms import FORMS
 from .subjects import Subject, subject_of
 
-PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 1, CHAOTIC: 5}  # repeats; of chaotic scenes they are seeds
-BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare a run with one run
+PHASES = {SMOOTH: 4, IMPACTS: 64, RESTING: 1, CHAOTIC: 5}  # repeats; for chaotic scenes these are seeds
+BY_BODY = ("position", "impact_time", "count", "apex")  # norms that compare single runs
 OF_CONTACTS = ("impact_time", "count", "overlap", "overlap_mean", "pressure", "rate")
-FINER = 8  # times smaller than the smallest step are those of the own references
-FEWEST_STEPS = 3  # of a run
-MOST_REFINED = 2  # times
+FINER = 8  # own references use steps this many times smaller than the smallest measured step
+FEWEST_STEPS = 3  # per run
+MOST_REFINED = 2  # refinements of a reference at most
 QUICK_REPEATS = 8
 
 
 @dataclass(frozen=True)
 class Known:
-    """What the library knows of a scene: anything left None comes from the survey.
+    """What the library knows about a scene; fields that are None come from the survey.
 
     orders
-        (integrator, norm, order) of methods that do better than theory promises in general, at the end of ``seconds``
+        (integrator, norm, order) of methods with a higher order than theory gives in general, at the end of ``seconds``
     """
 
     seconds: float | None = None
@@ -51,9 +51,9 @@ def _halved(largest: float, count: int) -> tuple[float, ...]:
 
 KNOWN: Mapping[str, Known] = {
     "jump": Known(1.0, ("apex", "position", "energy"), steps=_halved(1 / 15, 6)),
-    "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # not at a turn, where phase errors hide
-    # Semi-implicit Euler is velocity Verlet seen half a step aside (Hairer, Lubich, Wanner: Geometric Numerical
-    # Integration, VI.3): at the perihelion, where it starts, that shift has no energy, after whole turns no length.
+    "spring": Known(5.2, ("position", "energy"), steps=_halved(1 / 15, 8)),  # a turning point would hide phase errors
+    # Semi-implicit Euler is velocity Verlet shifted by half a step (Hairer, Lubich, Wanner: Geometric Numerical
+    # Integration, VI.3). At the perihelion, the start, that shift changes no energy, and after whole orbits no length.
     "orbit": Known(
         20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8),
         orders=(("semi_implicit_euler", "position", 2.0),),
@@ -74,9 +74,9 @@ class Case:
     """One scene ready to be measured.
 
     reference
-        what a closed form gives; None: own fine runs decide
+        the result of a closed form; None: fine runs of carom are the reference
     reference_cells
-        of the own runs: two methods, and the first with twice its step where the scene is not chaotic
+        of these fine runs: two methods, and unless the scene is chaotic the first one with twice its step
     orders
         as in ``Known``
     """
@@ -104,39 +104,39 @@ class Case:
         return f"{self.repeats} {self.repeated if self.repeats > 1 else self.repeated[:-1]}"
 
     def theory(self, cell: Cell, norm: str) -> float | None:
-        """The order that the method should show in this norm, as ``grids.theory``."""
+        """The order of accuracy expected of the method in this norm, as ``grids.theory``."""
         for integrator, name, order in self.orders:
             if (cell.engine, cell.integrator, name) == (CAROM, integrator, norm):
                 return order
         return grids.theory(cell, norm, self.survey)
 
     def phase(self, repeat: int) -> float:
-        """The length of the first step of that repeat, in steps."""
+        """The length of the first step of that repeat, as a fraction of a step."""
         return 1.0 if self.kind == CHAOTIC else 1.0 - repeat / self.repeats
 
     def replace(self, **changes: Any) -> Case:
         return dataclasses.replace(self, **changes)
 
     def quick(self, fewer_steps: bool = True, fewer_repeats: bool = True) -> Case:
-        """Every second step, and a few repeats: a first look."""
+        """The case with every second step and few repeats, for a quick look."""
         steps = self.steps[::2] if fewer_steps else self.steps
         repeats = min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats
         return self.replace(steps=steps, repeats=repeats)._with_reference_step(steps[-1] / FINER)
 
     def _with_reference_step(self, dt: float) -> Case:
-        """The same with other steps in its own references; those of chaotic scenes stay."""
+        """The case with other steps in its own references; those of chaotic scenes do not change."""
         if self.kind == CHAOTIC or not self.reference_cells:
             return self
         cells = [dataclasses.replace(cell, dt=dt) for cell in self.reference_cells[:2]]
         return self.replace(reference_cells=with_twice_the_step(cells), reference=None)
 
     def coarse_reference(self) -> Case:
-        """The same with the largest steps that its own references may have, where smooth motion makes them converge."""
+        """The case with the largest steps allowed in its own references, where smooth motion lets them converge."""
         coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
         return self._with_reference_step(coarse) if self.kind == SMOOTH else self
 
     def finer_reference(self) -> Case | None:
-        """The same with smaller steps in its own references; None where that has been tried often enough."""
+        """The case with smaller steps in its own references; None after MOST_REFINED refinements."""
         if self.kind == CHAOTIC or not self.reference_cells:
             return None
         finer = self.reference_cells[0].dt / FINER
@@ -153,10 +153,10 @@ def case_of(
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> Case:
-    """A case for a scene's name, a file, or a function build(settings, seed=0) -> World.
+    """A case for a scene name, a file, or a function build(settings, seed=0) -> World.
 
-    norms: the first decides; seconds: of each run; repeats; steps: s, from which the grid is made. What is not given
-    comes from the library or from a survey of the scene. Problem for a scene that cannot be measured.
+    norms: the first is the main one; seconds: of each run; repeats; steps: s, the step lengths of the grid. Values not
+    given come from the library or from a survey of the scene. Problem for a scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
     known = KNOWN.get(target, Known()) if isinstance(target, str) else Known()
@@ -195,7 +195,7 @@ def case_of(
 def check_arguments(
     norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None, steps: Sequence[float] = ()
 ) -> None:
-    """ValueError, TypeError or Problem for what no case can have."""
+    """Raise ValueError, TypeError or Problem for arguments that no case can have."""
     if isinstance(norms, str):
         raise TypeError(f"norms must be a sequence of names, got {norms!r}")
     for name in norms:
@@ -210,7 +210,7 @@ def check_arguments(
 
 
 def _fitting(steps: Sequence[float], seconds: float) -> tuple[float, ...]:
-    """From the largest to the smallest, without those that a run has no room for; Problem if none is left."""
+    """Steps from largest to smallest, without those too long for the run; Problem if none is left."""
     largest = seconds / FEWEST_STEPS
     fitting = tuple(sorted({dt for dt in steps if dt <= largest}, reverse=True))
     if not fitting:
@@ -219,13 +219,13 @@ def _fitting(steps: Sequence[float], seconds: float) -> tuple[float, ...]:
 
 
 def _repeats(kind: str, norms: Sequence[str]) -> int:
-    """Where within a step the highest point lies decides how much of it is seen: the worst of a few would flatter."""
+    """An apex norm needs many start phases: the error depends on where in a step the apex lies."""
     return max(PHASES[kind], PHASES[IMPACTS]) if "apex" in norms else PHASES[kind]
 
 
 def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[str]) -> tuple[str, Seen | None]:
-    """The name of the closed form and what it gives, if it tells all the norms; rest needs none, for its right answer
-    is 0."""
+    """Name and result of the closed form, if it defines all the norms. Scenes at rest need none: the right answer is
+    0."""
     form = FORMS.get(subject.target)
     if form is None or (subject.target == "jump" and kind != SMOOTH):
         return "", None
@@ -238,16 +238,16 @@ def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[st
 
 
 def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
-    """Two methods that share as little as possible, with a step far below the smallest one measured; and, of what is
-    not chaotic, the first one with twice that step, for what both may get wrong together."""
+    """Two methods that share as little as possible, with steps far below the smallest one measured. Unless the scene is
+    chaotic, also the first method with twice that step, to detect errors that both methods share."""
     own = facts.settings
     fine = ladder[-1] / FINER
-    if facts.kind == CHAOTIC:  # long runs; the step does not matter where nothing bends the paths
+    if facts.kind == CHAOTIC:  # long runs; without forces the step does not affect the paths
         fine = ladder[0] / 2 if not facts.forces and not facts.damping else ladder[-1]
         pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
     elif facts.force_systems and not facts.contacts:
         pairs = (("yoshida4", own.collision), ("rk4", own.collision))
-    elif facts.force_systems:  # two kinds of sweeps: both on a bent path would be wrong together
+    elif facts.force_systems:  # two kinds of sweep: both could make the same error on a curved path
         pairs = (("yoshida4", "continuous"), ("velocity_verlet", "event_driven"))
     else:
         pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
@@ -256,5 +256,5 @@ def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
 
 
 def with_twice_the_step(cells: Sequence[Cell]) -> tuple[Cell, ...]:
-    """Two cells, and the first with twice the step."""
+    """The two cells, and the first one with twice its step."""
     return (*cells, dataclasses.replace(cells[0], dt=2 * cells[0].dt))

@@ -1,4 +1,4 @@
-"""Right answers on paper: what scenes of the library must show, computed without a step."""
+"""Reference results in closed form for scenes of the library, computed without a step."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..measure.body_shapes import Floats
 from ..measure.observation import Seen
 from ..testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
 
-SAMPLES = 2000  # of a path, for its farthest point
-Path = Callable[[float], Floats]  # seconds to positions (n, d)
+SAMPLES = 2000  # of a path, to find the largest displacement
+Path = Callable[[float], Floats]  # maps seconds to positions (n, d)
 
 
 def _start(world: World) -> tuple[Floats, Floats, Floats]:
-    """Positions, velocities (n, d) and masses (n,) of the dynamic bodies by entity id."""
+    """Positions, velocities (n, d) and masses (n,) of the dynamic bodies, by entity id."""
     dynamic = world.bodies.dynamic
     order = np.argsort(dynamic.entity, kind="stable")
     position, velocity, mass = dynamic.position, dynamic.linear_velocity, dynamic.mass
@@ -27,7 +27,7 @@ def _start(world: World) -> tuple[Floats, Floats, Floats]:
 
 
 def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[float], **found: Any) -> Seen:
-    """What the path shows. The energy stays what it is: all scenes here are conservative."""
+    """What a run on this path would show. The energy is constant: all scenes here are conservative."""
     start = path(0.0)
     places = np.array([path(t) for t in np.linspace(0.0, seconds, SAMPLES)])
     energy = world.kinetic_energy() + world.potential_energy()
@@ -46,7 +46,7 @@ def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[fl
 
 
 def flight(world: World, seconds: float) -> Seen:
-    """Parabolas that meet nothing; the apex is v^2 / 2g."""
+    """Parabolas without contacts; the apex is v^2 / 2g."""
     x, v, _ = _start(world)
     gravity = np.asarray(world.gravity, float)
     size = float(np.linalg.norm(gravity))
@@ -56,7 +56,7 @@ def flight(world: World, seconds: float) -> Seen:
 
 
 def swinging(world: World, seconds: float) -> Seen:
-    """The undamped spring of the scene: x(t) = x0 cos(w t); all energy is kinetic in the middle."""
+    """The undamped spring of the scene: x(t) = x0 cos(w t); at the centre all energy is kinetic."""
     x, v, mass = _start(world)
     stiffness = world.force_systems[0].stiffness  # type: ignore[attr-defined]
     total = world.kinetic_energy() + world.potential_energy()
@@ -66,7 +66,7 @@ def swinging(world: World, seconds: float) -> Seen:
 
 
 def kepler(world: World, seconds: float) -> Seen:
-    """An ellipse around the origin, GM = 1, from its perihelion on the x axis, by Kepler's equation M = E - e sin E."""
+    """An ellipse around the origin, GM = 1, from the perihelion on the x axis, by Kepler's equation M = E - e sin E."""
     x, v, _ = _start(world)
     near, speed = float(x[0, 0]), float(v[0, 1])
     axis = 1 / (2 / near - speed**2)
@@ -76,7 +76,7 @@ def kepler(world: World, seconds: float) -> Seen:
     def path(t: float) -> Floats:
         mean = mean_motion * t
         anomaly = mean + e * math.sin(mean)
-        for _ in range(50):  # Newton; e < 1 converges
+        for _ in range(50):  # Newton's method; converges for e < 1
             anomaly -= (anomaly - e * math.sin(anomaly) - mean) / (1 - e * math.cos(anomaly))
         return axis * np.array([[math.cos(anomaly) - e, math.sqrt(1 - e * e) * math.sin(anomaly)]])
 
@@ -84,7 +84,7 @@ def kepler(world: World, seconds: float) -> Seen:
 
 
 def bounces(world: World, seconds: float) -> Seen:
-    """Elastic balls, dropped from rest: each flight is the one before, mirrored in time."""
+    """Elastic balls dropped from rest: each flight is the previous one mirrored in time."""
     x, _, mass = _start(world)
     g = -float(np.asarray(world.gravity)[1])
     radius = 0.1
@@ -101,7 +101,7 @@ def bounces(world: World, seconds: float) -> Seen:
 
 
 def one_impact(world: World, seconds: float) -> Seen:
-    """Two discs of radius 1/2, equal and elastic as the scene has them: straight lines with one corner each."""
+    """Two equal elastic discs of radius 1/2, as in the scene: straight lines with one corner each."""
     x, v, mass = _start(world)
     when = impact_time(x[0], v[0], x[1], v[1], 1.0)
     touch = x + when * v
@@ -116,7 +116,7 @@ def one_impact(world: World, seconds: float) -> Seen:
 
 @dataclass(frozen=True)
 class Form:
-    """``options``: keywords of the scene that it knows how to follow."""
+    """``options``: keywords of the scene that the closed form supports."""
 
     text: str
     function: Callable[[World, float], Seen]

@@ -1,8 +1,8 @@
-"""The grid of settings worth trying in a scene, and the order of accuracy that theory gives to each method.
+"""The grid of settings worth trying in a scene, and each method's theoretical order of accuracy.
 
-Dials that change nothing in a scene are left alone: without force systems velocity Verlet, Runge-Kutta 4 and Yoshida 4
-are one method, without any force all five are; substeps matter where something rests, geometry where bodies have
-levels, the kind of collision where something touches; what is driven by events has an integrator of its own.
+Settings without effect in a scene are not varied. Without force systems velocity Verlet, Runge-Kutta 4 and Yoshida 4
+are one method; without any force all five are. Substeps matter for contacts at rest, geometry for bodies with levels,
+the collision mode for scenes with contacts. Event-driven worlds have an integrator of their own.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ALL_METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4"
 CONSTANT_FORCE = ("explicit_euler", "semi_implicit_euler", "velocity_verlet")
 COLLISIONS = ("discrete", "continuous", "event_driven")
 SUBSTEPS = (1, 2, 4, 8, 16, 32)
-ITERATIONS = (10, 50)  # of pymunk's solver: its default, and what it takes to hold a stack
+ITERATIONS = (10, 50)  # of pymunk's solver: its default, and the number needed to hold a stack
 SLOWEST = 1 / 15  # s: the largest step of a game
 HALVINGS = 7
 ORDER = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "rk4": 4, "yoshida4": 4}
@@ -26,7 +26,7 @@ OF_STATE = ("position", "energy", "kinetic")
 
 
 def steps_for(survey: Survey) -> tuple[float, ...]:
-    """From 1/15 s, or four times what the scene recommends, downwards; each half of the one before."""
+    """Steps from 1/15 s, or from four times the scene's recommended step, each half of the one before."""
     largest = max(SLOWEST, 4 * survey.settings.dt)
     smallest = min(largest / 2**HALVINGS, survey.settings.dt / 4)
     count = math.ceil(math.log2(largest / smallest)) + 1
@@ -38,10 +38,10 @@ def methods(survey: Survey) -> tuple[Cell, ...]:
     own = survey.settings
     base = Cell(1.0, own.integrator, own.collision, own.substeps, own.geometry)
     integrators = ALL_METHODS if survey.force_systems else CONSTANT_FORCE
-    if survey.kind == RESTING or (not survey.forces and not survey.damping):  # at rest the solver decides
+    if survey.kind == RESTING or (not survey.forces and not survey.damping):  # at rest the solver determines the result
         integrators = (own.integrator,)
     if own.integrator not in integrators and own.integrator not in ALL_METHODS:
-        integrators = (*integrators, own.integrator)  # a plugin's
+        integrators = (*integrators, own.integrator)  # from a plugin
     collisions = COLLISIONS if survey.contacts else (own.collision,)
     substeps = SUBSTEPS if survey.kind == RESTING else (own.substeps,)
     geometries = ("precise", "bounds") if survey.levels else (own.geometry,)
@@ -58,7 +58,7 @@ def methods(survey: Survey) -> tuple[Cell, ...]:
 
 
 def with_own_flight(cell: Cell) -> Cell:
-    """What is driven by events flies its own way, whatever the integrator: named after the one that it resembles."""
+    """Name an event-driven cell after the integrator its flight resembles; it ignores the integrator setting."""
     return dataclasses.replace(cell, integrator="velocity_verlet") if cell.collision == "event_driven" else cell
 
 
@@ -73,11 +73,11 @@ def grid(curves: Sequence[Cell], steps: Sequence[float]) -> tuple[Cell, ...]:
 
 
 def theory(cell: Cell, norm: str, survey: Survey) -> float | None:
-    """The order in dt that the method should show in this norm; inf: exact but for rounding; None: nobody knows.
+    """The order in dt expected of the method in this norm; inf: exact up to rounding; None: unknown.
 
-    Impacts are found at their true time in continuous and event-driven worlds, so the flight between them decides;
-    contacts at rest give way with the square of the step; a highest point that is looked for at steps only is missed by
-    g dt^2 / 8 at most.
+    Continuous and event-driven worlds find impacts at their true time, so the flight between impacts sets the order.
+    The error of contacts at rest scales with the square of the step. An apex sampled at steps only is missed by at most
+    g dt^2 / 8.
     """
     if cell.engine != CAROM:
         return _of_pymunk(norm, survey)
@@ -91,14 +91,14 @@ def theory(cell: Cell, norm: str, survey: Survey) -> float | None:
     if survey.kind == SMOOTH:
         return _of_smooth(cell, norm, flight)
     if flight == math.inf:
-        return None if cell.collision == "discrete" else math.inf  # a discrete world misses grazes
+        return None if cell.collision == "discrete" else math.inf  # discrete worlds miss grazing impacts
     if survey.kind == CHAOTIC:
         return None
     return {"energy": flight, "position": flight, "energy_square": 2 * flight}.get(norm) if flight == 1 else None
 
 
 def _of_flight(cell: Cell, survey: Survey) -> float | None:
-    """Of the position, between impacts."""
+    """The order of the position between impacts."""
     if not survey.forces and not survey.damping:
         return math.inf
     order = 2 if cell.collision == "event_driven" else ORDER.get(cell.integrator)
@@ -116,7 +116,7 @@ def _of_smooth(cell: Cell, norm: str, flight: float) -> float | None:
 
 
 def _of_pymunk(norm: str, survey: Survey) -> float | None:
-    """It moves as explicit Euler does under gravity (measured), and sees impacts at the ends of steps: both order 1."""
+    """pymunk moves like explicit Euler under gravity (measured) and detects impacts at step ends: both order 1."""
     first = {SMOOTH: ("position", "apex"), IMPACTS: ("energy",), CHAOTIC: ("pressure", "rate")}
     if survey.kind == IMPACTS and norm == "energy_square":
         return 2.0

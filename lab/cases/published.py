@@ -1,11 +1,11 @@
-"""Errors and times that others have published for scenes of this library, to stand on the same axes as our own."""
+"""Published errors and times for scenes of this library, for comparison on the same axes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-SCENE, NORM = "bouncing", "energy_square"  # what the points belong to; the norm is a mean of squares, in J²
-SECONDS = 20.0  # simulated, of the times below
+SCENE, NORM = "bouncing", "energy_square"  # where the points belong; the norm is a mean of squares, in J²
+SECONDS = 20.0  # simulated time that the published times are for
 ERROR_UNIT = "J²"
 
 SOURCE = (
@@ -25,7 +25,7 @@ class PublishedPoint:
 
 
 def _points(engine: str, *rows: tuple[float, float, float]) -> list[PublishedPoint]:
-    """Of (dt in s, error in J², processor seconds for all of SECONDS)."""
+    """Points from (dt in s, error in J², processor seconds for all of SECONDS)."""
     return [PublishedPoint(engine, dt, error, 1000 * spent / SECONDS) for dt, error, spent in rows]
 
 
@@ -44,5 +44,5 @@ BOUNCING = [
 
 
 def published(scene: str, norm: str) -> list[PublishedPoint]:
-    """The points for this scene and norm; none for most."""
+    """The points for this scene and norm; none for most scenes."""
     return list(BOUNCING) if (scene, norm) == (SCENE, NORM) else []

@@ -1,4 +1,4 @@
-"""What is measured: a scene of the library, a file, or a function of the caller's, built anew for each run."""
+"""What is measured: a scene of the library, a file, or a caller's function, rebuilt for each run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ... import scenes
 from ...framework import Settings, World
 from ..commands.loading import Loaded, load
 
-DEFAULT_SECONDS = 5.0  # of what does not say
+DEFAULT_SECONDS = 5.0  # if the subject does not define it
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Subject:
     seed: int = 0
 
     def world(self, settings: Settings | None, seed: int | None = None) -> World:
-        """A new world; Problem for what goes wrong in somebody's file. settings None: the recommended ones."""
+        """A new world; Problem for errors in a user's file. settings None: the recommended ones."""
         return self._loaded.build(settings, {}, self.seed if seed is None else seed)
 
-    def blamed(self) -> contextlib.AbstractContextManager[None]:
-        """What is raised inside becomes a Problem that names the line of the file it came from."""
-        return self._loaded.blame()
+    def attribute_errors(self) -> contextlib.AbstractContextManager[None]:
+        """Convert exceptions raised inside to a Problem that names the line of the user's file."""
+        return self._loaded.attribute_errors()
 
     @property
     def _loaded(self) -> Loaded:
@@ -55,7 +55,7 @@ class Subject:
 
     @property
     def recommended(self) -> tuple[float, Any]:
-        """Seconds that the scene or file recommends, and its view or None."""
+        """The seconds that the scene or file recommends, and its view or None."""
         if self.build is not None:
             return DEFAULT_SECONDS, None
         loaded = _load_once(self.target)
@@ -63,7 +63,7 @@ class Subject:
 
     @property
     def description(self) -> str:
-        """One line of the library, of the file's docstring, or of the function's."""
+        """One line from the library, the file's docstring or the function's docstring."""
         if self.build is not None:
             return _first_line(self.build.__doc__)
         if self.target in scenes.names():
@@ -73,7 +73,7 @@ class Subject:
 
     @functools.cached_property
     def mark(self) -> str:
-        """What tells its results from those of another scene, file content or version of carom."""
+        """Identifies its results: differs between scenes, file contents and versions of carom."""
         text = repr((self.name, self.target, self.options, self.seed, importlib.metadata.version("carom")))
         if self.build is not None:
             text += _source_of(self.build)
@@ -83,7 +83,7 @@ class Subject:
 
 
 def _text_around(file: Path | None) -> str:
-    """That of the file and of the modules it has imported from its own folder."""
+    """The text of the file and of the modules it has imported from its folder."""
     if file is None:
         return ""
     places = {Path(found) for module in list(sys.modules.values()) if (found := getattr(module, "__file__", None))}
@@ -93,8 +93,8 @@ def _text_around(file: Path | None) -> str:
 
 
 def _source_of(function: Any) -> str:
-    """What tells it from other functions, and from itself after a change: its module's text or its code, its name, and
-    what it closes over. Values that do not show themselves in their repr make it another one each time, which is safe.
+    """Identifies a function and its version: module text or code, name, and closed-over values. Values whose repr does
+    not show their contents give a different text each time, which is safe: results are not reused.
     """
     code = getattr(function, "__code__", None)
     try:
@@ -111,7 +111,7 @@ def _source_of(function: Any) -> str:
 
 
 def _load_once(target: str) -> Loaded:
-    """A file again only if it has changed."""
+    """Load a file; load it again only if it has changed."""
     path = Path(target)
     if target in scenes.names() or not path.is_file():
         return load(target)
@@ -120,7 +120,7 @@ def _load_once(target: str) -> Loaded:
 
 @functools.lru_cache(maxsize=32)
 def _load_file(place: str, target: str, changed: int) -> Loaded:
-    del place, changed  # tell two files of one name, or of two times, apart
+    del place, changed  # in the cache key only: distinguish files of one name, and versions of one file
     return load(target)
 
 
