@@ -181,7 +181,7 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
 def _run_with_progress(
     loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool
 ) -> Run:
-    with StepProgress(screen, loaded.name, steps) as progress, loaded.blame(), stdout_kept_clean():
+    with StepProgress(screen, loaded.name, steps) as progress, loaded.attribute_errors(), stdout_kept_clean():
         return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done, profile=profile)
 
 

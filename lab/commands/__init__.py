@@ -1,5 +1,5 @@
-"""What all commands of the command line share: the click group, options, choices, errors, loading of scenes and files.
+"""Shared parts of all commands: the click group, options, choices, errors, loading of scenes and files.
 
-Reads the arguments of a command. Hands out worlds, settings and plugins, or says in one line what is wrong. The
-commands ``plan`` and ``warm-up`` are here too; each study has its command in its own folder.
+Reads a command's arguments. Returns worlds, settings and plugins, or reports errors in one line. The commands ``plan``
+and ``warm-up`` are here too; each study has its command in its own folder.
 """

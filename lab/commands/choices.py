@@ -1,4 +1,4 @@
-"""Settings from the command line: a preset by name, and ``--set field=value`` typed as Settings says."""
+"""Settings from the command line: a preset by name, and ``--set field=value`` parsed by the field's type."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ WORDS_FOR_BOOL = {
 
 
 def preset(name: str) -> Settings:
-    """The Settings of that name; Problem for an unknown one."""
+    """The Settings preset of that name; Problem for an unknown name."""
     if name not in PRESETS:
         raise Problem(f"no preset named {name!r}{did_you_mean(name, PRESETS)}")
     return getattr(Settings, name)()
@@ -65,7 +65,7 @@ def parse_view(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def apply(settings: Settings, values: dict[str, Any]) -> Settings:
-    """``settings`` with ``values`` in place; Problem with the message of Settings where it refuses one."""
+    """``settings`` with ``values`` replaced; Problem with the message of Settings if it rejects one."""
     try:
         return dataclasses.replace(settings, **values)
     except (ValueError, TypeError) as error:
@@ -73,7 +73,7 @@ def apply(settings: Settings, values: dict[str, Any]) -> Settings:
 
 
 def _parse(name: str, text: str, hint: Any) -> Any:
-    """``text`` as the first of the hint's types that takes it."""
+    """``text`` as the first of the hint's types that accepts it."""
     kinds = _kinds(hint)
     for kind in kinds:
         try:
@@ -89,7 +89,7 @@ def _parse(name: str, text: str, hint: Any) -> Any:
 
 
 def _kinds(hint: Any) -> list[Any]:
-    """The members of a union, flat; a plain string last, for it takes everything."""
+    """The members of a union, flattened; a plain string last, because it accepts any text."""
     origin = typing.get_origin(hint)
     if origin in (typing.Union, types.UnionType):
         members = [kind for member in typing.get_args(hint) for kind in _kinds(member)]
@@ -118,11 +118,11 @@ def _as_kind(text: str, kind: Any) -> Any:
         return float(_fraction(text)) if "/" in text else float(text)
     if kind is str:
         return text
-    raise ValueError  # a type that has no spelling on a command line
+    raise ValueError  # a type that cannot be written on a command line
 
 
 def _fraction(text: str) -> Fraction:
-    """1/120, exactly what a person means by a time step."""
+    """1/120 as an exact time step."""
     try:
         return Fraction(text.replace(" ", ""))
     except ZeroDivisionError:

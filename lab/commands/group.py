@@ -1,4 +1,4 @@
-"""A click group as the ``carom`` command and its parts are: errors in one line, and what was probably meant."""
+"""The click group of the ``carom`` command and its subcommands: one-line errors with suggestions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 
 from .usage_errors import Problem, did_you_mean
 
-STOPPED = 130  # the exit code of what Ctrl-C stopped
+STOPPED = 130  # exit code after Ctrl-C
 
 
 class Commands(click.Group):

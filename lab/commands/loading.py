@@ -1,4 +1,4 @@
-"""What is to be run: a scene of the library by name, or a file that defines build(settings, seed=0)."""
+"""Loading of what a command runs: a scene of the library by name, or a file that defines build(settings, seed=0)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Bounds = tuple[tuple[float, ...], tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Loaded:
-    """Something that builds worlds; ``seconds`` and ``view`` are None where nobody says."""
+    """Something that builds worlds; ``seconds`` and ``view`` are None if not defined."""
 
     name: str
     function: Any
@@ -39,7 +39,7 @@ class Loaded:
     def build(
         self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
     ) -> World:
-        """A world with ``settings`` (None: the scene's own, for a file the default), and with plugins besides its own;
+        """A world with ``settings`` (None: the scene's own; for a file the default ones) and with additional plugins;
         Problem if it fails."""
         if settings is None and self.file is not None:
             settings = Settings()
@@ -55,15 +55,15 @@ class Loaded:
             try:
                 with stdout_kept_clean():
                     world.add_plugin(plugin)
-            except Exception as error:  # its systems are made there: somebody else's code
+            except Exception as error:  # runs third-party code that creates systems
                 raise Problem(f"--plugin {plugin.name}: {one_line(error)}") from error
         if late:
-            with self.blame():
+            with self.attribute_errors():
                 world.settings = apply(world.settings, late)
         return world
 
     def _call(self, settings: Settings | None, seed: int) -> World:
-        with self.blame(), stdout_kept_clean():
+        with self.attribute_errors(), stdout_kept_clean():
             world = self.function(settings, seed=seed)
         if not isinstance(world, World):
             raise Problem(f"{self.name}: build returned {_a(world)}, not a World")
@@ -72,8 +72,8 @@ class Loaded:
         return world
 
     @contextmanager
-    def blame(self) -> Iterator[None]:
-        """Turns what is raised inside into a Problem that names the line of the user's file it came from."""
+    def attribute_errors(self) -> Iterator[None]:
+        """Convert exceptions raised inside to a Problem that names the line of the user's file."""
         try:
             yield
         except (Exception, SystemExit) as error:
@@ -83,17 +83,17 @@ class Loaded:
 
 
 def _names_for_settings(plugin: Plugin) -> list[str]:
-    """What a world's settings can name once it has the plugin."""
+    """The names that a world's settings accept once it has the plugin."""
     return [*plugin.integrators, *plugin.broad_phases, *plugin.mixing_rules]
 
 
 def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
-    """What a user's code prints goes to stderr: stdout holds the result and nothing else."""
+    """Redirect prints of user code to stderr, so that stdout holds only the result."""
     return contextlib.redirect_stdout(sys.stderr)
 
 
 def load(target: str) -> Loaded:
-    """The scene named ``target``, or the file at that path; Problem if there is neither."""
+    """The scene named ``target``, or the file at that path; Problem if neither exists."""
     if target in scenes.names():
         scene = scenes.get(target)
         return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view)
@@ -112,7 +112,7 @@ def load(target: str) -> Loaded:
 
 
 def import_file(path: Path) -> ModuleType:
-    """The module in that file, imported; Problem if there is none or it raises."""
+    """Import the module in that file; Problem if it does not exist or raises."""
     _must_exist(path)
     return _execute(path)
 
@@ -138,7 +138,7 @@ def _load_file(path: Path) -> Loaded:
 
 
 def _check_source(path: Path) -> None:
-    """A file without a build is not executed: it may be a whole game."""
+    """Problem for a file without a build; such a file is not executed, since it may be a whole game."""
     try:
         tree = ast.parse(path.read_bytes(), str(path))
     except SyntaxError as error:
@@ -159,7 +159,7 @@ def _check_source(path: Path) -> None:
 
 
 def _top_level(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a module, with those under its ``if``, ``try`` and ``with``."""
+    """The statements of a module, including those under its ``if``, ``try`` and ``with``."""
     for node in body:
         yield node
         if isinstance(node, (ast.If, ast.Try, ast.With)):
@@ -170,7 +170,7 @@ def _top_level(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _seconds_of(path: Path, module: Any) -> float | None:
-    """What the file recommends, as ``seconds`` or ``SECONDS``."""
+    """The duration that the file recommends, as ``seconds`` or ``SECONDS``."""
     value = getattr(module, "seconds", getattr(module, "SECONDS", None))
     if value is None:
         return None
@@ -195,7 +195,7 @@ def _view_of(path: Path, module: Any) -> Bounds | None:
 
 
 def _execute(path: Path) -> Any:
-    """Import the file under a name of its own; its folder goes on the path, for its neighbours."""
+    """Import the file under a unique name; its folder is added to the path for its sibling modules."""
     name = f"carom_file_{path.stem}"
     loader = _SourceLoader(name, str(path))
     module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
@@ -216,7 +216,7 @@ def _execute(path: Path) -> Any:
 
 
 class _SourceLoader(importlib.machinery.SourceFileLoader):
-    """Reads the file as it is now and leaves no byte code beside it."""
+    """Reads the current file and writes no byte code."""
 
     def get_code(self, fullname: str) -> Any:
         return self.source_to_code(self.get_data(self.path), self.path)
@@ -232,7 +232,7 @@ def _check_signature(path: Path, function: Any) -> None:
 
 
 def _line_in(file: Path | None, error: BaseException) -> str:
-    """`, line 12`: the last line of the user's file on the way to the error or to its cause; else nothing."""
+    """`, line 12`: the last line of the user's file in the traceback of the error or its cause; else empty."""
     if file is None:
         return ""
     seen: set[int] = set()
@@ -242,7 +242,7 @@ def _line_in(file: Path | None, error: BaseException) -> str:
         seen.add(id(step))
         chain.append(step)
         step = step.__cause__ or step.__context__
-    for link in reversed(chain):  # the first cause knows best
+    for link in reversed(chain):  # the first cause is the most precise
         lines = [
             frame.lineno
             for frame in traceback.extract_tb(link.__traceback__)

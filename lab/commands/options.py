@@ -1,4 +1,4 @@
-"""Options that several commands take, read and checked as they are parsed."""
+"""Options shared by several commands, parsed and checked."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .choices import parse_assignments
 from .usage_errors import Problem, did_you_mean
 
 GEOMETRIES = ("precise", "bounds")
-WORDS = "carom.words"  # where the words of a command line stay: see KeepsWords
+WORDS = "carom.words"  # key for the words of a command line: see KeepsWords
 
 Option = Callable[[Any], Any]
 
@@ -33,7 +33,7 @@ def together(*options: Option) -> Option:
 
 
 class KeepsWords(click.Command):
-    """A command that remembers the words it was called with: ``context.meta[WORDS]``."""
+    """A command that stores the words it was called with in ``context.meta[WORDS]``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         ctx.meta[WORDS] = list(args)
@@ -41,7 +41,7 @@ class KeepsWords(click.Command):
 
 
 def _read(read: Callable[[Any], Any]) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """A callback for click: what was given goes through ``read``; what was left out stays as it is."""
+    """A callback for click that passes a given value through ``read`` and leaves a missing one unchanged."""
     return lambda context, parameter, given: read(given) if given is not None else None
 
 
@@ -99,7 +99,7 @@ def repeats_option(default: int, help_text: str) -> Option:
 
 
 def writable_folder(folder: Path, option: Path | None = None) -> None:
-    """Make it if it is not there; Problem if nothing can be written to it. option: what --out was, if not that."""
+    """Create the folder if missing; Problem if it is not writable. option: the value of --out, if different."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -183,7 +183,7 @@ case_options = together(
 
 
 def _listed(option: str, known: tuple[str, ...] = ()) -> Callable[[str], tuple[str, ...]]:
-    """"a,b" as words; Problem for one that is not among the ``known``, if they are."""
+    """Parse "a,b" into words; Problem for a word not in ``known``, if that is not empty."""
 
     def read(text: str) -> tuple[str, ...]:
         words = tuple(dict.fromkeys(filter(None, (word.strip() for word in text.split(",")))))
@@ -220,7 +220,7 @@ only_options = together(
     ),
 )  # fmt: skip
 
-# -- how long runs are performed --------------------------------------------------------------------------------
+# -- execution of runs -------------------------------------------------------------------------------------------
 
 runs_options = together(
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),

@@ -1,4 +1,4 @@
-"""``carom plan``: what a step of a scene runs, and why."""
+"""``carom plan``: the systems and kernels of a scene's step, and why they run."""
 
 from __future__ import annotations
 
@@ -32,6 +32,6 @@ def plan_command(
     loaded = load(target)
     number = seed_number(seed)
     world = loaded.build(settings, changes, number, [plugin_named(name) for name in plugins])
-    with loaded.blame(), stdout_kept_clean():
+    with loaded.attribute_errors(), stdout_kept_clean():
         plan = str(world.plan())
     click.echo(plan)

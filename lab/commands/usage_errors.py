@@ -1,4 +1,4 @@
-"""How the command line says no: one clear line, with what was probably meant, and exit code 2."""
+"""Errors of the command line: one clear line, with the probable intention, and exit code 2."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import click
 
 from ...framework import CaromError
 
-LONGEST = 400  # characters of an error's own message
+LONGEST = 400  # characters of an error message
 
 
 class Problem(click.ClickException):
-    """Something the user can mend; the command line prints it as one line and exits with code 2."""
+    """An error that the user can fix; the command line prints it as one line and exits with code 2."""
 
     exit_code = 2
 
 
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:
-    """`; did you mean 'gas2d'?` for a near miss, else the known names (as long as they fit in a line)."""
+    """`; did you mean 'gas2d'?` for a near miss, else the known names (as many as fit in a line)."""
     names = list(known)
     by_lower_case = {name.lower(): name for name in names}
     near = difflib.get_close_matches(wrong.lower(), by_lower_case, n=3, cutoff=0.55)
@@ -29,7 +29,7 @@ def did_you_mean(wrong: str, known: Iterable[str]) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """The error's message in one line, with its type where the message alone would say little."""
+    """The error's message in one line, with its type if the message alone is unclear."""
     text = _shortened(" ".join(str(error).split()))
     if isinstance(error, KeyError) and len(error.args) == 1 and isinstance(error.args[0], str):
         text = " ".join(error.args[0].split())
@@ -39,5 +39,5 @@ def one_line(error: BaseException) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Compilers write pages; their beginning and the option that shows the rest have to do."""
+    """The beginning of a long message, and the option that shows all of it."""
     return text if len(text) <= LONGEST else f"{text[:LONGEST]} ... (--traceback shows all of it)"

@@ -1,4 +1,4 @@
-"""``carom warm-up``: compile ahead what scenes, or worlds of the built-in shapes, will need."""
+"""``carom warm-up``: compile in advance the kernels that scenes, or worlds of the built-in shapes, need."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from ..reporting.progress import CompileStatus
 from .loading import Loaded, load, stdout_kept_clean
 from .usage_errors import Problem
 
-SHAPE_SETS = ((SphereCollider,), (AABBCollider,), (SphereCollider, AABBCollider))  # each has kernels of its own
-STEPS = 10  # of a scene, for what its own systems call
+SHAPE_SETS = ((SphereCollider,), (AABBCollider,), (SphereCollider, AABBCollider))  # each has its own kernels
+STEPS = 10  # of a scene, to compile what its own systems call
 
 Work = tuple[str, Callable[[], None]]
 
 
 @dataclass
 class Row:
-    """What one target needed that the targets before it had not needed yet.
+    """The kernels that one target needed in addition to the targets before it.
 
-    compiled: kernels and their seconds; found: how many were in the cache already.
+    compiled: kernels and their seconds; found: how many were already in the cache.
     """
 
     target: str
     compiled: list[tuple[str, float]] = field(default_factory=list)
     found: int = 0
-    seconds: float = 0.0  # everything: imports, building and stepping too
+    seconds: float = 0.0  # total, including imports, building and stepping
 
 
 @click.command("warm-up", short_help="Compile ahead, so that the first run does not wait.")
@@ -79,7 +79,7 @@ def warm_up_command(
 
 
 def warm_up(work: Iterator[Work], say: Callable[[str], None]) -> list[Row]:
-    """Do the work, piece by piece, ``say`` its name, and note what compiled."""
+    """Do each piece of work, ``say`` its name, and record what compiled."""
     rows = []
     for name, action in work:
         say(name)
@@ -96,12 +96,12 @@ def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> I
         for d in sorted(dimensions):
             yield f"spheres and boxes, {d}D", lambda d=d: prepare_built_in(d)
     names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
-    for loaded in [load(name) for name in names]:  # what cannot be found is said before anything compiles
+    for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
         yield loaded.name, lambda loaded=loaded: _prepare_scene(loaded)
 
 
 def prepare_built_in(dimensions: int) -> None:
-    """Worlds of spheres, of boxes and of both, and every integrator of the standard physics."""
+    """Build worlds of spheres, of boxes and of both, with every integrator of the standard physics."""
     for shapes in SHAPE_SETS:
         with closing(World(Physics(dimensions=dimensions))) as world:
             world.prepare(*shapes)
@@ -111,7 +111,7 @@ def prepare_built_in(dimensions: int) -> None:
 
 
 def _prepare_scene(loaded: Loaded) -> None:
-    with closing(loaded.build(None, {}, 0)) as world, loaded.blame():
+    with closing(loaded.build(None, {}, 0)) as world, loaded.attribute_errors():
         world.prepare()
         for _ in range(STEPS):
             world.step()
@@ -134,7 +134,7 @@ def _print(rows: list[Row], folder: Path, before: tuple[int, int], after: tuple[
     for row in rows:
         table.add_row(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}")
     console.print(table)
-    variants: dict[str, list[float]] = {}  # of the same kernel: for other shapes, for 2D and for 3D
+    variants: dict[str, list[float]] = {}  # seconds by kernel name: variants differ in shapes and dimensions
     for kernel, seconds in (item for row in rows for item in row.compiled):
         variants.setdefault(kernel, []).append(seconds)
     if variants:

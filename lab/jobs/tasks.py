@@ -69,7 +69,7 @@ def perform(task: Task) -> dict[str, Any]:
 def _run(task: Task) -> Seen:
     engine = engine_of(task.case, task.cell, task.repeat + FIRST_REFERENCE_SEED * task.reference)
     try:
-        with task.case.subject.blamed():
+        with task.case.subject.attribute_errors():
             case = task.case
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled

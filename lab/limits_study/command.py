@@ -126,7 +126,7 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
     found = []
     progress.begin(steps + 1)
     progress.say(f"watching {loaded.name}")
-    with loaded.blame(), stdout_kept_clean():
+    with loaded.attribute_errors(), stdout_kept_clean():
         for look in looks:
             before = world.step_count
             while world.step_count < look:

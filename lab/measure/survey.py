@@ -147,7 +147,7 @@ def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float, w
     if nudged:
         nudge(engine.world, nudged * engine.size)
     try:
-        with subject.blamed():
+        with subject.attribute_errors():
             seen = observe(engine, seconds, settings.dt, walled=walled)
         if seen.failure not in (None, ESCAPED):
             raise Problem(

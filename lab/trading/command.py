@@ -201,6 +201,6 @@ def draw_scene(subject: Subject, seconds: float, out: Path) -> list[Path]:
 
     with closing(subject.world(None)) as world:
         steps = min(max(round(seconds / world.settings.dt), 1), MOST_STEPS)
-        with subject.blamed(), stdout_kept_clean():
+        with subject.attribute_errors(), stdout_kept_clean():
             finished = run(world, steps, scene=subject.name, seed=subject.seed)
         return draw_run(finished, out, subject.recommended[1])
