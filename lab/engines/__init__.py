@@ -1,4 +1,4 @@
-"""carom and pymunk behind one interface: the same bodies, the same measure of quality, the same count of work.
+"""carom and pymunk behind one interface: the same bodies, the same quality measure, the same work counts.
 
-Reads a world of carom as plain arrays. Writes the equal space of pymunk, and for both the figures that are compared.
+Reads a world of carom as plain arrays. Writes the equivalent pymunk space, and the compared figures for both.
 """

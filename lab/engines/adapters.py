@@ -1,4 +1,4 @@
-"""carom and pymunk behind one face, so that one eye sees both: the same scene, the same norms, the same axes."""
+"""carom and pymunk behind one interface, so that both are measured in the same way."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .quality import overlaps
 
 
 class ComesAndGoesError(ValueError):
-    """Bodies were created or deleted on the way."""
+    """Bodies were created or deleted during the run."""
 
 
 class Engine(ABC):
-    """A scene under way. Bodies are the dynamic ones, ascending by entity id.
+    """A running scene. Bodies are the dynamic ones, ascending by entity id.
 
-    After a step: ``impulse`` N s on what stands still, ``times`` s of its impacts, ``struck`` which bodies (n,) had
-    one or a contact so far.
+    After a step: ``impulse`` N s on static bodies, ``times`` s of the impacts of the step, ``struck`` (n,) true for
+    bodies that have had an impact or a contact since the start.
     """
 
     def __init__(self, world: World) -> None:
@@ -52,11 +52,11 @@ class Engine(ABC):
 
     @abstractmethod
     def advance(self, count: int, dt: float) -> None:
-        """``count`` steps without looking at anything: what a game would wait for."""
+        """Take ``count`` steps without observation, as a game would."""
 
     @property
     def position(self) -> Floats:
-        """A copy, (n, d); ComesAndGoesError if there are other bodies than at the start."""
+        """A copy, (n, d); ComesAndGoesError if the bodies are not those of the start."""
         dynamic = self.world.bodies.dynamic
         order = self._order
         if len(dynamic) != len(order) or (np.asarray(dynamic.entity)[order] != self.ids).any():
@@ -67,21 +67,21 @@ class Engine(ABC):
 
     @property
     def velocity(self) -> Floats:
-        """A copy, (n, d), of the bodies whose position was asked for last."""
+        """A copy, (n, d), of the bodies whose position was last read."""
         return np.array(self.world.bodies.dynamic.linear_velocity)[self._order]
 
     @property
     def energy(self) -> float:
-        """Kinetic and potential, J; without the parts of force systems that do not tell theirs."""
+        """Kinetic and potential energy, J; without force systems that do not report theirs."""
         return self.world.kinetic_energy() + self.world.potential_energy()
 
     @property
     def kinetic(self) -> float:
-        """J."""
+        """Kinetic energy, J."""
         return self.world.kinetic_energy()
 
     def overlaps(self) -> Floats:
-        """Of the pairs that overlap, in sizes of the smaller body, (k,)."""
+        """(k,) depths of the overlapping pairs, in sizes of the smaller body."""
         if self._plain is None:
             return self._overlaps_of_contacts()
         moving, fixed = self._plain
@@ -105,16 +105,16 @@ class Engine(ABC):
 
     @cached_property
     def size(self) -> float:
-        """The smallest dynamic body's extent; where none has a shape, how far from the origin they are, else 1."""
+        """The smallest extent of the dynamic bodies; without shapes the largest coordinate, else 1."""
         known = [self.sizes[e] for e in self.ids.tolist() if e in self.sizes]
         return min(known, default=0.0) or float(np.abs(self.position).max(initial=0.0)) or 1.0
 
     @abstractmethod
     def counts(self) -> dict[str, float]:
-        """Machine-free counts since the start."""
+        """Machine-independent counts since the start."""
 
     def close(self) -> None:
-        """Give the world back."""
+        """Close the world."""
         self.world.close()
 
 
@@ -156,7 +156,7 @@ class CaromEngine(Engine):
             world.step()
 
     def _rows(self, entities: Any) -> np.ndarray:
-        """The places of the entities among the bodies; -1 for what stands still."""
+        """The rows of the entities in the body arrays; -1 for static bodies."""
         if not len(self.ids):
             return np.full(len(entities), -1)
         places = np.searchsorted(self.ids, entities)
@@ -164,7 +164,7 @@ class CaromEngine(Engine):
         return np.where(self.ids[places] == entities, places, -1)
 
     def _solid(self) -> np.ndarray:
-        """Which contacts are none of a sensor."""
+        """True for contacts without a sensor."""
         contacts = self.world.contacts
         return ~(np.isin(contacts.entity_a, self._sensors) | np.isin(contacts.entity_b, self._sensors))
 
@@ -182,16 +182,16 @@ class CaromEngine(Engine):
 
 
 class PymunkEngine(Engine):
-    """pymunk on the bodies of a world of carom, which goes along: it sums the forces and the energies.
+    """pymunk on the bodies of a world of carom. The world is kept in sync; it sums the forces and the energies.
 
-    Force systems act as pymunk's manual says: their force is given to each body before the step. substeps: iterations
-    of its solver. NotPlainError for scenes that do not translate.
+    Force systems follow pymunk's manual: their force is applied to each body before the step. substeps: iterations of
+    the solver. NotPlainError for scenes that cannot be translated.
     """
 
     def __init__(self, world: World, iterations: int) -> None:
         super().__init__(world)
         if self._plain is None:
-            moving_and_fixed(world)  # says what is in the way
+            moving_and_fixed(world)  # raises, with the reason
         self.space = PymunkSpace(world)
         self.space.space.iterations = iterations
         self._iterations = iterations
@@ -240,7 +240,7 @@ class PymunkEngine(Engine):
         self.space.step(count)
 
     def _push(self) -> None:
-        """The forces of the force systems at this state, for one step; gravity is pymunk's own."""
+        """Apply the forces of the force systems at this state for one step; pymunk applies gravity itself."""
         self._forces += 1
         self._sums.evaluate(self._time)
         dynamic = self.world.bodies.dynamic
@@ -267,5 +267,5 @@ class PymunkEngine(Engine):
 
 
 def engine_for(world: World, engine: str, iterations: int) -> Engine:
-    """The engine of that name on ``world``, which it takes over; iterations: of pymunk's solver."""
+    """The engine of that name on ``world``, which it will close; iterations: of pymunk's solver."""
     return PymunkEngine(world, iterations) if engine == PYMUNK else CaromEngine(world)

@@ -1,4 +1,4 @@
-"""The bodies of a flat world as plain arrays, so that one scene serves two engines and one measure of quality."""
+"""The bodies of a 2D world as plain arrays, the common input of both engines and of the quality measure."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from ..measure.body_shapes import Floats
 
 
 class NotPlainError(ValueError):
-    """A world has something that the plain form has no place for."""
+    """A world has something that plain arrays cannot represent."""
 
 
 @dataclass(frozen=True)
 class BodyArrays:
     """One row per body, ascending by entity id.
 
-    ``position (n, 2)``, ``velocity (n, 2)``, ``mass (n,)``, ``half (n, 2)`` half extents (a disc has its radius in
-    both), ``round (n,)`` true for discs, ``shaped (n,)`` false without a collider, ``restitution (n,)`` and
-    ``friction (n,)``, nan where the partner's value counts.
+    ``position (n, 2)``, ``velocity (n, 2)``, ``mass (n,)``, ``half (n, 2)`` half extents (the radius in both for a
+    disc),
+    ``round (n,)`` true for discs, ``shaped (n,)`` false without a collider, ``restitution (n,)`` and ``friction (n,)``,
+    NaN: use the other body's coefficient.
     """
 
     position: Floats
@@ -38,12 +39,12 @@ class BodyArrays:
         return len(self.position)
 
     def where(self, chosen: np.ndarray) -> BodyArrays:
-        """The rows for which ``chosen`` is true."""
+        """The rows where ``chosen`` is true."""
         return BodyArrays(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 def moving_and_fixed(world: World) -> tuple[BodyArrays, BodyArrays]:
-    """The dynamic and the static bodies of ``world`` as they stand; NotPlainError for what has no place here."""
+    """The dynamic and the static bodies of ``world`` in their present state; NotPlainError if not representable."""
     if world.dimensions != 2:
         raise NotPlainError(f"a world of {world.dimensions} dimensions, not 2")
     if len(world.bodies.kinematic):

@@ -1,8 +1,8 @@
-"""What a run cost, in counts that are the same on every machine, and one number for all of them.
+"""The cost of a run, in counts that are the same on every machine, and as one number.
 
-The number is a weighted sum. Its weights are nanoseconds, measured once on one machine (``carom bench`` and
-``carom run --profile`` tell them for another) and fixed since: so it ranks settings in the same way everywhere, which a
-clock does not. For few bodies the step itself counts most, for many what is done for each.
+The number is a weighted sum. Its weights are nanoseconds, measured once on one machine and fixed since (``carom bench``
+and ``carom run --profile`` measure them on another). So it ranks settings identically on every machine, unlike a clock.
+With few bodies the cost per step dominates, with many the cost per body.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from ...framework import World
 
-# ns each. A step is Python between kernels; an evaluation of forces calls each force system once.
+# ns each. A step runs Python code between kernels; an evaluation of forces calls each force system once.
 WEIGHTS: Mapping[str, float] = {
     "steps": 50_000.0,
     "force_evaluations": 10_000.0,
@@ -25,10 +25,10 @@ WEIGHTS: Mapping[str, float] = {
 
 
 def counts_of(world: World, solver_loops: float) -> dict[str, float]:
-    """The counts of a world since it began; solver_loops: contacts at rest times substeps, which settings may change.
+    """The counts of a world since its creation; solver_loops: contacts at rest times substeps.
 
     steps, force_evaluations (sums over all bodies), body_steps, candidates of the broad phase, pairs tested, impacts,
-    rounds of candidates made anew within a step.
+    rounds: how often candidates were searched again within a step.
     """
     counters = world.stats().counters
     return {
@@ -44,5 +44,5 @@ def counts_of(world: World, solver_loops: float) -> dict[str, float]:
 
 
 def work_of(counts: Mapping[str, float]) -> float:
-    """The weighted sum of counts; per simulated second if they are."""
+    """The weighted sum of counts; per simulated second if the counts are."""
     return sum(WEIGHTS[name] * count for name, count in counts.items() if name in WEIGHTS)

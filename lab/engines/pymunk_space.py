@@ -1,6 +1,6 @@
-"""pymunk on the same bodies: a world of carom translated once, as pymunk's manual would have it built.
+"""A world of carom translated to pymunk with the same bodies, as pymunk's manual recommends.
 
-Static shapes hang on the space's own static body, moments of inertia are infinite (nothing turns), sleeping stays off.
+Static shapes are attached to the space's static body, moments of inertia are infinite (no rotation), sleeping is off.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from ..commands.usage_errors import Problem
 from ..measure.body_shapes import Floats
 from .body_arrays import BodyArrays, NotPlainError, moving_and_fixed
 
-INDEXES = ("tree", "hash")  # pymunk's two ways to find pairs: a tree of bounding boxes, or a spatial hash
+INDEXES = ("tree", "hash")  # pymunk's two broad phases: a tree of bounding boxes, or a spatial hash
 ITERATIONS = 10
-HASH_CELL = 2.0  # of the largest moving body's size; measured: 1.5 times as fast as cells of one size (gas2d 10k)
-HASH_CELLS_PER_BODY = 2  # and no slower than the 10 that pymunk's manual starts from
+HASH_CELL = 2.0  # cell size over the largest moving body's size; measured: 1.5 times as fast as 1.0 (gas2d 10k)
+HASH_CELLS_PER_BODY = 2  # measured: as fast as the 10 of pymunk's manual
 
 
 def pymunk_module() -> ModuleType:
-    """pymunk; Problem, with the name of the extra, where it is missing."""
+    """The pymunk module; Problem with the name of the extra if it is missing."""
     try:
         return importlib.import_module("pymunk")
     except ImportError as error:
@@ -32,10 +32,10 @@ def pymunk_module() -> ModuleType:
 
 
 class PymunkSpace:
-    """A pymunk space with the bodies of ``world`` as they stand now; ``index`` is one of INDEXES.
+    """A pymunk space with the bodies of ``world`` in their present state; ``index`` is one of INDEXES.
 
-    NotPlainError for what does not translate: pymunk multiplies the restitutions of two bodies and carom takes the
-    larger one, so only one value for all moving bodies can be meant in the same way.
+    NotPlainError for worlds that cannot be translated. pymunk multiplies the restitutions of two bodies and carom takes
+    the larger one, so all moving bodies must have the same restitution.
     """
 
     def __init__(self, world: World, index: str = "tree") -> None:
@@ -86,25 +86,25 @@ class PymunkSpace:
         return position, velocity
 
     def settings(self) -> dict[str, Any]:
-        """The space's settings, as they are."""
+        """The settings of the space."""
         names = ("iterations", "collision_slop", "collision_bias", "damping", "threads")
         sleeping = math.isfinite(self.space.sleep_time_threshold)
         return {**{name: getattr(self.space, name) for name in names}, "sleeping": sleeping}
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""
 
-    # -- questions, one by one as pymunk takes them ----------------------------------------------------
+    # -- queries, one by one as pymunk takes them ------------------------------------------------------
 
     def boxes(self, lower: Floats, upper: Floats) -> int:
-        """How many bounding boxes all the boxes meet, corners (m, 2)."""
+        """The number of bounding boxes overlapped, summed over all boxes; corners (m, 2)."""
         pymunk = pymunk_module()
         everything, query, box = pymunk.ShapeFilter(), self.space.bb_query, pymunk.BB
         corners = np.concatenate([lower, upper], axis=1).tolist()
         return sum([len(query(box(*four), everything)) for four in corners])
 
     def spheres(self, centres: Floats, radius: float) -> int:
-        """How many shapes all the discs meet, centres (m, 2)."""
+        """The number of shapes overlapped, summed over all discs; centres (m, 2)."""
         everything, query = pymunk_module().ShapeFilter(), self.space.point_query
         return sum([len(query((x, y), radius, everything)) for x, y in centres.tolist()])
 
@@ -115,7 +115,7 @@ class PymunkSpace:
         return np.array([math.inf if hit is None else hit.distance for hit in hits])
 
     def rays(self, starts: Floats, ends: Floats) -> Floats:
-        """The fraction of its way that each ray has gone at its first hit; 1 where there is none."""
+        """The fraction of each ray at its first hit; 1 without a hit."""
         everything, query = pymunk_module().ShapeFilter(), self.space.segment_query_first
         ways = np.concatenate([starts, ends], axis=1).tolist()
         hits = [query((a, b), (c, d), 0.0, everything) for a, b, c, d in ways]
@@ -123,7 +123,7 @@ class PymunkSpace:
 
 
 def _materials(world: World, moving: BodyArrays, fixed: BodyArrays) -> tuple[float, Floats, Floats]:
-    """The restitution for all shapes and the friction of each, so that products give what carom's rules give."""
+    """One restitution for all shapes and the friction of each, chosen so that pymunk's products match carom's rules."""
     shaped, fixed_shaped = moving.restitution[moving.shaped], fixed.restitution[fixed.shaped]
     largest = float(shaped.max(initial=0.0))
     if (shaped != largest).any() or (fixed_shaped > largest).any():

@@ -1,4 +1,4 @@
-"""How good a state is, measured from positions and velocities alone: the same measure for every engine."""
+"""Quality of a state, measured from positions and velocities alone, so that it is the same for every engine."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ..measure.body_shapes import Floats
 from ..measure.escape import Enclosure
 from .body_arrays import BodyArrays
 
-LARGE = 2.0  # times the largest moving body: a fixed box beyond that is tested against all instead of by cell
-NEIGHBOURS = ((0, 0), (1, -1), (1, 0), (1, 1), (0, 1))  # of a cell: each pair of cells once
+LARGE = 2.0  # times the largest moving body: larger fixed boxes are tested against all bodies, not by cell
+NEIGHBOURS = ((0, 0), (1, -1), (1, 0), (1, 1), (0, 1))  # offsets of a cell's neighbours: each pair of cells once
 
 
 @dataclass
 class Quality:
-    """What is seen of one engine's run: call :meth:`sample` now and then, :meth:`figures` at the end of a window."""
+    """Quality of one engine's run: call :meth:`sample` at intervals, :meth:`figures` at the end of a window."""
 
     moving: BodyArrays
     fixed: BodyArrays
@@ -25,11 +25,11 @@ class Quality:
     overlap_most: float = 0.0
 
     def begin(self) -> None:
-        """Forget the overlaps of the window before."""
+        """Discard the overlaps of the previous window."""
         self.overlap_means, self.overlap_most = [], 0.0
 
     def sample(self, position: Floats) -> None:
-        """Note the overlaps at ``position`` (n, 2)."""
+        """Record the overlaps at ``position`` (n, 2)."""
         depths = overlaps(self.moving, position, self.fixed)
         self.overlap_means.append(float(depths.mean()) if len(depths) else 0.0)
         self.overlap_most = max(self.overlap_most, float(depths.max(initial=0.0)))
@@ -55,9 +55,9 @@ def kinetic_energy(mass: Floats, velocity: Floats) -> float:
 
 
 def overlaps(moving: BodyArrays, position: Floats, fixed: BodyArrays) -> Floats:
-    """The overlaps (k,) of the pairs that overlap, in diameters of the smaller one, of moving bodies at ``position``.
+    """The overlaps (k,) of overlapping pairs of moving bodies at ``position``, in diameters of the smaller one.
 
-    Fixed bodies are tested against moving ones, never among themselves. Bodies that are not finite touch nothing.
+    Fixed bodies are tested against moving ones only. Bodies with non-finite positions overlap nothing.
     """
     shown = moving.shaped & np.isfinite(position).all(axis=1)
     bodies, places = moving.where(shown), position[shown]
