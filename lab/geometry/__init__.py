@@ -1,5 +1,5 @@
-"""``carom geometry``: which levels of collision geometry suit which objects.
+"""``carom geometry``: which geometry levels suit which objects.
 
-Reads convex polygons with the circles and boxes that enclose them, and a reference by separating axes in numpy. Writes
-records, tables and a picture.
+Reads convex polygons with their enclosing circles and boxes, and a numpy reference by separating axes. Writes records,
+tables and a picture.
 """

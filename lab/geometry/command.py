@@ -1,4 +1,4 @@
-"""``carom geometry``: which levels of collision geometry suit which objects."""
+"""``carom geometry``: which geometry levels suit which objects."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The objects of the study of levels, each a convex polygon, with the circle and the box that hold it.
+"""The objects of the geometry study: convex polygons with their enclosing circle and box.
 
-All have an area of 1 m2, so that a place as crowded with one as with another is as crowded for both.
+All have an area of 1 m2, so that equal numbers of objects in a world mean equal density.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-ENCLOSED = 1e-12  # of the radius: corners that lie on the smallest circle count as inside
+ENCLOSED = 1e-12  # of the radius: tolerance for corners on the smallest circle
 
 
 @dataclass(frozen=True)
 class Object:
-    """A kind of object: its name, what it stands for, and its corners as drawn, in any unit and about any point."""
+    """A kind of object: its name, what it represents, and its corners in any unit and about any point."""
 
     name: str
     description: str
@@ -25,42 +25,43 @@ class Object:
 
     @cached_property
     def corners(self) -> np.ndarray:
-        """(n, 2) m, counter-clockwise, of area 1 m2, the middle of the box around them being the origin."""
+        """(n, 2) m, counter-clockwise, of area 1 m2; the origin is the centre of the bounding box."""
         corners = np.array(self.drawn, float)
         corners -= (corners.min(axis=0) + corners.max(axis=0)) / 2
         return corners / math.sqrt(area(corners))
 
     @property
     def half_extents(self) -> np.ndarray:
-        """(2,) m, of the box around the object as it stands."""
+        """(2,) m, of the bounding box of the upright object."""
         return self.corners.max(axis=0)
 
     @cached_property
     def circle(self) -> tuple[np.ndarray, float]:
-        """Centre (2,) and radius, m, of the smallest circle that holds the object."""
+        """Centre (2,) and radius, m, of the smallest enclosing circle."""
         return smallest_circle(self.corners)
 
 
 def area(corners: np.ndarray) -> float:
-    """Of a polygon with these corners (n, 2), counter-clockwise."""
+    """Area of a polygon with these corners (n, 2), counter-clockwise."""
     x, y = corners.T
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
 
 
 def smallest_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre (2,) and radius of the smallest circle that holds the points (n, 2).
+    """Centre (2,) and radius of the smallest circle that encloses the points (n, 2).
 
-    Two or three of them determine it; all twos and threes are tried, so n should be small. ValueError below two points.
+    Two or three of the points determine it. All pairs and triples are tried, so n should be small. ValueError for fewer
+    than two points.
     """
     if len(points) < 2:
         raise ValueError(f"smallest_circle: points must be two or more, got {len(points)}")
     centres = [(one + two) / 2 for one, two in itertools.combinations(points, 2)]
     for one, two, three in itertools.combinations(points, 3):
         sides = np.stack((two - one, three - one))
-        if abs(np.linalg.det(sides)) > 0.0:  # else they lie on a line, and two of them will do
+        if abs(np.linalg.det(sides)) > 0.0:  # otherwise the three are collinear, and two of them suffice
             centres.append(one + np.linalg.solve(sides, (sides**2).sum(axis=1) / 2))
     radii = [float(np.linalg.norm(points - centre, axis=1).max()) for centre in centres]
-    best = int(np.argmin(radii))  # the largest distance from any centre holds all, so the least of these is the answer
+    best = int(np.argmin(radii))  # each circle grown to hold all points; the smallest is the answer
     return centres[best], radii[best] * (1 + ENCLOSED)
 
 

@@ -1,4 +1,4 @@
-"""The picture of ``carom geometry``: the objects with what holds them, false positives among them, and bars."""
+"""The picture of ``carom geometry``: objects with enclosing shapes, examples of false positives, and bars."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .report import attitude
 from .study import OPTIONS
 
 SIZE = (12.5, 11.8)  # inches
-ROWS = (2.9, 2.9, 2.4, 2.8)  # their heights, in proportion
+ROWS = (2.9, 2.9, 2.4, 2.8)  # relative heights
 TURN = 0.6  # radians, of the objects in the second row
 SPHERE, BOX, PRECISE = "#4dabf7", "#ffa94d", "#51cf66"
 COLOURS = {
@@ -27,7 +27,7 @@ COLOURS = {
     "box then precise": "#ffd43b", "precise": PRECISE,
 }  # fmt: skip
 BY_NAME = {thing.name: thing for thing in OBJECTS}
-MARGIN = 0.12  # m around what is drawn
+MARGIN = 0.12  # m around the outlines
 # Two objects whose cheap shapes overlap and whose polygons do not: offset of the second, m, and both rotations.
 EXAMPLES = {
     False: ("humanoid", "sphere", (0.95, 0.35), (0.0, 0.0)),
@@ -71,13 +71,13 @@ def draw_geometry(result: GeometryStudy, folder: Path) -> Path:
 
 
 def _extent(thing: Object) -> float:
-    """m from the origin to the farthest that is drawn of it."""
+    """m from the origin to the farthest point drawn."""
     centre, radius = thing.circle
     return max(float(np.linalg.norm(centre)) + radius, float(np.linalg.norm(thing.half_extents))) + MARGIN
 
 
 def _view(axes: Any, wide: float, high: float) -> None:
-    """To scale, without ticks."""
+    """Set equal scales and remove the ticks."""
     axes.set_xlim(-wide, wide)
     axes.set_ylim(-high, high)
     axes.set_aspect("equal")
@@ -85,7 +85,7 @@ def _view(axes: Any, wide: float, high: float) -> None:
 
 
 def _outlines(axes: Any, thing: Object, position: np.ndarray, rotation: float, only: str | None = None) -> None:
-    """The polygon, filled, with its circle and its stretched box, or with one of them."""
+    """The polygon, filled, with its circle and its enlarged box, or with one of them."""
     corners = placed(thing.corners, position[None], np.array([rotation]))[0]
     axes.add_patch(Polygon(corners, facecolor=PRECISE, edgecolor=canvas.TEXT, alpha=0.55, lw=1.0))
     centre, radius = thing.circle

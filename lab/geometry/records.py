@@ -1,4 +1,4 @@
-"""What the study of levels has found, as plain records that go through JSON and back."""
+"""Results of the geometry study, as plain records that convert to JSON and back."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from ..measure.timing import Spread
 
-DERIVED = ("false_positives", "share", "first_share")  # in JSON beside what they follow from
+DERIVED = ("false_positives", "share", "first_share")  # written to JSON besides the fields they follow from
 
 
 @dataclass
@@ -18,15 +18,15 @@ class GeometryCost:
     touching
         pairs of polygons that truly overlap
     tested
-        pairs that the broad phase gives to the narrow phase
+        pairs that the broad phase passes to the narrow phase
     first_hits
-        of these, let pass by the first level
+        of these, accepted by the first level
     hits
         pairs reported as contacts
     misses
-        pairs that overlap and are not reported
+        overlapping pairs that are not reported
     expected_share
-        the share of false positives by closed form, None where there is none
+        the share of false positives in closed form, None if there is none
     nanoseconds
         of the narrow phase, per pair tested
     finding
@@ -48,27 +48,27 @@ class GeometryCost:
 
     @property
     def false_positives(self) -> int:
-        """Contacts that are reported and are none."""
+        """Reported contacts whose polygons do not overlap."""
         return self.hits - (self.touching - self.misses)
 
     @property
     def share(self) -> float:
-        """Of false positives among the hits; 0 without hits."""
+        """False positives over hits; 0 without hits."""
         return self.false_positives / self.hits if self.hits else 0.0
 
     @property
     def first_share(self) -> float:
-        """What the first level lets pass and does not overlap, as a share of what it lets pass."""
+        """Pairs accepted by the first level that do not overlap, over all pairs it accepts."""
         return (self.first_hits - self.touching + self.misses) / self.first_hits if self.first_hits else 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; what follows from the rest is there too."""
+        """For JSON, with the derived figures."""
         derived = {name: getattr(self, name) for name in DERIVED}
         return {**dataclasses.asdict(self), **derived}
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         given = {name: value for name, value in plain.items() if name not in DERIVED}
         spreads = {name: Spread.from_dict(plain[name]) for name in ("nanoseconds", "finding")}
         return cls(**{**given, **spreads})
@@ -76,7 +76,7 @@ class GeometryCost:
 
 @dataclass
 class GeometryStudy:
-    """All of them, on one machine."""
+    """All records, measured on one machine."""
 
     machine: dict[str, str]
     count: int
@@ -100,7 +100,7 @@ class GeometryStudy:
 
     @property
     def options(self) -> list[str]:
-        """Those that were tried, in order."""
+        """The options tried, in order."""
         return list(dict.fromkeys(cost.option for cost in self.costs))
 
     def as_dict(self) -> dict[str, Any]:
@@ -109,5 +109,5 @@ class GeometryStudy:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(**{**plain, "costs": [GeometryCost.from_dict(cost) for cost in plain["costs"]]})

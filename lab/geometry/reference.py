@@ -1,8 +1,8 @@
-"""Which convex polygons touch, found without the engine: by separating axes, in numpy; and how often that is to be.
+"""The reference of the geometry study: which convex polygons overlap, by separating axes in numpy.
 
-A pair of objects placed at random overlaps with a probability in proportion to the area of the places where the second
-may lie then: the Minkowski sum of the one and the other's mirror image. So shares of false positives are known in
-closed form, whatever the crowd's density.
+Also the expected shares: two objects placed at random overlap with a probability proportional to the area of the
+Minkowski sum of one with the mirror image of the other. So the shares of false positives are known in closed form,
+independent of the density.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ def placed(corners: np.ndarray, positions: np.ndarray, rotations: np.ndarray) ->
 
 
 def overlaps(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """(m,) how deep convex polygons (m, n, 2) and (m, k, 2), counter-clockwise, overlap, in m; negative: they do not.
+    """(m,) depth, m, of the overlap of convex polygons (m, n, 2) and (m, k, 2), counter-clockwise; negative if apart.
 
-    Convex polygons that are apart are so along the normal of some edge (the separating axis theorem). Overlapping ones
-    part with the shortest push along such a normal; of those apart this is minus a lower bound of their distance.
+    Two separate convex polygons are separated along the normal of some edge (separating axis theorem). For overlapping
+    ones this is the shortest translation along such a normal that separates them; for separate ones it is minus a lower
+    bound of their distance.
     """
     return np.minimum(_least_overlap(one, other), _least_overlap(other, one))
 
 
 def _least_overlap(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Over the normals of one's edges."""
+    """The smallest overlap over the edge normals of ``one``."""
     edges = np.roll(one, -1, axis=1) - one
     normals = np.stack((edges[..., 1], -edges[..., 0]), axis=2)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
@@ -41,7 +42,7 @@ def _least_overlap(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def touching(corners: np.ndarray, positions: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which of equal polygons overlap: (pairs (k, 2), the smaller index first, in order; overlaps (k,) m)."""
+    """Overlapping pairs of equal polygons: (pairs (k, 2), the smaller index first, sorted; overlaps (k,) m)."""
     reach = 2 * float(np.linalg.norm(corners, axis=1).max())
     first, second = _near(positions, reach)
     polygons = placed(corners, positions, rotations)
@@ -53,7 +54,7 @@ def touching(corners: np.ndarray, positions: np.ndarray, rotations: np.ndarray) 
 
 
 def _near(positions: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs at most ``reach`` apart: in order of x, each with those after it, until none is near in x any more."""
+    """Pairs at most ``reach`` apart: sort by x, then compare each with its successors while any is near in x."""
     order = np.argsort(positions[:, 0], kind="stable")
     places = positions[order]
     first, second = [], []
@@ -69,13 +70,14 @@ def _near(positions: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def expected_area(thing: Object, levels: tuple[str, ...], turned: bool) -> float | None:
-    """m2 of the offsets at which two of these objects hit in every level; the mean over all turns if ``turned``.
+    """m2 of the offsets at which two of these objects overlap in every level; the mean over all rotations if
+    ``turned``.
 
     Levels as in :data:`~carom.lab.geometry.study.OPTIONS`. Circles: pi (2 r)^2.
-    Boxes that stand: 4 w h; stretched ones:
-    2 E[W H] + 2 E[W]^2 with E[W] = 2 (w + h) / pi and E[W H] = w h + (w^2 + h^2) / pi. Polygons that stand: 2 A plus
-    the mixed area; turned: 2 A + P^2 / (2 pi), after Santalo. None: a circle around a box that stretches has no such
-    formula. A last level that lies within the ones before it decides alone.
+    Upright boxes: 4 w h; boxes enlarged to hold the turned one:
+    2 E[W H] + 2 E[W]^2 with E[W] = 2 (w + h) / pi and E[W H] = w h + (w^2 + h^2) / pi. Upright polygons: 2 A plus the
+    mixed area; turned: 2 A + P^2 / (2 pi), after Santalo. None: there is no such formula for a circle together with an
+    enlarged box. A last level that lies inside the levels before it decides alone.
     """
     if levels == ("sphere", "box") and turned:
         return None

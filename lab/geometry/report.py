@@ -1,4 +1,4 @@
-"""The tables of ``carom geometry``: what each option lets pass wrongly, how many pairs it tests, and the cost."""
+"""The tables of ``carom geometry``: false positives of each option, pairs tested, and cost."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from ..reporting.text_tables import TextTable
 from .records import GeometryCost, GeometryStudy
 from .study import OPTIONS
 
-BOUNDS = ("sphere", "box")  # the options of one cheap level, of which one fits better
+BOUNDS = ("sphere", "box")  # the options with one cheap level, which are compared
 
 
 def tables(result: GeometryStudy) -> list[TextTable]:
-    """What there is to show."""
+    """All tables of the result."""
     return [shares(result), counts(result), costs(result)]
 
 
 def shares(result: GeometryStudy) -> TextTable:
-    """Contacts that are none, and which cheap shape has fewer."""
+    """Shares of false positives, and the cheap shape with fewer."""
     rows = [
         (*heading, *(percent(result.cost(*case, option).share) for option in result.options), better(result, *case))
         for heading, case in _rows(result)
@@ -53,7 +53,7 @@ def costs(result: GeometryStudy) -> TextTable:
 
 
 def remarks(result: GeometryStudy) -> list[str]:
-    """How it was checked, and where it ran."""
+    """How the result was checked, and the machine."""
     misses = sum(cost.misses for cost in result.costs)
     touching = sum(result.cost(*case, result.options[0]).touching for case in result.cases)
     checked = f"misses: {misses} of the {touching:,} overlapping pairs with any option"
@@ -67,21 +67,21 @@ def remarks(result: GeometryStudy) -> list[str]:
 
 
 def better(result: GeometryStudy, thing: str, turned: bool) -> str:
-    """Which of the cheap shapes alone has fewer false positives."""
+    """The cheap shape with fewer false positives, used alone."""
     tried = [option for option in BOUNDS if option in result.options]
     return min(tried, key=lambda option: result.cost(thing, turned, option).share, default=NOTHING)
 
 
 def attitude(turned: bool) -> str:
-    """In words."""
+    """"turned" or "upright", in words."""
     return "turned" if turned else "upright"
 
 
 def percent(value: float) -> str:
-    """Of a share."""
+    """A share as a percentage."""
     return f"{100 * value:.0f}"
 
 
 def _rows(result: GeometryStudy) -> list[tuple[tuple[str, str], tuple[str, bool]]]:
-    """What stands before each row, and the case it is about."""
+    """The row headings, and the case of each row."""
     return [((thing, attitude(turned)), (thing, turned)) for thing, turned in result.cases]

@@ -1,7 +1,7 @@
-"""What levels of collision geometry let pass wrongly, and what they cost, for several kinds of objects.
+"""False positives and cost of geometry levels, for several kinds of objects.
 
 Equal objects lie at random in a 2D world, upright or turned at random. Each option gives them other colliders around
-the same polygons; which polygons truly overlap is found without the engine, see :mod:`carom.lab.geometry.reference`.
+the same polygons. The true overlaps are found without the engine, see :mod:`carom.lab.geometry.reference`.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ OPTIONS = {
     "precise": ("precise",),
 }
 COUNT = 4000  # objects in a world
-WORLDS = 4  # of each option: one alone, again and again, teaches the processor its branches
+WORLDS = 4  # per option: repeating one world would train the branch predictor
 REPEATS = 7
-CALLS = 3  # on one world at a time; then it is another option's turn
-ROOM = 4.0  # m2 of the world for each object of 1 m2
-ROUNDING = 1e-9  # m, between the engine's depth and that of the separating axes
+CALLS = 3  # consecutive calls on one world; then another option runs
+ROOM = 4.0  # m2 of the world per object of 1 m2
+ROUNDING = 1e-9  # m, tolerance between the engine's depth and that of the separating axes
 
 
 def geometry_study(
@@ -57,9 +57,9 @@ def geometry_study(
 ) -> GeometryStudy:
     """Count and time these options, of :data:`OPTIONS`, for these objects, upright and turned.
 
-    count: objects in each world; worlds: of each option; room: m2 of the world for each object, which has 1 m2. Equal
-    arguments give equal counts. ValueError for what is out of range, Problem if the engine's precise level does not
-    find what the separating axes find.
+    count: objects in each world; worlds: per option; room: m2 of the world per object of 1 m2. Equal arguments give
+    equal counts. ValueError for arguments out of range, Problem if the engine's precise level and the separating axes
+    disagree.
     """
     for option in options:
         if option not in OPTIONS:
@@ -92,14 +92,14 @@ class Crowd:
 
     @classmethod
     def random(cls, thing: Object, turned: bool, count: int, room: float, seed: tuple[int, ...]) -> Self:
-        """Anywhere in a square with that much room for each; all objects lie at the same places, for a seed."""
+        """Uniformly in a square of that area per object; the positions depend only on the seed and the count."""
         rng = np.random.default_rng(seed)
         positions = rng.uniform(0.0, math.sqrt(count * room), (count, 2))
         rotations = rng.uniform(-math.pi, math.pi, count) if turned else np.zeros(count)
         return cls(thing, turned, positions, rotations)
 
     def world(self, levels: tuple[str, ...]) -> World:
-        """These objects with colliders of those levels; sensors, so that nothing but finding contacts takes time."""
+        """These objects with colliders of those levels; sensors, so that only finding contacts takes time."""
         world = World(Physics(dimensions=2), convex_polygon.plugin)
         colliders = [COLLIDERS[level](self.thing, levels, len(self.positions)) for level in levels]
         world.create_entities(
@@ -109,7 +109,7 @@ class Crowd:
 
 
 def _sphere(thing: Object, levels: tuple[str, ...], count: int) -> Any:
-    """The smallest circle around the polygon; around the box, where that is the next level."""
+    """The smallest circle around the polygon; around the box if the next level is a box."""
     if "box" in levels:
         return SphereCollider.many(radius=float(np.linalg.norm(thing.half_extents)), sensor=True)
     centre, radius = thing.circle
@@ -131,7 +131,7 @@ COLLIDERS: dict[str, Callable[[Object, tuple[str, ...], int], Any]] = {
 
 @dataclass
 class Tally:
-    """What the worlds of one option have found."""
+    """Counts over the worlds of one option."""
 
     tested: int = 0
     first_hits: int = 0
@@ -140,16 +140,16 @@ class Tally:
 
 
 class Finder:
-    """The two phases that find contacts in a world, on the state as it is."""
+    """Runs broad and narrow phase of a world on its present state."""
 
     def __init__(self, world: World) -> None:
         self._world = world
-        world.run(Phase.NARROW)  # all is taken in, and compiled
+        world.run(Phase.NARROW)  # gathers the bodies and compiles
         state: Any = world.physics
         self._broad, self._narrow = state.broad_phase, NarrowPhase(state)
 
     def seconds(self, calls: int) -> np.ndarray:
-        """(2,) seconds of so many calls of the broad and of the narrow phase."""
+        """(2,) seconds of this many calls of the broad and of the narrow phase."""
         total = np.zeros(2)
         for _ in range(calls):
             started = now()
@@ -157,12 +157,12 @@ class Finder:
             middle = now()
             self._narrow.process(0.0)
             total += middle - started, now() - middle
-            _ = self._world.contacts.depth  # made here, else the next call would make it
+            _ = self._world.contacts.depth  # build the lazy column outside the timed part
         return total
 
 
 def _case(crowds: list[Crowd], options: tuple[str, ...], repeats: int, progress: Progress) -> list[GeometryCost]:
-    """These options on the same crowds."""
+    """Measure these options on the same crowds."""
     thing, turned = crowds[0].thing, crowds[0].turned
     truths = [touching(thing.corners, crowd.positions, crowd.rotations) for crowd in crowds]
     tallies = {option: Tally() for option in options}
@@ -194,7 +194,7 @@ def _case(crowds: list[Crowd], options: tuple[str, ...], repeats: int, progress:
 
 
 def _count(world: World, option: str, truth: tuple[np.ndarray, np.ndarray], tally: Tally) -> None:
-    """Add what this world has found; Problem if the polygons' contacts are not the true ones."""
+    """Add the counts of this world; Problem if the polygons' contacts differ from the reference."""
     counters, contacts = world.stats().counters, world.contacts
     count = len(world.bodies)
     first_entity = int(world.bodies.entity.min())
@@ -213,7 +213,7 @@ def _count(world: World, option: str, truth: tuple[np.ndarray, np.ndarray], tall
 
 
 def _time(finders: dict[str, list[Finder]], repeats: int, progress: Progress) -> dict[str, np.ndarray]:
-    """(repeats, 2) seconds of one pass of both phases through all worlds of an option; the options take turns."""
+    """(repeats, 2) seconds of one pass of both phases through all worlds of an option; the options alternate."""
     seconds = {option: np.zeros((repeats, 2)) for option in finders}
     names = list(finders)
     for repeat in range(repeats):
