@@ -1,8 +1,8 @@
-"""Results of runs that take hours, kept in a file as they come, so that nothing has to run twice.
+"""Results of long runs, appended to a file as they arrive, so that no run has to be repeated.
 
-The file holds one line of JSON for each finished run, ``{"key": "...", ...}``, and only ever grows. Two words go beyond
-JSON, as Python's ``json`` module writes and reads them: the numbers ``NaN`` and ``Infinity``. The file is for carom
-itself; what others read is made from it.
+The file holds one line of JSON for each finished run, ``{"key": "...", ...}``, and is only appended to. It uses two
+extensions of JSON that Python's ``json`` module reads and writes: the numbers ``NaN`` and ``Infinity``. The file is
+internal to carom; exports are made from it.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from typing import Any, Self
 from ..commands.usage_errors import Problem, one_line
 
 BEGINNING = b'{"key": "'  # of each line
-SETTLING = 0.05  # s; two processes that find the same abandoned lock at once need less to see each other
+SETTLING = 0.05  # s; enough for two processes that find the same abandoned lock at once to detect each other
 
 
 class Store:
     """The finished runs in one file, by key. A context manager; one process at a time can have the file open.
 
-    A record is a mapping that JSON knows how to write; it is given back as JSON does: tuples have become lists, and
-    keys strings. NaN and infinity survive.
+    A record is a mapping that can be written as JSON; it is returned as read from JSON: tuples become lists, keys
+    become strings. NaN and infinity are preserved.
     """
 
     def __init__(self, path: Path, lock: _Lock, file: FileIO, records: dict[str, dict[str, Any]]) -> None:
@@ -39,14 +39,14 @@ class Store:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], resume: bool = False) -> Self:
-        """Begin a file, or go on with it.
+        """Create a file, or continue an existing one.
 
-        With ``resume`` the records of an existing file are there at once. A last line that was cut short, as a process
-        leaves it that is killed while it writes, is taken off the file. Without ``resume`` a file with anything in it
-        is first moved to NAME.before (in the place of an older one).
+        With ``resume`` the records of an existing file are available at once. An incomplete last line, left by a
+        process that was killed while writing, is removed. Without ``resume`` a non-empty file is first moved to
+        NAME.before, replacing an older one.
 
-        Problem if another process has the file open, if it cannot be read or written, or if it has a line that no
-        store can have written.
+        Problem if another process has the file open, if it cannot be read or written, or if it has a line that no store
+        can have written.
         """
         path = Path(path)
         try:
@@ -76,7 +76,7 @@ class Store:
         self.close()
 
     def close(self) -> None:
-        """Others may have the file now. Closing twice does nothing."""
+        """Release the file for other processes. Closing twice does nothing."""
         if not self._file.closed:
             self._file.close()
             self._lock.release()
@@ -88,14 +88,14 @@ class Store:
         return key in self._records
 
     def get(self, key: str) -> dict[str, Any] | None:
-        """The record of that run, without its key; None if it is not finished."""
+        """The record of that run, without its key; None if the run is not finished."""
         return self._records.get(key)
 
     def add(self, key: str, record: Mapping[str, Any]) -> None:
-        """Keep a record; when this returns it is on the disk.
+        """Append a record; it is on the disk when this returns.
 
-        ValueError for a key that is there already, a record that has a field "key" of its own, and a closed store;
-        TypeError for what JSON cannot write. If the disk refuses it (OSError) the file is as it was before.
+        ValueError for a key that already exists, a record that has a field "key", and a closed store; TypeError if the
+        record cannot be written as JSON. If writing fails (OSError) the file is left as it was before.
         """
         if not isinstance(key, str):
             raise TypeError(f"key must be a string, not {key!r}")
@@ -110,14 +110,14 @@ class Store:
             while rest:
                 rest = rest[self._file.write(rest) :]
             os.fsync(self._file.fileno())
-        except BaseException:  # a full disk, Ctrl-C: half a line must not stay before the next one
+        except BaseException:  # a full disk, Ctrl-C: remove the incomplete line
             self._file.truncate(size)
             raise
         _, self._records[key] = _parsed(line)
 
 
 def _read(path: Path, file: FileIO) -> dict[str, dict[str, Any]]:
-    """All records; takes a last line that was cut short off the file."""
+    """All records; removes an incomplete last line from the file."""
     file.seek(0)
     content = file.readall()
     *lines, rest = content.split(b"\n")
@@ -140,7 +140,7 @@ def _read(path: Path, file: FileIO) -> dict[str, dict[str, Any]]:
 
 
 def _parsed(line: bytes) -> tuple[str, dict[str, Any]]:
-    """Key and record; ValueError if it is no such line."""
+    """Key and record; ValueError if the line is not a record."""
     record = json.loads(line.decode())
     if not isinstance(record, dict) or not isinstance(record.get("key"), str):
         raise ValueError("it has no key")
@@ -148,9 +148,9 @@ def _parsed(line: bytes) -> tuple[str, dict[str, Any]]:
 
 
 class _Lock:
-    """NAME.lock beside the file, which says whose it is: process id and machine.
+    """NAME.lock beside the file; it holds the owner's process id and machine.
 
-    It is taken with nothing but what every file system can do: make a file that must not be there yet.
+    Locking needs only exclusive creation of a file, which every file system supports.
     """
 
     def __init__(self, path: Path) -> None:
@@ -162,7 +162,7 @@ class _Lock:
             self._path.unlink(missing_ok=True)
             if not self._taken():
                 raise self._refusal(path)
-            time.sleep(SETTLING)  # another process that found it abandoned too may just have removed ours
+            time.sleep(SETTLING)  # another process that found the lock abandoned may just have removed ours
             if self._content() != self._text:
                 os.close(self._handle)
                 raise self._refusal(path)
@@ -176,7 +176,7 @@ class _Lock:
             self._handle = os.open(self._path, os.O_CREAT | os.O_EXCL | os.O_WRONLY)
         except FileExistsError:
             return False
-        os.write(self._handle, self._text.encode())  # stays open: Windows lets nobody remove it then
+        os.write(self._handle, self._text.encode())  # stays open: Windows then refuses to delete the file
         return True
 
     def _content(self) -> str:
@@ -186,11 +186,11 @@ class _Lock:
             return ""
 
     def _abandoned(self) -> bool:
-        """Whether the process that made it has ended. One of another machine is believed to run."""
+        """True if the process that made the lock has ended. A process on another machine is assumed to run."""
         number, _, machine = self._content().strip().partition(" ")
         if machine != platform.node() or not number.isdecimal() or int(number) < 1:
             return False
-        if os.name == "nt":  # asking there whether a process runs would interrupt it
+        if os.name == "nt":  # on Windows os.kill would interrupt the process
             with contextlib.suppress(PermissionError):
                 self._path.unlink(missing_ok=True)
                 return True
@@ -199,7 +199,7 @@ class _Lock:
             os.kill(int(number), 0)
         except (ProcessLookupError, OverflowError):
             return True
-        except PermissionError:  # it runs, for another user
+        except PermissionError:  # the process runs, as another user
             return False
         return False
 

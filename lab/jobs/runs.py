@@ -1,4 +1,4 @@
-"""Runs tasks on all cores and keeps what they show, so that nothing runs twice."""
+"""Runs tasks on all cores and keeps their results, so that no run is repeated."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .result_store import Store
 from .tasks import Task, mean_of, perform
 from .workers import Lost, in_parallel
 
-FEW_STEPS = 20_000  # together: they take less time than workers need to start
-WORTH_IT = 4.0  # times better must references agree with a step 8 times smaller: else it is rounding or chance
+FEW_STEPS = 20_000  # in total: fewer take less time than starting workers
+WORTH_IT = 4.0  # required improvement of the agreement with steps 8 times smaller; less is rounding or chance
 ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
 
 
 class Runs:
-    """Performs tasks with ``workers`` processes; a store remembers them over an interruption."""
+    """Performs tasks with ``workers`` processes; a store keeps the results if the command is interrupted."""
 
     def __init__(
         self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS
@@ -38,18 +38,18 @@ class Runs:
         self.performed = 0
 
     def get(self, task: Task) -> dict[str, Any] | None:
-        """What is known of the task already."""
+        """The record of a task already performed, or None."""
         known = self._kept.get(task.key)
         return known if known is not None or self._store is None else self._store.get(task.key)
 
     def all(self, tasks: Iterable[Task], what: str) -> list[dict[str, Any]]:
-        """The records of all tasks, in their order."""
+        """The records of all tasks, in order."""
         tasks = list(tasks)
         missing = [task for task in tasks if self.get(task) is None]
         total = sum(task.cost for task in tasks)
         self.progress.begin(total, total - sum(task.cost for task in missing))
         self.progress.say(what)
-        missing.sort(key=lambda task: -task.cost)  # the long ones first: no core idles in the end
+        missing.sort(key=lambda task: -task.cost)  # longest first, so that no core is idle at the end
         few = sum(task.cost for task in missing) < FEW_STEPS
         with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers)) as results:
             for task, record in results:
@@ -66,14 +66,14 @@ class Runs:
 
 
 def _lost(task: Task, lost: Lost) -> dict[str, Any]:
-    """A run whose process died twice is a failed run; a reference cannot fail."""
+    """The record of a run whose process died twice: a failed run. Problem if it is a reference."""
     if task.reference:
         raise Problem(f"{task.case.subject.name}: the reference run with {task.cell} was lost: {lost.reason}")
     return dataclasses.asdict(Outcome(task.cell, task.repeat, {}, STOPPED, {}, task.case.seconds, lost.reason))
 
 
 def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
-    """The case with what its errors are measured against: a closed form, or two own runs and how far they agree."""
+    """The case with its reference: a closed form, or two own runs and the difference between them."""
     if case.reference is not None:
         return case, Reference(f"closed form: {case.form}" if case.kind != "resting" else case.form)
     tasks = reference_tasks(case)
@@ -91,7 +91,7 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
     apart = [errors_of(other, first, NORMS) for other in others]
     agreement = {name: max(abs(errors[name]) for errors in apart) for name in NORMS}
     if conserves(first):
-        agreement["energy"] = 0.0  # what is conserved is known without a reference
+        agreement["energy"] = 0.0  # a conserved energy is known without a reference
     a, b, _ = case.reference_cells
     text = f"own runs with {_words(a)} and with {_words(b)}, steps of {a.dt:.3g} s, and twice that"
     return case.replace(reference=first), Reference(text, {n: agreement[n] for n in case.norms})
@@ -100,8 +100,8 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
 def refined_reference(
     case: Case, runs: Runs, enough: Callable[[Case, Reference], bool]
 ) -> tuple[Case, Reference, bool]:
-    """The case with its reference, whose steps are made smaller until it is ``enough`` or nothing is gained any more;
-    and whether it is enough."""
+    """The case with its reference, refined with smaller steps until it is ``enough`` or no longer improves; and whether
+    it is enough."""
     before, case = math.inf, case.coarse_reference()
     while True:
         with_own, reference = with_reference(case, runs)
@@ -115,13 +115,13 @@ def refined_reference(
 
 
 def reference_tasks(case: Case) -> list[Task]:
-    """Those of the first method, then as many of the second."""
+    """The tasks of the first method, then as many of the second."""
     repeats = ENSEMBLE if case.kind == CHAOTIC else 1
     return [Task(case, cell, repeat, True) for cell in case.reference_cells for repeat in range(repeats)]
 
 
 def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Reference]:
-    """Two ensembles: their means differ by noise if both are right."""
+    """The case with two ensembles as reference: if both are right, their means differ only by noise."""
     means = mean_of(seens[:half]), mean_of(seens[half:])
     both = mean_of(seens)
     case = _told(case, both)
@@ -142,7 +142,7 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
 
 
 def _told(case: Case, reference: Seen) -> Case:
-    """The case with the norms that the reference tells; Problem if there are none."""
+    """The case with the norms that can be computed from the reference; Problem if there are none."""
     told = tuple(name for name in case.norms if NORMS[name].tells(reference))
     if not told:
         others = ", ".join(name for name in OF_KIND[case.kind] if NORMS[name].tells(reference))
@@ -158,12 +158,12 @@ def _words(cell: Cell) -> str:
 
 
 def run_tasks(case: Case, cells: Iterable[Cell]) -> list[Task]:
-    """Every repeat of every cell."""
+    """One task for every repeat of every cell."""
     return [Task(case, cell, repeat) for cell in cells for repeat in range(case.repeats)]
 
 
 def point_of(outcomes: list[Outcome]) -> Point:
-    """One cell from its repeats."""
+    """The point of one cell, from its repeats."""
     good = [outcome for outcome in outcomes if outcome.failure is None]
     failures: dict[str, int] = {}
     for outcome in outcomes:

@@ -1,4 +1,4 @@
-"""One run as a worker takes it: a case, a cell and a repeat go in, what the run showed comes out."""
+"""One run as a worker performs it: input is a case, a cell and a repeat; output is what the run showed."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from ..measure.observation import Seen, observe
 from ..measure.survey import NUDGE, nudge
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
 
-FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes start elsewhere than what they judge
+FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds than the runs compared with them
 
 
 @dataclass(frozen=True)
 class Task:
-    """One run. reference: it is one of the case's own references, and what it showed is kept as a whole."""
+    """One run. reference: it is one of the case's own references, whose full observation is kept."""
 
     case: Case
     cell: Cell
@@ -33,7 +33,7 @@ class Task:
 
     @property
     def key(self) -> str:
-        """The same for the same run, in this process and in the next."""
+        """Identifies the run, in this process and later ones."""
         case = self.case
         facts = (
             case.subject.mark, case.seconds, case.kind, repr(case.survey.settings), self.reference, self.cell.key,
@@ -45,12 +45,12 @@ class Task:
 
     @property
     def cost(self) -> float:
-        """For the bar: steps."""
+        """Steps, for the progress bar."""
         return self.case.seconds / self.cell.dt
 
 
 def perform(task: Task) -> dict[str, Any]:
-    """Run it; what it showed as plain data. A run that is stopped by an error is a result too."""
+    """Perform the run and return its observation as plain data. A run stopped by an error is a result too."""
     case, cell = task.case, task.cell
     try:
         seen = _run(task)
@@ -88,7 +88,7 @@ def world_of(case: Case, cell: Cell, repeat: int) -> World:
 
 
 def engine_of(case: Case, cell: Cell, repeat: int) -> Engine:
-    """An engine at the start of that repeat; Problem where pymunk cannot take the scene."""
+    """An engine at the start of that repeat; Problem if pymunk cannot represent the scene."""
     if cell.engine == PYMUNK:
         cell_of_carom = dataclasses.replace(cell, integrator=case.survey.settings.integrator)
         world = world_of(case, cell_of_carom, repeat)
@@ -102,7 +102,7 @@ def engine_of(case: Case, cell: Cell, repeat: int) -> Engine:
 
 
 def mean_of(seens: list[Seen]) -> Seen:
-    """The statistics of several runs, averaged; everything else is the first one's."""
+    """The averaged statistics of several runs; all other fields are those of the first."""
     signed = [name for name, norm in NORMS.items() if norm.signed]
     means = {name: float(np.mean([getattr(seen, name) for seen in seens])) for name in signed}
     return dataclasses.replace(seens[0], **means)

@@ -1,7 +1,7 @@
-"""Work for all cores: tasks run in processes of their own, and one of them that dies costs no other task anything.
+"""Tasks performed in parallel processes, so that a process that dies affects only its own task.
 
-Each worker has a pipe of its own and at most one task, so when a pipe ends it is certain which task was lost and that
-it gave no result: a half written answer of a killed worker can reach nobody else.
+Each worker has its own pipe and at most one task. When a pipe ends, it is certain which task was lost and that it gave
+no result: an incomplete answer of a killed worker cannot be read as another task's.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from ...framework.compilation import log
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-TRIES = 2  # of a task whose worker dies
-STARTS = 10  # of workers in a row that end before they are ready, until no more are started
+TRIES = 2  # attempts at a task whose worker dies
+STARTS = 10  # workers in a row that end before they are ready, before giving up
 
-PATIENCE = 5.0  # s, for a process to end whose pipe has
+PATIENCE = 5.0  # s, to wait for a process to end after its pipe ended
 
-READY, COMPILES, DONE, RAISED, UNKNOWN = "ready", "compiles", "done", "raised", "unknown"  # what a worker says
-DIED = "died"  # what is said of it
+READY, COMPILES, DONE, RAISED, UNKNOWN = "ready", "compiles", "done", "raised", "unknown"  # messages of a worker
+DIED = "died"  # in place of a message
 
 logger = logging.getLogger("carom")
 
 
 @dataclass(frozen=True)
 class Lost:
-    """What stands for the result of a task that ended its worker process each time it was tried."""
+    """The result of a task that ended its worker process at every attempt."""
 
     task: Any
     reason: str
@@ -59,19 +59,21 @@ def in_parallel(
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
     """``(task, function(task))`` for each task, as they finish, from ``workers`` processes (None: all cores).
 
-    A worker gets one task at a time. If it dies with it (killed, out of memory, a crash) the task is tried once more in
-    another one; if that dies too, :class:`Lost` is its result. No other task is touched, and none is finished twice.
+    A worker gets one task at a time. If it dies during the task (killed, out of memory, a crash), the task is tried
+    once more in another worker; if that dies too, :class:`Lost` is its result. No other task is affected, and none is
+    finished twice.
 
-    The tasks run here instead, one after the other and in order, with ``workers=1``, inside a worker, and if
-    ``function`` cannot be pickled (a lambda, a function inside another). A task that a worker cannot load runs here
-    too, while the workers go on with the others: functions and classes of the script that was started (``__main__``)
-    are not known to them, as workers never run that script. An INFO line of the logger ``carom`` says why.
+    The tasks run in this process instead, one after the other and in order, with ``workers=1``, inside a worker, and if
+    ``function`` cannot be pickled (a lambda, a function inside another). A task that a worker cannot load also runs
+    here, while the workers continue with the others: functions and classes of the script that was started
+    (``__main__``) are unknown to workers, which never run that script. An INFO line of the logger ``carom`` gives the
+    reason.
 
-    What ``function`` raises ends everything and is raised here, with the worker's traceback as a note. Closing the
-    generator and Ctrl-C end the workers at once, without a word from them; so does the death of this process. What
-    workers print goes to stderr, and kernels that they compile are told to the listeners of this process.
+    An exception of ``function`` stops everything and is raised here, with the worker's traceback as a note. Closing the
+    generator and Ctrl-C end the workers at once and silently; so does the death of this process. Prints of workers go
+    to stderr, and the kernels they compile are reported to the listeners of this process.
 
-    ValueError for fewer than one worker; ChildProcessError if processes cannot be started here.
+    ValueError for fewer than one worker; ChildProcessError if processes cannot be started.
     """
     tasks = list(tasks)
     if workers is None:
@@ -79,7 +81,7 @@ def in_parallel(
     if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:
         raise ValueError(f"workers must be a whole number of at least 1, not {workers!r}")
     pickled = None
-    if workers > 1 and not multiprocessing.current_process().daemon:  # a worker must not have workers
+    if workers > 1 and not multiprocessing.current_process().daemon:  # a worker cannot have workers
         pickled = _pickled(function)
     if pickled is None or not tasks:
         return ((task, function(task)) for task in tasks)
@@ -92,11 +94,11 @@ def _shared_out(
     waiting = deque(range(len(tasks)))
     tries = [0] * len(tasks)
     here: deque[int] = deque()  # tasks that only this process can load
-    workers: list[_Worker] = []  # all of them busy, or starting
+    workers: list[_Worker] = []  # all of them busy or starting
     failed_starts = 0
 
     def go_on(worker: _Worker) -> None:
-        """Give it the next task that can be sent; without one it ends."""
+        """Give it the next task that can be sent; end the worker if there is none."""
         while waiting:
             worker.task = waiting.popleft()
             message = _pickled(tasks[worker.task])
@@ -131,14 +133,14 @@ def _shared_out(
                         if failed_starts == STARTS:
                             raise ChildProcessError(f"worker processes end before they begin: {content}")
                     elif tries[index] < TRIES:
-                        waiting.append(index)  # last: memory may be what was short
+                        waiting.append(index)  # at the end: the cause may be lack of memory
                     else:
                         yield tasks[index], Lost(tasks[index], f"its process ended {TRIES} times: {content}")
                     continue
                 if said == RAISED:
                     raise content
                 failed_starts = 0
-                go_on(worker)  # before the caller gets its result and takes time over it
+                go_on(worker)  # first, because the caller may take time over the result
                 if said == DONE:
                     assert index is not None
                     yield tasks[index], content
@@ -152,13 +154,13 @@ def _shared_out(
 
 
 def _heard(workers: Sequence[_Worker], wait: bool) -> list[_Worker]:
-    """Those that have said something or died; waits for one if asked to."""
+    """The workers that have sent a message or died; waits for one if ``wait``."""
     by_pipe: dict[Any, _Worker] = {worker.pipe: worker for worker in workers}
     return [by_pipe[pipe] for pipe in multiprocessing.connection.wait(list(by_pipe), None if wait else 0)]
 
 
 def _pickled(thing: Any) -> bytes | None:
-    """None if it cannot be."""
+    """The pickled object; None if it cannot be pickled."""
     try:
         return pickle.dumps(thing)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -167,10 +169,10 @@ def _pickled(thing: Any) -> bytes | None:
 
 
 class _Worker:
-    """A process, as seen from the one that started it.
+    """A worker process, seen from its parent.
 
     task
-        the index of the one it works on; None until it has its first
+        the index of the current task; None before the first
     """
 
     def __init__(self, pickled: bytes) -> None:
@@ -180,14 +182,14 @@ class _Worker:
             target=_serve, args=(theirs, pickled, bool(log.listeners)), daemon=True
         )
         with theirs, _interrupts_held_back(), _main_hidden():
-            self._process.start()  # and close our copy of its end: the pipe must end when the process does
+            self._process.start()  # then close our copy of the child's end, so that the pipe ends with the process
 
     def send(self, message: bytes) -> None:
-        with suppress(OSError):  # it has just died: that its pipe ends is heard next
+        with suppress(OSError):  # it has just died: the end of its pipe is handled later
             self.pipe.send_bytes(message)
 
     def answer(self) -> tuple[str, Any]:
-        """What it says, once that has begun to arrive; (DIED, how) if it never will."""
+        """The message that has begun to arrive; (DIED, how) if the process ended instead."""
         try:
             message = self.pipe.recv_bytes()
         except (EOFError, OSError):
@@ -200,7 +202,7 @@ class _Worker:
         return pickle.loads(message)
 
     def end(self) -> None:
-        """At once."""
+        """Kill the process at once."""
         self.pipe.close()
         self._process.kill()
         self._process.join()
@@ -208,16 +210,16 @@ class _Worker:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C reaches every process of a terminal: one that is just starting must not answer with a traceback.
+    """Ctrl-C reaches every process of a terminal; a process that is starting must not print a traceback.
 
-    A blocked signal stays blocked in a process started meanwhile; here it comes through afterwards.
+    A blocked signal stays blocked in processes started meanwhile; this process receives it afterwards.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # its start would lift the block
+    resource_tracker.ensure_running()  # starting it later would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -227,7 +229,7 @@ def _interrupts_held_back() -> Iterator[None]:
 
 @contextmanager
 def _main_hidden() -> Iterator[None]:
-    """A process started now does not run the user's script again, which may lack an ``if __name__ == "__main__"``."""
+    """Start processes without running the user's script again, which may lack ``if __name__ == "__main__"``."""
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     try:
@@ -237,7 +239,7 @@ def _main_hidden() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, pickled: bytes, listened: bool) -> None:
-    """What a worker does: answers tasks until its pipe ends."""
+    """The main loop of a worker: perform tasks until the pipe ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     os.dup2(2, 1)
@@ -253,7 +255,7 @@ def _serve(pipe: Connection, pickled: bytes, listened: bool) -> None:
                 if function is None:
                     function = pickle.loads(pickled)
                 task = pickle.loads(message)
-            except (Exception, SystemExit) as error:  # this imports their modules: somebody else's code
+            except (Exception, SystemExit) as error:  # imports user modules, which may raise anything
                 _say(pipe, UNKNOWN, f"{type(error).__name__}: {error}")
                 continue
             pipe.send_bytes(_outcome(function, task))
@@ -264,16 +266,16 @@ def _say(pipe: Connection, what: str, content: Any = None) -> None:
 
 
 def _outcome(function: Callable[[Any], Any], task: Any) -> bytes:
-    """What is said after a task."""
+    """The message after a task."""
     try:
         return pickle.dumps((DONE, function(task)))
-    except (Exception, SystemExit) as error:  # whatever it is, the caller gets it
+    except (Exception, SystemExit) as error:  # passed on to the caller
         trace = "".join(traceback.format_exception(error)).rstrip()
         error.add_note(trace)
         try:
             message = pickle.dumps((RAISED, error))
-            pickle.loads(message)  # which fails where dumps does not if __init__ wants arguments of its own
-        except Exception:  # an error may hold anything
+            pickle.loads(message)  # can fail where dumps does not: if __init__ has required arguments
+        except Exception:  # the error has contents that cannot be pickled
             stand_in = RuntimeError(f"{type(error).__name__}: {error}")
             stand_in.add_note(trace)
             message = pickle.dumps((RAISED, stand_in))
@@ -281,7 +283,7 @@ def _outcome(function: Callable[[Any], Any], task: Any) -> bytes:
 
 
 def _end_with_parent() -> None:
-    """A parent that was killed ends no worker itself."""
+    """End this process with its parent: a killed parent does not end its workers."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
