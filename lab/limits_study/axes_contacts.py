@@ -1,4 +1,4 @@
-"""The axes of contacts: speed against a thin wall, ratios of masses, towers, crowds at one point."""
+"""The axes of contacts: speed against a thin wall, mass ratios, towers, many bodies at one point."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .records import MODES, Axis, BrokenError, Method, decades
 SHOTS = 200  # start phases of a step
 RADIUS, WALL = 0.25, 0.1  # m
 SIZE = WALL + 2 * RADIUS
-REST_STEPS, LAST_STEPS = 600, 60  # of ten seconds the last one counts
+REST_STEPS, LAST_STEPS = 600, 60  # ten seconds, of which the last second is measured
 CROWD_STEPS = 60
 ONE_SWEPT = Method("discrete with ccd", MODES[:1])
 FINE_SOLVER = Method("discrete with 32 substeps", MODES[:1], MappingProxyType({"substeps": 32}))
 
 
 def speed(method: Method, ratio: float) -> float:
-    """Balls shot at a wall from all phases of a step: the share that is behind it, or the error of their places."""
+    """Balls shot at a wall from all phases of a step: the share behind the wall, or the error of their positions."""
     way = ratio * SIZE  # in a step
     velocity = 60 * way
     touch = -(WALL / 2 + RADIUS)
@@ -47,7 +47,7 @@ def speed(method: Method, ratio: float) -> float:
 
 
 def exchange(method: Method, ratio: float) -> float:
-    """A light ball meets one so much heavier, elastic: the closed form of both velocities and of the momentum."""
+    """Elastic impact of a light ball and one ``ratio`` times heavier, against the closed form of both velocities."""
     with closing(new_world(method)) as world:
         for side, mass in ((-1, 1.0), (1, ratio)):
             world.create_entity(
@@ -66,22 +66,22 @@ def exchange(method: Method, ratio: float) -> float:
 
 
 def load(method: Method, ratio: float) -> float:
-    """A box that rests on one so much lighter: the largest overlap."""
+    """The largest overlap of a box at rest on another that is ``ratio`` times lighter."""
     return _tower(method, [1.0, ratio])[0]
 
 
 def load_on_three(method: Method, ratio: float) -> float:
-    """A box that rests on three so much lighter ones, one on the other: the largest overlap."""
+    """The largest overlap of a box at rest on a tower of three boxes that are ``ratio`` times lighter."""
     return _tower(method, [1.0, 1.0, 1.0, ratio])[0]
 
 
 def tower(method: Method, height: float) -> float:
-    """How far the top of a tower of so many boxes has sunk."""
+    """The distance that the top of a tower of ``height`` boxes has sunk."""
     return _tower(method, [1.0] * round(height))[1]
 
 
 def _tower(method: Method, masses: list[float]) -> tuple[float, float]:
-    """(largest overlap in ten seconds, sinking of the top in the last one), in sizes of a box."""
+    """(largest overlap in ten seconds, sinking of the top in the last second), in box sizes."""
     with closing(new_world(method, GRAVITY)) as world:
         world.create_entity(Transform((0, -0.5)), AABBCollider((10, 0.5)))
         n = len(masses)
@@ -106,7 +106,7 @@ def _tower(method: Method, masses: list[float]) -> tuple[float, float]:
 
 
 def crowd(method: Method, count: float) -> float:
-    """Balls at one point: the deepest overlap that is left after a second, of a diameter."""
+    """Balls at one point: the deepest overlap left after a second, in diameters."""
     with closing(new_world(method)) as world:
         n = round(count)
         world.create_entities(n, Transform.many(np.zeros((n, 2))), RigidBody.many(), SphereCollider.many(radius=0.5))

@@ -1,6 +1,6 @@
-"""The axes of free flight: the step's length, stiffness, duration, distance from the origin, sizes.
+"""The axes of free flight: step length, stiffness, duration, distance from the origin, sizes.
 
-Each measurement builds a world whose motion is known in closed form, steps it, and gives the error as a share.
+Each measurement builds a world whose motion is known in closed form, steps it, and returns the relative error.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from .records import FLYING, Axis, BrokenError, Method, by_integrator, by_mode, 
 
 GRAVITY = 10.0  # m/s^2
 TAKE_OFF = 5.0  # m/s: a jump of one second
-FREQUENCY = 2 * math.pi  # rad/s: a swing of one second
+FREQUENCY = 2 * math.pi  # rad/s: one oscillation per second
 MOST_STEPS = 1000
 SWINGS = 10
-FEWEST_STEPS = 100  # of a swing: what grows needs time to show it
+FEWEST_STEPS = 100  # of an oscillation: growth needs time to be visible
 BLOWN_UP = 1e6  # times the energy at the start
-SHORT_SWING = 0.1  # z of the spring that swings for long
-TEN_SWINGS, TEN_BOUNCES = 628, 1073  # steps of these two, over which the energy is averaged
-SPEED = 1.0  # m/s, of what meets head on
+SHORT_SWING = 0.1  # z of the spring in the long run
+TEN_SWINGS, TEN_BOUNCES = 628, 1073  # steps of ten oscillations and ten bounces, over which the energy is averaged
+SPEED = 1.0  # m/s, of bodies that meet head on
 
 
 class PullToOrigin(ForceSystem):
@@ -41,7 +41,7 @@ class PullToOrigin(ForceSystem):
 
 
 class Drag(ForceSystem):
-    """A force against the motion, in N s/m."""
+    """A force opposite to the velocity, in N s/m."""
 
     def __init__(self, rate: float) -> None:
         self.rate = rate
@@ -51,12 +51,12 @@ class Drag(ForceSystem):
 
 
 def new_world(method: Method, gravity: float = 0.0, **settings: Any) -> World:
-    """An empty world in the plane."""
+    """An empty 2D world."""
     return World(Physics(dimensions=2, gravity=(0.0, -gravity)), settings=method.settings(**settings))
 
 
 def jump(method: Method, dt: float) -> float:
-    """A body thrown upwards: v t - g t^2 / 2, for a second or a thousand steps."""
+    """A body thrown upwards, against v t - g t^2 / 2, for one jump but at most a thousand steps."""
     with closing(new_world(method, GRAVITY, dt=dt)) as world:
         world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(0, TAKE_OFF)))
         steps = min(max(round(2 * TAKE_OFF / GRAVITY / dt), 1), MOST_STEPS)
@@ -72,7 +72,7 @@ def jump(method: Method, dt: float) -> float:
 
 
 def swing(method: Method, dt: float) -> float:
-    """A body pushed off on a spring: sin(w t), for ten swings, at least a hundred steps and at most a thousand."""
+    """A body pushed off on a spring, against sin(w t), for ten periods, at least 100 and at most 1,000 steps."""
     steps = min(max(round(SWINGS * 2 * math.pi / FREQUENCY / dt), FEWEST_STEPS), MOST_STEPS)
     t = dt * np.arange(1, steps + 1)
     true = np.sin(FREQUENCY * t)
@@ -81,14 +81,14 @@ def swing(method: Method, dt: float) -> float:
 
 
 def stiffness(method: Method, z: float) -> float:
-    """A body let go on a spring of z = w dt, a thousand steps: how far the energy leaves its value at the start."""
+    """A body released on a spring of z = w dt, a thousand steps: the largest change of the energy."""
     states = _swung(method, 1.0, z, 1.0, 0.0, MOST_STEPS)
     energy = (states**2 @ (z * z, 1.0)) / (z * z)
     return float(np.abs(energy - 1).max())
 
 
 def drag(method: Method, ratio: float) -> float:
-    """A body that a force brakes: exp(-c t), a thousand steps."""
+    """A body slowed by a drag force, against exp(-c t), a thousand steps."""
     with closing(new_world(method, dt=1.0)) as world:
         world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(SPEED, 0)))
         world.add_system(Drag(ratio))
@@ -118,7 +118,7 @@ def _swung(method: Method, dt: float, frequency: float, x: float, v: float, step
 
 
 def long_swing(method: Method, steps: float) -> float:
-    """How far the mean energy of a spring of z = 0.1 drifts, from the first steps to the last."""
+    """Drift of the mean energy of a spring of z = 0.1, from the first steps to the last."""
     with closing(new_world(method, dt=1.0)) as world:
         world.create_entity(Transform((1, 0)), RigidBody())
         world.add_system(PullToOrigin(SHORT_SWING**2))
@@ -130,7 +130,7 @@ def long_swing(method: Method, steps: float) -> float:
 
 
 def long_bounce(method: Method, steps: float) -> float:
-    """The same of an elastic ball that falls four metres, at 60 steps a second."""
+    """Drift of the mean energy of an elastic ball that falls four metres, at 60 steps a second."""
     with closing(new_world(method, GRAVITY)) as world:
         world.create_entity(Transform((0, -1)), AABBCollider((5, 1)))
         world.create_entity(Transform((0, 4.5)), RigidBody(), SphereCollider(0.5, restitution=1.0))
@@ -142,7 +142,7 @@ def long_bounce(method: Method, steps: float) -> float:
 
 
 def _drift(world: World, steps: int, window: int, energy: Callable[[], float]) -> float:
-    """The change of the mean of the energy between the first window of steps and the last, as a share."""
+    """The relative change of the mean energy between the first window of steps and the last."""
     window = min(window, steps // 2)
     means = []
     for skipped in (0, steps - 2 * window):
@@ -157,7 +157,7 @@ def _drift(world: World, steps: int, window: int, energy: Callable[[], float]) -
 
 
 def distance(method: Method, offset: float) -> float:
-    """Two balls of a metre meet head on so far from the origin: where they are after half a second."""
+    """Two balls of 1 m meet head on at this distance from the origin: the error of their positions after 0.5 s."""
     with closing(new_world(method)) as world:
         for side in (-1, 1):
             world.create_entity(
@@ -178,7 +178,7 @@ def distance(method: Method, offset: float) -> float:
 
 
 def sizes(method: Method, ratio: float) -> float:
-    """A small ball meets a large one of the same mass and stops, the large one flies on."""
+    """A small ball hits a large one of the same mass and stops; the large one moves on."""
     small, large = ratio**-0.5, ratio**0.5
     gap, steps = 0.1, 12
     with closing(new_world(method)) as world:
@@ -198,7 +198,7 @@ def sizes(method: Method, ratio: float) -> float:
 
 INTEGRATORS = by_integrator(tuple(STANDARD_INTEGRATORS))
 BY_MODE = by_mode()
-LONG_RUNS = tuple(method for method in INTEGRATORS if method.name != "explicit_euler")  # it has no long run
+LONG_RUNS = tuple(method for method in INTEGRATORS if method.name != "explicit_euler")  # its long runs diverge
 STEPS = decades(3, 5)
 
 AXES = (

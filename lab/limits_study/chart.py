@@ -1,4 +1,4 @@
-"""The limits as a picture: one panel for each axis, the error against the value, crosses where it breaks."""
+"""The limits as a picture: one panel per axis, the error against the value, crosses where it breaks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .records import LEVELS, AxisLimits, Limits
 PANEL = (3.4, 2.5)  # inches
 DPI = 90
 COLUMNS = 3
-TOP, BOTTOM = 1e3, 1e-16  # errors beyond are drawn at these
+TOP, BOTTOM = 1e3, 1e-16  # errors outside this range are drawn at its ends
 COLOURS: dict[str, str] = dict(
     zip(
         ("discrete", "continuous", "event_driven", "explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4",
@@ -27,7 +27,7 @@ COLOURS: dict[str, str] = dict(
 
 
 def draw_limits(result: Limits, folder: Path) -> Path:
-    """One panel for each axis; into limits.png."""
+    """Draw limits.png with one panel per axis."""
     columns = min(COLUMNS, len(result.axes))
     rows = -(-len(result.axes) // columns)
     size = (PANEL[0] * columns, PANEL[1] * rows + 0.9)
@@ -52,7 +52,7 @@ def _draw(panel: Any, axis: AxisLimits, shown: dict[str, Any], labelled: bool) -
     for order, line in enumerate(axis.lines):
         colour = COLOURS.get(line.method, canvas.TEXT)
         known = [(s.value, min(max(s.error, BOTTOM), TOP)) for s in line.samples if s.error is not None]
-        # Lines that lie on each other: the later ones are thinner.
+        # Lines may coincide: the later ones are thinner.
         width = 1.0 + 0.7 * (len(axis.lines) - 1 - order)
         drawn = panel.plot([v for v, _ in known], [e for _, e in known], "-", color=colour, lw=width)[0]
         shown.setdefault(line.method, drawn)

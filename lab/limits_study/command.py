@@ -1,4 +1,4 @@
-"""``carom limits``: where carom fails, one axis at a time; and how long the step of a scene may be."""
+"""``carom limits``: where carom fails, one axis at a time; and the longest safe step of a scene."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from . import report as limits_report
 from .step_length import StepLimits, step_limits
 from .sweep import AXES, limits
 
-LOOKS = 20  # at a scene while it runs
-DEFAULT_SECONDS = 10.0  # of a file that does not say
+LOOKS = 20  # times that a running scene is examined
+DEFAULT_SECONDS = 10.0  # for a file that does not define it
 MARK = "carom limits"
 NAMES = tuple(axis.name for axis in AXES)
 
@@ -120,7 +120,7 @@ def _sweep(axis_names: str | None, quick: bool, long_runs: bool, output: Output)
 
 
 def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -> list[tuple[float, StepLimits]]:
-    """(time, limits) at the start, and while it runs."""
+    """(time, limits) at the start and at intervals of the run."""
     steps = round(seconds / world.settings.dt)
     looks = sorted({round(steps * k / LOOKS) for k in range(LOOKS + 1)})
     found = []

@@ -1,6 +1,6 @@
-"""What a sweep to the limits consists of: axes, the kinds of worlds tried on them, what each showed.
+"""Records of a sweep to the limits: axes, the kinds of worlds tried on them, and their results.
 
-The results are plain data that goes through JSON and back.
+The results are plain data that converts to JSON and back.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ LEVELS = {"1 %": 0.01, "10 %": 0.1}
 BREAKS = "breaks"
 UP, DOWN = "up", "down"
 MODES = ("discrete", "continuous", "event_driven")
-FLYING = MODES[:2]  # in which the integrator counts
+FLYING = MODES[:2]  # collision modes in which the integrator matters
 
 
 class BrokenError(Exception):
-    """Raised by a measurement: what was measured is no longer what it should be, and in which way.
+    """Raised by a measurement whose result is unusable; the message says why.
 
-    error: how large the error is all the same, None if there is none to tell.
+    error: its size all the same, None if it has none.
     """
 
     def __init__(self, why: str, error: float | None = None) -> None:
@@ -33,10 +33,10 @@ class BrokenError(Exception):
 
 @dataclass(frozen=True)
 class Method:
-    """One kind of world that is tried: a name, and how its settings differ from the default.
+    """One kind of world: a name, and the settings that differ from the default.
 
     modes
-        kinds of collision for which its result holds
+        collision modes for which its result holds
     """
 
     name: str
@@ -50,22 +50,22 @@ class Method:
 
 @dataclass(frozen=True)
 class Axis:
-    """One thing that is made larger and smaller until it fails.
+    """One quantity that is increased and decreased until carom fails.
 
     unit
         of the values, in words
     norm
-        what the error is, and of what it is a share
+        the error, and what it is relative to
     values
         ascending; ``quick`` are fewer of them, ``long`` more
     home
-        where all is well: from there it is gone outwards
+        the value from which the sweep starts, where all works
     measure
-        (method, value) -> error; raises BrokenError. Errors of carom count as broken too
+        (method, value) -> error; raises BrokenError. Errors raised by carom count as broken too
     fine
-        edges are known to this factor; None: the values are not refined
+        edges are found to this factor; None: the values are not refined
     whole
-        whether values are whole numbers
+        True if values are whole numbers
     """
 
     name: str
@@ -90,14 +90,14 @@ class Axis:
 
 @dataclass
 class Sample:
-    """One world; error None if there is none to tell; broken: in what way, or empty."""
+    """One world; error: None if it has none; broken: the way it broke, or empty."""
 
     value: float
     error: float | None
     broken: str = ""
 
     def beyond(self, level: str) -> bool:
-        """Whether it is past that level."""
+        """True if it is past that level."""
         if level == BREAKS:
             return bool(self.broken)
         return self.error is None or self.error > LEVELS[level]
@@ -105,12 +105,12 @@ class Sample:
 
 @dataclass
 class Edge:
-    """Where a level is passed, on the way up or down from the axis's home.
+    """Where a level is first exceeded, going up or down from the axis's home.
 
     value
-        the first found beyond it; None if none of those tried is
+        the first found beyond the level; None if none of those tried is
     last
-        the one next to it that is not beyond; if value is None, the last tried. None if even the home is beyond
+        its neighbour that is not beyond; if value is None, the last tried. None if even the home is beyond
     """
 
     way: str
@@ -129,7 +129,7 @@ class Line:
     edges: list[Edge]
 
     def edge(self, level: str, way: str = UP) -> Edge:
-        """The edge of that level; KeyError if nobody went that way."""
+        """The edge of that level; KeyError if that direction was not swept."""
         for edge in self.edges:
             if (edge.level, edge.way) == (level, way):
                 return edge
@@ -137,7 +137,7 @@ class Line:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         samples = [Sample(**sample) for sample in plain["samples"]]
         return cls(plain["method"], samples, [Edge(**edge) for edge in plain["edges"]])
 
@@ -153,7 +153,7 @@ class AxisLimits:
     lines: list[Line]
 
     def line(self, method: str) -> Line:
-        """That method's; KeyError if there is none."""
+        """The line of that method; KeyError if there is none."""
         for line in self.lines:
             if line.method == method:
                 return line
@@ -161,13 +161,13 @@ class AxisLimits:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "lines": [Line.from_dict(line) for line in plain["lines"]]})
 
 
 @dataclass
 class Limits:
-    """A whole sweep, and on which machine and versions it ran."""
+    """A whole sweep, with the machine and versions it ran on."""
 
     machine: dict[str, str]
     axes: list[AxisLimits]
@@ -185,22 +185,22 @@ class Limits:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         return cls(plain["machine"], [AxisLimits.from_dict(axis) for axis in plain["axes"]])
 
 
 def decades(first: int, last: int, per_decade: int = 1) -> tuple[float, ...]:
-    """10^first ... 10^last, so many per decade."""
+    """10^first ... 10^last, with ``per_decade`` values per decade."""
     count = (last - first) * per_decade
     return tuple(float(10.0 ** (first + k / per_decade)) for k in range(count + 1))
 
 
 def by_mode(**changes: Any) -> tuple[Method, ...]:
-    """One method for each kind of collision."""
+    """One method per collision mode."""
     return tuple(Method(mode, (mode,), MappingProxyType({"collision": mode, **changes})) for mode in MODES)
 
 
 def by_integrator(names: Sequence[str]) -> tuple[Method, ...]:
-    """One method for each integrator, and one for the flight of worlds that events drive."""
+    """One method per integrator, and one for the flight of event-driven worlds."""
     flying = [Method(name, FLYING, MappingProxyType({"integrator": name})) for name in names]
     return (*flying, Method("event_driven", MODES[2:], MappingProxyType({"collision": "event_driven"})))

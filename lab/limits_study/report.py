@@ -1,4 +1,4 @@
-"""The limits as tables: one for each axis, methods with the same limits in one row."""
+"""The limits as tables: one per axis; methods with equal limits share a row."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from ..reporting.text_tables import TextTable
 from .records import BREAKS, DOWN, LEVELS, AxisLimits, Edge, Limits, Line
 
 LONGEST = 90  # characters of a reason
-ROUNDING = 1e-9  # less is rounding
-MOST = 10.0  # more is no longer told apart
+ROUNDING = 1e-9  # smaller errors count as rounding
+MOST = 10.0  # larger errors are shown as "over"
 
 
 def tables(result: Limits) -> list[TextTable]:
@@ -17,7 +17,7 @@ def tables(result: Limits) -> list[TextTable]:
 
 
 def remarks(result: Limits) -> list[str]:
-    """How to read them."""
+    """How to read the tables."""
     return [
         "A level is passed at the figure given, found to the axis's precision; a .. b: between these two, not narrowed "
         "down. Worst: the largest error where nothing breaks. "
@@ -41,7 +41,7 @@ def table(axis: AxisLimits) -> TextTable:
 
 
 def number(value: float) -> str:
-    """Three digits: 2,050 and 1e15."""
+    """Three significant digits: 2,050 and 1e15."""
     if 1e3 <= value < 1e5:
         return f"{float(f'{value:.3g}'):,.0f}"
     mantissa, _, exponent = f"{value:.3g}".partition("e")

@@ -1,9 +1,8 @@
-"""Limits of stability: the longest step at which an integrator does not make a linear world grow.
+"""Limits of stability: the longest step at which an integrator keeps a linear world from growing.
 
-What is asked is x'' = -K x - C x' - G x', K stiffness and C drag by forces, G linear damping, which integrators take in
-on a road of their own. One step of the integrator is applied to states that span all others, which gives the matrix of
-the step; while no eigenvalue of it lies outside the unit circle the step is stable. So an integrator that a plugin
-brings has its limit found like the others.
+The system is x'' = -K x - C x' - G x': K stiffness and C drag by forces, G linear damping, which integrators treat
+separately. One step of the integrator is applied to a basis of states, which gives the matrix of the step. The step is
+stable while no eigenvalue lies outside the unit circle. So the limit of a plugin's integrator is found in the same way.
 
 For one oscillator (k = w^2, c) the limits are known: w h = 2 for semi-implicit Euler and velocity Verlet, 2 sqrt 2 for
 Runge-Kutta 4, none for explicit Euler; c h = 2, 2 and 2.785 for drag alone (Hairer & Wanner, Solving Ordinary
@@ -24,21 +23,21 @@ from ...systems.integration.motion import Motion
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
-ROUNDING = 1e-12  # growth per step that is none
-SHORTEST, LONGEST = 1e-5, 30.0  # steps that are looked at, in units of the oscillator's own time
-RATIO = 1.02  # of neighbouring steps
+ROUNDING = 1e-12  # growth per step that counts as none
+SHORTEST, LONGEST = 1e-5, 30.0  # range of steps searched, in units of the oscillator's own time
+RATIO = 1.02  # of consecutive steps
 HALVINGS = 50
-# A growth that begins at h = 0 with a power of h comes out of the rounding at a short step, and doubling the step makes
-# it larger by no more than this power of two.
+# A growth with a power of h from h = 0 exceeds rounding at a short step, and doubling the step multiplies it by at
+# most STEEPEST.
 SHORT, STEEPEST = 0.05, 2.0**8
 
 
 def advanced(
     integrator: Integrator, position: Floats, velocity: Floats, damping: Floats, force: Callable[..., Floats]
 ) -> tuple[Floats, Floats]:
-    """One step of one second of bodies of one kilogram: position and velocity (n, 2), damping (n,).
+    """One step of 1 s of bodies of 1 kg: position and velocity (n, 2), damping (n,).
 
-    force(position, velocity) gives (n, 2).
+    force(position, velocity) returns (n, 2).
     """
     motion = Motion(
         position.copy(), velocity.copy(), force(position, velocity), np.ones(len(position)), damping.copy(),
@@ -56,14 +55,14 @@ def advanced(
 def growth(
     integrator: Integrator, stiffness: ArrayLike, drag: ArrayLike = 0.0, damping: ArrayLike = 0.0, h: ArrayLike = 1.0
 ) -> Floats:
-    """The largest eigenvalue, by size, of one step of each oscillator x'' = -stiffness x - (drag + damping) x'.
+    """The largest absolute eigenvalue of one step of each oscillator x'' = -stiffness x - (drag + damping) x'.
 
-    stiffness 1/s^2, drag and damping 1/s, h s: arrays of one length or numbers. Stiffness and drag may be complex: x is
-    the x + i y of a plane then, which forces that turn the velocity need. Above 1 the step grows.
+    stiffness 1/s^2, drag and damping 1/s, h s: arrays of one length or numbers. Stiffness and drag may be complex; then
+    x stands for x + i y of a plane, as needed for forces that turn the velocity. Above 1 the oscillation grows.
     """
     k, c, g, step = (np.atleast_1d(np.asarray(a)) for a in (stiffness, drag, damping, h))
     k, c, g, step = np.broadcast_arrays(k, c, g, step)
-    # In units of its own step every oscillator takes a step of one second.
+    # In units of its own step every oscillator takes a step of 1 s.
     k, c, g = np.tile(k * step * step + 0j, 2), np.tile(c * step + 0j, 2), np.tile(np.real(g * step) + 0.0, 2)
     half = len(k) // 2
     start = np.zeros((2, 2 * half), complex)
@@ -76,7 +75,7 @@ def growth(
     position, velocity = advanced(integrator, start[0][:, None].view(float), start[1][:, None].view(float), g, force)
     x, v = position.view(complex)[:, 0], velocity.view(complex)[:, 0]
     a, b, d, e = x[:half], x[half:], v[:half], v[half:]
-    a, e = a - 1, e - 1  # of the change in a step: short steps leave nearly the unit matrix, whose digits would be lost
+    a, e = a - 1, e - 1  # eigenvalues of the change: the matrix of a short step is nearly the unit matrix
     middle = 1 + (a + e) / 2
     root = np.sqrt((a + e) ** 2 / 4 - (a * e - b * d))
     return np.maximum(np.abs(middle + root), np.abs(middle - root))
@@ -85,9 +84,9 @@ def growth(
 def stability_limits(
     integrator: Integrator, stiffness: ArrayLike, drag: ArrayLike = 0.0, damping: ArrayLike = 0.0
 ) -> Floats:
-    """Seconds, for each oscillator (see :func:`growth`): the step at which it begins to grow.
+    """Seconds, for each oscillator (see :func:`growth`): the shortest step at which it grows.
 
-    0 if it grows at any step, inf if at none; inf too for what grows by itself, whatever the step.
+    0 if it grows at any step, inf if at none; inf too if the exact solution grows, whatever the step.
     """
     k, c, g = (np.atleast_1d(np.asarray(a)) for a in (stiffness, drag, damping))
     k, c, g = np.broadcast_arrays(k + 0j, c + 0j, np.real(g) + 0.0)
@@ -118,7 +117,7 @@ def stability_limits(
 
 
 def grows_by_itself(stiffness: Any, drag: Any, damping: Any) -> NDArray[np.bool_]:
-    """Whether the true solution of x'' = -stiffness x - (drag + damping) x' grows: no step could prevent it."""
+    """True if the exact solution of x'' = -stiffness x - (drag + damping) x' grows: no step could prevent it."""
     c = drag + damping
     root = np.sqrt(c * c / 4 - stiffness + 0j)
     fastest = np.maximum((-c / 2 + root).real, (-c / 2 - root).real)
@@ -126,9 +125,9 @@ def grows_by_itself(stiffness: Any, drag: Any, damping: Any) -> NDArray[np.bool_
 
 
 def growth_of_system(integrator: Integrator, stiffness: Floats, drag: Floats, damping: Floats, h: float) -> float:
-    """The largest eigenvalue, by size, of one step of a coupled system: stiffness and drag (n, n), damping (n,).
+    """The largest absolute eigenvalue of one step of a coupled system: stiffness and drag (n, n), damping (n,).
 
-    Needed where stiffness and drag do not share their modes: then no oscillator alone tells the whole.
+    Needed if stiffness and drag do not commute: then the system does not split into single oscillators.
     """
     n = len(damping)
     k, c = stiffness * h * h, drag * h

@@ -1,6 +1,6 @@
-"""How long a world's step may be: by the stability of its integrator, and by what would fly through what.
+"""The longest safe step of a world: by the stability of its integrator, and by tunnelling.
 
-    limits = step_limits(world)         # why; prints as sentences
+    limits = step_limits(world)         # the reasons; prints as sentences
     world.settings = world.settings.replace(dt=min(1 / 60, suggest_dt(world)))
 """
 
@@ -17,12 +17,12 @@ from ...systems import Integrator
 from .stability import growth_of_system, stability_limits
 from .stiffness import Modes, modes_of
 
-SAFETY = 0.9  # of the limit that is suggested
-EXACT = 60  # numbers that place bodies which hang together, up to which their whole step is looked at
-COUPLED_GROWTH = 1e-7  # per step, that is none: eigenvalues of large matrices that are equal come out so far apart
-SHORTEST, STEPS = 1e-3, 60  # of the limit that single oscillators have, where the whole is looked at
+SAFETY = 0.9  # fraction of the limit that is suggested
+EXACT = 60  # degrees of freedom of coupled bodies, up to which the full step is analysed
+COUPLED_GROWTH = 1e-7  # growth per step that counts as none: rounding of equal eigenvalues of large matrices
+SHORTEST, STEPS = 1e-3, 60  # range, as a fraction of the single oscillators' limit, and number of steps analysed
 HALVINGS = 20
-ROUNDS = 50  # more than it takes to find the first pair that tunnels
+ROUNDS = 50  # more than needed to find the first pair that tunnels
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Oscillation:
     """What limits stability: the oscillation x'' = -frequency^2 x - (drag + damping) x' of a body or of several.
 
     entity
-        the body that swings most
+        the body with the largest amplitude
     frequency
         rad/s; 0: drag alone
     drag, damping
@@ -48,12 +48,12 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class Passage:
-    """What flies through what first: two bodies that are sure to meet while speed * dt <= size.
+    """The pair that tunnels first: two bodies that are sure to meet while speed * dt <= size.
 
     speed
         m/s, the sum of both speeds
     size
-        m, the sum of the smallest extents of both: w + 2 r for a ball and a wall
+        m, the sum of both smallest extents: w + 2 r for a ball and a wall
     limit
         s
     """
@@ -67,12 +67,12 @@ class Passage:
 
 @dataclass(frozen=True)
 class StepLimits:
-    """What limits the step of a world in its present state; None where nothing does.
+    """What limits the step of a world in its present state; None if nothing does.
 
     dt
-        s, the step it has now
+        s, the present step
     integrator
-        as its settings say; "flight" if all is driven by events
+        as in its settings; "flight" if the world is event-driven
     """
 
     dt: float
@@ -83,21 +83,21 @@ class StepLimits:
 
     @property
     def stability(self) -> float:
-        """s: at longer steps oscillations grow; 0 if they do at any, inf if at none."""
+        """s: at longer steps oscillations grow; 0 if they grow at any step, inf if at none."""
         return math.inf if self.oscillation is None else self.oscillation.limit
 
     @property
     def tunnelling(self) -> float:
-        """s: at longer steps the fastest bodies may pass through what they should meet."""
+        """s: at longer steps the fastest bodies may pass through others."""
         return math.inf if self.passage is None else self.passage.limit
 
     @property
     def suggested(self) -> float:
-        """s: SAFETY times the smaller of both limits; 0 if no step is stable, inf if nothing limits it."""
+        """s: SAFETY times the smaller limit; 0 if no step is stable, inf if nothing limits it."""
         return SAFETY * min(self.stability, self.tunnelling)
 
     def sentences(self) -> list[str]:
-        """What limits the step, and what follows from it."""
+        """What limits the step, and the suggested step."""
         if self.suggested == math.inf:
             last = "Nothing limits the step: choose it by the accuracy you need."
         elif self.suggested == 0.0:
@@ -134,17 +134,18 @@ class StepLimits:
         return "\n".join(self.sentences())
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, which has no infinity: None means that nothing limits."""
+        """For JSON, which has no infinity: None means no limit."""
         numbers = {name: getattr(self, name) for name in ("stability", "tunnelling", "suggested")}
         return {**asdict(self), **{name: None if v == math.inf else v for name, v in numbers.items()}}
 
 
 def suggest_dt(world: World) -> float:
-    """The longest step, in seconds, that is safe for ``world`` as it is now; see :func:`step_limits` for the reasons.
+    """The longest step, in seconds, that is safe for ``world`` in its present state; see :func:`step_limits` for the
+    reasons.
 
-    At most the limits of stability of its integrator, which are known (Hairer & Wanner, Solving Ordinary Differential
-    Equations II): w dt = 2 for a spring of frequency w with semi-implicit Euler, for instance. SAFETY is taken off. In
-    a world with discrete collisions also at most what keeps the fastest bodies from tunnelling.
+    At most SAFETY times the limits of stability of its integrator, which are known (Hairer & Wanner, Solving Ordinary
+    Differential Equations II), for instance w dt = 2 for a spring of frequency w with semi-implicit Euler. In a world
+    with discrete collisions also short enough to keep the fastest bodies from tunnelling.
 
     0.0: no step is stable, as with explicit Euler and a spring without damping. inf: nothing limits the step.
     """
@@ -154,11 +155,11 @@ def suggest_dt(world: World) -> float:
 def step_limits(world: World) -> StepLimits:
     """What limits the step of ``world`` at its present state: positions, velocities, forces, bodies.
 
-    A spring that stiffens as it is stretched, or a ball that will fall, may set another limit later. What systems of
-    the game do in a step besides force systems is not seen. The world is left bit for bit as it was.
+    A spring that stiffens when stretched, or a ball that will fall, may set another limit later. Force systems are the
+    only user systems that are analysed. The world is left unchanged, bit for bit.
 
-    ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError inside a step, TypeError
-    for what is no World.
+    ValueError if its forces are not finite, NoPhysicsError if it has no physics, CaromError inside a step, TypeError if
+    ``world`` is not a World.
     """
     if not isinstance(world, World):
         raise TypeError(f"world must be a World, got {world!r}")
@@ -177,7 +178,7 @@ def step_limits(world: World) -> StepLimits:
 
 
 def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
-    """The mode with the shortest limit; the stiffest of several."""
+    """The mode with the shortest limit; of several the stiffest."""
     if not len(modes.entity):
         return None
     limits = stability_limits(integrator, modes.stiffness, modes.drag, modes.damping)
@@ -198,7 +199,7 @@ def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
 
 
 def _limit_of_system(integrator: Integrator, k: Any, c: Any, damping: Any, limit: float) -> float:
-    """At most ``limit``; less if bodies whose stiffness and drag do not share their modes grow before it."""
+    """``limit``, or less if bodies whose stiffness and drag do not commute grow before it."""
     if limit == math.inf:
         return limit
 
@@ -217,11 +218,11 @@ def _limit_of_system(integrator: Integrator, k: Any, c: Any, damping: Any, limit
 
 
 def first_passage(world: World) -> Passage | None:
-    """The pair of bodies that may fly through each other at the shortest step, if collisions are discrete.
+    """The pair of bodies that may tunnel at the shortest step, if collisions are discrete.
 
-    The way on which they overlap is the sum of their smallest extents; their speed that at which they may meet, the
-    sum of both. Left out: sensors, bodies with ``ccd``, pairs whose layers do not meet or of which none is dynamic. A
-    map of tiles counts as a whole. None if no pair is left, or nothing moves.
+    They overlap over a path as long as the sum of their smallest extents; the speed at which they may meet is the sum
+    of both speeds. Excluded: sensors, bodies with ``ccd``, pairs whose layers do not meet or of which none is dynamic.
+    A tile map counts as one body. None if no pair is left, or nothing moves.
     """
     bodies, services = world.bodies, world.physics
     size, solid, group = _sizes(services)
@@ -242,7 +243,7 @@ def first_passage(world: World) -> Passage | None:
     ]
     best: tuple[float, int, int] | None = None
     limit = 4 * float(size[solid].max()) / float(speed[solid].max())  # more than any
-    for _ in range(ROUNDS):  # Dinkelbach's method for the least ratio of two sums
+    for _ in range(ROUNDS):  # Dinkelbach's method for the smallest ratio of two sums
         room = size - limit * speed
         firsts = [rows[np.argsort(room[rows], kind="stable")[:2]] for rows in members]
         found = None
@@ -267,7 +268,7 @@ def first_passage(world: World) -> Passage | None:
 
 
 def _sizes(services: Any) -> tuple[Any, Any, Any]:
-    """Of every row: its smallest extent (m; inf for what has no end), whether it is solid, and (layer, mask)."""
+    """Of every row: its smallest extent (m; inf if unbounded), whether it is solid, and (layer, mask)."""
     table = services.table
     count = table.count
     services.refresh_structure()

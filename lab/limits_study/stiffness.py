@@ -1,8 +1,8 @@
-"""How stiff a world's forces are where its bodies are now: the oscillators that its forces make of the bodies.
+"""Stiffness of a world's forces in the present state: the oscillators that they form with the bodies.
 
-What force systems answer to small shifts of the bodies, and to small changes of their velocities, gives the matrices of
-stiffness and drag, each divided by the masses. Their modes are oscillators x'' = -k x - c x', one by one. The world is
-left bit for bit as it was; force systems are asked several times, which they are made for.
+The changes of the forces for small shifts of the bodies, and for small changes of their velocities, give the matrices
+of stiffness and drag, each divided by the masses. Their modes are independent oscillators x'' = -k x - c x'. The world
+is left unchanged, bit for bit; force systems are evaluated several times, which they must allow.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ...framework import World
 from .stability import Complexes, Floats
 
 EPS = float(np.finfo(float).eps)
-SHIFT = 1e-5  # of the distance between bodies, and of their speed
-FARTHEST = 1e-8  # of the coordinates: smaller shifts would be lost far from the origin
-KINK = 0.01  # answers to shifts back and forth that differ by more belong to a force with a kink there
-NOISE = 1e-7  # of the largest of its kind: less is rounding
-DENSE = 2000  # numbers that place all bodies, up to which every one of them is shifted alone
-BLOCK = 300  # of bodies that hang together, up to which all modes are found
-KRYLOV = 60  # directions tried where only the stiffest and the most damped modes are sought
-SOUGHT = 20  # of them
+SHIFT = 1e-5  # relative to the distance between bodies, and to their speed
+FARTHEST = 1e-8  # relative to the coordinates: smaller shifts would be lost to rounding far from the origin
+KINK = 0.01  # a relative difference above this between forward and backward shifts means a kink in the force
+NOISE = 1e-7  # relative to the largest of its kind: smaller values are rounding
+DENSE = 2000  # degrees of freedom up to which every one is shifted alone
+BLOCK = 300  # degrees of freedom of coupled bodies up to which all modes are found
+KRYLOV = 60  # directions tried if only the stiffest and the most damped modes are computed
+SOUGHT = 20  # number of these modes
 
 Apply: TypeAlias = Callable[[Floats], Floats]
 
@@ -35,13 +35,13 @@ class Modes:
     """Oscillators x'' = -stiffness x - (drag + damping) x', each (m,).
 
     entity
-        the body that swings most
+        the body with the largest amplitude
     stiffness, drag
-        1/s^2 and 1/s, by forces; complex where forces turn the motion
+        1/s^2 and 1/s, by forces; complex if forces turn the motion
     damping
         1/s, linear_damping
     coupled
-        (stiffness, drag, damping) of groups of bodies whose stiffness and drag do not share their modes
+        (stiffness, drag, damping) of groups of bodies whose stiffness and drag do not commute
     """
 
     entity: np.ndarray
@@ -52,10 +52,10 @@ class Modes:
 
 
 class Forces:
-    """The forces of a world's dynamic bodies, asked as functions of their state; a context manager that puts all back.
+    """The forces of a world's dynamic bodies as functions of their state; a context manager that restores the state.
 
-    Vectors have one number for each direction of each body, times the root of its mass: matrices of forces that have a
-    potential are symmetric then.
+    Vectors have one number per degree of freedom, times the root of its mass, so that the matrices of forces with a
+    potential are symmetric.
     """
 
     def __init__(self, world: World) -> None:
@@ -98,15 +98,15 @@ class Forces:
         return len(self._root)
 
     def stiffness(self, direction: Floats) -> Floats:
-        """-(change of the forces) per shift in that direction."""
+        """Minus the change of the forces per shift in that direction."""
         return self._answer("position", direction)
 
     def drag(self, direction: Floats) -> Floats:
-        """-(change of the forces) per change of the velocities in that direction."""
+        """Minus the change of the forces per change of the velocities in that direction."""
         return self._answer("linear_velocity", direction)
 
     def noise(self, name: str) -> float:
-        """What rounding makes of an answer: of stiffness ("position") or drag ("linear_velocity")."""
+        """The rounding error of stiffness ("position") or drag ("linear_velocity")."""
         return 8 * EPS * float(np.abs(self._rest / self._root).max(initial=0.0)) / self._shift[name]
 
     def _answer(self, name: str, direction: Floats) -> Floats:
@@ -123,7 +123,7 @@ class Forces:
         column[:] = start
         there, back = answers
         if np.abs(there - back).max() > KINK * max(np.abs(there).max(), np.abs(back).max()):
-            return max(there, back, key=lambda answer: float(np.abs(answer).max()))  # a rope: the taut side counts
+            return max(there, back, key=lambda answer: float(np.abs(answer).max()))  # a rope: take the taut side
         return (there + back) / 2
 
     def _sum(self) -> Floats:
@@ -136,9 +136,9 @@ class Forces:
 
 
 def modes_of(world: World) -> Modes:
-    """The oscillators that the force systems of ``world`` make of its dynamic bodies, where they are now.
+    """The oscillators that the force systems of ``world`` form with its dynamic bodies, in the present state.
 
-    All of them up to 300 numbers that place bodies which hang together; of more, the stiffest and the most damped.
+    All modes of coupled bodies with up to 300 degrees of freedom; with more, the stiffest and the most damped ones.
     ValueError if the forces are not finite.
     """
     if not world.force_systems or not len(world.bodies.dynamic):
@@ -156,7 +156,7 @@ def modes_of(world: World) -> Modes:
 
 
 def _of_block(k: Floats, c: Floats, rows: np.ndarray, forces: Forces) -> Modes:
-    """All modes of bodies that hang together; of many, the extreme ones."""
+    """All modes of a group of coupled bodies; of a large group, the extreme ones."""
     n, damping = len(rows), forces.damping[rows]
     if n > BLOCK:
         return _extreme(lambda u: k @ u, lambda u: c @ u, rows, forces)
@@ -176,7 +176,7 @@ def _of_block(k: Floats, c: Floats, rows: np.ndarray, forces: Forces) -> Modes:
 
 
 def _extreme(stiffness: Apply, drag: Apply, rows: np.ndarray, forces: Forces) -> Modes:
-    """The stiffest and the most damped modes, from the spaces that repeated use of either matrix spans."""
+    """The stiffest and the most damped modes, from the Krylov spaces of both matrices."""
     parts = []
     for apply in (stiffness, drag):
         vectors = _extreme_vectors(apply, len(rows))
@@ -187,14 +187,14 @@ def _extreme(stiffness: Apply, drag: Apply, rows: np.ndarray, forces: Forces) ->
 
 
 def _extreme_vectors(apply: Apply, n: int) -> Any:
-    """(n, m): Ritz vectors to the largest eigenvalues, by Arnoldi's method (Saad, Numerical Methods for Large
+    """(n, m): Ritz vectors of the largest eigenvalues, by Arnoldi's method (Saad, Numerical Methods for Large
     Eigenvalue Problems, section 6.2)."""
     start = np.random.default_rng(0).normal(size=n)
     basis, matrix = [start / np.linalg.norm(start)], np.zeros((KRYLOV + 1, KRYLOV))
     for j in range(min(KRYLOV, n)):
         image = apply(basis[j])
         size = float(np.linalg.norm(image))
-        for _ in range(2):  # once more: rounding leaves a rest
+        for _ in range(2):  # repeated: rounding leaves a remainder
             for i, vector in enumerate(basis):
                 share = float(vector @ image)
                 matrix[i, j] += share
@@ -217,7 +217,7 @@ def _of_complex(apply: Apply, vector: Any) -> Any:
 
 
 def _quotients(vectors: Any, by_stiffness: Any, by_drag: Any, rows: np.ndarray, forces: Forces) -> Modes:
-    """Rayleigh's quotients of each mode (n, m): with them its x'' = -k x - c x' is met exactly."""
+    """Rayleigh quotients of each mode (n, m), with which it satisfies x'' = -k x - c x' exactly."""
     weights = np.abs(vectors) ** 2
     squares = weights.sum(axis=0)
     k, c = ((np.conj(vectors) * image).sum(axis=0) / squares for image in (by_stiffness, by_drag))
@@ -237,12 +237,12 @@ def _cleaned(values: Any, noise: float) -> Complexes:
 
 
 def _apart(one: Floats, other: Floats) -> bool:
-    """Whether two matrices do not share their modes: then they do not commute."""
+    """True if two matrices do not share their modes, that is, do not commute."""
     return bool(np.abs(one @ other - other @ one).max() > 1e-5 * np.abs(one).max() * np.abs(other).max())
 
 
 def _groups(linked: np.ndarray) -> Iterator[np.ndarray]:
-    """Rows that hang together, each group sorted."""
+    """Rows of coupled degrees of freedom, each group sorted."""
     linked, left = linked | linked.T, set(range(len(linked)))
     while left:
         first = left.pop()
@@ -256,7 +256,7 @@ def _groups(linked: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _joined(parts: list[Modes]) -> Modes:
-    """Together; oscillators that are alike stand for each other."""
+    """All parts together; equal oscillators are merged."""
     if not parts:
         return Modes(np.empty(0, np.int64), np.empty(0, complex), np.empty(0, complex), np.empty(0), [])
     entity = np.concatenate([part.entity for part in parts])
@@ -273,7 +273,7 @@ def _joined(parts: list[Modes]) -> Modes:
 
 
 def _spacing(dynamic: Floats, everything: Floats) -> float:
-    """About how far the bodies are from each other, m; of one alone how far it is from the origin; else 1."""
+    """Typical distance between bodies, m; for a single body its distance from the origin; else 1."""
     for places in (dynamic, everything):
         wide = float(np.ptp(places, axis=0).max()) if len(places) else 0.0
         if wide > 0.0:

@@ -1,7 +1,7 @@
-"""Sweeps one thing at a time until carom fails, and says where: ``carom limits``.
+"""``carom limits``: sweep one quantity at a time until carom fails, and report where.
 
-From where all is well each axis is gone along outwards; where the error passes 1 % or 10 %, or something breaks, the
-place is bisected. Each sample is a world of its own, so no result depends on the others, nor on the machine's speed.
+Each axis is followed outwards from a value where all works. Where the error exceeds 1 % or 10 %, or something breaks,
+the edge is bisected. Each sample is a separate world, so no result depends on the others or on the machine's speed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from . import axes_motion as limits_axes
 from .records import BREAKS, DOWN, LEVELS, MODES, UP, Axis, AxisLimits, BrokenError, Edge, Limits, Line, Method, Sample
 
 AXES: tuple[Axis, ...] = (*limits_axes.AXES, *limits_axes_contacts.AXES)
-BLOWN_UP = 1e6  # an error of so much is none any more
+BLOWN_UP = 1e6  # larger errors count as broken
 
 
 def limits(
@@ -31,9 +31,9 @@ def limits(
     quick: bool = False,
     long: bool = False,
 ) -> Limits:
-    """Sweep the axes, all or those named, with the kinds of collision named: "discrete", "continuous", "event_driven".
+    """Sweep the axes and collision modes named, or all: "discrete", "continuous", "event_driven".
 
-    quick: fewer values. long: also those that take minutes. ValueError for a name that is none.
+    quick: fewer values. long: also those that take minutes. ValueError for an unknown name.
     """
     if quick and long:
         raise ValueError("limits: quick and long exclude each other")
@@ -53,7 +53,7 @@ def limits(
 
 
 def sweep(axis: Axis, method: Method, values: Sequence[float]) -> Line:
-    """One method on one axis: the samples of ``values``, and of what it takes to find the edges."""
+    """One method on one axis: the samples of ``values`` and those needed to find the edges."""
     samples: dict[float, Sample] = {}
 
     def sample(value: float) -> Sample:
@@ -74,7 +74,7 @@ def sweep(axis: Axis, method: Method, values: Sequence[float]) -> Line:
 
 
 def measured(axis: Axis, method: Method, value: float) -> Sample:
-    """One sample; whatever carom refuses or cannot do is an answer too."""
+    """One sample; an error raised by carom is recorded in it."""
     try:
         with np.errstate(all="ignore"):
             error = axis.measure(method, value)
@@ -88,7 +88,7 @@ def measured(axis: Axis, method: Method, value: float) -> Sample:
 
 
 def _outwards(path: list[float], sample: Callable[[float], Sample]) -> Iterator[Sample]:
-    """Up to where there is no error to tell any more."""
+    """Samples along the path until one has no error figure."""
     for value in path:
         found = sample(value)
         yield found
@@ -97,7 +97,7 @@ def _outwards(path: list[float], sample: Callable[[float], Sample]) -> Iterator[
 
 
 def _edge(axis: Axis, way: str, level: str, tried: list[Sample], sample: Callable[[float], Sample]) -> Edge:
-    """Where the level is passed first, between two samples, bisected on a logarithmic scale."""
+    """Where the level is first exceeded between two samples, bisected on a logarithmic scale."""
     first = next((place for place, found in enumerate(tried) if found.beyond(level)), None)
     if first is None:
         return Edge(way, level, None, tried[-1].value)
