@@ -141,12 +141,12 @@ def test_a_short_run_keeps_the_corners_of_its_paths():
         box = world.create_entity(Transform((0, 3)), RigidBody(linear_velocity=(75, 0)), AABBCollider((0.25, 0.25)))
         traces = run(world, 2).traces
     world.close()
-    blows = traces.blows or []
+    impacts = traces.impacts or []
     # The ball, which goes 2 in a step, turns 1 to the right, then 1 to the left; the box to the right, a little later.
-    assert [(blow.after, len(blow.centres)) for blow in blows] == [(1, 1), (1, 0), (2, 1)]
-    struck = [(blow.centres[ball][0], blow.after) for blow in blows if ball in blow.centres]
+    assert [(impact.after, len(impact.centres)) for impact in impacts] == [(1, 1), (1, 0), (2, 1)]
+    struck = [(impact.centres[ball][0], impact.after) for impact in impacts if ball in impact.centres]
     np.testing.assert_allclose(struck, [(1, 1), (-1, 2)], rtol=0, atol=1e-12)
-    assert not any(box in blow.centres for blow in blows)
+    assert not any(box in impact.centres for impact in impacts)
     assert traces.entities.tolist() == [ball, box]  # moved, though it is back where it was at the end of each step
     np.testing.assert_allclose(traces.positions[:, 0, 0], [0, 0, 0], rtol=0, atol=1e-6)
     path = traces.corners[:, 0, 0]
@@ -160,5 +160,5 @@ def test_longer_runs_and_larger_worlds_are_not_followed_step_by_step(bodies, ste
         world.create_entities(bodies, Transform.many(places), RigidBody.many(linear_velocity=(1.0, 0.0)))
         traces = run(world, steps).traces
     world.close()
-    assert traces.blows is None
+    assert traces.impacts is None
     np.testing.assert_array_equal(traces.corners, traces.positions)

@@ -1,6 +1,6 @@
-"""The collision geometry of a world as plain arrays, as pictures and measurements need it.
+"""The collision geometry of a world as plain arrays, for pictures and measurements.
 
-Read entity by entity through the public components, so it costs microseconds per body: once per run, not once
+Read entity by entity through the public components, which costs microseconds per body: use it once per run, not once
 per step.
 """
 
@@ -22,7 +22,7 @@ class Shapes:
     """One row per collider. A box has half extents (d); a sphere has its radius in each of them.
 
     ``entity (n,)``, ``centre (n, d)``, ``half (n, d)``, ``speed (n,)``, ``round (n,)`` true for spheres,
-    ``static (n,)`` true for what never moves, ``sensor (n,)`` for what only reports.
+    ``static (n,)`` true for static bodies, ``sensor (n,)`` true for sensors.
     """
 
     entity: NDArray[np.int64]
@@ -43,22 +43,22 @@ class Shapes:
 
     @property
     def typical_diameter(self) -> float:
-        """The median; 0 if there is no shape."""
+        """The median diameter; 0 without shapes."""
         return float(2 * np.median(self.half.max(axis=1))) if len(self.entity) else 0.0
 
     def row(self, index: int) -> Shapes:
-        """That row alone."""
+        """One row as Shapes."""
         return self.where(np.arange(len(self.entity)) == index)
 
     def at(self, places: Floats) -> Shapes:
-        """This one shape, again at each of the places (m, d)."""
+        """A single shape, repeated at each of the places (m, d)."""
         repeated = {
             name: np.repeat(getattr(self, name), len(places), axis=0) for name in self.__dataclass_fields__
         }
         return Shapes(**{**repeated, "centre": places})
 
     def where(self, chosen: NDArray[np.bool_]) -> Shapes:
-        """The rows for which ``chosen`` is true."""
+        """The rows where ``chosen`` is true."""
         return Shapes(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
 
 
@@ -68,7 +68,7 @@ def dimensions_of(world: World) -> int:
 
 
 def shapes_of(world: World) -> Shapes:
-    """All built-in colliders of ``world`` as they stand now."""
+    """All built-in colliders of ``world`` in its present state."""
     dimensions = dimensions_of(world)
     entities, centres, halves, rounds, sensors = [], [], [], [], []
     for entity, (transform, sphere) in world.get_components(Transform, SphereCollider):
@@ -105,7 +105,7 @@ def shapes_of(world: World) -> Shapes:
 
 
 def sensor_entities(world: World) -> NDArray[np.int64]:
-    """The ids of what has a collider that is a sensor."""
+    """The ids of entities with a sensor collider."""
     bodies = world.bodies
     found = np.zeros(len(bodies), bool)
     for name in bodies.column_names():
@@ -145,6 +145,6 @@ def _turned(rotation: object, offset: object, dimensions: int) -> Floats:
 
 
 def _stretched(rotation: object, half_extents: object, dimensions: int) -> Floats:
-    """The half extents of the box that holds the turned one with its sides parallel to the axes."""
+    """The half extents of the axis-aligned box that encloses the turned box."""
     half = np.broadcast_to(np.asarray(half_extents, float), (dimensions,))
     return half if _is_unrotated(rotation) else np.abs(rotation_matrix(rotation, dimensions)) @ half

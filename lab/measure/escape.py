@@ -1,8 +1,8 @@
-"""Which bodies got out: non-finite, or beyond a wall that stood around them at the start.
+"""Bodies that escaped: non-finite, or beyond a wall that enclosed them at the start.
 
-A wall, on one side of the bodies along one axis: static boxes that reach as far out as any, lie wholly beyond
-all bodies' centres, and together cover at least half of the bodies' extent across that axis. Where no wall
-stands, nobody can escape: to jump over an obstacle is no escape.
+A wall exists on one side along one axis if static boxes reach as far out as any other, lie wholly beyond all bodies'
+centres, and together cover at least half of the bodies' extent across that axis. Without a wall there is no escape on
+that side: passing over an obstacle does not count.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from ...framework import World
 from .body_shapes import Floats, Shapes, dimensions_of, shapes_of
 
 COVERED = 0.5
-ROUNDING = 1e-9  # of the coordinates: faces of walls of different sizes, that stand side by side, differ by less
+ROUNDING = 1e-9  # relative to the coordinates: tolerance for the faces of adjacent walls of different sizes
 
 
 @dataclass(frozen=True)
 class Enclosure:
-    """The space that the walls leave, to their outer faces; infinite where there is no wall."""
+    """The space inside the walls, up to their outer faces; infinite on a side without a wall."""
 
     lower: Floats
     upper: Floats
 
     @classmethod
     def around(cls, world: World) -> Enclosure:
-        """The enclosure of the dynamic bodies by the static boxes of ``world``, as both stand now."""
+        """The enclosure of the dynamic bodies by the static boxes of ``world`` in its present state."""
         dimensions = dimensions_of(world)
         lower, upper = np.full(dimensions, -np.inf), np.full(dimensions, np.inf)
         shapes = shapes_of(world)
@@ -44,12 +44,12 @@ class Enclosure:
         return cls(lower, upper)
 
     def outside(self, positions: Floats) -> int:
-        """How many of the finite ``positions`` (n, d) lie outside."""
+        """The number of finite ``positions`` (n, d) outside."""
         return int(np.any((positions < self.lower) | (positions > self.upper), axis=1).sum())
 
 
 def _covered(bodies: Shapes, walls: Shapes, axis: int) -> float:
-    """The share of the bodies' extent across ``axis`` that the walls cover; overlapping walls count twice."""
+    """The share of the bodies' extent across ``axis`` covered by walls; overlapping walls count twice."""
     lower, upper = bodies.lower.min(axis=0), bodies.upper.max(axis=0)
     span = np.minimum(walls.upper, upper) - np.maximum(walls.lower, lower)
     share = np.clip(span, 0, None) / np.maximum(upper - lower, np.finfo(float).tiny)

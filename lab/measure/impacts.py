@@ -1,4 +1,4 @@
-"""The impacts of a short run, with the places of the bodies in them: where their paths turn within a step."""
+"""The impacts of a short run, with the positions of the bodies in them: the corners of their paths within a step."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ...framework import World
 
 
 @dataclass(frozen=True)
-class Blow:
+class PathImpact:
     """One impact between the samples ``after - 1`` and ``after`` of the paths; ``point`` and ``normal`` (d,).
 
-    ``centres``: where its spheres were, (d,) by entity. Where a box was, its point of contact does not tell.
+    ``centres``: positions of its spheres, (d,) by entity. The position of a box does not follow from the contact point.
     """
 
     after: int
@@ -24,8 +24,8 @@ class Blow:
     centres: dict[int, NDArray[np.float64]]
 
 
-def blows_of(world: World, after: int) -> list[Blow]:
-    """Those of the world's last step, in order of time."""
+def path_impacts(world: World, after: int) -> list[PathImpact]:
+    """The impacts of the world's last step, in order of time."""
     found = []
     for impact in world.contacts.impacts:
         point, normal = np.array(impact.point, float), np.array(impact.normal, float)
@@ -34,28 +34,30 @@ def blows_of(world: World, after: int) -> list[Blow]:
             radius = _radius_of(world, entity)
             if radius is not None:
                 centres[int(entity)] = point + radius * inwards
-        found.append(Blow(after, point, normal, centres))
+        found.append(PathImpact(after, point, normal, centres))
     return found
 
 
-def with_corners(entities: NDArray[np.int64], positions: NDArray[np.float64], blows: list[Blow]) -> NDArray[np.float64]:
-    """``positions`` (samples, bodies, d) with a sample more for each blow: the struck are there, the others wait."""
+def with_corners(
+    entities: NDArray[np.int64], positions: NDArray[np.float64], impacts: list[PathImpact]
+) -> NDArray[np.float64]:
+    """``positions`` (samples, bodies, d) with one more sample per impact, in which only its bodies have moved."""
     samples: list[NDArray[np.float64]] = []
-    waiting = iter([*blows, None])
-    blow = next(waiting)
+    waiting = iter([*impacts, None])
+    impact = next(waiting)
     for number, sample in enumerate(positions):
-        while blow is not None and blow.after == number:
+        while impact is not None and impact.after == number:
             corner = samples[-1].copy()
-            for entity, centre in blow.centres.items():
+            for entity, centre in impact.centres.items():
                 corner[entities == entity] = centre
             samples.append(corner)
-            blow = next(waiting)
+            impact = next(waiting)
         samples.append(sample)
     return np.array(samples)
 
 
 def _radius_of(world: World, entity: int) -> float | None:
-    """Of what is a sphere around its position and nothing else; None for anything else."""
+    """The radius of an entity whose only collider is a centred sphere; else None."""
     if not world.entity_exists(entity):
         return None
     colliders = [part for part in world.components_for_entity(entity) if isinstance(part, Collider)]

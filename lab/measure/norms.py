@@ -1,8 +1,8 @@
-"""Norms: how wrong a run was, each a number relative to a stated scale, by what the reference run shows.
+"""Norms: the error of a run against a reference run, each a number relative to a stated scale.
 
-Which norm suits which kind of scene: smooth motion is compared in position and energy; impacts in the state at a fixed
-time, in their times and their number; rest in overlap, residual speed and drift, where the right answer is 0; chaos in
-statistics alone, whose errors keep their sign here so that noise averages out over the seeds.
+The norm depends on the kind of scene. Smooth motion: position and energy. Impacts: the state at a fixed time, the times
+and the number of impacts. Rest: overlap, residual speed and drift, where the right value is 0. Chaos: statistics only;
+their errors keep their sign so that noise averages out over the seeds.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from ..commands.usage_errors import Problem, did_you_mean
 from ..trading.records import BLEW_UP, CHAOTIC, IMPACTS, NOT_FINITE, RESTING, SMOOTH, TUNNELLED
 from .observation import Seen
 
-FAR = 1e3  # times the reference's reach: a body so far away has blown up, and its error is no error
-CONSERVED = 1e-6  # a reference that keeps its energy so well says that it is conserved
-NO_ENERGY = 1e-3  # of the largest kinetic energy: a total below it is nothing to be relative to
+FAR = 1e3  # times the reference's reach: a body farther away has blown up
+CONSERVED = 1e-6  # a reference with a relative energy change below this conserves energy
+NO_ENERGY = 1e-3  # relative to the largest kinetic energy: a smaller total is no useful scale
 Measure = Callable[[Seen, Seen], float]
 
 
 @dataclass(frozen=True)
 class Norm:
-    """``text`` says what it is and what it is relative to; ``scale`` gives that in the scene's units.
+    """``text``: the quantity and its scale, in words; ``scale``: the scale in the scene's units.
 
-    signed: a statistic, single runs of which are noise; absolute: in units of its own, relative to nothing;
-    relative_to: what of ``Seen`` it is relative to, if it is 1 that is right.
+    signed: a statistic, of which single runs are noise; absolute: in its own unit, without a scale;
+    relative_to: the field of ``Seen`` that is the scale, if the right value is 1.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Norm:
     relative_to: str = ""
 
     def tells(self, reference: Seen) -> bool:
-        """Whether runs can be compared by it: nothing is relative to 0."""
+        """True if runs can be compared by it: the scale must not be 0."""
         return not self.relative_to or getattr(reference, self.relative_to) != 0
 
 
@@ -58,14 +58,14 @@ def _position(seen: Seen, reference: Seen) -> float:
 
 
 def _energy_scale(seen: Seen, reference: Seen) -> float:
-    """The largest kinetic energy, or that at the start if it is smaller: where zero is, is a matter of taste."""
+    """The largest kinetic energy, or the energy at the start if smaller, since the zero of the energy is arbitrary."""
     kinetic = reference.energy_scale or seen.energy_scale or 1.0
     total = abs(reference.energy_start)
     return min(kinetic, total) if total > NO_ENERGY * kinetic else kinetic
 
 
 def conserves(reference: Seen) -> bool:
-    """Whether the scene keeps its energy, as far as the reference tells."""
+    """True if the scene conserves energy according to the reference."""
     return reference.energy_worst <= CONSERVED * (reference.energy_scale or 1.0)
 
 
@@ -76,14 +76,14 @@ def _energy(seen: Seen, reference: Seen) -> float:
 
 
 def _impact_time(seen: Seen, reference: Seen) -> float:
-    """An impact that only one of the two has counts as if the other had it at the end of the run."""
+    """The error in time; an impact that only one of the two runs has counts as if the other had it at the end."""
     count = max(len(seen.times), len(reference.times))
     mine, right = (times + [reference.seconds] * (count - len(times)) for times in (seen.times, reference.times))
     return float(np.abs(np.subtract(mine, right)).max(initial=0.0)) / reference.seconds
 
 
 def _relative(name: str, text: str, attribute: str = "", signed: bool = False) -> Norm:
-    """A quantity whose right value is 1; attribute: of ``Seen``, if it has another name."""
+    """A quantity whose right value is 1; attribute: the field of ``Seen``, if it has another name."""
     attribute = attribute or name
 
     def scale(seen: Seen, reference: Seen) -> float:
@@ -153,7 +153,7 @@ def norm_named(name: str) -> Norm:
 
 
 def failure_of(seen: Seen, reference: Seen | None) -> str | None:
-    """Why the run has no error, or None.
+    """The reason why the run has no error figure, or None.
 
     Tunnelled: a body that touches something in the reference has touched nothing.
     """
@@ -171,5 +171,5 @@ def failure_of(seen: Seen, reference: Seen | None) -> str | None:
 
 
 def errors_of(seen: Seen, reference: Seen, names: Iterable[str]) -> dict[str, float]:
-    """By name; those of statistics keep their sign."""
+    """Errors by name; those of statistics are signed."""
     return {name: NORMS[name].measure(seen, reference) for name in names}

@@ -1,7 +1,7 @@
-"""One run watched from outside: what the norms need to know of it, whatever the engine.
+"""One run observed from outside: the figures that norms need, for any engine.
 
-A run of T seconds takes a first step of a part of dt, its start phase, then whole steps, then what is left: so it ends
-at T exactly, whatever dt, and the phase says where within a step things happen.
+A run of T seconds takes a first step of a fraction of dt (its start phase), then whole steps, then the remainder. So it
+ends at exactly T for any dt, and the phase sets where in a step events happen.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ..engines.adapters import Engine
 from ..trading.records import ESCAPED, NOT_FINITE
 from .body_shapes import Floats
 
-SETTLED = 0.5  # of the run: contacts at rest are looked at after it
-EARLY = 0.2  # of the run: statistics begin after it
+SETTLED = 0.5  # fraction of the run after which contacts at rest are measured
+EARLY = 0.2  # fraction of the run after which statistics begin
 MOST_TIMES = 200  # impacts whose times are kept
 SAMPLES = 400  # of the overlaps, which cost more than a step
 
@@ -37,19 +37,19 @@ class Seen:
         at the end; energy_start at the start; energy_worst: the largest departure from the start;
         energy_square: its mean square, J^2; energy_scale: the largest kinetic energy
     impacts, times
-        how many, and when the first ones were
+        their number, and the times of the first ones
     pressure
-        mean force on what stands still, N, after the first part of the run; rate: impacts per second there
+        mean force on static bodies, N, after the first part of the run; rate: impacts per second there
     overlap, overlap_mean
         after half of the run, the worst and the mean over samples of the sum per body, in sizes of the smaller body
     speed
-        the largest at the end, sizes per second; drift: the largest way since half of the run, sizes
+        the largest at the end, sizes per second; drift: the largest displacement since half of the run, sizes
     struck (n,)
-        which bodies touched anything
+        bodies that touched anything
     failure
-        None, or why the run says nothing
+        None, or why the run is unusable
     seconds
-        that it should last; simulated: that it did, which is less if it failed
+        planned duration; simulated: the actual one, which is less if the run failed
     """
 
     position: Floats
@@ -81,7 +81,7 @@ class Seen:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`."""
+        """The inverse of :meth:`as_dict`."""
         return cls(**{**plain, "position": np.array(plain["position"], float)})
 
 
@@ -90,8 +90,8 @@ def observe(
 ) -> Seen:
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
-    whole_steps: leave out the last part of a step; contacts at rest are solved for the length of the step before, and
-    another one stirs them. walled: a body that gets beyond the walls around all bodies has escaped.
+    whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
+    a body outside the walls around all bodies has escaped.
     """
     watch = _Watch(engine, seconds, walled)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -104,7 +104,7 @@ def observe(
 
 
 def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[float]:
-    """Their lengths. What would be left below a millionth of a step is rounding, and left out."""
+    """The step lengths. A remainder below a millionth of a step is rounding, and omitted."""
     first = min(phase * dt, seconds)
     rest = seconds - first
     whole = int(rest / dt * (1 + 1e-12) + 1e-9)
@@ -113,7 +113,7 @@ def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[f
 
 
 class _Watch:
-    """Looks at the engine after each step."""
+    """Observes the engine after each step."""
 
     def __init__(self, engine: Engine, seconds: float, walled: bool) -> None:
         self.engine, self.seconds, self.walled = engine, seconds, walled

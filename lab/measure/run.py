@@ -1,4 +1,4 @@
-"""Runs a world for a number of steps and measures it: what reports and pictures show."""
+"""Runs a world for a number of steps and measures it, for reports and pictures."""
 
 from __future__ import annotations
 
@@ -21,22 +21,21 @@ from ...framework.schedule.profile_report import Stats, Totals
 from ..reporting.profile import profile_of
 from .body_shapes import dimensions_of, sensor_entities
 from .escape import Enclosure
-from .impacts import Blow, blows_of, with_corners
+from .impacts import PathImpact, path_impacts, with_corners
 
 TRACED_BODIES = 200  # in a picture
-CANDIDATES = 12_000  # bodies that are followed, to choose from
-QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported, not warned about
-SAMPLES = 600  # of the energy, at most; of a path if there are many
-FEW_STEPS, FEW_BODIES = 12, 60  # a run of no more is shown step by step, with all its impacts
-PATH_POINTS = 80_000  # of all paths; as long as they do, paths are sampled in every step, so that corners stay
+CANDIDATES = 12_000  # bodies that are recorded, to choose from
+QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
+SAMPLES = 600  # of the energy, at most; of paths too if there are many
+FEW_STEPS, FEW_BODIES = 12, 60  # up to this size a run is shown step by step, with all its impacts
+PATH_POINTS = 80_000  # of all paths together: up to this number every step is sampled, so that corners are visible
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A conserved quantity at the start and at the end, and the largest departure seen (sampled, in units of
-    ``scale``).
+    """A conserved quantity at the start and at the end, and the largest departure (sampled, in units of ``scale``).
 
-    ``relative`` is the change over the run, ``worst`` the largest departure from the start on the way.
+    ``relative`` is the change over the run, ``worst`` the largest departure from the start during it.
     """
 
     start: float | list[float]
@@ -48,7 +47,7 @@ class Drift:
 
 @dataclass
 class RunReport:
-    """What a run was and what it showed; times as named, everything else in the scene's units."""
+    """Settings and results of a run; times as named, everything else in the scene's units."""
 
     scene: str
     seed: int
@@ -57,7 +56,7 @@ class RunReport:
     steps: int = 0
     simulated_seconds: float = 0.0
     wall_seconds: float = 0.0
-    compile_seconds: float = 0.0  # what the steps took that compiled kernels, or loaded compiled ones
+    compile_seconds: float = 0.0  # of steps that compiled kernels, or loaded compiled ones
     kernels_compiled: int = 0
     kernels_loaded: int = 0
     bodies: dict[str, int] = field(default_factory=dict)
@@ -66,22 +65,22 @@ class RunReport:
     )  # at the end, mean and most per step, impacts in total
     step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
     step_milliseconds_mean: float = math.nan
-    system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, compiling left out
-    profile: dict[str, Any] | None = None  # see profile_of; None unless asked for
+    system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, without compilation
+    profile: dict[str, Any] | None = None  # see profile_of; None unless requested
     energy: Drift | None = None
-    energy_changes: list[str] = field(default_factory=list)  # why the scene does not keep its energy
+    energy_changes: list[str] = field(default_factory=list)  # reasons why the scene does not conserve energy
     momentum: Drift | None = None
-    momentum_conserved: bool = True  # whether the scene lets it be: nothing fixed, no force from outside
+    momentum_conserved: bool = True  # False with fixed bodies or external forces
     deepest_overlap: float = 0.0
     deepest_overlap_step: int | None = None
     escaped: dict[str, int] = field(default_factory=dict)  # outside, non_finite
-    counters: dict[str, int] = field(default_factory=dict)  # the world's own, totals
-    faults: list[str] = field(default_factory=list)  # what went wrong without stopping the world
+    counters: dict[str, int] = field(default_factory=dict)  # the world's counters, totals
+    faults: list[str] = field(default_factory=list)  # faults that did not stop the world
     state_hash: str = ""
     pictures: list[str] = field(default_factory=list)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain dicts, lists and numbers, ready for json.dumps; what is not finite becomes None."""
+        """Plain dicts, lists and numbers for json.dumps; non-finite numbers become None."""
         return _jsonable(dataclasses.asdict(self))
 
 
@@ -89,13 +88,13 @@ class RunReport:
 class Traces:
     """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending.
 
-    ``blows``: the impacts on the way, if all the steps are shown, else None.
+    ``impacts``: the impacts of the run, if all steps are shown, else None.
     """
 
     entities: NDArray[np.int64]
     samples: list[NDArray[np.float32]] = field(default_factory=list)
-    moved: int = 0  # how many bodies did, these among them
-    blows: list[Blow] | None = None
+    moved: int = 0  # number of all bodies that moved, including these
+    impacts: list[PathImpact] | None = None
 
     @property
     def places(self) -> NDArray[np.float64]:
@@ -109,35 +108,35 @@ class Traces:
 
     @property
     def corners(self) -> NDArray[np.float64]:
-        """The positions, with those at the impacts between them."""
-        return with_corners(self.entities, self.positions, self.blows or [])
+        """The positions, with additional samples at the impacts."""
+        return with_corners(self.entities, self.positions, self.impacts or [])
 
     @QUIET
     def farthest(self, count: int) -> Traces:
-        """The ``count`` bodies that travelled farthest, of those that moved; ``moved`` stays what it is."""
+        """The ``count`` bodies that travelled farthest; ``moved`` does not change."""
         travelled = np.zeros(len(self.entities))
-        for before, after in itertools.pairwise(self.corners if self.blows else self.samples):
+        for before, after in itertools.pairwise(self.corners if self.impacts else self.samples):
             travelled += np.nan_to_num(np.linalg.norm(after - before, axis=1))
         moved = int((travelled > 0).sum())
         chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
         samples = [sample[chosen] for sample in self.samples]
-        return Traces(self.entities[chosen], samples, moved, self.blows)
+        return Traces(self.entities[chosen], samples, moved, self.impacts)
 
 
 class Recorder:
-    """Follows what moves, those created on the way too, up to CANDIDATES bodies."""
+    """Records moving bodies, including those created during the run, up to CANDIDATES bodies."""
 
     def __init__(self, world: World, step_by_step: bool = False) -> None:
         self.world = world
-        self.blows: list[Blow] | None = [] if step_by_step else None
-        self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they were met
-        self.samples: list[NDArray[np.float32]] = []  # of those known then
+        self.impacts: list[PathImpact] | None = [] if step_by_step else None
+        self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they appeared
+        self.samples: list[NDArray[np.float32]] = []  # positions of the entities known at that time
 
     @QUIET
     def record(self) -> None:
         """Add a sample."""
-        if self.blows is not None and self.samples:
-            self.blows += blows_of(self.world, len(self.samples))
+        if self.impacts is not None and self.samples:
+            self.impacts += path_impacts(self.world, len(self.samples))
         bodies = self.world.bodies
         ids = np.asarray(bodies.entity)
         moving = np.concatenate([bodies.dynamic.entity, bodies.kinematic.entity])
@@ -155,19 +154,19 @@ class Recorder:
         self.samples.append(sample)
 
     def traces(self) -> Traces:
-        """What was recorded, NaN where a body was not there."""
+        """The recorded paths, NaN where a body did not exist."""
         order = np.argsort(self.entities, kind="stable")
         filled = []
         for sample in self.samples:
             whole = np.full((len(self.entities), sample.shape[1]), np.nan, np.float32)
             whole[: len(sample)] = sample
             filled.append(whole[order])
-        return Traces(self.entities[order], filled, blows=self.blows)
+        return Traces(self.entities[order], filled, impacts=self.impacts)
 
 
 @dataclass
 class Run:
-    """A finished run: the report, the paths, and the world as it stands at the end."""
+    """A finished run: the report, the paths, and the world in its final state."""
 
     report: RunReport
     traces: Traces
@@ -175,7 +174,7 @@ class Run:
 
 
 class Meter:
-    """Looks at a world between its steps; nothing here is inside the measured time of a step."""
+    """Observes a world between its steps, outside the measured time."""
 
     def __init__(self, world: World, every: int, path_every: int, step_by_step: bool) -> None:
         self.world, self.every, self.path_every = world, every, path_every
@@ -201,7 +200,7 @@ class Meter:
 
     @QUIET
     def sample(self) -> None:
-        """Energy and momentum: every few steps."""
+        """Sample energy and momentum, every few steps."""
         world = self.world
         self.came_or_went |= not np.array_equal(np.sort(np.asarray(world.bodies.entity)), self._entities)
         kinetic = float(world.kinetic_energy())
@@ -213,13 +212,13 @@ class Meter:
         self.momentum_scale = max(self.momentum_scale, float(np.dot(np.asarray(dynamic.mass), speed)))
 
     def step(self) -> None:
-        """One step, timed; then what must be seen after every step."""
+        """Take one step, timed; then record what is needed after every step."""
         world = self.world
         before = world.stats().totals
         started = time.perf_counter()
         world.step()
         seconds = time.perf_counter() - started
-        if _kernels() != self._kernels_seen:  # this step compiled or loaded kernels: its time says nothing
+        if _kernels() != self._kernels_seen:  # this step compiled or loaded kernels: its time does not count
             self._kernels_seen = _kernels()
             self.compile_seconds += seconds
         else:
@@ -239,7 +238,7 @@ class Meter:
 
     @QUIET
     def fill(self, report: RunReport) -> None:
-        """Write what was seen into ``report``."""
+        """Write the observations into ``report``."""
         world = self.world
         report.compile_seconds = self.compile_seconds
         report.steps, report.simulated_seconds = world.step_count, world.time
@@ -280,21 +279,21 @@ class Meter:
         report.state_hash = world.state_hash()
 
     def stats(self) -> Stats:
-        """Of the steps that neither compiled nor loaded kernels."""
+        """Statistics of the steps that neither compiled nor loaded kernels."""
         return Stats(self.measured, self.measured, self.world.stats().units)
 
     def _deepest_of_solids(self, depth: NDArray[np.float64]) -> float:
-        """Sensors are there to be overlapped."""
+        """The deepest overlap without sensors."""
         sensors, contacts = sensor_entities(self.world), self.world.contacts
         if len(sensors):
             depth = depth[~(np.isin(contacts.entity_a, sensors) | np.isin(contacts.entity_b, sensors))]
         return float(depth.max()) if len(depth) else 0.0
 
     def _energy_changes(self) -> list[str]:
-        """What in this world, as it stands, adds energy or takes it away."""
+        """What in the present world adds or removes energy."""
         bodies = self.world.bodies
         dynamic, reasons = bodies.dynamic, []
-        any_pair = self.world.settings.restitution_mixing != "max"  # the larger of two: a body's own is the least
+        any_pair = self.world.settings.restitution_mixing != "max"  # "max": a pair has at least a body's own value
         touched = bodies if any_pair else dynamic
         met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
         if met and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
@@ -310,7 +309,7 @@ class Meter:
         return reasons
 
     def _energy_drift(self) -> Drift:
-        """In units of the largest kinetic energy seen: a potential has no natural zero to compare with."""
+        """Relative to the largest kinetic energy seen: the zero of a potential is arbitrary."""
         energies = np.array(self.energies)
         scale = self.kinetic_most or 1.0
         departure = (energies - energies[0]) / scale
@@ -323,7 +322,7 @@ class Meter:
         )
 
     def _momentum_drift(self) -> Drift:
-        """The length of the change, in units of the largest sum of mass times speed seen."""
+        """The length of the change, relative to the largest sum of mass times speed seen."""
         momenta = np.array(self.momenta)
         scale = self.momentum_scale or 1.0
         departure = np.linalg.norm(momenta - momenta[0], axis=1) / scale
@@ -341,9 +340,9 @@ def run(
     after_step: Callable[[int], None] | None = None,
     profile: bool = False,
 ) -> Run:
-    """Take ``steps`` steps of ``world`` and measure them; ``after_step`` is told how many are done.
+    """Take ``steps`` steps of ``world`` and measure them; ``after_step`` is called with the number of steps done.
 
-    ``profile``: kernels too, one by one, which makes each call of one a little slower.
+    ``profile``: time each kernel too, which makes each call slightly slower.
     """
     report = RunReport(scene, seed, dimensions_of(world), plain_settings(world))
     compiled, loaded = _kernels()
@@ -370,14 +369,14 @@ def run(
 
 
 def plain_settings(world: World) -> dict[str, Any]:
-    """The settings' fields with values that JSON knows; anything else by its name."""
+    """The settings' fields as values of JSON; others by their name."""
     plain = (bool, int, float, str, type(None))
     values = {f.name: getattr(world.settings, f.name) for f in dataclasses.fields(world.settings)}
     return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
 
 
 def _restitutions(bodies: Any) -> list[NDArray[np.float64]]:
-    """The restitutions of those of ``bodies`` that have the collider, by collider."""
+    """The restitutions of ``bodies`` per collider type, for those that have the collider."""
     found = []
     for collider in (SphereCollider, AABBCollider):
         has = np.asarray(bodies.has(collider), bool)
@@ -392,7 +391,7 @@ def _kernels() -> tuple[int, int]:
 
 
 def _jsonable(value: Any) -> Any:
-    """JSON has no word for infinity and for what is not a number."""
+    """None instead of numbers that JSON cannot represent: infinity and NaN."""
     if isinstance(value, dict):
         return {key: _jsonable(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,7 +1,7 @@
-"""What a scene is like: a trial run tells which dials matter in it, and of what kind it is.
+"""Survey of a scene: trial runs find its kind and which settings matter.
 
-Two runs whose starts differ by less than anything that could be seen tell whether it is chaotic: how far they are apart
-in the end, over how far they were in the beginning.
+Two runs with starts that differ by an invisible amount tell whether it is chaotic, by the ratio of their distance at
+the end to that at the start.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from ..engines.adapters import CaromEngine
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 from .observation import Seen, observe
 
-NUDGE = 1e-10  # of the smallest body: the difference of the twins
-CHAOS = 1e7  # a nudge that grows so much within the run becomes a thousandth of a body
-STILL = 0.01  # sizes per second that count as rest
+NUDGE = 1e-10  # of the smallest body: the difference between the two starts
+CHAOS = 1e7  # a growth beyond this makes a nudge a thousandth of a body: chaotic
+STILL = 0.01  # sizes per second: slower bodies are at rest
 
 
 @dataclass(frozen=True)
@@ -29,17 +29,17 @@ class Survey:
     """Facts of a scene.
 
     settings
-        those it recommends; all dials that are not varied stay so
+        those it recommends; settings that are not varied keep these values
     growth
         of the distance between two nearby starts, over the run
     speed
-        the largest in the end, sizes per second
+        the largest at the end, sizes per second
     seeded
         whether seeds change the start
     walled
-        whether walls hold all bodies: who gets beyond them in another run has escaped
+        whether walls hold all bodies: a body beyond them in another run has escaped
     trial
-        what the run with all impacts at their true times showed
+        the observation of the run with all impacts at their true times
     """
 
     settings: Settings
@@ -68,7 +68,7 @@ class Survey:
 
     @property
     def why(self) -> str:
-        """How the kind was found, in a sentence."""
+        """How the kind was determined, in a sentence."""
         grown = f"two starts {NUDGE:g} of a body apart grew {self.growth:.1e} times farther apart"
         if not self.contacts:
             return f"nothing touches anything; {grown}" if self.kind == CHAOTIC else "nothing touches anything"
@@ -87,7 +87,7 @@ def survey(subject: Subject, seconds: float) -> Survey:
     _obedient(subject, settings.replace(dt=settings.dt / 2, substeps=settings.substeps + 1)).close()
     exact = settings.replace(collision="event_driven")
     first, walled = _twin(subject, exact, seconds, 0.0, True), True
-    if first.failure == ESCAPED:  # as a ball that rolls off a platform
+    if first.failure == ESCAPED:  # for example a ball that rolls off a platform
         first, walled = _twin(subject, exact, seconds, 0.0, False), False
     second = _twin(subject, exact, seconds, NUDGE, False)
     if not first.reach and not first.counts["solver_loops"]:
@@ -124,7 +124,7 @@ def _facts(name: str, world: World) -> dict[str, Any]:
 
 
 def _has_levels(world: World) -> bool:
-    """Whether one step tests first levels."""
+    """True if a step tests first levels."""
     world.step()
     return world.stats().counters.get("first_level_tests", 0) > 0
 
@@ -160,7 +160,7 @@ def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float, w
 
 
 def _obedient(subject: Subject, settings: Settings) -> World:
-    """The world with these settings; Problem if it has others."""
+    """The world with these settings; Problem if its settings differ."""
     world = subject.world(settings)
     changed = [
         f"{field.name}={getattr(world.settings, field.name)!r} instead of {getattr(settings, field.name)!r}"
@@ -177,7 +177,7 @@ def _obedient(subject: Subject, settings: Settings) -> World:
 
 
 def _seeded(subject: Subject, settings: Settings) -> bool:
-    """Whether seeds change the start; Problem where the same seed does."""
+    """True if seeds change the start; Problem if the same seed gives different worlds."""
     hashes = []
     for seed in (0, 0, 1):
         world = subject.world(settings, seed)

@@ -1,4 +1,4 @@
-"""The clock of all benchmarks, and what a series of measurements comes to."""
+"""The clock of all benchmarks, and summary statistics of repeated measurements."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FINE = 1e-6  # s: a coarser clock cannot time a block of steps
 
 
 def _choose() -> tuple[str, Callable[[], float]]:
-    """Processor time where it is fine enough: what other programs do does not count then."""
+    """Processor time if its resolution is fine enough: it excludes the time of other programs."""
     if time.get_clock_info("process_time").resolution <= FINE:
         return "processor time", time.process_time
     return "wall time", time.perf_counter
@@ -27,7 +27,7 @@ CLOCK, now = _choose()
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Python's collector of garbage stays off inside."""
+    """Switch Python's garbage collector off inside."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -38,7 +38,7 @@ def no_garbage_collection() -> Iterator[None]:
 
 
 def timed(work: Callable[[], Any]) -> tuple[float, bool, Any]:
-    """Seconds that ``work`` took, whether they count (not if a kernel was compiled or loaded), and its result."""
+    """Seconds that ``work`` took, whether they are valid (no kernel was compiled or loaded), and its result."""
     waited = log.waited
     started = now()
     result = work()
@@ -48,7 +48,7 @@ def timed(work: Callable[[], Any]) -> tuple[float, bool, Any]:
 
 @dataclass(frozen=True)
 class Spread:
-    """Several measurements of one thing: the median, the least and the largest, and all of them."""
+    """Repeated measurements: the median, the least and the largest, and all values."""
 
     median: float
     low: float
@@ -57,10 +57,10 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Spread:
-        """Of at least one value."""
+        """From at least one value."""
         return cls(statistics.median(values), min(values), max(values), tuple(values))
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Spread:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "values": tuple(plain["values"])})

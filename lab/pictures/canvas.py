@@ -1,4 +1,4 @@
-"""The sheet a picture is drawn on: dark theme, panels to scale, header, legend; always without a display."""
+"""The sheet of a picture: dark theme, panels to scale, header, legend; works without a display."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ View = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Panel:
-    """One view: matplotlib's axes, and how many points of the picture a unit of space takes."""
+    """One view: matplotlib's axes, and the number of points of the picture per unit of space."""
 
     axes: Any
     points: float
 
     def outline(self, lower: np.ndarray, upper: np.ndarray) -> None:
-        """The frame, in the whole, of the part that another panel magnifies."""
+        """Frame the part of this panel that another panel magnifies."""
         (x0, y0), (x1, y1) = lower, upper
         self.axes.plot([x0, x1, x1, x0, x0], [y0, y0, y1, y1, y0], color=TEXT, lw=1.0, alpha=0.9, zorder=8)
 
@@ -73,7 +73,7 @@ class Sheet:
         FigureCanvasAgg(figure)
 
         def place(left: float, bottom: float, width: float, height: float) -> Any:
-            """Axes at a place in inches."""
+            """Axes at a position in inches."""
             scale = np.array([total_width, total_height, total_width, total_height])
             return figure.add_axes(tuple(np.array([left, bottom, width, height]) / scale))
 
@@ -107,7 +107,7 @@ class Sheet:
         return float(self.footer.get_xlim()[1])
 
     def legend(self, entries: list[tuple[str, str, str]]) -> None:
-        """Entries from the footer's right edge: (marker, colour, text); a marker of matplotlib or '->'."""
+        """Entries right-aligned in the footer: (marker, colour, text); a matplotlib marker or '->'."""
         right = self.width - MARGIN
         for marker, colour, text in reversed(entries):
             label = self.footer.text(right, 0.3, text, color=MUTED, fontsize=8.5, ha="right", va="center")
@@ -122,7 +122,7 @@ class Sheet:
             right -= 0.3
 
     def speed_scale(self, norm: Normalize) -> None:
-        """The colour bar of the speed, in the left of the footer."""
+        """The colour bar of the speed, at the left of the footer."""
         width, height = self.width, float(self.figure.get_size_inches()[1])
         axes: Any = self.figure.add_axes((MARGIN / width, 0.34 / height, 2.0 / width, 0.09 / height))
         bar = self.figure.colorbar(ScalarMappable(norm, SPEED), cax=axes, orientation="horizontal")
@@ -136,7 +136,7 @@ class Sheet:
 
 
 def speed_norm(speeds: np.ndarray) -> Normalize:
-    """From 0 to what 98 % of the moving bodies stay below; one fast body must not turn all others blue."""
+    """From 0 to the 98 % quantile of the speeds: one fast body must not make all others look slow."""
     moving = speeds[(speeds > 0) & np.isfinite(speeds)]
     top = float(np.quantile(moving, 0.98)) if len(moving) else 1.0
     return Normalize(0.0, top or 1.0, clip=True)

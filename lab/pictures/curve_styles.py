@@ -1,4 +1,4 @@
-"""What tells the curves of a chart apart: colour, line and marker."""
+"""The styles that distinguish the curves of a chart: colour, line and marker."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from ..trading.records import CAROM, Cell, Curve
 from . import canvas
 
-FEW = 8  # curves that can have a colour each
+FEW = 8  # up to this number each curve has its own colour
 COLOURS = ("#4dabf7", "#ffa94d", "#51cf66", "#ff6b6b", "#b197fc", "#ffd43b", "#22d3c5", "#f78fd0")
 PEER = canvas.TEXT  # pymunk's colour
 MARKERS = "osD^vPpXhd"
 LINES = {"discrete": "-", "continuous": "-.", "event_driven": ":"}
 PEER_LINE = "--"
-MARKS, WIDTHS = (8.5, 4.5), (2.6, 1.3)  # points, of the first curve and of the last: what is covered still shows
+MARKS, WIDTHS = (8.5, 4.5), (2.6, 1.3)  # points, of the first and the last curve: covered ones stay visible
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class Style:
 
 
 def styles(curves: Sequence[Curve]) -> list[Style]:
-    """A colour each for few curves; for many the colour tells the integrator, the line the kind of collision, the
-    marker substeps and geometry. Other engines are dashed and without colour."""
+    """One colour per curve if there are few; with many the colour stands for the integrator, the line for the collision
+    mode, the marker for substeps and geometry. Other engines are dashed and without colour."""
     cells = [curve.points[0].cell for curve in curves]
     own = [cell for cell in cells if cell.engine == CAROM]
     peers = [cell for cell in cells if cell.engine != CAROM]
@@ -51,6 +51,6 @@ def styles(curves: Sequence[Curve]) -> list[Style]:
 
 
 def _numbered(cells: Sequence[Cell], key: Callable[[Cell], Hashable]) -> Callable[[Cell], int]:
-    """From a cell to the place of its key among those that are there."""
+    """A function from a cell to the index of its key among the keys present."""
     places = {found: place for place, found in enumerate(dict.fromkeys(key(cell.method) for cell in cells))}
     return lambda cell: places[key(cell.method)]

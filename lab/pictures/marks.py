@@ -1,4 +1,4 @@
-"""How walls, bodies, contacts, arrows and paths are drawn into a panel."""
+"""Drawing of walls, bodies, contacts, arrows and paths into a panel."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from . import canvas
 from .canvas import Panel
 from .projection import Projection, corners, edges, faces
 
-MOST_ARROWS = 1500  # in 2D; more could not be told apart
+MOST_ARROWS = 1500  # in 2D; more could not be distinguished
 MOST_ARROWS_3D = 400  # the nearest
 MOST_SEGMENTS = 160_000
-MOST_CONTACTS_3D = 200  # more only hide the bodies
+MOST_CONTACTS_3D = 200  # more would hide the bodies
 ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
 FACE_SHADE = (0.3, 0.0, 0.5)  # of boxes, by the axis of the face's normal: light from above
 OUTLINED = 6.0  # points: smaller bodies have no outline
 
 
 def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
-    """Static geometry: filled in 2D, the edges in 3D; sensors dashed."""
+    """Static geometry: filled in 2D, edges only in 3D; sensors dashed."""
     draw_sensors(panel, walls.where(walls.sensor), projection, canvas.SENSOR, zorder=1.2)
     walls = walls.where(~walls.sensor)
     if projection.flat:
@@ -90,7 +90,7 @@ def _draw_balls(
     shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
     light = canvas.mixed(shade, "#ffffff", np.full(len(shade), 0.35))
     edge = canvas.mixed(shade, canvas.BACKGROUND, np.full(len(shade), 0.6))
-    # Each ball and then its highlight, so that a nearer ball covers both.
+    # Each ball with its highlight in turn, so that a nearer ball covers both.
     highlight = places + size[:, None] * (-0.3, 0.33)
     width = np.stack([2 * size, 0.7 * size], axis=1)[order].reshape(-1)
     _ellipses(
@@ -107,7 +107,7 @@ def _draw_balls(
 def _draw_solids(
     panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
 ) -> None:
-    """Balls and boxes together: all as polygons, so that they can be painted in one order, far to near."""
+    """Balls and boxes as polygons in one list, painted from far to near."""
     places, magnification, depth = projection.plane(bodies.centre)
     shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
     circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
@@ -136,7 +136,7 @@ def _draw_solids(
 def draw_contacts(
     panel: Panel, points: Floats, normals: Floats, diameter: float, projection: Projection
 ) -> None:
-    """A dot at each contact point, with a stroke along its normal; ``diameter`` is a typical body's."""
+    """A dot at each contact point, with a line along its normal; ``diameter`` is a typical body's."""
     if not len(points) or (not projection.flat and len(points) > MOST_CONTACTS_3D):
         return
     size = float(np.clip(0.16 * diameter * panel.points, 1.6, 5.0))
@@ -151,7 +151,7 @@ def draw_contacts(
 def draw_arrows(
     panel: Panel, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float
 ) -> float:
-    """Velocity arrows of the bodies in sight; returns how many seconds an arrow stands for (0: none)."""
+    """Velocity arrows of the visible bodies; returns how many seconds an arrow stands for (0: none)."""
     start, _, depth = projection.plane(bodies.centre)
     x, y = panel.axes.get_xlim(), panel.axes.get_ylim()
     visible = (start[:, 0] > x[0]) & (start[:, 0] < x[1]) & (start[:, 1] > y[0]) & (start[:, 1] < y[1])
@@ -176,7 +176,7 @@ def draw_arrows(
 
 
 def draw_paths(panel: Panel, positions: Floats, colours: Floats, projection: Projection) -> None:
-    """Paths (samples, bodies, d) that fade into the past; a jump across a third of the view is no path."""
+    """Paths (samples, bodies, d) that fade with age; a jump across a third of the view is not connected."""
     stride = max(1, positions.shape[0] * positions.shape[1] // MOST_SEGMENTS)
     positions = np.concatenate([positions[:-1:stride], positions[-1:]])
     steps, bodies = len(positions) - 1, positions.shape[1]

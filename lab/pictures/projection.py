@@ -1,4 +1,4 @@
-"""How a scene falls onto the plane of a picture: 2D as it is, 3D through a perspective camera."""
+"""Projection of a scene onto the picture plane: 2D unchanged, 3D by a perspective camera."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ DISTANCE = 2.6  # of the camera from the middle of the view, in diagonals of the
 
 @dataclass(frozen=True)
 class Projection:
-    """The space between ``lower`` and ``upper``, seen from outside.
+    """The space between ``lower`` and ``upper``, viewed from outside.
 
-    ``axes`` (d, d): rows right, up and, in 3D, towards the camera; y points up in the picture.
+    ``axes`` (d, d): rows are right, up and, in 3D, towards the camera; y points up in the picture.
     """
 
     lower: Floats
@@ -27,7 +27,7 @@ class Projection:
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> Projection:
-        """Looks at the space between two corners."""
+        """A projection of the space between two corners."""
         if len(lower) == 2:
             return cls(lower, upper, np.eye(2), np.inf)
         level = np.cos(ELEVATION)
@@ -60,11 +60,11 @@ class Projection:
 
     @property
     def camera(self) -> Floats:
-        """Where it stands, (3,)."""
+        """The position of the camera, (3,)."""
         return (self.lower + self.upper) / 2 + self.distance * self.axes[2]
 
     def frame(self, points: Floats | None = None) -> tuple[Floats, Floats]:
-        """The corners of the rectangle in the plane that holds the view, or only ``points`` (n, d), if any."""
+        """The corners of the rectangle in the plane that encloses the view, or only ``points`` (n, d) if given."""
         places, _, _ = self.plane(corners(self.lower, self.upper) if points is None or not len(points) else points)
         return places.min(axis=0), places.max(axis=0)
 
@@ -73,7 +73,7 @@ class Projection:
 
 
 def corners(lower: Floats, upper: Floats) -> Floats:
-    """The 2^d corners; bit k of the row's number says which end of axis k."""
+    """The 2^d corners; bit k of the row number selects the end of axis k."""
     d = len(lower)
     bits = (np.arange(2**d)[:, None] >> np.arange(d)) & 1
     return np.where(bits, upper, lower)

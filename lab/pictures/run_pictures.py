@@ -1,4 +1,4 @@
-"""The two pictures of a run: how things stand at the end, and the paths they took."""
+"""The two pictures of a run: the final state and the paths."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .projection import Projection, corners
 SMALLEST_LEGIBLE = 5.0  # points: below this typical diameter a second panel magnifies a part
 MAGNIFIED_DIAMETER = 20.0  # points
 CROWD_3D = 500  # untraced bodies that would hide the paths behind them
-SOME = 60  # bodies whose beginnings are shown
-FEW = 3  # bodies whose shapes are repeated along their path, however long
-GHOSTS = 14  # times that they are
-DRAWABLE = 1e30  # farther out there is no picture
+SOME = 60  # up to this number of bodies the starts are shown
+FEW = 3  # up to this number of bodies the shapes are repeated along the path
+GHOSTS = 14  # number of repetitions
+DRAWABLE = 1e30  # larger coordinates are not drawn
 UNTRACED = "#1b2431"
-HUGE = 5.0  # times the extent of everything smaller: such static bodies are cut off by the view
+HUGE = 5.0  # times the extent of everything smaller: such static bodies are clipped by the view
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Still:
 
     @classmethod
     def of(cls, run: Run) -> Still:
-        """The world as it stands at the end of ``run``."""
+        """The final state of ``run``."""
         world, d = run.world, run.report.dimensions
         shapes = shapes_of(world)
         ids = np.asarray(world.bodies.entity)
@@ -51,13 +51,13 @@ class Still:
 
     @property
     def moving(self) -> np.ndarray:
-        """Which shapes can be drawn as bodies."""
+        """True for shapes that can be drawn as bodies."""
         return ~self.shapes.static & (np.abs(self.shapes.centre) < DRAWABLE).all(axis=1)
 
 
 @QUIET
 def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
-    """Draw ``run`` into the folder ``out``; returns the files. ``view``: two corners, None to find them.
+    """Draw ``run`` into the folder ``out``; returns the files. ``view``: two corners, None to choose them.
 
     An ``out`` that ends in .png is a file for the paths alone.
     """
@@ -81,12 +81,12 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
 
 
 def is_file(out: Path) -> bool:
-    """Whether it is the name of one picture, not that of a folder."""
+    """True if it is the name of one picture, not of a folder."""
     return out.suffix.lower() == ".png"
 
 
 def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
-    """Where the bodies have been, and what stands; of what is huge, the part that is close by."""
+    """The region that holds all paths and static shapes; of huge shapes only the near part."""
     shapes, moving = still.shapes, still.shapes.where(still.moving)
     d = shapes.centre.shape[1]
     lows, highs = [moving.lower], [moving.upper]
@@ -102,7 +102,7 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
         )
     lower, upper = low.min(axis=0), high.max(axis=0)
     fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
-    for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # the smaller ones first
+    for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # smallest first
         if 2 * fixed.half[k].max() <= HUGE * float((upper - lower).max()):
             lower, upper = np.minimum(lower, fixed.lower[k]), np.maximum(upper, fixed.upper[k])
     room = 0.12 * max(float((upper - lower).max()), 1e-9)
@@ -121,7 +121,7 @@ def _smallest(shapes: Shapes) -> tuple[Floats, Floats]:
 
 
 def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas.View:
-    """3D: what the bodies, their paths and the walls near them take up in the plane, with a margin."""
+    """3D: the region of the plane that bodies, paths and near walls cover, with a margin."""
     bodies, walls = still.shapes.where(still.moving), still.shapes.where(still.shapes.static)
     near = walls.where(np.all((walls.upper >= projection.lower) & (walls.lower <= projection.upper), axis=1))
     boxes = [
@@ -137,7 +137,7 @@ def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas
 
 
 def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
-    """All shapes to scale, coloured by speed, with velocities and contacts; crowds get a magnified part."""
+    """All shapes to scale, coloured by speed, with velocities and contacts; a crowd gets a magnified part."""
     report, shapes = run.report, still.shapes
     bodies, velocity = shapes.where(still.moving), still.velocity[still.moving]
     norm = canvas.speed_norm(bodies.speed)
@@ -167,11 +167,11 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
 
 
 def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
-    """The paths, each body in its colour, the past fading; the traced bodies where they are now."""
+    """The paths, one colour per body, fading with age; the traced bodies at their present positions."""
     traces, shapes, report = run.traces, still.shapes, run.report
     count, moved = len(traces.entities), traces.moved
     over = f"{report.simulated_seconds:.4g} s"
-    if traces.blows is not None:
+    if traces.impacts is not None:
         over = f"{_counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
     if not report.bodies["total"] and not count:
         subtitle = "no bodies"
@@ -182,7 +182,7 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     else:
         subtitle = f"{'path' if count == 1 else 'paths'} of {_that_moved(count)}, over {over}"
     subtitle += ", fading into the past" if count else ""
-    if traces.blows is not None:
+    if traces.impacts is not None:
         subtitle += f"   ·   {report.settings['collision']}"
     sheet = Sheet.new(report.scene, subtitle, [frame], numbered=projection.flat)
     panel = sheet.panels[0]
@@ -194,17 +194,17 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
         faint = np.tile(to_rgba_array(UNTRACED), (len(others.entity), 1))
         draw_bodies(panel, others, faint, projection, zorder=2)
     palette = to_rgba_array(canvas.BODY_COLOURS)
-    colours = palette[np.arange(count) * 5 % len(palette)]  # neighbours by id get different ones
+    colours = palette[np.arange(count) * 5 % len(palette)]  # bodies with consecutive ids get different colours
     if count and len(traces.samples) > 1:
         draw_paths(panel, traces.corners, colours, projection)
     own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
     if 0 < count <= SOME:
         _draw_starts(panel, traces, followed, own, projection)
-    if 0 < count <= FEW or (count and traces.blows is not None):
+    if 0 < count <= FEW or (count and traces.impacts is not None):
         _draw_ghosts(panel, traces, followed, own, projection)
     draw_bodies(panel, followed, own, projection)
-    if traces.blows:
-        points, normals = (np.array([getattr(blow, name) for blow in traces.blows]) for name in ("point", "normal"))
+    if traces.impacts:
+        points, normals = (np.array([getattr(one, name) for one in traces.impacts]) for name in ("point", "normal"))
         draw_contacts(panel, points, normals, followed.typical_diameter, projection)
         sheet.legend([("o", canvas.CONTACT, "impact")])
     return sheet
@@ -219,7 +219,7 @@ def _that_moved(count: int) -> str:
 
 
 def _moving_bodies(report: RunReport) -> str:
-    """`12 bodies and 2 kinematic ones`, static ones apart."""
+    """`12 bodies and 2 kinematic ones`; static ones are not counted."""
     dynamic, kinematic = report.bodies["dynamic"], report.bodies["kinematic"]
     if not dynamic and not kinematic:
         return "no bodies" if not report.bodies["total"] else "only static bodies"
@@ -231,9 +231,9 @@ def _moving_bodies(report: RunReport) -> str:
 def _draw_starts(
     panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
 ) -> None:
-    """Where the bodies began, faintly."""
+    """The start positions, faintly."""
     paths = traces.positions[:, np.searchsorted(traces.entities, followed.entity)]
-    first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have come later
+    first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have been created later
     places = paths[first, np.arange(len(first))]
     faint = colours.copy()
     faint[:, 3] = 0.16
@@ -243,7 +243,7 @@ def _draw_starts(
 def _draw_ghosts(
     panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
 ) -> None:
-    """The shapes at even times along the path, as under a stroboscope."""
+    """The shapes at equal time intervals along the path."""
     positions = traces.positions
     when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]
     for row, entity in enumerate(followed.entity):
@@ -255,7 +255,7 @@ def _draw_ghosts(
 
 
 def _magnified(bodies: Shapes, projection: Projection) -> tuple[Floats, Floats] | None:
-    """2D, bodies too small to be seen: the part around the fastest one, for a second panel to show."""
+    """2D, bodies too small to be legible: the region around the fastest one, for a second panel."""
     if not projection.flat or not len(bodies.entity):
         return None
     lower, upper = projection.lower, projection.upper
