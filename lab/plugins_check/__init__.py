@@ -1,4 +1,4 @@
-"""``carom plugins`` and ``carom plugins check``: which plugins are installed, and whether one does what it must.
+"""``carom plugins`` and ``carom plugins check``: list the installed plugins, and check one plugin's functions.
 
-Reads a plugin's shapes and pairs; compiles them and calls them with random and extreme inputs. Writes findings.
+Reads a plugin's shapes and pairs, compiles them and calls them with random and extreme inputs. Writes findings.
 """

@@ -1,4 +1,4 @@
-"""``carom plugins check``: a plugin's functions compiled, and tried with thousands of random and extreme inputs."""
+"""``carom plugins check``: compile a plugin's functions and call them with thousands of random and extreme inputs."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from .kernels import RaisedError, SupportCode, compiler_said
 from .pair_checks import TOLERANCE, PairChecks
 from .samples import ORDINARY, Rows, directions, poses, rows
 
-SUPPORTS = 2000  # directions to look in
-BOXES = 400  # that a broad phase is tried with
+SUPPORTS = 2000  # directions tested
+BOXES = 400  # boxes given to a broad phase
 STEPS = 3
 
 
 def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str], None] = lambda what: None) -> Report:
-    """Check all that a plugin brings.
+    """Check all shapes, pairs and other functions of a plugin.
 
     others
         plugins whose shapes its pairs need, besides the built-in ones
     progress
-        called with what is about to be looked at
+        called with the name of each check before it runs
     """
     report = Report(plugin.name)
     registry = Registry()
@@ -58,7 +58,7 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
         for dimensions in (2, 3):
             _attempt(report.subject("broad phase", name, dimensions), progress,
                      lambda subject, m=made: _check_broad_phase(subject, m))  # fmt: skip
-    if not built_in and not report.findings:  # else it would only fail in other words
+    if not built_in and not report.findings:  # a world would only report the same findings in other words
         known = {d for component in plugin.shapes for d in _dimensions(component)} or {2, 3}
         for integrator in plugin.integrators or (None,):
             for dimensions in sorted(known):
@@ -69,7 +69,7 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
 
 
 def _attempt(subject: Subject, progress: Callable[[str], None], check: Callable[[Subject], None]) -> None:
-    """Whatever somebody else's code raises becomes a finding."""
+    """Run a check; convert any exception of plugin code to a finding."""
     where = f"{subject.kind} {subject.name}{f', {subject.dimensions}D' if subject.dimensions else ''}"
     progress(where)
     try:
@@ -80,12 +80,12 @@ def _attempt(subject: Subject, progress: Callable[[str], None], check: Callable[
                     "use what numba compiles: numbers and tuples, math, carom.framework.vectors, helpers marked "
                     "@plugin.kernel; return the same types on every way")
         )  # fmt: skip
-    except Exception as error:  # somebody else's code: whatever it raises is said in the report
+    except Exception as error:  # plugin code may raise anything; the report shows it
         subject.findings.append(Finding(f"it raised {one_line(error)}", "see the message", "correct what raises"))
 
 
 def _pairs(plugin: Plugin, registry: Registry) -> list[tuple[type[Any], type[Any]]]:
-    """What the plugin registers, and what its shapes form with each other and all others here, each once."""
+    """The registered pairs, and all pairs of its shapes with each other and with all others here, each once."""
     found: dict[Any, tuple[type[Any], type[Any]]] = {}
     for first in registry.shapes:
         for second in registry.shapes:
@@ -114,7 +114,7 @@ def _check_pair(subject: Subject, registry: Registry, plugin: Plugin, first: Any
 
 
 def _check_shape(subject: Subject, shape: Shape, dimensions: int) -> None:
-    """Bounds hold the shape; support is the farthest point; rounding is a radius."""
+    """Bounds enclose the shape; support is the farthest point; rounding is a radius."""
     rng = np.random.default_rng((2, dimensions))
     scale = np.repeat((1.0, 1e-9, 1e9), (ORDINARY, ORDINARY // 10, ORDINARY // 10))
     made = rows(shape, scale, rng.random(len(scale)) < 0.2, dimensions, rng)
@@ -123,7 +123,7 @@ def _check_shape(subject: Subject, shape: Shape, dimensions: int) -> None:
     def show(i: int) -> str:
         return row_shown(made, i)
 
-    wrong = ~(made.half >= 0).min(axis=1)  # nan too
+    wrong = ~(made.half >= 0).min(axis=1)  # also true for nan
     subject.found(
         wrong, lambda i: f"bounds returned {tuple(made.half[i].tolist())}", show,
         "half extents are numbers of at least 0, or inf where the shape has no end",
@@ -134,7 +134,7 @@ def _check_shape(subject: Subject, shape: Shape, dimensions: int) -> None:
 
 
 def _compare_bounds(subject: Subject, made: Rows) -> None:
-    """Compiled code and plain Python agree, as far as rounding lets them."""
+    """Compiled code and plain Python agree up to rounding."""
     bounds, dimensions = made.shape.component.bounds, made.half.shape[1]  # type: ignore[attr-defined]
     for i in range(0, len(made.half), 100):
         said = np.array(bounds(made.at(i), dimensions), float)
@@ -216,7 +216,7 @@ def _check_mixing(subject: Subject, rule: Any) -> None:
 
 
 def _check_broad_phase(subject: Subject, make: Any) -> None:
-    """Against all pairs, tested one by one."""
+    """Compare with all pairs, tested one by one."""
     assert subject.dimensions is not None
     rng = np.random.default_rng(4)
     for count in (0, 1, 2, BOXES):
@@ -247,7 +247,7 @@ def _check_broad_phase(subject: Subject, make: Any) -> None:
 
 
 def _check_world(subject: Subject, plugin: Plugin, others: list[Plugin], integrator: str | None) -> None:
-    """A world with it takes some steps, with bodies of each of its shapes, which meet if all pairs are handled."""
+    """A world with the plugin takes steps; bodies of all its shapes meet in it if all pairs are handled."""
     assert subject.dimensions is not None
     d = subject.dimensions
     settings = Settings(integrator=integrator) if integrator else Settings()
@@ -273,7 +273,7 @@ def _check_world(subject: Subject, plugin: Plugin, others: list[Plugin], integra
 
 
 def _missing(report: Report, plugin: Plugin, registry: Registry) -> None:
-    """Pairs of its shapes that nobody handles: no error, they may be meant never to meet."""
+    """Note pairs of its shapes that have no handler: no error, because such shapes may be meant never to meet."""
     for component in plugin.shapes:
         lacking = [other.__name__ for other in registry.shapes if registry.pair(component, other) is None]
         if lacking:

@@ -1,4 +1,4 @@
-"""``carom plugins``: what installed packages offer; ``carom plugins check``: whether a plugin does what it must."""
+"""``carom plugins``: plugins of installed packages; ``carom plugins check``: check a plugin's functions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .check import check_plugin
 from .findings import Report, Subject
 from .installed import needed_by, plugins_of
 
-FOUND = 1  # exit code of a check that found something
+FOUND = 1  # exit code of a check with findings
 
 
 @click.group("plugins", cls=Commands, invoke_without_command=True, short_help="List plugins, or check one.")

@@ -1,4 +1,4 @@
-"""What ``carom plugins check`` has looked at, and what it found."""
+"""Subjects and findings of ``carom plugins check``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .samples import KINDS, Poses, Rows
 
 @dataclass
 class Finding:
-    """Something wrong: what, for which input, and the cure; ``share``: of how many of the inputs it is true."""
+    """One defect: what, an example input, and the cure; ``share``: fraction of the inputs it occurs for."""
 
     what: str
     example: str
@@ -23,7 +23,7 @@ class Finding:
 
 @dataclass
 class Subject:
-    """A shape, a pair or something else that was checked, in one dimension; and the findings."""
+    """A checked shape, pair or other function, in one dimension, with its findings."""
 
     kind: str
     name: str
@@ -33,7 +33,7 @@ class Subject:
     note: str = ""
 
     def found(self, bad: np.ndarray, what: Any, example: Any, cure: str) -> bool:
-        """Note a finding where ``bad`` (n,) is true; ``what`` and ``example`` say it of the first row that is."""
+        """Record a finding where ``bad`` (n,) is true; ``what`` and ``example`` describe the first such row."""
         at = np.flatnonzero(bad)
         if len(at):
             first = int(at[0])
@@ -43,7 +43,7 @@ class Subject:
 
 @dataclass
 class Report:
-    """Of one plugin."""
+    """The findings for one plugin."""
 
     plugin: str
     subjects: list[Subject] = field(default_factory=list)
@@ -59,7 +59,7 @@ class Report:
 
 
 def pose_shown(poses: Poses, at: int, d: Any = None, swapped: bool = False) -> str:
-    """The input of a pair's function."""
+    """The input of a pair function, as text."""
     d = poses.d[at] if d is None else d
     a, b = (poses.b, poses.a) if swapped else (poses.a, poses.b)
     return f"{KINDS[poses.kind[at]][0]}: a = {row_shown(a, at)}, b = {row_shown(b, at)}, d = {numbers_shown(d)}"

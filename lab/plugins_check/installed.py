@@ -1,4 +1,4 @@
-"""Plugins by name, by module and by file, as the command line takes them."""
+"""Plugins by name, module or file, from the command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..commands.usage_errors import Problem, did_you_mean, one_line
 
 
 def plugin_named(name: str) -> Plugin:
-    """The plugin on offer under that name; Problem if there is none or it is broken."""
+    """The installed plugin of that name; Problem if there is none or it is broken."""
     known = importlib.metadata.entry_points(group=GROUP).names
     if name not in known:
         raise Problem(f"no installed package offers a plugin named {name!r}{did_you_mean(name, sorted(known))}")
@@ -28,7 +28,7 @@ def plugin_named(name: str) -> Plugin:
 
 
 def plugins_of(target: str) -> list[Plugin]:
-    """The plugins that a name, a module or a file stands for; Problem if there are none."""
+    """The plugins that a name, a module or a file refers to; Problem if there are none."""
     if target.endswith(".py") or "/" in target:
         return _plugins_in(import_file(Path(target)), target)
     if target in importlib.metadata.entry_points(group=GROUP).names:
@@ -36,7 +36,7 @@ def plugins_of(target: str) -> list[Plugin]:
     known = sorted(importlib.metadata.entry_points(group=GROUP).names)
     try:
         with stdout_kept_clean():
-            sys.path.insert(0, str(Path.cwd()))  # as `python -m` does: authors check what lies before them
+            sys.path.insert(0, str(Path.cwd()))  # as `python -m` does: authors check files in the current folder
             try:
                 module = importlib.import_module(target)
             finally:
@@ -52,7 +52,7 @@ def plugins_of(target: str) -> list[Plugin]:
 
 def _plugins_in(module: ModuleType, target: str) -> list[Plugin]:
     found = list(dict.fromkeys(value for value in vars(module).values() if isinstance(value, Plugin)))
-    if not found:  # a class that is made per world
+    if not found:  # a plugin class, instantiated per world
         makers: list[Any] = [v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Plugin)]
         own = [maker for maker in makers if maker.__module__ == module.__name__]
         try:
@@ -65,7 +65,7 @@ def _plugins_in(module: ModuleType, target: str) -> list[Plugin]:
 
 
 def needed_by(plugin: Plugin) -> list[Plugin]:
-    """Other plugins whose shapes its pairs name: those in the modules that these shapes are from."""
+    """Other plugins whose shapes its pairs use: those in the modules of these shapes."""
     needed: dict[Plugin, None] = {}
     for component in {component for pair in plugin.pairs for component in pair}:
         module: Any = sys.modules.get(component.__module__)

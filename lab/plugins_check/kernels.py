@@ -1,4 +1,4 @@
-"""Kernels for ``carom plugins check``: a plugin's functions, compiled the way worlds compile them, over many inputs."""
+"""Kernels for ``carom plugins check``: a plugin's functions, compiled as in worlds, called for many inputs."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ...framework.vectors import axes_at, row, store
 from ...systems.shapes.dispatch import pair_call, parameters_source, source_module
 from .samples import Rows
 
-# Of the compiler's messages: lines that say nothing, and files that are not the plugin's.
+# Compiler messages: lines without information, and files outside the plugin.
 NOISE = ("Failed in nopython", "- Resolution failure", "During:", ">>>")
 FOREIGN = ("numba/", "numba\\", "carom_shapes_")
 
 
 class RaisedError(Exception):
-    """A compiled function of the plugin raised; ``at`` is the row it was called for."""
+    """A compiled function of the plugin raised; ``at`` is the row of its input."""
 
     def __init__(self, at: int, error: BaseException) -> None:
         super().__init__(f"{type(error).__name__}: {error}")
@@ -32,7 +32,7 @@ class RaisedError(Exception):
 
 @dataclass
 class Results:
-    """What a pair's function returned, an array for each part."""
+    """The results of a pair function, one array per part."""
 
     hit: np.ndarray
     depth: np.ndarray
@@ -96,7 +96,7 @@ class SupportCode:
 
 
 def compiler_said(error: BaseException) -> str:
-    """The gist of a page of numba's: what it did not understand, and the line of the plugin's file."""
+    """The essence of numba's message: what it could not compile, and the line of the plugin's file."""
     lines = [line.strip() for line in str(error).splitlines()]
     gist = next((line for line in lines if line and not line.startswith(NOISE)), type(error).__name__)
     call = next((line for line in lines if line.startswith(">>>")), "")
@@ -122,7 +122,7 @@ def _call(compiled: Any, at: np.ndarray, *arguments: Any) -> None:
     at[0] = -1
     try:
         compiled(*arguments)
-    except Exception as error:  # the plugin's own, whatever it is; before the first row it is the compiler's
+    except Exception as error:  # raised by the plugin; before the first row, by the compiler
         if at[0] < 0:
             raise
         raise RaisedError(int(at[0]), error) from error

@@ -1,7 +1,7 @@
-"""The checks of a pair of shapes: what makes a contact, looked at for thousands of random and extreme poses.
+"""Checks of a pair of shapes, for thousands of random and extreme poses.
 
-Lengths are compared within TOLERANCE of the scale of the pose, which is the distance of the centres plus the sizes of
-both shapes; through the generic pair, which searches for smooth shapes, within GENERIC of it.
+Lengths are compared within TOLERANCE times the scale of the pose: the distance of the centres plus the sizes of both
+shapes. For the generic pair, which iterates for smooth shapes, the factor is GENERIC.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from .kernels import PairCode, RaisedError, Results, SupportCode
 from .samples import KINDS, Poses, directions
 
 TOLERANCE, GENERIC = 1e-9, 2e-6
-UNIT = 1e-6  # how far a normal's length may be from 1
-PLAIN_ORDINARY, PLAIN_EXTREME = 100, 15  # poses that plain Python runs too
-PATH = 24  # places on a sweep that are looked at
+UNIT = 1e-6  # tolerance of a normal's length
+PLAIN_ORDINARY, PLAIN_EXTREME = 100, 15  # poses that are also run in plain Python
+PATH = 24  # samples along a sweep
 
 
 class PairChecks:
-    """All checks of one pair in one dimension; findings go to the subject."""
+    """All checks of one pair in one dimension; findings are recorded in the subject."""
 
     def __init__(self, subject: Subject, pair: Pair, shapes: tuple[Shape, Shape], poses: Poses, by_hand: bool) -> None:
         self.subject, self.pair, self.shapes, self.poses = subject, pair, shapes, poses
         self.convex = all(shape.support is not None for shape in shapes)
         self.twins = shapes[0].component is shapes[1].component
-        self.by_hand = by_hand  # by the plugin that is checked, not by the generic pair
+        self.by_hand = by_hand  # the checked plugin's own function, not the generic pair
         self.tolerance = (GENERIC if pair.helpers and not by_hand else TOLERANCE) * poses.scale()
         self.rng = np.random.default_rng(7)
         self.d = poses.d
@@ -51,7 +51,7 @@ class PairChecks:
         self._points(result)
         self._meets(result)
         self._parting(result)
-        if self.convex and not self.subject.findings:  # else it would say the same again
+        if self.convex and not self.subject.findings:  # otherwise it would repeat them
             self._supports(result)
         self._steadiness(result)
         if self.twins:
@@ -64,7 +64,7 @@ class PairChecks:
     # -- each pose by itself ----------------------------------------------------------------------
 
     def _contacts(self, r: Results) -> np.ndarray:
-        """Which results are contacts or misses at all."""
+        """Check that results are valid, and return which of them are usable."""
         apart = ~r.hit & (r.depth == -np.inf)
         finite = np.isfinite(r.depth) & np.isfinite(r.normal).all(axis=1) & np.isfinite(r.point).all(axis=1) | apart
         self._found(
@@ -82,7 +82,7 @@ class PairChecks:
         return finite & ~bent & ~apart
 
     def _boxes(self, r: Results) -> None:
-        """Where there is contact, the boxes around both overlap: else the broad phase never offers the pair."""
+        """At a contact the bounds of both shapes overlap; otherwise the broad phase does not report the pair."""
         reach = self.poses.a.half + self.poses.b.half
         outside = (r.depth > self.tolerance) & (np.abs(self.d) - reach > self.tolerance[:, None]).any(axis=1)
         self._found(
@@ -93,7 +93,7 @@ class PairChecks:
         )
 
     def _points(self, r: Results) -> None:
-        """The point of a contact lies within both boxes, but for the overlap."""
+        """The contact point lies in both boxes, up to the overlap."""
         room = np.abs(r.depth) + self.tolerance
         hit = r.depth >= 0
         off_a = np.any(np.abs(r.point) - self.poses.a.half > room[:, None], axis=1)
@@ -113,7 +113,7 @@ class PairChecks:
             self._found_one(int(np.argmax(near)), what, cure)
 
     def _supports(self, r: Results) -> None:
-        """Along the normal, what the support functions say of both shapes is what depth says."""
+        """The depth along the normal agrees with the support functions of both shapes."""
         known = np.isfinite(r.depth)
         normal = np.where(known[:, None], r.normal, np.eye(self.d.shape[1])[0])
         room = -(self.d * normal).sum(axis=1)
@@ -129,16 +129,16 @@ class PairChecks:
             "correct the depth, the normal, or the support function",
         )
 
-    # -- two poses that belong together -----------------------------------------------------------
+    # -- two related poses ------------------------------------------------------------------------
 
     def _parting(self, r: Results) -> None:
-        """Moved by depth along the normal the two just touch."""
+        """After a translation by depth along the normal the shapes just touch."""
         hit = r.depth >= 0
         after = self._evaluate(self.d + np.where(np.isfinite(r.depth), r.depth, 0.0)[:, None] * r.normal)
         left = np.where(hit, after.depth, 0.0)
         if self.convex:
             deep, far = left > self.tolerance, left < -self.tolerance
-        else:  # shapes that may be hollow or made of pieces: from one into the next, but not as a rule
+        else:  # hollow or composite shapes may run into another piece, but not in most poses
             deep, far = left > 0.5 * r.depth + self.tolerance, np.zeros(len(hit), bool)
             deep &= (hit & deep).sum() > 0.5 * hit.sum()
         cure = "depth is how far the second shape has to move along the normal until they part; normal points from the "
@@ -156,7 +156,7 @@ class PairChecks:
         )
 
     def _steadiness(self, r: Results) -> None:
-        """Moving by s changes the distance by s at most: the search for the time of impact steps by that distance."""
+        """A translation by s changes the distance by at most s: the search for the time of impact relies on it."""
         n, dimensions = self.d.shape
         size = np.where(np.isfinite(r.depth), np.abs(r.depth), 0.0) + 0.1 * self.poses.scale()
         step = (size * 10.0 ** self.rng.uniform(-6, 0, n))[:, None] * directions(n, dimensions, self.rng)
@@ -167,7 +167,7 @@ class PairChecks:
             change = np.where(both, after.depth - r.depth, 0.0)
         jumps = change > moved + 2 * self.tolerance
         if not self.convex:
-            jumps &= r.depth < 0  # overlapping pieces may do as they like, apart it matters
+            jumps &= r.depth < 0  # the depth of overlapping pieces is arbitrary, their distance is not
         self._found(
             jumps,
             lambda i: f"depth is {r.depth[i]:.9g}; the second shape moved by {moved[i]:.3g} it is {after.depth[i]:.9g}",
@@ -175,7 +175,7 @@ class PairChecks:
         )
 
     def _turned_round(self, r: Results) -> None:
-        """Two of one shape, seen from the other."""
+        """Two of one shape, with the roles exchanged."""
         back = self.code(self.poses.b, self.poses.a, -self.d)
         both = np.isfinite(r.depth) & np.isfinite(back.depth)
         with np.errstate(invalid="ignore"):
@@ -187,7 +187,7 @@ class PairChecks:
             cure,
         )
         along = (r.normal * back.normal).sum(axis=1)
-        # Where centres are level, either side is right.
+        # With level centres either direction is right.
         level = (np.abs(self.d) <= 1e-6 * self.poses.scale()[:, None]).any(axis=1)
         self._found(
             both & ~unequal & ~level & (along > UNIT),
@@ -200,14 +200,14 @@ class PairChecks:
         gap = np.abs(back.point - (r.point - self.d)).max(axis=1)
         same = (r.depth >= 0) & (along < -1 + 1e-9)
         slip = same & (gap > np.abs(r.depth) + self.tolerance)
-        slip &= slip.sum() > 0.5 * same.sum()  # where sides lie on each other, any point of them is right
+        slip &= slip.sum() > 0.5 * same.sum()  # for touching faces any point of them is right
         self._found(
             slip,
             lambda i: f"the points of contact seen from both sides are {gap[i]:.6g} apart",
             "point counts from the centre of the first shape, and lies in the middle of the overlap",
         )
 
-    # -- other roads to the same result -----------------------------------------------------------
+    # -- other ways to the same result ------------------------------------------------------------
 
     def _plain(self, r: Results) -> None:
         """Compiled code and plain Python agree."""
@@ -220,7 +220,7 @@ class PairChecks:
             try:
                 with np.errstate(all="ignore"):
                     result = self.pair.function(self.poses.a.at(i), self.poses.b.at(i), d, *self.pair.helpers)
-            except Exception as error:  # the plugin's own code
+            except Exception as error:  # raised by the plugin
                 raised = f"{type(error).__name__}: {error}"
                 what = f"as plain Python it raises {raised}; compiled it returns {self._said(r, i)}"
                 self._found_one(i, what, "guard what fails: compiled code does not raise there, it goes on with nan")
@@ -238,7 +238,7 @@ class PairChecks:
                 return
 
     def _sweeps(self, r: Results) -> None:
-        """The closed form agrees with the depth on the way."""
+        """The closed-form sweep agrees with the depth along the path."""
         away = np.flatnonzero(r.depth < 0)
         poses = self.poses.take(away)
         d, tolerance = poses.d, 1e3 * self.tolerance[away]

@@ -1,4 +1,4 @@
-"""Random shapes and poses for ``carom plugins check``: parameters within the columns' rules, ordinary and extreme."""
+"""Random shapes and poses for ``carom plugins check``: ordinary and extreme parameters that the columns accept."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from ...systems.shapes.dispatch import half_extents_kernel, parameter_columns
 from ...systems.shapes.rotation import axes_of
 
 ORDINARY = 10_000  # poses of a pair
-EXTREME = 300  # of each of the kinds below
-VARIANTS = 8  # of an array, stretched
-# Kinds of poses: (name, size of a, size of b, how far apart, in their sizes), in metres; the first are checked first.
+EXTREME = 300  # poses of each other kind below
+VARIANTS = 8  # stretched variants of an array
+# Kinds of poses: (name, size of a, size of b, distance in units of their sizes), in metres; the first come first.
 KINDS = (
     ("ordinary", 1.0, 1.0, "near"), ("along the axes", 1.0, 1.0, "axes"),
     ("coincident centres", 1.0, 1.0, "coincident"), ("centres 1e-9 apart", 1.0, 1.0, "close"),
@@ -29,7 +29,7 @@ KINDS = (
 
 @dataclass
 class Rows:
-    """Parameters of n colliders of one shape, as kernels take them, with half the size of the boxes around them."""
+    """Parameters of n colliders of one shape, as kernels take them, with the half extents of their boxes."""
 
     shape: Shape
     arrays: dict[str, np.ndarray]
@@ -41,7 +41,7 @@ class Rows:
         return parameter_columns(self.shape, self.arrays, self.axes)
 
     def at(self, row: int) -> Any:
-        """The parameters of one, as a plain Python function gets them."""
+        """The parameters of one row, as passed to a plain Python function."""
         values: dict[str, Any] = {}
         for name in self.shape.columns:
             column, value = self.shape.component.columns[name], self.arrays[name][row]
@@ -57,13 +57,13 @@ class Rows:
         return Rows(self.shape, {n: array[rows] for n, array in self.arrays.items()}, self.axes[rows], self.half[rows])
 
     def size(self) -> np.ndarray:
-        """(n,) the largest half extent that is finite; 0 for what has no end anywhere."""
+        """(n,) the largest finite half extent; 0 if all are infinite."""
         return np.where(np.isfinite(self.half), self.half, 0.0).max(axis=1)
 
 
 @dataclass
 class Poses:
-    """n pairs to look at: a, b, d (n, dimensions) from a's centre to b's, and of which kind each is."""
+    """n pairs: a, b, d (n, dimensions) from a's centre to b's, and the kind of each."""
 
     a: Rows
     b: Rows
@@ -74,7 +74,7 @@ class Poses:
         return Poses(self.a.take(rows), self.b.take(rows), self.d[rows], self.kind[rows])
 
     def scale(self) -> np.ndarray:
-        """(n,) the length by which rounding is judged: distance and both sizes."""
+        """(n,) the length that tolerances are relative to: distance plus both sizes."""
         return np.sqrt((self.d * self.d).sum(axis=1)) + self.a.size() + self.b.size()
 
 
@@ -90,7 +90,7 @@ def poses(first: Shape, second: Shape, dimensions: int, seed: int) -> Poses:
 
 
 def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, rng: np.random.Generator) -> Rows:
-    """Colliders of that shape, their lengths around ``scale`` (n,); ``upright`` ones are not turned."""
+    """Colliders of that shape with lengths around ``scale`` (n,); ``upright`` ones are not rotated."""
     count = len(scale)
     own_sample = shape.component.sample.__func__ is not Collider.sample.__func__  # type: ignore[attr-defined]
     sample = shape.component.sample()  # type: ignore[attr-defined]
@@ -102,7 +102,7 @@ def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, 
             arrays[name] = _array_numbers(column, value, common, rng)
         else:
             arrays[name] = _numbers(column, value, common, own_sample, dimensions, rng)
-            if type(column) is not Column:  # it has rules of its own
+            if type(column) is not Column:  # it has its own rules
                 _keep_rules(column, value, arrays[name])
     axes = np.eye(dimensions) * np.ones((count, 1, 1)) if not shape.rotates else _axes(count, dimensions, rng)
     axes[upright] = np.eye(dimensions)
@@ -115,7 +115,7 @@ def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, 
 def _numbers(
     column: Column, value: Any, common: np.ndarray, own_sample: bool, dimensions: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """Values of a field; lengths are what the constructor demands, and vectors."""
+    """Values of a field; those that the constructor requires to be positive are lengths, and so are vectors."""
     count = len(common)
     shape = (count, *column.item_shape(dimensions))
     stored = np.asarray(column.checked(value))
@@ -129,14 +129,14 @@ def _numbers(
         return result
     if column.default is REQUIRED or column.item == "vector":
         factor = common.reshape((count,) + (1,) * (len(shape) - 1))
-        if own_sample:  # its numbers belong together
+        if own_sample:  # its numbers depend on each other
             return result * factor
         signs = -1.0 if column.minimum is None and not column.positive and column.item == "vector" else 0.0
         low = max(column.minimum or 0.0, 0.0)
         result = low + factor * np.abs(result) * 10.0 ** rng.uniform(-0.5, 0.5, shape)
         if signs:
             result *= rng.choice((-1.0, 1.0), shape)
-        if not column.positive:  # a point, a plate
+        if not column.positive:  # zero is allowed: a point, a plate
             result[rng.random(shape) < 0.03] = low
     elif not own_sample and (column.positive or column.minimum is not None):
         other = rng.random(count) < 0.5
@@ -145,7 +145,7 @@ def _numbers(
 
 
 def _keep_rules(column: Column, value: Any, array: np.ndarray) -> None:
-    """Make of every row what the column stores for it; of one that it refuses, the sample's value."""
+    """Store each row as the column would; use the sample's value for rows that it rejects."""
     for row, wanted in enumerate(array.tolist()):
         try:
             array[row] = column.checked(tuple(wanted) if isinstance(wanted, list) else wanted)
@@ -154,7 +154,7 @@ def _keep_rules(column: Column, value: Any, array: np.ndarray) -> None:
 
 
 def _array_numbers(column: ArrayColumn, value: Any, common: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The sample's array, and it stretched along its columns, as far as the field's own check lets it."""
+    """The sample's array and stretched variants of it, as far as the field's own check accepts them."""
     factors = np.exp(np.linspace(np.log(common.min()), np.log(common.max()), VARIANTS))
     known = [column.checked(value)]
     scaled = []
@@ -178,13 +178,13 @@ def _axes(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def directions(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
-    """(count, d) unit vectors, everywhere alike."""
+    """(count, d) uniformly distributed unit vectors."""
     vectors = rng.normal(size=(count, dimensions))
     return vectors / np.sqrt((vectors * vectors).sum(axis=1, keepdims=True))
 
 
 def _apart(a: Rows, b: Rows, kind: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Where b is, seen from a: mostly so near that their boxes touch or nearly do."""
+    """The position of b relative to a: mostly so near that their boxes touch or nearly do."""
     count, dimensions = len(kind), a.half.shape[1]
     sizes = a.size() + b.size()
     reach = sum(np.where(np.isfinite(each.half), each.half, sizes[:, None]) for each in (a, b))
