@@ -1,4 +1,4 @@
-"""Where a benchmark's result goes: the terminal, JSON, Markdown, a page, a chart."""
+"""Output of a benchmark's result: the terminal, JSON, Markdown, a page, a chart."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .text_tables import TextTable, between_marks, replace_between_marks
 
 @dataclass(frozen=True)
 class Output:
-    """``mark`` names the place in the page; ``charts`` is the module that draws, or None."""
+    """``mark`` names the section of the page; ``charts`` is the module that draws, or None."""
 
     mark: str
     as_json: bool
@@ -37,7 +37,7 @@ class Output:
         out: Path | None,
         charts: str = "bench.charts",
     ) -> Output:
-        """Problem for what cannot be: said before the long run, not after it. charts: the lab's module that draws."""
+        """Problem for impossible options, raised before the long run. charts: the lab's module that draws."""
         if as_json and as_markdown:
             raise Problem("--json and --markdown exclude each other")
         if into is not None:
@@ -47,7 +47,7 @@ class Output:
     def show(
         self, result: Any, tables: list[TextTable], remarks: list[str], page: list[TextTable] | None = None
     ) -> None:
-        """Print the result, and put the tables into the page; ``page``: others go there."""
+        """Print the result, and write the tables into the page; ``page``: other tables for the page."""
         markdown = _markdown(tables, remarks)
         if self.as_json:
             click.echo(json.dumps(result.as_dict(), indent=2))
@@ -64,7 +64,7 @@ class Output:
             click.echo(f"tables: {self.into}", err=True)
 
     def draw(self, function: str, result: Any) -> None:
-        """Draw the chart, if one was asked for, and say where it is."""
+        """Draw the chart if requested, and print its path."""
         if self.charts is None:
             return
         picture = getattr(self.charts, function)(result, self.out)

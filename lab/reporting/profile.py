@@ -1,4 +1,4 @@
-"""``carom run --profile``: where the time of a step goes, as plain values and as a table."""
+"""``carom run --profile``: the time of a step by system and kernel, as plain values and as a table."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ UNITS = tuple(SINGULAR.values())  # body, candidate, pair, contact
 
 
 def profile_of(stats: Stats, step_milliseconds: float, compile_seconds: float) -> dict[str, Any]:
-    """By system in their order, and within it by kernel: means per step, and the share of the whole step.
+    """Mean times per step by system, in order, and by kernel within it, with the share of the whole step.
 
-    What its kernels leave over of a system is Python and numpy. The steps that compiled or loaded kernels, which took
-    ``compile_seconds``, are in none of it.
+    The time of a system outside its kernels is Python and numpy. Steps that compiled or loaded kernels, which took
+    ``compile_seconds``, are excluded.
     """
 
     def share(mean: float) -> float:
@@ -89,5 +89,5 @@ def _nanoseconds(value: float) -> str:
 
 
 def milliseconds(value: float) -> str:
-    """A dash for what was not measured: every step compiled or loaded kernels."""
+    """A dash for a value that was not measured, because every step compiled or loaded kernels."""
     return f"{max(value, 0.0):.4f}" if math.isfinite(value) else "-"

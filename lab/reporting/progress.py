@@ -1,4 +1,4 @@
-"""What a command shows while it works: what compiles, how many steps are done, at what rate, and how long is left."""
+"""Progress of a command: what compiles, the number of steps done, their rate, and the time left."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ REFRESH = 0.1  # s between two updates of the numbers
 
 
 class Compiling:
-    """The words for a compilation that begins: the kernel, how many there were, and, once, where they are kept."""
+    """The text shown when a compilation begins: the kernel, the number so far, and once the cache folder."""
 
     def __init__(self) -> None:
         self._before = (len(log.compiled), log.seconds)
         self._told = False
 
     def words(self, kernel: str) -> str:
-        """``kernel`` as the log's listeners get it."""
+        """The text for ``kernel``, named as in the log."""
         count, seconds = len(log.compiled) - self._before[0], log.seconds - self._before[1]
         so_far = f" ({count} so far, {seconds:.1f} s)" if count else ""
         return f"compiling {kernel.rpartition('.')[2]}{so_far} ..."
 
     def tell_where(self, console: Console) -> None:
-        """A line that says where the kernels are kept for next time; at the first call only."""
+        """Print where the kernels are kept; at the first call only."""
         if self._told:
             return
         self._told = True
@@ -43,8 +43,8 @@ class Compiling:
 class StepProgress:
     """A context manager around a run: call :meth:`done` after each step.
 
-    The rate is that of the steps since the last compilation, so that the time left does not jump with the
-    first step.
+    The rate is measured since the last compilation, so that the time left does not jump after the first
+    step.
     """
 
     def __init__(self, console: Console, name: str, steps: int) -> None:
@@ -59,7 +59,7 @@ class StepProgress:
             expand=True,
         )
         self._task = self._bar.add_task(f"{name}: starting", total=steps, rate="")
-        self._since = (time.perf_counter(), 0)  # when the counting began, and with how many steps done
+        self._since = (time.perf_counter(), 0)  # start of the measurement, and the steps done then
         self._shown = 0.0
         self._words = Compiling()
         self._compiling = False
@@ -76,7 +76,7 @@ class StepProgress:
         self._bar.stop()
 
     def done(self, steps: int) -> None:
-        """``steps`` steps have been taken so far."""
+        """Report that ``steps`` steps have been taken so far."""
         now = time.perf_counter()
         if self._compiling:
             self._compiling = False
@@ -101,7 +101,7 @@ class StepProgress:
 
 
 class CompileStatus:
-    """A context manager that says on ``console`` what compiles; for work without a bar of its own."""
+    """A context manager that reports compilations on ``console``; for work without a progress bar."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -121,7 +121,7 @@ class CompileStatus:
         self._status.stop()
 
     def say(self, what: str) -> None:
-        """What is being done now."""
+        """Show the current activity."""
         self._what = what
         self._status.update(what)
 

@@ -1,4 +1,4 @@
-"""The progress bar of all that is measured: drawn when something is done only, with the time left."""
+"""The progress bar of all measurements, redrawn only when work is done, with the time left."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from ...framework.compilation import log
 
 
 class Progress:
-    """Counts, and shows nothing."""
+    """Counts, but shows nothing."""
 
     def __init__(self) -> None:
         self.done = 0.0
 
     def begin(self, total: float, done: float = 0.0) -> None:
-        """How much there is to do, in any unit, and how much of it an earlier process has done."""
+        """Set the total amount of work, in any unit, and the part done by an earlier process."""
         self.done = done
 
     def say(self, what: str) -> None:
-        """What is being done."""
+        """Show the current activity."""
 
     def advance(self, amount: float) -> None:
-        """So much more is done."""
+        """Add to the work done."""
         self.done += amount
 
 
@@ -35,7 +35,7 @@ NO_PROGRESS = Progress()
 class Bar(Progress):
     """A context manager that shows a bar on ``console``, and the names of kernels while they compile.
 
-    It has no thread of its own, which would take time from what is measured.
+    It has no thread, which would take time from the measurement.
     """
 
     def __init__(self, console: Console) -> None:
@@ -66,22 +66,22 @@ class Bar(Progress):
         self._bar.stop()
 
     def begin(self, total: float, done: float = 0.0) -> None:
-        """How much there is to do, in any unit, and how much of it an earlier process has done.
+        """Set the total amount of work, in any unit, and the part done by an earlier process.
 
-        That part fills the bar and does not count for the time left.
+        That part fills the bar and is not used for the time left.
         """
         super().begin(total, done)
         self._bar.update(self._task, total=total, completed=done)
         self._bar.refresh()
 
     def say(self, what: str) -> None:
-        """What is being done."""
+        """Show the current activity."""
         self._what = what
         self._bar.update(self._task, description=what)
         self._bar.refresh()
 
     def advance(self, amount: float) -> None:
-        """So much more is done."""
+        """Add to the work done."""
         super().advance(amount)
         self._bar.update(self._task, completed=self.done, description=self._what)
         self._bar.refresh()

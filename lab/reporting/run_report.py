@@ -1,4 +1,4 @@
-"""What a run showed, as tables for a terminal; the same numbers go out as JSON."""
+"""The results of a run as terminal tables; the JSON output has the same numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FAULTS_SHOWN = 3
 
 
 def print_report(report: RunReport, console: Console) -> None:
-    """The tables: what ran, what it cost by system, and how true it stayed."""
+    """Print the tables: settings, cost by system, and accuracy."""
     console.print()
     console.print(summary(report))
     if report.profile is None:
@@ -112,7 +112,7 @@ def quality(report: RunReport) -> Table:
 
 
 def number(value: float) -> str:
-    """Four digits, and 1/60 where that is what it is."""
+    """Four digits, and 1/60 if the value is exactly that."""
     if (
         0 < value < 1
         and abs(1 / value - round(1 / value)) < 1e-9 * round(1 / value)

@@ -1,4 +1,4 @@
-"""Tables made once as text, and shown in a terminal or written as Markdown."""
+"""Text tables, shown in a terminal or written as Markdown."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..commands.usage_errors import Problem
 
 @dataclass(frozen=True)
 class TextTable:
-    """``rows`` of cells under ``headings``; the first ``words`` columns hold words and are set to the left."""
+    """``rows`` of cells under ``headings``; the first ``words`` columns hold words and are left-aligned."""
 
     title: str
     headings: tuple[str, ...]
@@ -53,7 +53,7 @@ def between_marks(path: Path, name: str) -> tuple[str, str, str]:
 
 
 def replace_between_marks(path: Path, name: str, text: str) -> None:
-    """Put ``text`` between the two comments of a page; Problem where they are missing."""
+    """Replace the text between the two comments of a page; Problem if they are missing."""
     before, _, after = between_marks(path, name)
     try:
         path.write_text(f"{before}\n\n{text}\n\n{after}", encoding="utf-8")
