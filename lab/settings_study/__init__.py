@@ -1,4 +1,4 @@
-"""``carom settings``: what each field of Settings costs and buys, and which settings suit which kind of game.
+"""``carom settings``: cost and benefit of each field of Settings, and the best settings for each kind of game.
 
-Reads small worlds in which a field matters, and the search of tuning. Writes records and tables.
+Reads small worlds in which a field matters, and the search of ``carom tune``. Writes records and tables.
 """

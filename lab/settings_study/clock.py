@@ -1,7 +1,7 @@
-"""What several settings of one world cost, side by side.
+"""The cost of several settings of one world, measured side by side.
 
-All worlds start alike and take turns in short blocks, another one first each time, so that what disturbs the machine
-for a while does not meet one of them alone. What is done in the blocks is counted too: that is the same everywhere.
+All worlds start alike and alternate in short blocks, with another one first each time, so that background load affects
+all of them. The work of the blocks is counted too, which is independent of the machine.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from ...framework import World
 from ..engines.cost import counts_of, work_of
 from ..measure.timing import no_garbage_collection, timed
 
-BLOCKS = 5  # of the timed span: the worlds take turns so often
-ENOUGH = 0.03  # s of processor time for the first world in one repeat: short spans run again until then
+BLOCKS = 5  # of the timed span: the worlds alternate this many times
+ENOUGH = 0.03  # s of processor time for the first world per repeat: shorter spans are repeated until then
 WARM_UP = 2  # steps, not timed
-ATTEMPTS = 5  # at a span without a kernel compiled or loaded in it
+ATTEMPTS = 5  # to time a span in which no kernel is compiled or loaded
 
 Play = Callable[[World, float], float]
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one second: processor time in s, and the weighted sum of the counts, see :mod:`carom.lab.engines.cost`."""
+    """Cost per simulated second: processor time in s, and the weighted counts of :mod:`carom.lab.engines.cost`."""
 
     seconds: float
     work: float
 
 
 def steps(world: World, seconds: float) -> float:
-    """Whole steps, as many as fit best; the seconds simulated."""
+    """Take the number of whole steps closest to ``seconds``; returns the seconds simulated."""
     count = max(1, round(seconds / world.settings.dt))
     for _ in range(count):
         world.step()
@@ -42,9 +42,9 @@ def steps(world: World, seconds: float) -> float:
 def costs(
     makes: Sequence[Callable[[], World]], seconds: float, repeats: int, play: Play = steps
 ) -> Iterator[list[Cost]]:
-    """The cost of each world from its start on, repeat by repeat.
+    """The cost of each world from its start, repeat by repeat.
 
-    play: what passes so many seconds in a world; it returns how many those were.
+    play: advances a world by that many seconds and returns the seconds actually simulated.
     """
     with no_garbage_collection():
         for repeat in range(repeats):
@@ -52,7 +52,7 @@ def costs(
 
 
 def _repeat(makes: Sequence[Callable[[], World]], seconds: float, first: int, play: Play) -> list[Cost]:
-    """Means over as many spans as it takes."""
+    """Means over as many spans as needed for ENOUGH."""
     spans: list[list[Cost]] = []
     while sum(span[0].seconds for span in spans) * seconds < ENOUGH:
         span, undisturbed = _span(makes, seconds, first + len(spans), play)
@@ -69,7 +69,7 @@ def _repeat(makes: Sequence[Callable[[], World]], seconds: float, first: int, pl
 def _span(
     makes: Sequence[Callable[[], World]], seconds: float, first: int, play: Play
 ) -> tuple[list[Cost], bool]:
-    """All worlds once, in turns; False if a kernel was compiled or loaded on the way."""
+    """All worlds once, alternating; False if a kernel was compiled or loaded meanwhile."""
     count = len(makes)
     spent, passed, undisturbed = [0.0] * count, [0.0] * count, True
     with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""A point of the grid as the line of Python to paste into a game."""
+"""A point of the grid as a line of Python for a game's source."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from fractions import Fraction
 from ...framework import Settings
 from ..trading.records import CAROM, Cell
 
-LARGEST_NUMERATOR = 16  # 2/45 is read at a glance, 347/20820 is not
+LARGEST_NUMERATOR = 16  # 2/45 is easy to read, 347/20820 is not
 LARGEST_DENOMINATOR = 1_000_000
 
 
 def settings_line(cell: Cell, base: Settings | None = None) -> str:
-    """The shortest ``Settings(...)`` that is ``cell.settings(base)``; evaluated, it gives the same bits.
+    """The shortest ``Settings(...)`` that is ``cell.settings(base)``, with identical values, bit for bit.
 
     Fields with their default values are left out. ``base``: Settings() if None. ValueError for another engine's cell,
-    and for what Settings refuses.
+    and for values that Settings rejects.
     """
     if cell.engine != CAROM:
         raise ValueError(f"a cell of {cell.engine} has no Settings")
@@ -30,14 +30,14 @@ def settings_line(cell: Cell, base: Settings | None = None) -> str:
 
 
 def python_line(cell: Cell, base: Settings | None = None) -> str:
-    """What sets ``cell`` in the engine it belongs to: :func:`settings_line`, or pymunk's two lines in one."""
+    """The code that sets ``cell`` in its engine: :func:`settings_line`, or pymunk's two statements in one line."""
     if cell.engine == CAROM:
         return settings_line(cell, base)
     return f"space.iterations = {cell.substeps}; space.step({seconds(cell.dt)})"
 
 
 def seconds(dt: float) -> str:
-    """A step as Python: a small fraction that is exactly this number, where that is not longer than the number."""
+    """A step as Python source: an exactly equal small fraction, unless it is longer than the decimal number."""
     dt = float(dt)
     plain = repr(dt)
     fraction = Fraction(dt).limit_denominator(LARGEST_DENOMINATOR)
@@ -48,7 +48,7 @@ def seconds(dt: float) -> str:
 
 
 def quoted(value: object) -> str:
-    """Python's own words, with the quotation marks that the documentation uses."""
+    """The Python repr, with the quotation marks used in the documentation."""
     if isinstance(value, str) and value.isprintable() and '"' not in value and "\\" not in value:
         return f'"{value}"'
     return repr(value)

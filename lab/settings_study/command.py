@@ -1,4 +1,4 @@
-"""``carom settings``: what each field of Settings costs and buys; which settings suit which kind of game."""
+"""``carom settings``: cost and benefit of each field of Settings; the best settings for each kind of game."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def settings_command(
     del traceback  # seen by Commands.main
     if names and into is not None:
         raise Problem("--into fills the page with all of them: it takes no names")
-    (of_names if games else of_fields)(names)  # says what is unknown before anything runs
+    (of_names if games else of_fields)(names)  # raises for unknown names before anything runs
     output = Output.checked(GAMES_MARK if games else FIELDS_MARK, as_json, as_markdown, into, None)
     found: GamesStudy | SettingsStudy
     with Bar(Console(stderr=True)) as bar:

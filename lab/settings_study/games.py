@@ -1,9 +1,10 @@
-"""Which settings for which kind of game: a scene that stands for it, what it needs, and the cheapest that gives it.
+"""The cheapest settings for each kind of game: a representative scene and its required accuracy.
 
-Each scene is tuned by search (:mod:`carom.lab.tuning.search`), and the presets are measured in the same norm. Where the
-error is not a number that falls with the step, but whether anything gets lost, all candidates are tried instead.
+Each scene is tuned by search (:mod:`carom.lab.tuning.search`), and the presets are measured in the same norm. If the
+requirement is only that no body gets lost, which is no error that falls with the step, all candidates are tried
+instead.
 
-A game draws a step or more per frame, so no step is longer than 1/60 s here, though a longer one may do.
+A game takes at least one step per frame, so no step here is longer than 1/60 s, though longer ones may be sufficient.
 """
 
 from __future__ import annotations
@@ -45,15 +46,15 @@ class Game:
     """A kind of game.
 
     scene
-        of the library, with ``options``; ``label`` is what tables call it
+        of the library, with ``options``; ``label`` is its name in tables
     norm, target
-        the error, in ``unit``, and how much of it is allowed; ``absolute``: of a norm with a unit of the scene
+        the error, in ``unit``, and its upper limit; ``absolute``: the norm has a unit of the scene
     per_unit
-        how many units one of the norm is
+        number of units per 1 of the norm
     timed
-        s of the scene under the clock
+        timed duration of the scene, s
     also
-        other errors worth seeing, by norm, with unit and factor
+        other errors to report, by norm, with unit and factor
     """
 
     name: str
@@ -72,7 +73,7 @@ class Game:
     also: Mapping[str, tuple[str, float]] = field(default_factory=dict)
 
     def measure(self, repeats: int, progress: Progress = NO_PROGRESS) -> GameChoices:
-        """Search, and measure the presets beside what it finds."""
+        """Search, and measure the presets for comparison."""
         return _tuned(self, repeats, progress)
 
 
@@ -113,7 +114,7 @@ GAMES: tuple[Game, ...] = (
 def games_study(
     names: Sequence[str] | None = None, repeats: int = REPEATS, progress: Progress = NO_PROGRESS
 ) -> GamesStudy:
-    """Tune each kind of game of ``names`` (None: all); repeats of what is timed. Problem for an unknown name."""
+    """Tune each kind of game of ``names`` (None: all); repeats of timed runs. Problem for an unknown name."""
     return GamesStudy({**machine()}, [game.measure(repeats, progress) for game in of_names(names)])
 
 
@@ -148,7 +149,7 @@ def _tuned(game: Game, repeats: int, progress: Progress) -> GameChoices:
 
 
 def cell_of(settings: Settings) -> Cell:
-    """The dials of ``settings`` that the laboratory varies."""
+    """The fields of ``settings`` that the lab varies, as a cell."""
     dials = [dial.name for dial in dataclasses.fields(Cell) if dial.name != "engine"]
     return Cell(**{name: getattr(settings, name) for name in dials})
 
@@ -175,7 +176,7 @@ def _time(
     repeats: int,
     progress: Progress,
 ) -> None:
-    """Fill in their ``milliseconds``."""
+    """Fill in the ``milliseconds`` of these choices."""
     progress.begin(repeats)
     progress.say("timing")
     taken = []
@@ -186,23 +187,23 @@ def _time(
         choice.milliseconds = Spread.of([1e3 * cost.seconds for cost in of])
 
 
-# -- by trying all ----------------------------------------------------------------------------------------------
+# -- by trying all candidates -----------------------------------------------------------------------------------
 
-BULLETS = 300  # at 1,000 m/s, for half a second, walls a centimetre thick
+BULLETS = 300  # at 1,000 m/s, for half a second, walls 1 cm thick
 FLIGHT = 0.5  # s
 VOLLEY = 0.1  # s, of the eight shots
 
 
 @dataclass(frozen=True)
 class Shooter:
-    """Bullets: nothing may get lost, and what is hit must be hit where it is."""
+    """Bullets: none may get lost, and hits must be at the right place."""
 
     name: str = "shooter with bullets"
     label: str = f"8 shots and {BULLETS} bullets"
     needs: str = "no bullet gets through a wall, no impact is left out, each shot within 1 % of its size of its place"
 
     def measure(self, repeats: int, progress: Progress = NO_PROGRESS) -> GameChoices:
-        """All candidates: the kinds of collision, smaller and smaller steps, and bullets with ``ccd``."""
+        """All candidates: the collision modes, shorter and shorter steps, and bullets with ``ccd``."""
         progress.begin(len(SHOOTERS))
         found: dict[str, Choice] = {}
         for name, (settings, ccd) in SHOOTERS.items():
@@ -210,7 +211,7 @@ class Shooter:
             found[name] = _shot(name, settings, ccd)
             progress.advance(1)
         shown = [*PRESETS, FINEST, CCD]
-        good = [name for name in found if found[name].met and name != CCD]  # which is no setting
+        good = [name for name in found if found[name].met and name != CCD]  # CCD is not a setting
         best = min(good, key=lambda name: found[name].work, default=None)
         chosen = [found[name] for name in shown]
         if best is not None:
@@ -231,7 +232,7 @@ SHOOTERS: Mapping[str, tuple[Settings, bool]] = {
 
 
 def bullets(settings: Settings, ccd: bool) -> World:
-    """The bullets of the library, fewer; ccd: each of them has it."""
+    """The scene bullets of the library with fewer bodies; ccd: set for each bullet."""
     world = settings_scenes.scene_of("bullets", n=BULLETS)(settings)
     world.bodies.dynamic.ccd[:] = ccd
     return world

@@ -1,4 +1,4 @@
-"""What the studies of the settings have found, as plain records that go through JSON and back."""
+"""Results of the settings studies, as plain records that convert to JSON and back."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from ..measure.timing import Spread
 
-INFINITE = "infinite"  # how JSON, which has no word for it, is told
+INFINITE = "infinite"  # represents infinity in JSON
 
 
 @dataclass
@@ -18,9 +18,9 @@ class Sample:
     """One value of a field in one scene.
 
     time
-        processor time per simulated second over that of the default value, within each repeat
+        processor time per simulated second relative to the default value, within each repeat
     work
-        the weighted sum of the counts, see :mod:`carom.lab.engines.cost`, over that of the default value
+        the weighted counts, see :mod:`carom.lab.engines.cost`, relative to the default value
     errors
         by name: see ``Setting.errors``
     """
@@ -32,13 +32,13 @@ class Sample:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "time": Spread.from_dict(plain["time"])})
 
 
 @dataclass
 class Setting:
-    """One field varied in one scene, all others as they are there.
+    """One field varied in one scene; all other fields keep the scene's values.
 
     others
         the fields that are not the default ones in this scene
@@ -47,7 +47,7 @@ class Setting:
     milliseconds
         processor time per simulated second with that value
     errors
-        by name the unit; ``words`` say what they are, and against what
+        units by name; ``words`` say what the errors are, and the reference
     """
 
     field: str
@@ -61,7 +61,7 @@ class Setting:
     samples: list[Sample]
 
     def sample(self, value: Any) -> Sample:
-        """KeyError for a value that was not tried."""
+        """The sample of that value; KeyError if it was not tried."""
         for sample in self.samples:
             if sample.value == value and type(sample.value) is type(value):
                 return sample
@@ -69,7 +69,7 @@ class Setting:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         samples = [Sample.from_dict(sample) for sample in plain["samples"]]
         return cls(**{**plain, "milliseconds": Spread.from_dict(plain["milliseconds"]), "samples": samples})
 
@@ -84,11 +84,11 @@ class SettingsStudy:
 
     @property
     def fields(self) -> list[str]:
-        """Each once."""
+        """The names of the fields, each once."""
         return list(dict.fromkeys(setting.field for setting in self.settings))
 
     def setting(self, field: str, scene: str) -> Setting:
-        """KeyError if there is none."""
+        """The record of that field and scene; KeyError if there is none."""
         for setting in self.settings:
             if (setting.field, setting.scene) == (field, scene):
                 return setting
@@ -100,7 +100,7 @@ class SettingsStudy:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         whole = _with_infinities(plain)
         return cls(**{**whole, "settings": [Setting.from_dict(setting) for setting in whole["settings"]]})
 
@@ -110,17 +110,17 @@ class Choice:
     """Settings tried in a game's scene.
 
     name
-        "tuned", a preset, or what was tried
+        "tuned", a preset, or a description of the candidate
     line
         of Python, to paste
     error
-        the worst of all repeats; inf where one failed, and ``failure`` says how
+        the worst of all repeats; inf if one failed, see ``failure``
     also
         other figures of interest, by name
     work
         per simulated second
     milliseconds
-        processor time per simulated second; None where nothing could be timed
+        processor time per simulated second; None if it was not timed
     """
 
     name: str
@@ -134,7 +134,7 @@ class Choice:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         spread = plain["milliseconds"]
         return cls(**{**plain, "milliseconds": None if spread is None else Spread.from_dict(spread)})
 
@@ -144,13 +144,13 @@ class GameChoices:
     """One kind of game.
 
     scene
-        what stands for it; ``needs`` says in words what the game asks for
+        the representative scene; ``needs`` describes the game's requirement in words
     target, unit
-        the error that is allowed
+        the largest allowed error
     how
-        by what the choice was found: "search", or "all candidates"
+        how the choice was found: "search", or "all candidates"
     tried
-        how many settings that took
+        number of settings tried
     """
 
     game: str
@@ -164,11 +164,11 @@ class GameChoices:
 
     @property
     def tuned(self) -> Choice | None:
-        """The cheapest that meets the target; None if nothing does."""
+        """The cheapest choice that meets the target; None if there is none."""
         return next((choice for choice in self.choices if choice.name == TUNED), None)
 
     def choice(self, name: str) -> Choice:
-        """KeyError if there is none."""
+        """The choice of that name; KeyError if there is none."""
         for choice in self.choices:
             if choice.name == name:
                 return choice
@@ -176,7 +176,7 @@ class GameChoices:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "choices": [Choice.from_dict(choice) for choice in plain["choices"]]})
 
 
@@ -200,7 +200,7 @@ class GamesStudy:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         whole = _with_infinities(plain)
         return cls(**{**whole, "games": [GameChoices.from_dict(game) for game in whole["games"]]})
 

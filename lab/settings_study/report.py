@@ -1,4 +1,4 @@
-"""The tables of ``carom settings``: what each value of each field costs and gets wrong; settings for games."""
+"""The tables of ``carom settings``: cost and error of each value of each field; settings for games."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from ..reporting.text_tables import TextTable
 from . import code_line as settings_line
 from .records import Choice, GameChoices, GamesStudy, SettingsStudy
 
-ROUNDING = 1e-6  # no more is said of what is smaller
-LARGE = 1000.0  # a margin beyond it says that the target is no matter
+ROUNDING = 1e-6  # smaller errors are shown as this limit
+LARGE = 1000.0  # beyond this margin the target is irrelevant
 
 
 def tables(study: SettingsStudy) -> list[TextTable]:
-    """What each value costs and gets wrong, and what that is."""
+    """Tables of cost and errors, and of what the errors mean."""
     return [values(study), meanings(study)]
 
 
 def values(study: SettingsStudy) -> TextTable:
-    """One row for each value."""
+    """One row per value."""
     rows = []
     for setting in study.settings:
         for place, sample in enumerate(setting.samples):
@@ -39,7 +39,7 @@ def values(study: SettingsStudy) -> TextTable:
 
 
 def meanings(study: SettingsStudy) -> TextTable:
-    """What the errors are, each said once."""
+    """The meaning of the errors, each once."""
     rows, said = [], {}
     for setting in study.settings:
         rows.append((
@@ -55,7 +55,7 @@ def meanings(study: SettingsStudy) -> TextTable:
 
 
 def remarks(study: SettingsStudy) -> list[str]:
-    """How it was timed, and where."""
+    """How and where it was timed."""
     spread = max(
         (sample.time.high - sample.time.low) / sample.time.median for of in study.settings for sample in of.samples
     )
@@ -69,12 +69,12 @@ def remarks(study: SettingsStudy) -> list[str]:
 
 
 def game_tables(study: GamesStudy) -> list[TextTable]:
-    """The settings for each game, and what it was asked for."""
+    """The settings for each game, and its requirement."""
     return [choices(study), needs(study)]
 
 
 def choices(study: GamesStudy) -> TextTable:
-    """Tuned first, the presets beside it."""
+    """The tuned settings first, then the presets."""
     rows = []
     for game in study.games:
         for place, choice in enumerate(game.choices):
@@ -91,7 +91,7 @@ def choices(study: GamesStudy) -> TextTable:
 
 
 def needs(study: GamesStudy) -> TextTable:
-    """What each scene was asked for."""
+    """The requirement of each scene."""
     rows = [
         (game.game, game.scene, game.needs, _amount(game.target, game.unit), f"{game.how}, {game.tried} tried")
         for game in study.games
@@ -100,7 +100,7 @@ def needs(study: GamesStudy) -> TextTable:
 
 
 def game_remarks(study: GamesStudy) -> list[str]:
-    """Where nothing met its target, and where it ran."""
+    """Scenes without a choice that meets the target, and the machine."""
     missing = [f"{game.game} ({game.scene})" for game in study.games if game.tuned is None]
     lines = [f"nothing that was tried meets the target of {', '.join(missing)}"] if missing else []
     return [
@@ -113,14 +113,14 @@ def game_remarks(study: GamesStudy) -> list[str]:
 
 
 def error(game: GameChoices, choice: Choice) -> str:
-    """With its unit, or how it failed."""
+    """The error with its unit, or the failure."""
     if not math.isfinite(choice.error):
         return choice.failure
     return ", ".join([_amount(choice.error, game.unit), *(_amount(more, unit) for unit, more in choice.also.items())])
 
 
 def margin(game: GameChoices, choice: Choice) -> str:
-    """How many times smaller than the target the error is."""
+    """Target over error."""
     if not choice.met:
         return "misses"
     if not choice.error or game.target / choice.error > LARGE:
@@ -129,12 +129,12 @@ def margin(game: GameChoices, choice: Choice) -> str:
 
 
 def ratio(of: float) -> str:
-    """Two digits behind the point, for they are compared with 1."""
+    """Two decimals, because ratios are compared with 1."""
     return f"{of:.2f}" if of < 10 else digits(of)
 
 
 def value(field: str, of: Any) -> str:
-    """As it is written in Python; a step as a fraction."""
+    """The value as Python source; a step as a fraction."""
     return settings_line.seconds(of) if field == "dt" else settings_line.quoted(of)
 
 

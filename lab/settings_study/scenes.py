@@ -1,6 +1,6 @@
-"""Where each field of Settings matters: small worlds, and what is wrong in them, told from outside.
+"""Small worlds in which a field of Settings matters, and measures of their errors.
 
-A measure takes a function that makes the world anew and returns its errors by name; what they are is said beside it in
+A measure takes a function that builds the world and returns its errors by name; their meaning is described in
 :mod:`carom.lab.settings_study.study`.
 """
 
@@ -30,8 +30,8 @@ Build = Callable[[Settings], World]
 Make = Callable[[], World]
 Errors = dict[str, float]
 
-PHASES = 4  # of the first step, where it matters when within a step something happens
-GRAVITY = 10.0  # m/s2, of what slides
+PHASES = 4  # start phases, if the time of an event within a step matters
+GRAVITY = 10.0  # m/s2, of sliding bodies
 
 
 def scene_of(name: str, **options: Any) -> Build:
@@ -41,7 +41,7 @@ def scene_of(name: str, **options: Any) -> Build:
 
 
 def seen(make: Make, seconds: float, phase: float = 1.0) -> Seen:
-    """What a run shows."""
+    """The observation of a run."""
     with make() as world:
         return observe(CaromEngine(world), seconds, world.settings.dt, phase)
 
@@ -55,7 +55,7 @@ def _run(world: World, seconds: float) -> None:
 
 
 def apex(make: Make, seconds: float) -> Errors:
-    """Of the jump, in pixels: the worst of PHASES."""
+    """Apex of the jump, in pixels: the worst of PHASES."""
     true = _closed_form("jump", make, seconds)
     runs = [seen(make, seconds, 1 - k / PHASES) for k in range(PHASES)]
     return {"apex": max(NORMS["apex"].measure(run, true) * true.apex for run in runs)}
@@ -65,7 +65,7 @@ TEN_TURNS = 10 * orbit_scene.PERIOD
 
 
 def orbit(make: Make, seconds: float) -> Errors:
-    """% of the energy at the start: the largest departure, and what is left of it in the end."""
+    """Energy in % of that at the start: the largest departure, and the departure at the end."""
     true, run = _closed_form("orbit", make, seconds), seen(make, seconds)
     grown = run.energy - run.energy_start
     return {
@@ -80,26 +80,26 @@ def _closed_form(name: str, make: Make, seconds: float) -> Seen:
 
 
 def rest(make: Make, seconds: float) -> Errors:
-    """Deepest overlap in % of a body, and the speed that is left, in thousandths of a body per second."""
+    """Deepest overlap in % of a body, and the residual speed, in thousandths of a body per second."""
     run = seen(make, seconds)
     return {"overlap": 100 * run.overlap, "speed": 1000 * run.speed}
 
 
 def restless(make: Make, seconds: float) -> Errors:
-    """mm/s of the fastest body in the end."""
+    """mm/s of the fastest body at the end."""
     with make() as world:
         _run(world, seconds)
         return {"speed": 1000 * float(np.sqrt((world.bodies.dynamic.linear_velocity**2).sum(axis=1)).max())}
 
 
 def last_bounce(make: Make, seconds: float) -> Errors:
-    """mm that the first bounce that is not made would have reached: after n impacts the ball comes up to h e^(2n)."""
+    """mm, height of the first bounce that is suppressed: after n impacts the ball would rise to h e^(2n)."""
     impacts = seen(make, seconds).impacts
     return {"lost": 1000 * drops.HEIGHT * drops.RESTITUTION ** (2 * (impacts + 1))}
 
 
 STEPS_UP = (0.001, 0.003, 0.01, 0.03, 0.06, 0.12)  # m
-LENGTH, GOES, TILES = 2.0, 6.0, 20  # of a tile, m; of the box, m/s; so many
+LENGTH, GOES, TILES = 2.0, 6.0, 20  # tile length, m; speed of the box, m/s; number of tiles
 
 
 def tiles(settings: Settings, *, step: float = 0.0) -> World:
@@ -112,7 +112,7 @@ def tiles(settings: Settings, *, step: float = 0.0) -> World:
 
 
 def seams(make: Make, seconds: float) -> Errors:
-    """% of its speed that the box loses on an even floor, and mm of the highest step that it does not notice."""
+    """% of its speed that the box loses on an even floor, and the highest step, in mm, that does not slow it down."""
     with make() as world:
         settings = world.settings
         _run(world, seconds)
@@ -133,7 +133,7 @@ def seams(make: Make, seconds: float) -> Errors:
 def lost(make: Make, seconds: float) -> Errors:
     """% of the bodies that end outside the walls, and % of the impacts that are missing.
 
-    Those with all impacts at their true times are right.
+    The reference is a run with all impacts at their true times.
     """
     with make() as world:
         enclosure, counter = Enclosure.around(world), galperin.ImpactCounter()
@@ -157,12 +157,12 @@ def _true_impacts(make: Make, seconds: float) -> int:
 
 
 def wrong_balls(make: Make, seconds: float) -> Errors:
-    """Of the eight shots, those more than 1 % of their size from where they must be."""
+    """Of the eight shots, those more than 1 % of their size from the right position."""
     return {"wrong": float((misses(make, seconds) > 0.01).sum())}
 
 
 def misses(make: Make, seconds: float) -> Floats:
-    """How far each body is from where it must be, in sizes of the body, (n,)."""
+    """(n,) distance of each body from its right position, in sizes of the body."""
     with make() as world:
         ids = np.sort(world.bodies.dynamic.entity)
         engine = CaromEngine(world)
@@ -178,7 +178,7 @@ def misses(make: Make, seconds: float) -> Floats:
 
 
 def counted_pi(make: Make, seconds: float) -> Errors:
-    """Galperin's blocks: % of the 314 impacts that are missing, and % of the energy that is."""
+    """Galperin's blocks: % of the 314 impacts that are missing, and % of the energy that is lost."""
     with make() as world:
         before = world.kinetic_energy()
         _run(world, seconds)
@@ -191,7 +191,7 @@ def counted_pi(make: Make, seconds: float) -> Errors:
 
 
 def boxes_in_spheres(settings: Settings, *, dimensions: int, n: int = 2000) -> World:
-    """Sensors all over the place: boxes of side 1, each in the smallest sphere that holds it."""
+    """Sensors at random places: boxes of side 1, each in its smallest enclosing sphere."""
     world = World(Physics(dimensions=dimensions), settings=settings)
     side = (4 * n) ** (1 / dimensions)
     places = side * random_numbers.uniform(n * dimensions, 0).reshape(n, dimensions)
@@ -204,7 +204,7 @@ def boxes_in_spheres(settings: Settings, *, dimensions: int, n: int = 2000) -> W
 
 
 def false_contacts(make: Make, seconds: float) -> Errors:
-    """% of the contacts that are none."""
+    """% of the contacts that are false positives."""
     del seconds
     counts = []
     for geometry in (None, "precise"):
@@ -237,17 +237,17 @@ def head_on(settings: Settings) -> World:
 
 
 def bounced(make: Make, seconds: float) -> Errors:
-    """The restitution that shows, and its distance from the rule's own formula."""
+    """The observed restitution, and its difference from the rule's formula."""
     with make() as world:
         rule = RULES[world.settings.restitution_mixing]
         _run(world, seconds)
         engine = CaromEngine(world)
-        parting = float(np.diff(engine.velocity[:, 0])[0])  # m/s, at which they came together with 1
+        parting = float(np.diff(engine.velocity[:, 0])[0])  # m/s; they approached at 1 m/s
     return {"shown": parting, "off": abs(parting - rule(FIRST, SECOND))}
 
 
 def sliding(settings: Settings) -> World:
-    """A box that slides at 5 m/s, of friction FIRST, on a floor of SECOND."""
+    """A box with friction FIRST that slides at 5 m/s on a floor with friction SECOND."""
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     world.create_entity(Transform((0.0, -0.5)), AABBCollider((50.0, 0.5), friction=SECOND))
     body = RigidBody(linear_velocity=(5.0, 0.0))
@@ -256,7 +256,7 @@ def sliding(settings: Settings) -> World:
 
 
 def slowed(make: Make, seconds: float) -> Errors:
-    """The coefficient of friction that shows, (v0 - v) / g t, and its distance from the rule's own formula."""
+    """The observed coefficient of friction, (v0 - v) / g t, and its difference from the rule's formula."""
     with make() as world:
         rule = RULES[world.settings.friction_mixing]
         before = world.bodies.dynamic.linear_velocity[0, 0]
@@ -265,7 +265,7 @@ def slowed(make: Make, seconds: float) -> Errors:
     return {"shown": shown, "off": abs(shown - rule(FIRST, SECOND))}
 
 
-# -- what must change nothing -----------------------------------------------------------------------------------
+# -- settings that must change nothing ---------------------------------------------------------------------------
 
 EVERY_PAIR = "every pair"
 every_pair = Plugin("every pair of boxes")
@@ -273,7 +273,7 @@ every_pair = Plugin("every pair of boxes")
 
 @every_pair.broad_phase(EVERY_PAIR)
 class EveryPair:
-    """Compares all boxes with all: what there is without dividing space."""
+    """Compares all boxes with all others, without a spatial index."""
 
     def pairs(self, lower: Floats, upper: Floats, moving: int) -> tuple[Any, Any]:
         """Rows of overlapping boxes."""
@@ -286,7 +286,7 @@ class EveryPair:
 
 
 def with_every_pair(settings: Settings, *, n: int) -> World:
-    """The gas, with a broad phase more to choose from."""
+    """The gas, with this additional broad phase available."""
     world = scene_of("gas2d", n=n)(settings.replace(broad_phase="automatic"))
     world.add_plugin(every_pair)
     world.settings = settings
@@ -294,7 +294,7 @@ def with_every_pair(settings: Settings, *, n: int) -> World:
 
 
 def same_as(**default: Any) -> Callable[[Make, float], Errors]:
-    """Bodies that do not end in the same place, to the last bit, as with ``default``."""
+    """The number of bodies whose final position differs in any bit from that with ``default``."""
     return partial(_elsewhere, default)
 
 
@@ -310,7 +310,7 @@ def _elsewhere(default: dict[str, Any], make: Make, seconds: float) -> Errors:
 
 
 class Spoiler(System):
-    """A mistake of a game's own: in the third step a body's velocity is no number."""
+    """A user error: in the third step a body's velocity becomes NaN."""
 
     phase = Phase.FORCES
 
@@ -321,7 +321,7 @@ class Spoiler(System):
 
 
 def culprit(make: Make, seconds: float) -> Errors:
-    """Bodies elsewhere than without debug, and whether the first fault fails to name the system that made it."""
+    """Bodies that differ from a run without debug, and whether the first fault fails to name the culprit system."""
     errors = _elsewhere({"debug": False}, make, seconds)
     with make() as world:
         world.add_system(Spoiler())
@@ -332,12 +332,12 @@ def culprit(make: Make, seconds: float) -> Errors:
 
 # -- frames -----------------------------------------------------------------------------------------------------
 
-FRAME, SLOW_FRAME, EVERY = 1 / 60, 1 / 4, 30  # s, s, frames: a hiccup about every half second
+FRAME, SLOW_FRAME, EVERY = 1 / 60, 1 / 4, 30  # s, s, frames: one slow frame about every half second
 CYCLE = (EVERY - 1) * FRAME + SLOW_FRAME  # s
 
 
 def frames(world: World, seconds: float) -> float:
-    """Play whole cycles of frames, each EVERY-th of which is a slow one; the seconds played."""
+    """Play whole cycles of frames in which every EVERY-th frame is slow; returns the seconds played."""
     cycles = round(seconds / CYCLE)
     for _ in range(cycles):
         _cycle(world)
@@ -350,7 +350,7 @@ def _cycle(world: World) -> list[int]:
 
 
 def dropped(make: Make, seconds: float) -> Errors:
-    """% of the time played that was not simulated, and the steps of the longest frame."""
+    """% of the time played that was not simulated, and the number of steps in the longest frame."""
     with make() as world:
         taken = [count for _ in range(round(seconds / CYCLE)) for count in _cycle(world)]
         gone = world.stats().counters.get("dropped_steps", 0)

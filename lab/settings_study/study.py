@@ -1,7 +1,7 @@
-"""Each field of Settings, varied alone in a scene where it matters: what its values cost, and what they get wrong.
+"""Each field of Settings, varied alone in a scene where it matters: cost and error of its values.
 
 Costs are ratios to the default value, within each repeat: see :mod:`carom.lab.settings_study.clock`. Errors are
-measured apart, in whole runs.
+measured separately, in whole runs.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ class Varied:
     """One field and one scene.
 
     others
-        the fields that are not the default ones here, beside the varied one
+        the fields other than the varied one that differ from the default
     values
-        that are tried; the ratios are relative to ``others``' or Settings' own
+        the values tried; the ratios are relative to the value in ``others`` or in Settings
     errors
-        by name the unit; ``measure`` returns them, ``words`` say what they are
+        units by name; ``measure`` returns the errors, ``words`` describe them
     seconds
-        of the runs whose errors are measured; ``timed`` of those under the clock
+        duration of the runs whose errors are measured; ``timed``: of the timed runs
     play
-        what passes that many seconds in the blocks
+        advances a world by that many seconds in the timed blocks
     """
 
     field: str
@@ -54,7 +54,7 @@ class Varied:
 
     @property
     def base(self) -> Settings:
-        """With the default value."""
+        """The settings with the default value."""
         return Settings().replace(**self.others)
 
     @property
@@ -202,14 +202,14 @@ VARIED: tuple[Varied, ...] = (
 def settings_study(
     fields: Sequence[str] | None = None, repeats: int = REPEATS, progress: Progress = NO_PROGRESS
 ) -> SettingsStudy:
-    """Measure each of ``fields`` (None: all of them); repeats of what is timed. Problem for an unknown field."""
+    """Measure each of ``fields`` (None: all of them); repeats of timed runs. Problem for an unknown field."""
     chosen = of_fields(fields)
     progress.begin(sum(len(varied.values) for varied in chosen) * (repeats + 1))
     return SettingsStudy({**machine()}, repeats, [measured(varied, repeats, progress) for varied in chosen])
 
 
 def of_fields(fields: Sequence[str] | None) -> list[Varied]:
-    """All that is varied of these; Problem for an unknown field."""
+    """All studies of these fields; Problem for an unknown field."""
     known = [entry.name for entry in dataclasses.fields(Settings)]
     for name in fields or ():
         if name not in known:
@@ -218,14 +218,14 @@ def of_fields(fields: Sequence[str] | None) -> list[Varied]:
 
 
 def measured(varied: Varied, repeats: int = REPEATS, progress: Progress = NO_PROGRESS) -> Setting:
-    """One of them."""
+    """Measure one field in one scene."""
     errors = []
     for value in varied.values:
         progress.say(f"{varied.field} {value}: {varied.scene}")
         errors.append(varied.measure(partial(varied.world, value), varied.seconds))
         progress.advance(1)
     progress.say(f"{varied.field}: {varied.scene}, timing")
-    order = sorted(varied.values, key=lambda value: value != varied.default)  # the clock looks at the first
+    order = sorted(varied.values, key=lambda value: value != varied.default)  # the default first
     taken: list[dict[Any, Cost]] = []
     for repeat in costs([partial(varied.world, value) for value in order], varied.timed, repeats, varied.play):
         taken.append(dict(zip(order, repeat, strict=True)))
