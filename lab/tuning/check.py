@@ -1,4 +1,4 @@
-"""Whether a promise holds elsewhere: the settings that a search found, run on scenes that it has not seen."""
+"""Check of tuned settings on scenes that were not used in the search."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from ..reporting.progress_bar import NO_PROGRESS, Progress
 from ..trading.records import CAROM, Cell, Outcome, Point, Reference
 from .search import Tuning, enough_repeats, exact_enough
 
-TOLERATED = 2.0  # times the promise: beyond it, it is said clearly
+TOLERATED = 2.0  # times the promised error: beyond it a warning is shown
 
 
 @dataclass
 class Check:
-    """What the settings of a search do on another scene.
+    """The result of tuned settings on another scene.
 
     promise
-        the error that was promised, and ``scale`` what it is part of, in the scene's units; refused: why nothing was
-        measured, else ""
+        the promised error; ``scale``: what it is relative to, in the scene's units; refused: why nothing was measured,
+        else ""
     """
 
     scene: str
@@ -41,19 +41,19 @@ class Check:
 
     @property
     def error(self) -> float:
-        """The worst of all repeats, parts of the scale; inf where one failed or nothing was measured."""
+        """The worst of all repeats, relative to the scale; inf if one failed or nothing was measured."""
         if self.point is None or self.point.failed:
             return math.inf
         return self.point.errors[self.norm].high
 
     @property
     def times(self) -> float:
-        """How many times the promise that is."""
+        """The error over the promise."""
         return self.error / self.promise
 
     @property
     def tolerated(self) -> bool:
-        """Whether it is at most twice the promise."""
+        """True if the error is at most twice the promise."""
         return self.times <= TOLERATED
 
 
@@ -70,12 +70,12 @@ def check(
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> Check:
-    """The error of the settings that ``tuning`` chose on a scene that they were not tuned on, by the same norm.
+    """Measure the settings that ``tuning`` chose on a scene that they were not tuned on, by the same norm.
 
     target, options, seed, workers, store: as of :func:`carom.lab.trade`. seconds, repeats: as of the search if None.
-    absolute: the promise is meant in the scene's units, else in parts of the new scene's scale. All of the settings
-    count, whatever the scene recommends. NothingMeetsError if the search found none; Problem for a scene that cannot be
-    measured so.
+    absolute: the promise is in the scene's units, else relative to the new scene's scale. All fields of the chosen
+    settings are used, whatever the scene recommends. NothingMeetsError if the search found none; Problem for a scene
+    that cannot be measured in this way.
     """
     settings = tuning.settings
     runs = Runs(workers, store, progress)
@@ -98,14 +98,14 @@ def check(
 
 
 def measured_with(case: Case, settings: Settings, runs: Runs) -> Point:
-    """The point of these settings over all repeats of a case; dials that no cell has stay the scene's."""
+    """The point of these settings over all repeats of a case; fields that no cell has keep the scene's values."""
     cell = cell_of(settings)
     records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats_told}")
     return point_of([Outcome.from_dict(record) for record in records])
 
 
 def cell_of(settings: Settings) -> Cell:
-    """The point of the grid that these settings are."""
+    """The point of the grid with these settings."""
     return Cell(
         settings.dt, settings.integrator, settings.collision, settings.substeps, settings.geometry, CAROM
     )

@@ -1,4 +1,4 @@
-"""``carom tune``: the cheapest settings that keep an error, and the line of code that sets them."""
+"""``carom tune``: the cheapest settings that keep an error limit, and the line of code that sets them."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _store(out: Path | None, resume: bool) -> contextlib.AbstractContextManager[
 
 
 def _checked(tuning: Tuning, target: str, **options: Any) -> Check:
-    """A scene that cannot be measured so takes nothing from what was found before."""
+    """Check on another scene; if it cannot be measured, the result of the search is still reported."""
     try:
         return check(tuning, target, **options)
     except Problem as problem:
@@ -142,7 +142,7 @@ def _checked(tuning: Tuning, target: str, **options: Any) -> Check:
 
 
 def _show(result: TuneResult, output: Output) -> None:
-    """Tables and sentences; last, where the eye is, the line to paste."""
+    """Print tables and sentences; the line to paste comes last."""
     words, tuning = sentences(result), result.tuning
     pasted = [] if tuning.choice is None else [f"`{tuning.line}`"]
     plain = not output.as_json and not output.as_markdown

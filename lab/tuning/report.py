@@ -1,4 +1,4 @@
-"""What a search for settings found, as tables and sentences: the choice, why, what else was tried, what it is not."""
+"""The result of a search for settings, as tables and sentences: the choice, the reasons, the trials, the limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .search import FAR_DEARER, Trial, Tuning
 
 @dataclass
 class TuneResult:
-    """All that one command has to say.
+    """Everything that the command reports.
 
     balanced
         ``Settings.balanced()`` on the same scene, for comparison
@@ -30,7 +30,7 @@ class TuneResult:
     checks: list[Check]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, which has no word for infinity: the error of a run that failed is null."""
+        """For JSON, which cannot represent infinity: the error of a failed run is null."""
         tuning = self.tuning
         return {
             "command": self.command,
@@ -77,13 +77,13 @@ def _plain(point: Point | None) -> dict[str, Any] | None:
 
 
 def tables(result: TuneResult) -> list[TextTable]:
-    """What was tried, what the choice compares with, and what it does elsewhere."""
+    """The trials, the comparison, and the checks on other scenes."""
     made = [tried_table(result.tuning), compared_table(result)]
     return [*made, checks_table(result)] if result.checks else made
 
 
 def tried_table(tuning: Tuning) -> TextTable:
-    """Each trial, in the order of the search."""
+    """All trials in the order of the search."""
     cells = {trial.cell.method for trial in tuning.trials}
     rows = [
         (
@@ -131,7 +131,7 @@ def worst_heading(tuning: Tuning) -> str:
 
 
 def is_statistic(tuning: Tuning) -> bool:
-    """Whether single repeats are noise, so that what counts is two standard errors beyond the mean."""
+    """True if single repeats are noise, so that the limit applies to the mean plus two standard errors."""
     return tuning.norm in tuning.reference.spread
 
 
@@ -178,7 +178,7 @@ def _error(error: float) -> str:
 
 
 def sentences(result: TuneResult) -> list[str]:
-    """What was chosen and why; or that nothing was."""
+    """The choice and the reasons for it; or that there is none."""
     tuning = result.tuning
     lines = [result.command, *_about(tuning)]
     if tuning.choice is None:
@@ -239,7 +239,7 @@ def _against_balanced(result: TuneResult, choice: Point) -> str:
 
 
 def check_line(check: Check) -> str:
-    """What has to be said clearly of a scene that was not tuned on; empty if the promise was kept well enough."""
+    """A warning for a scene that was not tuned on; empty if the promise was kept."""
     if check.refused:
         return f"{check.scene}: not measured: {check.refused}"
     if check.tolerated:

@@ -1,10 +1,10 @@
-"""``tune()``: the cheapest settings that keep an error, found by search instead of by the whole grid.
+"""``tune()``: the cheapest settings that keep an error limit, found by search instead of by the whole grid.
 
-All methods wait in one queue, each with the step it would try next and the work that step is expected to need. The
-cheapest is tried with a single run; what misses the target goes back into the queue with a smaller step, as many
-halvings away as the order of its errors promises; what meets it has to do so in all repeats. So the first that holds is
-the cheapest of the grid, and nothing dearer was run. Between its step and the next larger one, which failed, the search
-then goes on in finer strides.
+All methods are in one queue, each with its next step and the work expected for it. The cheapest one is tried with a
+single run. If it misses the target it returns to the queue with a smaller step; the number of halvings follows from the
+order of its errors. If it meets the target it must do so in all repeats. So the first method that holds is the cheapest
+of the grid, and no more expensive one was run. Between its step and the next larger one, which failed, the search then
+continues in finer steps.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from ..settings_study.code_line import settings_line
 from ..trading.records import TRUSTED, Cell, Outcome, Point, Reference
 from ..trading.trade import Only
 
-BELOW = 16  # times the smallest step of the case: no method is driven further
+BELOW = 16  # a method's step is at least the smallest step of the case over this
 MOST_REPEATS = 400  # of a noisy statistic
-NOISE = 4.0  # times smaller than the target must the standard error of a statistic be
+NOISE = 4.0  # the standard error of a statistic must be smaller than the target by this factor
 LONGEST_JUMP = 4  # halvings at once
-FINE = (1.5, 1.25, 1.75)  # times the step that holds: tried in this order, the last two as the first turns out
+FINE = (1.5, 1.25, 1.75)  # factors of the step that holds: the first, then the second or third by its result
 ROUNDING = 1e-9  # of a step
-SMALLEST = 1e-13  # of the scale: what own runs can tell at best, ten times the rounding of some hundred steps
-FAR_DEARER = 4.0  # times the choice's work: no runner-up is looked for beyond it
-STUCK = 3  # smaller steps in a row that bring nothing: an error that steps do not cure
+SMALLEST = 1e-13  # of the scale: accuracy limit of own runs, ten times the rounding of some hundred steps
+FAR_DEARER = 4.0  # times the choice's work: limit of the search for a runner-up
+STUCK = 3  # smaller steps in a row without improvement: the error does not depend on the step
 
 
 class NothingMeetsError(CaromError, ValueError):
-    """No settings keep the error; the message names the best that was found."""
+    """No settings keep the error limit; the message names the best settings found."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One cell as it was tried: ``error`` inf where it failed; ``repeats``: 1 for a first look."""
+    """One cell as tried: ``error`` is inf if it failed; ``repeats``: 1 for a first look."""
 
     cell: Cell
     error: float
@@ -59,16 +59,16 @@ class Trial:
 
 @dataclass
 class Tuning:
-    """What the search found.
+    """The result of the search.
 
     target
-        parts of the norm's scale, which is ``scale`` in the scene's units
+        relative to the norm's scale, which is ``scale`` in the scene's units
     choice, runner_up
         the cheapest point that holds, and the cheapest of another method; None if there is none
     base
-        the scene's own settings, whose other dials stay
+        the scene's own settings, whose other fields are kept
     case
-        as it was searched: with its reference and repeats
+        as searched: with its reference and repeats
     """
 
     scene: str
@@ -89,33 +89,33 @@ class Tuning:
 
     @property
     def settings(self) -> Settings:
-        """Those to take; NothingMeetsError if there are none."""
+        """The chosen settings; NothingMeetsError if there are none."""
         if self.choice is None:
             raise NothingMeetsError(self.why_not)
         return self.choice.cell.settings(self.base)
 
     @property
     def line(self) -> str:
-        """The Python to paste."""
+        """The line of Python to paste."""
         if self.choice is None:
             raise NothingMeetsError(self.why_not)
         return settings_line(self.choice.cell, self.base)
 
     @property
     def error(self) -> float:
-        """Of the choice, the worst of all repeats and the reference's own; inf without a choice."""
+        """Error of the choice: the worst of all repeats plus the reference's own; inf without a choice."""
         if self.choice is None:
             return math.inf
         return self.choice.errors[self.norm].high + self.reference.agreement.get(self.norm, 0.0)
 
     @property
     def margin(self) -> float:
-        """How many times smaller than the target that is."""
+        """The target over the error."""
         return self.target / self.error if self.error > 0 else math.inf
 
     @property
     def why_not(self) -> str:
-        """A sentence for the case that nothing meets the target."""
+        """A sentence for a search in which nothing meets the target."""
         best = min(self.trials, key=lambda trial: trial.error, default=None)
         text = f"{self.scene}: no settings keep the {self.norm} error below {self.target:.3g}"
         if best is None or not math.isfinite(best.error):
@@ -128,7 +128,7 @@ def tune(build: Any, max_error: float = 1e-3, norm: str | None = None, **options
     """The cheapest Settings that keep the error of a scene below ``max_error`` in all repeats.
 
     build: a function build(settings, seed=0) -> World, a scene's name or a file; norm: see docs/trade.md, None for the
-    one that suits the scene; options: as of :func:`search`. NothingMeetsError if there are none.
+    default of the scene; options: as of :func:`search`. NothingMeetsError if there are none.
     """
     return search(build, max_error, norm, **options).settings
 
@@ -149,11 +149,11 @@ def search(
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> Tuning:
-    """What :func:`tune` finds, with all that was tried on the way.
+    """The result of :func:`tune` with all its trials.
 
-    max_error: parts of the norm's scale, or with ``absolute`` in the scene's units. The rest as in
-    :func:`carom.lab.trade`. ValueError for a target that is no positive number; Problem for a scene that cannot be
-    measured, or not so exactly.
+    max_error: relative to the norm's scale, or with ``absolute`` in the scene's units. The rest as in
+    :func:`carom.lab.trade`. ValueError for a target that is not a positive number; Problem for a scene that cannot be
+    measured, or not with that accuracy.
     """
     number = isinstance(max_error, (int, float)) and not isinstance(max_error, bool)
     if not (number and math.isfinite(max_error) and max_error > 0):
@@ -206,7 +206,7 @@ class _Search:
             if held and expected > FAR_DEARER * held[0].work:
                 break
             error, work = self._look(cell)
-            if queue and work > expected and work > queue[0][0]:  # dearer than it promised: others come first
+            if queue and work > expected and work > queue[0][0]:  # more expensive than expected: others come first
                 heapq.heappush(queue, (work, number, cell))
                 continue
             if error <= self.target + 3 * self.noise:
@@ -221,7 +221,7 @@ class _Search:
         return held
 
     def _walked_back(self, point: Point) -> Point:
-        """The largest step of the grid down from which all hold: a jump may have gone too far."""
+        """The largest step of the grid from which on all smaller ones hold: a jump may have been too long."""
         while True:
             larger = dataclasses.replace(point.cell, dt=2 * point.cell.dt)
             if larger in self.looks or larger.dt > self.case.steps[0] * (1 + ROUNDING):
@@ -244,13 +244,13 @@ class _Search:
         return self.looks[cell]
 
     def _hold(self, cell: Cell) -> Point | None:
-        """The point over all repeats if it meets the target, the reference's own error included."""
+        """The point over all repeats if it meets the target, including the reference's own error."""
         records = self.runs.all(run_tasks(self.case, [cell]), f"{_words(self.case, cell)}, all repeats")
         point = point_of([Outcome.from_dict(record) for record in records])
         self.whole[cell] = point
         error = self._worst(cell)
         met = error <= self.target
-        if self.case.repeats > 1 or cell not in self.looks:  # else the look has said it all
+        if self.case.repeats > 1 or cell not in self.looks:  # otherwise the single run is already recorded
             self.trials.append(Trial(cell, error, point.work, point.repeats, met, ", ".join(point.failures)))
         return point if met else None
 
@@ -259,7 +259,7 @@ class _Search:
         return math.inf if point.failed else point.errors[self.norm.name].high + self.own
 
     def _next(self, cell: Cell, error: float) -> Cell | None:
-        """The same method with the step at which its order promises the target; None to give it up."""
+        """The same method with the step expected to meet the target by its order; None to give up the method."""
         history = sorted(
             (dt, e) for (dt, e) in ((c.dt, looked[0]) for c, looked in self.looks.items() if c.method == cell.method)
         )
@@ -278,7 +278,7 @@ class _Search:
         return dataclasses.replace(cell, dt=dt) if dt >= self.case.steps[-1] / BELOW else None
 
     def _refined(self, point: Point) -> Point:
-        """A larger step of the same method that holds too, between this one and the next of the grid."""
+        """A larger step of the same method that also holds, between this one and the next of the grid."""
         cell = point.cell
         if cell.dt >= self.case.steps[0]:
             return point
@@ -289,9 +289,9 @@ class _Search:
 
 
 def enough_repeats(case: Case, norm: str, noise: float, target: float) -> Case:
-    """Enough seeds for a statistic to be known far better than the target; Problem where that takes too many.
+    """The case with enough seeds to know a statistic far better than the target; Problem if that needs too many.
 
-    noise: the standard deviation of a single run; 0 for what is no statistic.
+    noise: the standard deviation of a single run; 0 if the norm is not a statistic.
     """
     wanted = max(case.repeats, math.ceil((NOISE * noise / target) ** 2))
     if wanted > MOST_REPEATS:
@@ -305,9 +305,9 @@ def enough_repeats(case: Case, norm: str, noise: float, target: float) -> Case:
 def exact_enough(
     case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
 ) -> tuple[Case, Reference]:
-    """The case with a reference that knows the target: Problem if own runs cannot be brought to agree so well."""
+    """The case with a reference accurate enough for the target; Problem if own runs cannot be made to agree so well."""
     def told(known: Case, reference: Reference) -> float:
-        """The target over what the reference knows."""
+        """The target over the accuracy of the reference."""
         seen = known.reference
         assert seen is not None
         target = max_error / NORMS[norm].scale(seen, seen) if absolute else max_error
@@ -335,7 +335,7 @@ def exact_enough(
 
 
 def _expected(cell: Cell) -> float:
-    """Work per simulated second before anything is known of the scene."""
+    """Estimated work per simulated second before anything has run."""
     evaluations = {"rk4": 4, "yoshida4": 4, "velocity_verlet": 2}.get(cell.integrator, 1)
     return (WEIGHTS["steps"] + evaluations * WEIGHTS["force_evaluations"]) / cell.dt
 
