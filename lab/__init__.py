@@ -1,6 +1,6 @@
-"""carom.lab: the ``carom`` command: running scenes, measuring them, drawing them.
+"""carom.lab: the ``carom`` command, which runs, measures and draws scenes.
 
-The names below are imported when they are first used: the package itself is light.
+The names below are imported on first use, so importing the package itself is cheap.
 """
 
 from __future__ import annotations

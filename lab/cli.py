@@ -1,4 +1,4 @@
-"""The ``carom`` command: run a scene, list the scenes, and what the other modules add."""
+"""The ``carom`` command: run a scene, list the scenes; other commands are added by the other modules."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .settings_study.command import settings_command
 from .trading.command import trade_command
 from .tuning.command import tune_command
 
-DEFAULT_SECONDS = 10.0  # of a file that does not say
+DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 
 
 @click.group(
@@ -145,7 +145,7 @@ cli.add_command(warm_up_command)
 
 
 def _drawing(no_pictures: bool, out: Path) -> Any:
-    """The function that draws, or None; what is in the way is said at once, not after a long run."""
+    """The drawing function, or None; missing packages and permissions are reported before a long run."""
     if no_pictures:
         return None
     try:

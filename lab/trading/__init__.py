@@ -1,4 +1,4 @@
-"""``carom trade``: what speed costs in accuracy, measured over a grid of settings.
+"""``carom trade``: the trade-off between speed and accuracy, measured over a grid of settings.
 
 Reads the results of jobs and the clock. Writes records, tables, charts, a page, JSON and CSV.
 """

@@ -1,6 +1,6 @@
-"""Work-precision charts of a trade: the error to the right, what it costs upwards, a curve per method.
+"""Work-precision charts of a trade: the error on the x axis, the cost on the y axis, one curve per method.
 
-Failed repeats have a cost and no error: they are crosses in a strip of their own, at the right edge, one column a kind.
+Failed repeats have a cost but no error: they are crosses in a strip at the right edge, one column per kind of failure.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ PUBLISHED_COLOURS = ("#9aa7b6", "#c2a878", "#8fb59b", "#b79ac2")
 
 WIDTH, PLOT = 10.0, 5.2  # inches
 LEFT, RIGHT, TOP, AXIS_LABEL = 0.85, 0.3, 0.9, 0.75
-STRIP, STRIP_GAP = 0.72, 0.12  # inches: a column of the strip of failures, and what is left of it
+STRIP, STRIP_GAP = 0.72, 0.12  # inches: a column of the strip of failures, and the gap on its left
 ROW, SMALL = 0.176, 7.5  # inches between rows of the legend; points of small print
 NOTE = 0.17  # inches between lines of small print
-LEAST_ERROR = 1e-17  # where an axis begins on which all errors are 0
-APART = (0.075, 0.035)  # shares of the axes that two labels of steps stay apart
+LEAST_ERROR = 1e-17  # lower end of an axis on which all errors are 0
+APART = (0.075, 0.035)  # minimum distance of two step labels, as fractions of the axes
 
 
 @dataclass
 class Sheet:
-    """A chart that is being made: its axes, its limits, and the small print below it."""
+    """A chart in progress: its axes, its limits, and the small print below it."""
 
     case: CaseTrade
     norm: str
@@ -59,15 +59,15 @@ class Sheet:
     notes: list[str] = field(default_factory=list)
 
     def height(self, point: Point) -> float | None:
-        """What the point costs; None where that is not known, or nothing that a logarithm could show."""
+        """The cost of the point; None if it is unknown or not positive."""
         cost = point.work if self.quantity == WORK else point.milliseconds and point.milliseconds.median
         return cost if cost and math.isfinite(cost) and cost > 0 else None
 
 
 def draw(trade: Trade, folder: Path, norm: str | None = None) -> list[Path]:
-    """Charts of all measured cases as PNG and SVG in ``folder``: by work and, where it was timed, by wall time.
+    """Draw charts of all measured cases as PNG and SVG in ``folder``: by work and, if timed, by wall time.
 
-    ``norm``: the one to show, where a case has it; else its first. Problem if no case has it, or for the folder.
+    ``norm``: used for cases that have it; the others use their first one. Problem if no case has it, or for the folder.
     """
     check_norm(trade, norm)
     made: list[Path] = []
@@ -95,7 +95,7 @@ def quantities(case: CaseTrade) -> list[str]:
 
 
 def inline_svg(case: CaseTrade, quantity: str, norm: str | None, prefix: str) -> str:
-    """The chart as an element of a page: no header of its own, no addresses, every id begins with ``prefix``."""
+    """The chart as an SVG element of a page: without header and links; every id begins with ``prefix``."""
     text = _saved(figure(case, quantity, norm), "svg").decode("utf-8")
     head, inside = text[text.index("<svg") :].split(">", 1)
     box = re.search(r'viewBox="[^"]*"', head)
@@ -146,7 +146,7 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
 
 
 def legend_text(curve: Curve, norm: str) -> str:
-    """`velocity Verlet, order 2.0 (2)`, or `exact`, or the label alone where no order is known."""
+    """`velocity Verlet, order 2.0 (2)`, or `exact`, or the label alone if no order is known."""
     found, theory = curve.orders.get(norm), curve.theory.get(norm)
     if theory == math.inf:
         return f"{curve.label}, exact"
@@ -165,13 +165,13 @@ def _points(case: CaseTrade) -> list[Point]:
 
 
 def _bar(point: Point, norm: str) -> ErrorBar | None:
-    """The point's error, if there is one and it is a number."""
+    """The point's error bar, or None if its error is not a number."""
     bar = point.errors.get(norm)
     return bar if bar is not None and math.isfinite(bar.mean) else None
 
 
 def _failures(point: Point, norm: str) -> dict[str, int]:
-    """How many repeats failed; an error that is no number counts as one kind of it."""
+    """Number of failed repeats by kind; an error that is not a number counts as a kind."""
     failures = {kind: count for kind, count in point.failures.items() if count}
     if norm in point.errors and _bar(point, norm) is None and NOT_FINITE not in failures:
         failures[NOT_FINITE] = point.repeats
@@ -179,7 +179,7 @@ def _failures(point: Point, norm: str) -> dict[str, int]:
 
 
 def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
-    """Axes at a place in inches from the lower left corner."""
+    """Axes at a position in inches from the lower left corner."""
     width, height = made.get_size_inches()
     left, bottom, across, up = place
     axes = made.add_axes((left / width, bottom / height, across / width, up / height), facecolor=canvas.PANEL)
@@ -191,7 +191,7 @@ def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
 
 
 def _set_limits(sheet: Sheet) -> None:
-    """Both axes around all that is drawn, and a place at the left edge for errors of 0."""
+    """Set both axes to enclose everything drawn, with room at the left edge for errors of 0."""
     axes, norm = sheet.axes, sheet.norm
     bars = [bar for point in _points(sheet.case) if (bar := _bar(point, norm))]
     others = published(sheet.case.scene, norm) if sheet.quantity == TIME else []
@@ -225,7 +225,7 @@ def _set_limits(sheet: Sheet) -> None:
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
-    """At least one decade, with a margin; on a logarithmic axis."""
+    """The range with a margin, at least one decade, for a logarithmic axis."""
     middle, half = (math.log10(low) + math.log10(high)) / 2, (math.log10(high) - math.log10(low)) / 2
     half = max(half * 1.08, half + 0.06, 0.5)
     return 10 ** (middle - half), 10 ** (middle + half)
@@ -254,7 +254,7 @@ def _draw_curve(sheet: Sheet, curve: Curve, style: Style) -> None:
 
 
 def _draw_failures(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
-    """A cross for each point and kind, at the point's cost; without one at the upper edge."""
+    """A cross for each point and kind, at the point's cost; at the upper edge if the cost is unknown."""
     for column, kind in enumerate(sheet.kinds):
         found = [(p, style) for curve, style in drawn for p in curve.points if kind in _failures(p, sheet.norm)]
         bottom, top = sheet.axes.get_ylim()
@@ -270,7 +270,7 @@ def _draw_failures(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
 
 
 def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
-    """The step beside the ends and middles of curves, as far as there is room."""
+    """Step labels at the ends and middles of curves, as far as they fit."""
     kept: list[tuple[float, float]] = []
     to_share = sheet.axes.transAxes.inverted()
     wanted: list[tuple[Point, Style]] = []
@@ -295,7 +295,7 @@ def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
 
 
 def _published_entries(sheet: Sheet) -> list[Line2D]:
-    """The other engines in the legend of the chart they stand on."""
+    """Legend entries of the other engines."""
     return [
         Line2D([], [], ls=":", lw=1, color=colour, marker=marker, ms=8, mew=1.6, label=f"{engine}, published")
         for engine, colour, marker in _published_styles(sheet)
@@ -317,7 +317,7 @@ def _draw_published(sheet: Sheet) -> None:
 
 
 def _notes(sheet: Sheet) -> list[str]:
-    """What the marks mean, of those that are there, and what could not be drawn."""
+    """The meaning of the marks used, and what could not be drawn."""
     case, norm, points = sheet.case, sheet.norm, _points(sheet.case)
     bars = [bar for point in points if (bar := _bar(point, norm))]
     what = {WORK: "work", TIME: "wall time"}[sheet.quantity]
@@ -346,7 +346,7 @@ def _notes(sheet: Sheet) -> list[str]:
 
 
 def _saved(chart: Figure, suffix: str) -> bytes:
-    """The same bytes for the same chart, as far as matplotlib can."""
+    """The chart as bytes, reproducible as far as matplotlib allows."""
     buffer = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "carom", "svg.fonttype": "path"}):
         extra: dict[str, Any] = {"metadata": {"Date": None}} if suffix == "svg" else {"dpi": canvas.DPI}
@@ -355,5 +355,5 @@ def _saved(chart: Figure, suffix: str) -> bytes:
 
 
 def _slug(name: str) -> str:
-    """A name of a file."""
+    """A file name."""
     return re.sub(r"[^A-Za-z0-9_]+", "-", name).strip("-")

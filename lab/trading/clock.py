@@ -1,4 +1,4 @@
-"""The clock of a trade: wall time per simulated second of each setting, one after the other and nothing beside it."""
+"""The clock of a trade: wall time per simulated second of each setting, measured one after the other on one core."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from ..measure.timing import Spread, no_garbage_collection
 from ..reporting.progress_bar import Progress
 from .records import Point
 
-REPEATS = 5  # at most, of a run
-ENOUGH = 1.0  # s of one setting: long runs are not repeated
-BLOCKS = 20  # of a run, dealt out to PARTS that each see all of it: as many measurements
+REPEATS = 5  # of a run, at most
+ENOUGH = 1.0  # s for one setting: longer runs are not repeated
+BLOCKS = 20  # of a run, distributed over PARTS that each sample the whole run, one measurement per part
 PARTS = 5
 
 
 def time_points(case: Case, points: Sequence[Point], progress: Progress) -> None:
-    """Fill in ``milliseconds`` of the points that did not fail altogether.
+    """Fill in ``milliseconds`` of the points that did not fail in all repeats.
 
-    Repeats go round over all points, each time from another one on, so that what disturbs the machine for a while
-    does not meet one setting alone.
+    Each repeat covers all points, starting with a different one, so that background load affects all settings.
     """
     wanted = [point for point in points if point.errors]
     found: dict[int, list[float]] = {id(point): [] for point in wanted}
@@ -45,7 +44,8 @@ def time_points(case: Case, points: Sequence[Point], progress: Progress) -> None
 
 
 def _parts(case: Case, point: Point) -> list[tuple[float, int]]:
-    """Seconds and steps of each part of a whole run: what steps cost may change as things gather and come to rest."""
+    """Seconds and steps of each part of a whole run: the cost of a step may change as bodies gather and come to
+    rest."""
     engine = engine_of(case, point.cell, 0)
     dt = point.cell.dt
     seconds, steps = [0.0] * PARTS, [0] * PARTS
@@ -59,7 +59,7 @@ def _parts(case: Case, point: Point) -> list[tuple[float, int]]:
             started = time.perf_counter()
             engine.advance(count, dt)
             took = time.perf_counter() - started
-            if log.waited == waited or not (left or any(steps)):  # else kernels were compiled or loaded meanwhile
+            if log.waited == waited or not (left or any(steps)):  # otherwise kernels were compiled or loaded meanwhile
                 seconds[part] += took
                 steps[part] += count
                 part = (part + 1) % PARTS
@@ -70,7 +70,7 @@ def _parts(case: Case, point: Point) -> list[tuple[float, int]]:
 
 @contextlib.contextmanager
 def _one_core() -> Iterator[None]:
-    """This process stays on one core, where the system can do that."""
+    """Keep this process on one core, if the system supports it."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return

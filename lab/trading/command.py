@@ -1,4 +1,4 @@
-"""``carom trade``: what speed costs in accuracy, measured over a grid of settings."""
+"""``carom trade``: the trade-off between speed and accuracy, measured over a grid of settings."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from .trade import Only, trade
 
 MARK = "carom trade"
 RESULTS = "results.jsonl"
-MOST_STEPS = 3000  # of the run that pictures show
+MOST_STEPS = 3000  # of the run shown in the pictures
 
 
 @click.command("trade", cls=KeepsWords, short_help="What speed costs in accuracy, measured.")
@@ -132,7 +132,7 @@ def trade_command(
 
 
 def _check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> None:
-    """Problem, with what was probably meant, for an integrator that a scene does not have; plugins bring their own."""
+    """Problem, with suggestions, for an integrator that a scene does not have; plugins can add integrators."""
     for subject in subjects:
         for name in names:
             if name not in ALL_METHODS:
@@ -142,7 +142,7 @@ def _check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> Non
 
 
 def _charts_there() -> bool:
-    """Whether matplotlib is; says so at once if not."""
+    """True if matplotlib is installed; prints a note if not."""
     try:
         chart_module()
     except Problem as problem:
@@ -152,7 +152,7 @@ def _charts_there() -> bool:
 
 
 def _command_line(context: click.Context) -> str:
-    """What measures it all again, from the beginning."""
+    """The command line that repeats the measurement from the start."""
     return shlex.join([*MARK.split(), *(word for word in context.meta[WORDS] if word != "--resume")])
 
 
@@ -161,12 +161,12 @@ def _results(store: Store) -> str:
 
 
 def _tables(result: Trade, norms: Sequence[str]) -> list[TextTable]:
-    """Of each norm that was asked for; of each case's first one if none was."""
+    """The tables of each requested norm; of each case's first one if none was requested."""
     return [_narrow(table) for norm in norms or [None] for table in tables(result, norm)]
 
 
 def _narrow(table: TextTable) -> TextTable:
-    """Without the single counts, which the page and the CSV file have: a terminal is not so wide."""
+    """The table without the single counts, which are on the page and in the CSV file: a terminal is too narrow."""
     kept = [place for place, heading in enumerate(table.headings) if heading not in COUNTS.values()]
     rows = [tuple(row[place] for place in kept) for row in table.rows]
     return dataclasses.replace(table, headings=tuple(table.headings[place] for place in kept), rows=rows)
@@ -184,7 +184,7 @@ def _write(result: Trade, out: Path) -> list[Path]:
 def _pictures(
     result: Trade, subjects: Sequence[Subject], out: Path, progress: Progress
 ) -> dict[str, list[Path]]:
-    """By scene, of what was measured."""
+    """Pictures of the measured scenes, by scene."""
     seconds = {case.target: case.seconds for case in measured(result)}
     found = {}
     for subject in subjects:

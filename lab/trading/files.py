@@ -1,4 +1,4 @@
-"""A trade as files for other programs: JSON, which goes back into records, and a table of values."""
+"""A trade as files for other programs: JSON, which converts back to records, and CSV."""
 
 from __future__ import annotations
 
@@ -44,12 +44,13 @@ COLUMNS: dict[str, str] = {
 
 
 def write_json(trade: Trade, path: Path) -> Path:
-    """All of it; ``Trade.from_dict(json.loads(...))`` is the way back. Problem if the file cannot be written."""
+    """Write everything as JSON; ``Trade.from_dict(json.loads(...))`` reads it. Problem if the file cannot be
+    written."""
     return _write(path, json.dumps(trade.as_dict(), indent=1, allow_nan=False) + "\n")
 
 
 def write_csv(trade: Trade, path: Path) -> Path:
-    """A row for each point and norm, with COLUMNS. Problem if the file cannot be written."""
+    """Write one row per point and norm, with COLUMNS. Problem if the file cannot be written."""
     buffer = io.StringIO()
     writer = csv.DictWriter(buffer, list(COLUMNS), lineterminator="\n")
     writer.writeheader()

@@ -1,4 +1,4 @@
-"""A trade as one HTML file that needs nothing else: charts and pictures are inside it."""
+"""A trade as one self-contained HTML file, with charts and pictures embedded."""
 
 from __future__ import annotations
 
@@ -90,8 +90,8 @@ def write_page(
 ) -> Path:
     """Write the page and return its path.
 
-    ``pictures``: by scene, files (PNG, JPEG or SVG) that go into the page. ``norm``: the one to show, where a case has
-    it; else its first. ``charts``: draw them, which needs matplotlib. Problem for a norm that no case has, a file that
+    ``pictures``: files (PNG, JPEG or SVG) to embed, by scene. ``norm``: used for cases that have it; the others use
+    their first one. ``charts``: draw charts, which needs matplotlib. Problem for a norm that no case has, a file that
     cannot be read or written, and for charts without matplotlib.
     """
     check_norm(trade, norm)
@@ -121,7 +121,7 @@ def write_page(
 
 
 def chart_module() -> Any:
-    """carom.lab.trading.charts; Problem, with the name of the extra, where matplotlib is missing."""
+    """The module carom.lab.trading.charts; Problem, with the name of the extra, if matplotlib is missing."""
     try:
         return importlib.import_module(".charts", __package__)
     except ImportError as error:
@@ -170,7 +170,7 @@ def _figure(inside: str, caption: str) -> str:
 
 
 def _table(table: TextTable) -> str:
-    """A table that scrolls sideways where the screen is narrow."""
+    """A table that scrolls sideways on a narrow screen."""
 
     words = ' class="word"'
 
@@ -187,7 +187,7 @@ def _table(table: TextTable) -> str:
 
 
 def _image(path: Path, scene: str) -> str:
-    """A picture as part of the page."""
+    """A picture embedded in the page."""
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise Problem(f"{path}: a picture of the page must end in {', '.join(KINDS)}")

@@ -1,6 +1,6 @@
-"""What a trade of accuracy for speed consists of: the settings tried, what a run of them showed, what it comes to.
+"""Records of a trade of accuracy for speed: the settings tried, the result of each run, and the summary.
 
-Everything here is plain data that goes through JSON and back.
+Everything here is plain data that converts to JSON and back.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ CAROM, PYMUNK = "carom", "pymunk"
 SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  # kinds of scenes
 
 NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
-FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: an error ended it
-TRUSTED = 10.0  # an error counts as measured if the references agree so many times better
+FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: ended by an error
+TRUSTED = 10.0  # an error counts as measured if the references agree better by this factor
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Cell:
     engine: str = CAROM
 
     def settings(self, base: Settings) -> Settings:
-        """``base`` with these dials; ValueError where Settings refuses one."""
+        """``base`` with these fields; ValueError if Settings rejects one."""
         return base.replace(
             dt=self.dt,
             integrator=self.integrator,
@@ -49,12 +49,12 @@ class Cell:
 
     @property
     def method(self) -> Cell:
-        """The curve this point lies on: the same dials, and a step of one second for all."""
+        """Identifies the curve of this point: the same fields with a step of 1 s."""
         return dataclasses.replace(self, dt=1.0)
 
     @property
     def key(self) -> str:
-        """One word that names the cell, and no other."""
+        """A unique word for the cell."""
         return "/".join(str(value) for value in dataclasses.astuple(self))
 
 
@@ -63,11 +63,11 @@ class Outcome:
     """One run of one cell.
 
     repeat
-        which start phase or seed it was
+        number of the start phase or seed
     errors
         by norm; empty if the run failed
     failure
-        None, or one of FAILURES; ``detail`` says more
+        None, or one of FAILURES; ``detail`` gives more information
     counts
         of the whole run, the same on every machine: steps, force_evaluations, candidates, pairs, impacts, solver_loops
     seconds
@@ -84,7 +84,7 @@ class Outcome:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "cell": Cell(**plain["cell"])})
 
 
@@ -92,7 +92,7 @@ class Outcome:
 class ErrorBar:
     """An error over all repeats: mean, least, largest, and the standard error of the mean.
 
-    For statistics, where single repeats are noise: low and high are two standard errors beside the mean.
+    For statistics, where single repeats are noise, low and high are the mean minus and plus two standard errors.
     """
 
     mean: float
@@ -102,7 +102,7 @@ class ErrorBar:
 
     @classmethod
     def of(cls, values: Sequence[float], signed: bool = False) -> Self:
-        """Of at least one value; a single one has no uncertainty that could be told: 0. signed: of statistics."""
+        """From at least one value; with a single value the uncertainty is unknown: 0. signed: for statistics."""
         spread = statistics.stdev(values) if len(values) > 1 else 0.0
         mean, uncertainty = statistics.fmean(values), spread / math.sqrt(len(values))
         if not signed:
@@ -117,11 +117,11 @@ class Point:
     errors
         by norm, of the repeats that did not fail
     failures
-        how many repeats failed, by kind
+        number of failed repeats, by kind
     counts
         per simulated second, means over the repeats
     work
-        one number for them: see :mod:`carom.lab.engines.cost`; per simulated second
+        weighted sum of the counts, see :mod:`carom.lab.engines.cost`; per simulated second
     milliseconds
         wall time per simulated second; None if it was not timed
     """
@@ -139,12 +139,12 @@ class Point:
         return bool(self.failures)
 
     def meets(self, norm: str, target: float) -> bool:
-        """Whether no repeat failed and the worst of them keeps the target."""
+        """True if no repeat failed and the worst of them meets the target."""
         return not self.failed and norm in self.errors and self.errors[norm].high <= target
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         spread = plain["milliseconds"]
         return cls(**{
             **plain,
@@ -159,11 +159,11 @@ class Curve:
     """One method: its points from the largest step to the smallest.
 
     label
-        what tells it from the other curves of its case
+        distinguishes it from the other curves of its case
     orders
-        by norm: the observed order in dt, a line through the logarithms of the errors that count; None if there is none
+        by norm: the observed order in dt, fitted to the logarithms of the usable errors; None if there is none
     theory
-        by norm: the order that theory gives; inf for exact (rounding only); None if nobody knows
+        by norm: the order expected from theory; inf for exact (rounding only); None if unknown
     """
 
     label: str
@@ -173,7 +173,7 @@ class Curve:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         return cls(**{**plain, "points": [Point.from_dict(point) for point in plain["points"]]})
 
 
@@ -184,9 +184,10 @@ class Reference:
     text
         one sentence: a closed form by name, or own runs and how well they agree
     agreement
-        by norm: how far two methods are apart; 0 for a closed form. Smaller errors than TRUSTED times this say nothing
+        by norm: the difference between two methods; 0 for a closed form. Errors below TRUSTED times this are not
+        reliable
     spread
-        by norm, of statistics: the standard deviation of a single run
+        by norm, for statistics: the standard deviation of a single run
     """
 
     text: str
@@ -194,7 +195,7 @@ class Reference:
     spread: dict[str, float] = field(default_factory=dict)
 
     def trusts(self, norm: str, error: float) -> bool:
-        """Whether an error of that size can be told from that of the reference."""
+        """True if an error of that size can be distinguished from the reference's own."""
         return error >= TRUSTED * self.agreement.get(norm, 0.0)
 
 
@@ -203,17 +204,17 @@ class CaseTrade:
     """One scene with all its curves.
 
     scene
-        its name, or the file's; ``target`` is what the command line called it
+        its name, or the file's; ``target``: the name on the command line
     kind
-        SMOOTH, IMPACTS, RESTING or CHAOTIC; ``why`` says how that was found
+        SMOOTH, IMPACTS, RESTING or CHAOTIC; ``why``: how it was determined
     norms
-        what each is and what it is relative to, by name; the first is the one that charts and tuning use
+        quantity and scale, by name; charts and tuning use the first one
     repeated
         what differs between repeats: "start phases" or "seeds"
     refused
         why nothing was measured, else ""
     whole
-        repeats that it takes to trust the worst of them: a quick look has fewer
+        number of repeats needed to trust their worst; a quick look has fewer
     """
 
     scene: str
@@ -236,21 +237,21 @@ class CaseTrade:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From what ``dataclasses.asdict`` and JSON made of one."""
+        """From the output of ``dataclasses.asdict``, also after JSON."""
         curves = [Curve.from_dict(curve) for curve in plain["curves"]]
         return cls(**{**plain, "reference": Reference(**plain["reference"]), "curves": curves})
 
 
 @dataclass
 class Trade:
-    """All cases of one call, on one machine; ``command`` makes it again."""
+    """All cases of one call, on one machine; ``command`` reproduces it."""
 
     machine: dict[str, str]
     command: str
     cases: list[CaseTrade]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON, which has no word for infinity: theory's inf becomes the string "exact"."""
+        """For JSON, which cannot represent infinity: an inf order of theory becomes the string "exact"."""
         plain = dataclasses.asdict(self)
         for case in plain["cases"]:
             for curve in case["curves"]:
@@ -259,7 +260,7 @@ class Trade:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The opposite of :meth:`as_dict`, also after JSON."""
+        """The inverse of :meth:`as_dict`, also after JSON."""
         cases = [CaseTrade.from_dict(case) for case in plain["cases"]]
         for case in cases:
             for curve in case.curves:

@@ -1,4 +1,4 @@
-"""A trade of accuracy for speed as tables and sentences: every point, what it cost, and what to choose."""
+"""A trade of accuracy for speed as tables and sentences: every point, its cost, and the best choices."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from ..settings_study.code_line import python_line
 from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
 
 NOTHING = "-"
-DOUBTED = "*"  # beside an error that is too close to the reference's own
+DOUBTED = "*"  # marks an error that is too close to the reference's own
 TARGETS = (0.1, 0.01, 0.001, 1e-6)
-ORDER_TOLERANCE = 0.3  # an observed order that is farther from the theory's is no accident
+ORDER_TOLERANCE = 0.3  # a larger difference between the observed and the theoretical order is significant
 COUNTS = {
     "steps": "steps",
     "force_evaluations": "force evaluations",
@@ -28,9 +28,9 @@ COUNTS = {
 
 
 def tables(trade: Trade, norm: str | None = None) -> list[TextTable]:
-    """A table of all points for each case, and one of what others published where there is any.
+    """A table of all points for each case, and one of published results if there are any.
 
-    ``norm``: the one to show, where a case has it; else its first. Problem if no case has it.
+    ``norm``: used for cases that have it; the others use their first one. Problem if no case has it.
     """
     check_norm(trade, norm)
     made = []
@@ -60,7 +60,7 @@ def norm_of(case: CaseTrade, norm: str | None) -> str:
 
 
 def points_table(case: CaseTrade, norm: str) -> TextTable:
-    """One row per point; columns that say nothing are left out."""
+    """One row per point; columns without information are left out."""
     points = [point for curve in case.curves for point in curve.points]
     counts = [name for name in COUNTS if any(point.counts.get(name) for point in points)]
     bars = [point.errors[norm] for point in points if norm in point.errors]
@@ -85,7 +85,7 @@ def points_table(case: CaseTrade, norm: str) -> TextTable:
 
 
 def published_table(scene: str, norm: str) -> TextTable:
-    """What others published for this scene."""
+    """Published results for this scene."""
     rows = [
         (point.engine, number(point.dt), compact(point.error), compact(point.milliseconds))
         for point in published(scene, norm)
@@ -98,7 +98,7 @@ def error_heading(norm: str) -> str:
 
 
 def is_statistic(case: CaseTrade, norm: str) -> bool:
-    """Whether single repeats are noise, so that what counts is two standard errors beyond the mean."""
+    """True if single repeats are noise, so that the limit applies to the mean plus two standard errors."""
     return norm in case.reference.spread
 
 
@@ -107,7 +107,7 @@ def worst_heading(case: CaseTrade, norm: str) -> str:
 
 
 def _error(case: CaseTrade, norm: str, bar: ErrorBar | None) -> str:
-    """The mean, its standard error where there is one, and a mark where the reference is no better."""
+    """The mean, its standard error if there is one, and a mark if the reference is not more accurate."""
     if bar is None:
         return NOTHING
     text = f"{compact(bar.mean)} ± {compact(bar.uncertainty, 1)}" if bar.uncertainty else compact(bar.mean)
@@ -115,7 +115,7 @@ def _error(case: CaseTrade, norm: str, bar: ErrorBar | None) -> str:
 
 
 def order(curve: Curve, norm: str) -> str:
-    """The observed order and, in brackets, the theory's: `2.01 (2)`; `(exact)` where only rounding is left."""
+    """The observed order and, in brackets, the theoretical one: `2.01 (2)`; `(exact)` if only rounding is left."""
     found, theory = curve.orders.get(norm), curve.theory.get(norm)
     if theory == math.inf:
         return "(exact)"
@@ -124,7 +124,7 @@ def order(curve: Curve, norm: str) -> str:
 
 
 def off_theory(curve: Curve, norm: str) -> bool:
-    """Whether the observed order is too far from the theory's to be an accident."""
+    """True if the observed order differs significantly from theory."""
     found, theory = curve.orders.get(norm), curve.theory.get(norm)
     if found is None or theory is None or theory == math.inf:
         return False
@@ -142,7 +142,7 @@ def failures(point: Point) -> str:
 
 
 def failure_lines(case: CaseTrade) -> list[str]:
-    """A sentence for each point of which some repeat failed."""
+    """A sentence for each point with failed repeats."""
     return [
         f"{curve.label}, step {number(point.cell.dt)} s: {failures(point)}"
         for curve in case.curves
@@ -152,7 +152,7 @@ def failure_lines(case: CaseTrade) -> list[str]:
 
 
 def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None) -> TextTable:
-    """For each target and engine, the setting of least work that keeps it on all repeats."""
+    """For each target and engine, the setting of least work that meets it in all repeats."""
     chosen = norm_of(case, norm)
     rows = []
     for target, engine, found in choices(case, targets, chosen):
@@ -174,9 +174,9 @@ def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | No
 def choices(
     case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None
 ) -> list[tuple[float, str, tuple[Curve, Point] | None]]:
-    """Target, engine, and the curve and point of least work that meets it; None if none does or nobody could tell.
+    """Target, engine, and the curve and point of least work that meets it; None if there is none or it is unknown.
 
-    Engines apart: their counts do not mean the same.
+    Engines are treated separately, because their counts are not comparable.
     """
     chosen = norm_of(case, norm)
     engines = dict.fromkeys(point.cell.engine for curve in case.curves for point in curve.points)
@@ -195,7 +195,7 @@ def choices(
 
 
 def choice_lines(case: CaseTrade, norm: str | None = None) -> list[tuple[str, str]]:
-    """For each target that can be met: what it is, and the line of Python that meets it."""
+    """For each target that can be met: its text, and the line of Python that meets it."""
     chosen = norm_of(case, norm)
     return [
         (f"{target_text(target, chosen)}, {engine}", python_line(found[1].cell))
@@ -205,7 +205,7 @@ def choice_lines(case: CaseTrade, norm: str | None = None) -> list[tuple[str, st
 
 
 def target_text(target: float, norm: str) -> str:
-    """`0.1 %` of a relative error; a norm with a unit has it."""
+    """`0.1 %` for a relative error; with the unit for a norm that has one."""
     if norm != ENERGY_SQUARE and target >= 1e-3:
         return f"{100 * target:g} %"
     short = f"{target:g}".replace("e-0", "e-").replace("e+", "e")
@@ -213,7 +213,7 @@ def target_text(target: float, norm: str) -> str:
 
 
 def remarks(trade: Trade, norm: str | None = None) -> list[str]:
-    """Where it ran and, for each case, what was measured, against what, and what to make of it."""
+    """The machine and, for each case, what was measured, against what, and how reliable it is."""
     lines = [machine_line(trade.machine), trade.command]
     for case in trade.cases:
         lines += [f"{case.scene}: {line}" for line in case_remarks(case, norm_of(case, norm))]
@@ -259,7 +259,7 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
 
 
 def reference_line(case: CaseTrade, norm: str) -> str:
-    """What the errors are measured against, and how far that can be trusted."""
+    """What the errors are measured against, and its accuracy."""
     agreement = case.reference.agreement.get(norm, 0.0)
     return f"{case.reference.text} ({norm}: {compact(agreement)} apart)" if agreement else case.reference.text
 
@@ -271,7 +271,7 @@ def untrusted(case: CaseTrade, norm: str) -> list[Point]:
 
 
 def compact(value: float, digits: int = 3) -> str:
-    """So many digits: 0.0123, 1,230, 1.23e-5, 4.56e7."""
+    """A number with that many significant digits: 0.0123, 1,230, 1.23e-5, 4.56e7."""
     if not math.isfinite(value):
         return f"{value:g}"
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
@@ -284,6 +284,6 @@ def compact(value: float, digits: int = 3) -> str:
 
 
 def counted(value: float) -> str:
-    """A mean of counts: whole where it is."""
+    """A mean of counts, without decimals if it is whole."""
     whole = abs(value) < 1e6 and math.isclose(value, round(value), rel_tol=1e-9)
     return f"{value:,.0f}" if whole else compact(value)

@@ -1,4 +1,4 @@
-"""A trade in one short table for each scene: a row per method, with its orders and the step that each target takes."""
+"""A trade in one short table per scene: a row per method, with its orders and the step needed for each target."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from .report import NOTHING, TARGETS, compact, failures, measured, norm_of, orde
 
 
 def summaries(trade: Trade, norm: str | None = None) -> list[TextTable]:
-    """One table for each case that was measured; ``norm`` as in :func:`carom.lab.trading.report.tables`."""
+    """One table for each measured case; ``norm`` as in :func:`carom.lab.trading.report.tables`."""
     return [summary(case, norm_of(case, norm)) for case in measured(trade)]
 
 
 def summary(case: CaseTrade, norm: str, targets: Sequence[float] = TARGETS) -> TextTable:
-    """By method: the observed order of each norm with the theory's, and for each target the largest step that keeps it
-    in all repeats, with its work per simulated second; the best error of ``norm``, and what failed."""
+    """By method: the observed order of each norm with the theoretical one; for each target the largest step that meets
+    it in all repeats, with its work per simulated second; the best error of ``norm``; and the failures."""
     told = [target for target in targets if case.reference.trusts(norm, target)]
     headings = ["method", *(f"{name}, order" for name in case.norms), *(target_text(t, norm) for t in told), "best"]
     failing = any(point.failed for curve in case.curves for point in curve.points)
@@ -35,7 +35,7 @@ def summary(case: CaseTrade, norm: str, targets: Sequence[float] = TARGETS) -> T
 
 
 def _step(curve: Curve, norm: str, target: float) -> str:
-    """The largest step from which on all smaller ones keep the target too."""
+    """The largest step that meets the target together with all smaller ones."""
     kept: Point | None = None
     for point in reversed(curve.points):
         if not point.meets(norm, target):

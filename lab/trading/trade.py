@@ -1,4 +1,4 @@
-"""``trade()``: what speed costs in accuracy, measured over a grid of settings."""
+"""``trade()``: the trade-off between speed and accuracy, measured over a grid of settings."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from ..reporting.progress_bar import NO_PROGRESS, Progress
 from .clock import time_points
 from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Outcome, Point, Reference, Trade, by_method, observed_order
 
-ROUNDING = 1e-12  # errors below it are rounding, which follows no order
-SURE = 1e-10  # an agreement that leaves nothing to be wanted of a reference
-SMALL = 0.1  # an error of a tenth of the scale is no small one
-CLEAR = 4.0  # times its own noise must a statistic's error be to tell an order
-ASYMPTOTIC = 4  # points, the finest, that the order is read from
+ROUNDING = 1e-12  # smaller errors are rounding, which has no order
+SURE = 1e-10  # a reference with a better agreement needs no refinement
+SMALL = 0.1  # relative errors above this are too large for asymptotic orders
+CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
+ASYMPTOTIC = 4  # number of finest points used for the order
 
 
 @dataclass(frozen=True)
 class Only:
-    """What of the grid is wanted; empty: all that matters in the scene. TypeError for a name instead of several."""
+    """The requested part of the grid; empty: all that matters in the scene. TypeError for a name instead of several."""
 
     integrators: tuple[str, ...] = ()
     collisions: tuple[str, ...] = ()
@@ -42,7 +42,7 @@ class Only:
                 raise TypeError(f"Only.{field.name} must be a sequence, got {getattr(self, field.name)!r}")
 
     def of(self, case: Case) -> tuple[Cell, ...]:
-        """The methods of the case; a dial that is named is varied even where it changes nothing. Problem for none."""
+        """The methods of the case; a named field is varied even without effect. Problem if there is none."""
         world = case.subject.world(None)
         known = world.registry.integrators
         world.close()
@@ -61,7 +61,7 @@ class Only:
                 found = tuple(dataclasses.replace(cell, **{field: value}) for cell in found for value in wanted)
         chosen = tuple(dict.fromkeys(grids.with_own_flight(cell) for cell in found))
         for cell in chosen:
-            case.subject.world(cell.settings(case.survey.settings)).close()  # names what it does not know
+            case.subject.world(cell.settings(case.survey.settings)).close()  # raises for unknown names
         return chosen
 
 
@@ -84,12 +84,12 @@ def trade(
 ) -> Trade:
     """Measure work and error of every setting that matters in each scene.
 
-    targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the one that
-    counts; seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. What is
-    not given follows from the scene. quick: every second step and at most 8 repeats, where they are not given, for a
-    first look. workers: processes at most, None for all cores (little work is done without them); store: finished runs,
-    to go on with. Of several scenes, one that cannot be measured is in the result with the reason. ValueError or
-    Problem for wrong arguments, and for a single scene that cannot be.
+    targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
+    seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
+    follow from the scene. quick: every second step and at most 8 repeats, unless given, for a first look. workers:
+    processes at most, None for all cores (small amounts of work use none); store: finished runs, to be continued. Of
+    several scenes, one that cannot be measured is in the result with the reason. ValueError or Problem for wrong
+    arguments, and for a single scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
     for target in targets:
@@ -115,12 +115,12 @@ def trade(
 
 
 def measure(case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Runs) -> CaseTrade:
-    """One case: its references, its grid, then the clock, alone."""
+    """One case: its references, its grid, then the clock, with no other work in parallel."""
     name = case.subject.name
     curves = only.of(case)
     peers = grids.peer_methods() if against_pymunk else ()
     if peers:
-        engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # says what is in the way
+        engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # raises, with the reason
     case, reference, _ = refined_reference(
         case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
     )
@@ -162,8 +162,8 @@ def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> Case
 
 
 def order_of(points: Sequence[Point], norm: str, reference: Reference) -> float | None:
-    """From the points that count: nothing failed, neither rounding nor the reference's own error shows, and the error
-    is small enough for the law of small steps to hold."""
+    """The order of the usable points: without failures, above rounding and the reference's own error, and small enough
+    for the asymptotic order to hold."""
     usable = [point for point in points if _tells(point, norm, reference)]
     finest = usable[-ASYMPTOTIC:]
     return observed_order([p.cell.dt for p in finest], [p.errors[norm].mean for p in finest])
@@ -179,7 +179,7 @@ def _tells(point: Point, norm: str, reference: Reference) -> bool:
 
 
 def label_of(method: Cell, others: Iterable[Cell]) -> str:
-    """What tells it from the others."""
+    """A label that distinguishes the method from the others."""
     if method.engine == PYMUNK:
         return f"pymunk, {method.substeps} iterations"
     own = [other for other in others if other.engine == CAROM]
