@@ -1,4 +1,4 @@
-"""``carom.lab.testing``: the kit for tests of games, at the level of systems. docs/testing.md shows how.
+"""``carom.lab.testing``: the kit for system-level tests of games. docs/testing.md shows how to use it.
 
 Worlds: make_world, ball, box, floor, create_in_order; run, run_until; position, velocity.
 Predictions in closed form: free_flight, flight_after, fall_time, bounce_heights, collide, sliding_distance and others.

@@ -1,4 +1,4 @@
-"""Assertions about worlds. Each says which entity, at which step, which value and which limit."""
+"""Assertions about worlds. Each message names the entity, the step, the value and the limit."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..measure.body_shapes import Floats, shapes_of
 
 
 class Conserved:
-    """What held when this was made, to be checked later: energy, momentum, the number of bodies, finite numbers.
+    """The state at construction, to be compared later: energy, momentum, the number of bodies, finite numbers.
 
-    Energy is kinetic and potential energy together. ``relative`` is of what is summed: of the energy at the start and
-    of sum(m |v|); rounding stays below 1e-12.
+    Energy is kinetic plus potential energy. ``relative`` is relative to the energy at the start, and for momentum to
+    sum(m |v|); rounding stays below 1e-12.
     """
 
     def __init__(self, world: World, relative: float = 1e-12) -> None:
@@ -32,7 +32,7 @@ class Conserved:
         return float(np.abs(moving.mass[:, None] * moving.linear_velocity).sum())
 
     def assert_finite(self) -> None:
-        """No body was lost, every position and velocity is finite."""
+        """No body is missing; every position and velocity is finite."""
         bodies, step = self.world.bodies, self.world.step_count
         assert len(bodies) == self.bodies, f"step {step}: {len(bodies)} bodies, there were {self.bodies}"
         for name in ("position", "linear_velocity"):
@@ -41,7 +41,7 @@ class Conserved:
                 raise AssertionError(f"entity {bodies.entity[row]}, step {step}: {name} is {column[row].tolist()}")
 
     def assert_momentum(self) -> None:
-        """As it was: right without forces and without bodies that nothing can move."""
+        """Momentum is unchanged: valid without external forces and without immovable bodies."""
         off = float(np.abs(self.world.momentum() - self.momentum).max())
         limit = self.relative * max(self.momentum_scale, self._sum_of_momenta())
         assert off <= limit, (
@@ -50,11 +50,11 @@ class Conserved:
         )
 
     def assert_energy(self) -> None:
-        """As it was."""
+        """Energy is unchanged."""
         self._energy(abs)
 
     def assert_energy_not_raised(self) -> None:
-        """As it was, or less."""
+        """Energy is unchanged or lower."""
         self._energy(float)
 
     def _energy(self, measure: Callable[[float], float]) -> None:
@@ -67,15 +67,15 @@ class Conserved:
 
 
 def energy(world: World) -> float:
-    """Kinetic and potential, J."""
+    """Kinetic plus potential energy, J."""
     return world.kinetic_energy() + world.potential_energy()
 
 
-# -- where and how fast -----------------------------------------------------------------------------
+# -- position and velocity --------------------------------------------------------------------------
 
 
 def assert_position(world: World, entity: int, expected: Any, within: float = 1e-9) -> None:
-    """The entity is there, to ``within`` metres on every axis."""
+    """The entity is at that position, to ``within`` metres on every axis."""
     _assert_vector(world, entity, "position", "m", expected, within)
 
 
@@ -94,7 +94,7 @@ def _assert_vector(world: World, entity: int, name: str, unit: str, expected: An
 
 
 def assert_inside(world: World, lower: Any, upper: Any) -> None:
-    """No dynamic body's position is outside of these bounds, (d,) or one number for all axes."""
+    """No dynamic body's position is outside these bounds, (d,) or one number for all axes."""
     moving = world.bodies.dynamic
     inside = ((moving.position >= lower) & (moving.position <= upper)).all(axis=1)
     for row in np.flatnonzero(~inside)[:1]:
@@ -105,9 +105,9 @@ def assert_inside(world: World, lower: Any, upper: Any) -> None:
 
 
 def assert_at_rest(world: World, steps: int = 60, speed: float = 1e-3, drift: float = 1e-3) -> None:
-    """Take so many steps: no dynamic body is ever faster than ``speed`` sizes per second or moves by ``drift`` sizes.
+    """Take that many steps: no dynamic body ever moves faster than ``speed`` sizes per second or by ``drift`` sizes.
 
-    The size of a body is that of the least extent of its collider; of one without collider a metre.
+    The size of a body is the smallest extent of its collider; 1 m without a collider.
     """
     sizes = _sizes(world)
     start = np.array(world.bodies.dynamic.position)
@@ -141,7 +141,7 @@ def _assert_largest(world: World, values: Floats, limit: float, verb: str, unit:
 
 
 def touching(world: World, a: int, b: int) -> bool:
-    """Whether the two touched in the last step (a contact that was disabled does not count)."""
+    """True if the two touched in the last step (a disabled contact does not count)."""
     return any(contact.entity_b == b for contact in world.contacts.of(a))
 
 
@@ -159,7 +159,7 @@ def assert_apart(world: World, a: int, b: int) -> None:
 
 
 class ContactLog:
-    """Counts what happens between pairs from now on, however the world is stepped. Close it, or forget the world."""
+    """Counts contact events of pairs from now on, however the world is stepped. Close it, or drop the world."""
 
     EVENTS = ("contact_begin", "contact_end", "impact")
 
@@ -181,19 +181,19 @@ class ContactLog:
         self._handlers.clear()
 
     def count(self, event: str, a: int, b: int) -> int:
-        """How often; event: contact_begin, contact_end or impact."""
+        """The number of events; event: contact_begin, contact_end or impact."""
         return self._counts[event, min(a, b), max(a, b)]
 
     def assert_began(self, a: int, b: int, times: int = 1) -> None:
-        """They began to touch exactly so often."""
+        """They began to touch exactly that many times."""
         self._assert("contact_begin", "began to touch", a, b, times)
 
     def assert_ended(self, a: int, b: int, times: int = 1) -> None:
-        """They ceased to touch exactly so often."""
+        """They ceased to touch exactly that many times."""
         self._assert("contact_end", "ceased to touch", a, b, times)
 
     def assert_struck(self, a: int, b: int, times: int = 1) -> None:
-        """They had exactly so many impacts."""
+        """They had exactly that many impacts."""
         self._assert("impact", "struck each other", a, b, times)
 
     def _assert(self, event: str, verb: str, a: int, b: int, times: int) -> None:
@@ -202,9 +202,9 @@ class ContactLog:
 
 
 def assert_no_overlap(world: World, sizes: float = 0.01) -> None:
-    """No two solid built-in shapes overlap by more than that part of the smaller one, as measured from the geometry.
+    """No two solid built-in shapes overlap by more than that fraction of the smaller one, measured geometrically.
 
-    Pairs that layers keep apart count too; pairs that nothing can move do not.
+    Pairs that layers keep apart are included; pairs of two immovable bodies are not.
     """
     shapes = shapes_of(world)
     solid = shapes.where(~shapes.sensor)
@@ -242,7 +242,7 @@ def _overlap(one: Any, other: Any) -> float:
 
 
 def assert_same_bits(one: World, other: World) -> None:
-    """Equal ids, equal bits of all bodies' columns; says which entity and column differ first."""
+    """Equal ids and equal bits in all columns of bodies; the message names the first entity and column that differ."""
     if one.state_hash() == other.state_hash():
         return
     bodies, others = one.bodies, other.bodies
@@ -264,12 +264,12 @@ def assert_same_bits(one: World, other: World) -> None:
 
 
 def assert_frame_rate_free(build: Callable[[], World], seconds: float = 2.0, rates: Any = (30, 60, 144)) -> None:
-    """Worlds from ``build`` come to the same bits after ``seconds``, whatever frames they are advanced by."""
+    """Worlds from ``build`` reach the same bits after ``seconds`` at any frame rate."""
     worlds = []
     for rate in rates:
         world = build()
         steps = round(seconds / world.settings.dt)
-        most = int(1 / rate / world.settings.dt) + 2  # that one frame may take
+        most = int(1 / rate / world.settings.dt) + 2  # steps of one frame
         while world.step_count + most <= steps:
             world.advance(1 / rate)
         while world.step_count < steps:

@@ -1,6 +1,6 @@
-"""What must come out, in closed form: flight, falls, bounces, collisions, sliding, springs, orbits.
+"""Expected results in closed form: flight, falls, bounces, collisions, sliding, springs, orbits.
 
-Numbers or arrays (d,) alike where a vector makes sense; metres, seconds, kilograms.
+Arguments may be numbers or arrays (d,) where a vector makes sense; metres, seconds, kilograms.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ def free_flight(seconds: float, position: Any, velocity: Any, acceleration: Any)
 def flight_after(
     steps: int, dt: float, position: Any, velocity: Any, acceleration: Any, integrator: str = "semi_implicit_euler"
 ) -> tuple[Any, Any]:
-    """(position, velocity) that the integrator gives after so many steps of constant acceleration, to rounding.
+    """(position, velocity) of the integrator after that many steps of constant acceleration, up to rounding.
 
-    Both Euler methods miss the parabola by a dt t / 2, explicit Euler behind it, semi-implicit Euler ahead. ValueError
-    for an integrator that is not built in.
+    Both Euler methods differ from the parabola by a dt t / 2: explicit Euler lags, semi-implicit Euler leads.
+    ValueError for an integrator that is not built in.
     """
     if integrator not in LAGS:
         raise ValueError(f"integrator must be one of {', '.join(LAGS)}, got {integrator!r}")
@@ -35,22 +35,22 @@ def flight_after(
 
 
 def fall_time(height: float, gravity: float) -> float:
-    """From rest, s: sqrt(2 h / g)."""
+    """Time of a fall from rest, s: sqrt(2 h / g)."""
     return math.sqrt(2 * height / gravity)
 
 
 def fall_speed(height: float, gravity: float) -> float:
-    """At the end of a fall from rest, and the speed that jumps so high, m/s: sqrt(2 g h)."""
+    """Speed at the end of a fall from rest, or needed to jump that high, m/s: sqrt(2 g h)."""
     return math.sqrt(2 * gravity * height)
 
 
 def bounce_heights(height: float, restitution: float, count: int) -> Any:
-    """(count,) m: the highest points after the first bounces, h e^(2k)."""
+    """(count,) m: the apex after each of the first bounces, h e^(2k)."""
     return height * float(restitution) ** (2 * np.arange(1, count + 1))
 
 
 def bounce_times(height: float, gravity: float, restitution: float, count: int) -> Any:
-    """(count,) s: when a ball dropped from rest strikes the floor. For e < 1 they gather at t1 (1 + e) / (1 - e)."""
+    """(count,) s: when a ball dropped from rest hits the floor. For e < 1 the limit is t1 (1 + e) / (1 - e)."""
     flights = 2 * float(restitution) ** np.arange(count)
     flights[:1] = 1.0
     return fall_time(height, gravity) * np.cumsum(flights)
@@ -59,9 +59,9 @@ def bounce_times(height: float, gravity: float, restitution: float, count: int) 
 def collide(
     mass_a: float, velocity_a: Any, mass_b: float, velocity_b: Any, restitution: float = 1.0, normal: Any = 1.0
 ) -> tuple[Any, Any]:
-    """Velocities after two bodies have struck each other without friction.
+    """Velocities of two bodies after an impact without friction.
 
-    normal: the unit vector from a to b; 1 on a line. mass_b may be infinite: a wall.
+    normal: the unit vector from a to b; 1 in one dimension. mass_b may be infinite: a wall.
     """
     va, vb, n = (np.asarray(value, float) for value in (velocity_a, velocity_b, normal))
     share_a = 1.0 if math.isinf(mass_b) else mass_b / (mass_a + mass_b)
@@ -70,7 +70,7 @@ def collide(
 
 
 def impact_time(position_a: Any, velocity_a: Any, position_b: Any, velocity_b: Any, distance: float) -> float:
-    """When two spheres in straight flight come within ``distance`` of centres, the sum of radii, s; inf for never."""
+    """When two spheres in straight flight reach ``distance`` between centres, the sum of radii, s; inf if never."""
     d = np.atleast_1d(np.subtract(position_b, position_a).astype(float))
     w = np.atleast_1d(np.subtract(velocity_b, velocity_a).astype(float))
     closing, fast, room = -float(d @ w), float(w @ w), float(d @ d) - distance**2
@@ -81,17 +81,17 @@ def impact_time(position_a: Any, velocity_a: Any, position_b: Any, velocity_b: A
 
 
 def sliding_distance(speed: float, friction: float, gravity: float) -> float:
-    """Until a body that slides on level ground stops, m: v^2 / (2 mu g)."""
+    """Distance in which a body sliding on level ground stops, m: v^2 / (2 mu g)."""
     return speed**2 / (2 * friction * gravity)
 
 
 def sliding_time(speed: float, friction: float, gravity: float) -> float:
-    """Until it stops, s: v / (mu g)."""
+    """Time in which it stops, s: v / (mu g)."""
     return speed / (friction * gravity)
 
 
 def spring(seconds: float, stiffness: float, mass: float, position: Any, velocity: Any = 0.0) -> tuple[Any, Any]:
-    """(position, velocity) relative to the resting place, without drag; the period is 2 pi sqrt(m / k)."""
+    """(position, velocity) relative to the rest position, without drag; the period is 2 pi sqrt(m / k)."""
     rate = math.sqrt(stiffness / mass)
     x, v = np.asarray(position, float), np.asarray(velocity, float)
     c, s = math.cos(rate * seconds), math.sin(rate * seconds)
@@ -99,7 +99,7 @@ def spring(seconds: float, stiffness: float, mass: float, position: Any, velocit
 
 
 def orbit_speed(strength: float, radius: float) -> float:
-    """On a circle under the attraction strength / r^2, m/s: sqrt(strength / r); the period is 2 pi r over it."""
+    """Speed on a circle under the attraction strength / r^2, m/s: sqrt(strength / r); the period is 2 pi r / speed."""
     return math.sqrt(strength / radius)
 
 

@@ -1,4 +1,4 @@
-"""Small worlds for tests: bodies placed in a line each, and steps until something holds."""
+"""Small worlds for tests: bodies placed by one call each, and steps until a condition holds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def make_world(dimensions: int = 2, gravity: Any = 0.0, **settings: Any) -> Worl
 
 
 def _place(world: World, value: Any) -> tuple[float, ...]:
-    """A number stands for a place on the first axis."""
+    """Expand a number to a position on the first axis."""
     return tuple(value) if np.ndim(value) else (float(value), *(0.0,) * ((world.dimensions or 2) - 1))
 
 
@@ -35,7 +35,7 @@ def ball(
     world: World, position: Any, velocity: Any = 0.0, *, radius: float = 0.5, mass: float = 1.0, kind: Any = "dynamic",
     **collider: Any,
 ) -> int:  # fmt: skip
-    """A ball; its entity. position, velocity: (d,), or a number on the first axis; collider: restitution..."""
+    """Create a ball; returns its entity. position, velocity: (d,), or a number on the first axis; collider: fields."""
     body = RigidBody(mass, _place(world, velocity), kind=kind)
     return world.create_entity(Transform(_place(world, position)), body, SphereCollider(radius, **collider))
 
@@ -44,30 +44,30 @@ def box(
     world: World, position: Any, velocity: Any = 0.0, *, half: Any = 0.5, mass: float = 1.0, kind: Any = "dynamic",
     rotation: Any = 0.0, **collider: Any,
 ) -> int:  # fmt: skip
-    """A box; its entity. half: half extents, (d,) or one number for all axes; else as :func:`ball`."""
+    """Create a box; returns its entity. half: half extents, (d,) or one number for all axes; else as :func:`ball`."""
     half = tuple(half) if np.ndim(half) else (half,) * (world.dimensions or 2)
     body = RigidBody(mass, _place(world, velocity), kind=kind)
     return world.create_entity(Transform(_place(world, position), rotation), body, AABBCollider(half, **collider))
 
 
 def floor(world: World, restitution: float = 0.0, **collider: Any) -> int:
-    """A static box, 2 km wide, whose upper side is y = 0; its entity."""
+    """Create a static box, 2 km wide, with its top at y = 0; returns its entity."""
     half, centre = FLOOR_HALF[: world.dimensions], (0.0, -0.5, 0.0)[: world.dimensions]
     return world.create_entity(Transform(centre), AABBCollider(half, restitution=restitution, **collider))
 
 
 def position(world: World, entity: int) -> Floats:
-    """A copy, (d,) m; KeyError if the entity is no body."""
+    """A copy, (d,) m; KeyError if the entity is not a body."""
     return np.array(world.bodies.position[world.bodies.row_of(entity)])
 
 
 def velocity(world: World, entity: int) -> Floats:
-    """A copy, (d,) m/s; KeyError if the entity is no body."""
+    """A copy, (d,) m/s; KeyError if the entity is not a body."""
     return np.array(world.bodies.linear_velocity[world.bodies.row_of(entity)])
 
 
 def run(world: World, steps: int, *checks: Check) -> None:
-    """That many steps; each check, such as ``Conserved(world).check``, is called after every one."""
+    """Take that many steps; each check, such as ``Conserved(world).check``, is called after every step."""
     for _ in range(steps):
         world.step()
         for check in checks:
@@ -86,7 +86,7 @@ def run_until(world: World, condition: Callable[[], bool], seconds: float = 10.0
 
 
 def create_in_order(world: World, bodies: Sequence[Sequence[Any]], order: Sequence[int]) -> list[int]:
-    """Create one entity per list of components, ids as they stand, but give them their components in another order.
+    """Create one entity per list of components, with ids in sequence, but add the components in another order.
 
     order: a permutation of range(len(bodies)). Equal ids mean equal bits, whatever the order.
     """

@@ -1,4 +1,4 @@
-"""What the oracle of the step knows of bodies: their shapes, their motion within a step, and how two of them meet."""
+"""The oracle's bodies: their shapes, their motion within a step, and contact geometry of two bodies."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ....components import AABBCollider, Collider, RigidBody, SphereCollider, Tr
 from ....framework import Settings, World
 from ...measure.body_shapes import Floats, rotation_matrix
 
-FLAT = 0.005  # of the smaller body: what counts as nothing, unless the settings give a number
+FLAT = 0.005  # default slop, as a fraction of the smaller body's size
 FAST = 0.2  # of the smaller body's size: pairs that travel farther in a step are swept
 
 
 @dataclass(eq=False)
 class Body:
-    """One body. The second half is about the step that is being taken."""
+    """One body. The second group of fields belongs to the current step."""
 
     entity: int
     kind: str
@@ -38,18 +38,18 @@ class Body:
     mask: int
     ccd: bool
 
-    start: Floats = field(init=False)  # where the step began
-    seems_from: Floats = field(init=False)  # where its motion since the last blow leads back to
-    first_velocity: Floats = field(init=False)  # at the start of the step, with the blows since
+    start: Floats = field(init=False)  # position at the start of the step
+    seems_from: Floats = field(init=False)  # the present path extrapolated back to the start of the step
+    first_velocity: Floats = field(init=False)  # velocity at the start of the step plus the impacts since
     path: tuple[Floats, Floats] = field(init=False)  # x(t) = seems_from + path[0] t + path[1] t^2
-    gained: float = field(init=False, default=0.0)  # speed that forces gave it in free flight
-    support: Floats | None = field(init=False, default=None)  # velocity that those below it are expected to give
-    struck: int = field(init=False, default=0)
-    spent: int = field(init=False, default=0)  # of these, the impacts that the cap counts
-    last: float = field(init=False, default=-math.inf)  # the time of the latest
-    cluster: Cluster = field(init=False)  # what it sticks together with
-    stopped: bool = field(init=False, default=False)  # beyond the cap: it stands still until the step ends
-    aside: bool = field(init=False, default=False)  # stopped, or thrown from afar: no contact at rest holds it
+    gained: float = field(init=False, default=0.0)  # change of speed by forces in free flight
+    resting_prediction: Floats | None = field(init=False, default=None)  # velocity change by contacts at rest
+    impact_count: int = field(init=False, default=0)
+    counted_impacts: int = field(init=False, default=0)  # impacts that count towards the cap
+    last: float = field(init=False, default=-math.inf)  # time of the latest impact
+    cluster: Cluster = field(init=False)  # the bodies it sticks to, and itself
+    stopped: bool = field(init=False, default=False)  # beyond the cap: does not move until the step ends
+    excluded_from_rest: bool = field(init=False, default=False)  # stopped or deflected
 
     @property
     def inverse_mass(self) -> float:
@@ -68,15 +68,15 @@ class Body:
         return self.path[0] + 2.0 * t * self.path[1]
 
     def begin(self) -> None:
-        """A new step."""
+        """Start a new step."""
         self.start = self.seems_from = self.position
         self.first_velocity = self.velocity
-        self.support, self.struck, self.spent = None, 0, 0
+        self.resting_prediction, self.impact_count, self.counted_impacts = None, 0, 0
         self.last, self.cluster = -math.inf, Cluster([self], fixed=self.inverse_mass == 0.0)
-        self.stopped = self.aside = False
+        self.stopped = self.excluded_from_rest = False
 
     def fly(self, dt: float, gravity: Floats, method: str, curved: bool) -> None:
-        """The free flight of one step; ``curved``: whether paths are parabolas."""
+        """The free flight of one step; ``curved``: paths are parabolas."""
         at_rest = np.zeros_like(self.position)
         if self.kind != "dynamic":
             self.path = self.velocity, at_rest
@@ -85,11 +85,11 @@ class Body:
         force = self.mass * self.gravity_scale * gravity + self.constant_force
         acceleration, c = force / self.mass, self.damping
         decay, gain, second = 1.0, dt, 0.5 * dt * dt
-        if c:  # speed decays as e^(-c t) while the force acts
+        if c:  # the velocity decays as e^(-c t) while the force acts
             decay, gain = math.exp(-c * dt), -math.expm1(-c * dt) / c
             second = (dt - gain) / c
         before, after = self.velocity, decay * self.velocity + gain * acceleration
-        if method == "flight":  # damping acts at once, half of it before the flight and half of it after
+        if method == "flight":  # half of the damping is applied before the flight and half after it
             half = math.exp(-0.5 * c * dt)
             self.path = half * before, 0.5 * acceleration
             travel = self.path[0] * dt + self.path[1] * dt * dt
@@ -107,7 +107,7 @@ class Body:
 
 @dataclass(eq=False)
 class Cluster:
-    """Bodies that stick together until the step ends; ``fixed``: to something that cannot be moved, too."""
+    """Bodies that stick together until the step ends; ``fixed``: they also stick to an immovable body."""
 
     members: list[Body]
     fixed: bool
@@ -119,18 +119,18 @@ class Cluster:
 
 @dataclass(eq=False)
 class Pair:
-    """Two bodies that may meet in this step, a's entity id the smaller."""
+    """Two bodies that may meet in this step; a has the smaller entity id."""
 
     a: Body
     b: Body
-    pushes: bool = False  # not a sensor, and somebody can move
-    depth: float = 0.0  # of the overlap where free flight leads
-    near: bool = False  # touches there, or all but does
-    involved: bool = False  # bounced or rests
+    pushes: bool = False  # both solid, at least one movable
+    depth: float = 0.0  # of the overlap after free flight
+    near: bool = False  # touches after free flight, or is within the margin
+    has_contact: bool = False  # had an impact or is a contact at rest
     impulse: float = 0.0  # N s, of this step
     normal: Floats | None = None
-    crossed: bool = False  # met on the way, but does not push
-    doubtful: bool = False  # a number of rounding's size has decided whether they meet
+    crossed: bool = False  # met during the step without a collision response
+    doubtful: bool = False  # whether they meet was decided by a number of the size of rounding
 
     @property
     def bodies(self) -> tuple[Body, Body]:
@@ -147,7 +147,7 @@ class Pair:
 
     @property
     def size(self) -> float:
-        """Of the smaller body; a point takes that of the other."""
+        """Size of the smaller body; if that is a point, of the other one."""
         small, large = sorted((self.a.size, self.b.size))
         return small or large
 
@@ -156,19 +156,19 @@ class Pair:
         return max(self.a.gained, self.b.gained)
 
     def slop(self, settings: Settings) -> float:
-        """Metres that are nothing to these two."""
+        """Allowed overlap, m."""
         return FLAT * self.size if settings.slop is None else settings.slop
 
     def margin(self, settings: Settings) -> float:
-        """How near they are held: the slop and twice the way that forces make in a step from rest."""
+        """Distance within which they are contacts at rest: the slop plus twice the travel from rest in a step."""
         return self.slop(settings) + 2.0 * self.gained * settings.dt
 
     def edge(self, settings: Settings) -> float:
-        """How deep what slides may have sunk in: where swept, what is behind so low an edge does not stop it."""
+        """Height of edges that a sliding body passes over when swept."""
         return min(self.margin(settings), FAST * self.size)
 
     def threshold(self, settings: Settings) -> float:
-        """Approach, m/s, from which they bounce."""
+        """Approach speed, m/s, above which they bounce."""
         fixed = settings.restitution_threshold
         return 2.0 * self.gained if fixed is None else fixed
 
@@ -176,17 +176,17 @@ class Pair:
         return mixed(settings.restitution_mixing, self.a.restitution, self.b.restitution)
 
     def friction(self, settings: Settings) -> float:
-        """Who has none of his own takes the partner's."""
+        """The mixed coefficient; None: use the other body's coefficient."""
         values = [body.friction for body in self.bodies if body.friction is not None]
         return mixed(settings.friction_mixing, values[0], values[-1]) if values else 0.0
 
     def between(self, at_a: Floats, at_b: Floats) -> Floats:
-        """From the centre of a's shape to that of b's, if the bodies are at these places."""
+        """From the centre of a's shape to that of b's, for these body positions."""
         return (at_b + self.b.offset) - (at_a + self.a.offset)
 
 
 def mixed(rule: str, one: float, other: float) -> float:
-    """The contact's value from those of its two bodies."""
+    """The contact's coefficient from those of its two bodies."""
     if rule == "max":
         return max(one, other)
     if rule == "min":
@@ -201,8 +201,8 @@ def mixed(rule: str, one: float, other: float) -> float:
 
 @dataclass(frozen=True)
 class Touch:
-    """How deep two shapes overlap (negative: how far they are apart), the unit normal from a to b, and the point of
-    contact seen from a's centre."""
+    """Depth of the overlap (negative: distance), the unit normal from a to b, and the contact point relative to a's
+    centre."""
 
     depth: float
     normal: Floats
@@ -210,7 +210,7 @@ class Touch:
 
 
 def touch(a: Body, b: Body, d: Floats) -> Touch:
-    """The two shapes, b's centre being ``d`` from a's."""
+    """Contact geometry of the two shapes; b's centre is at ``d`` from a's."""
     if a.is_sphere and b.is_sphere:
         distance = float(np.linalg.norm(d))
         depth = a.radius + b.radius - distance
@@ -221,21 +221,21 @@ def touch(a: Body, b: Body, d: Floats) -> Touch:
     if b.is_sphere:
         seen = _sphere_and_box(b, a, -d)
         return Touch(seen.depth, -seen.normal, seen.point + d)
-    overlap = a.half + b.half - np.abs(d)  # along each axis; where it is least they part
+    overlap = a.half + b.half - np.abs(d)  # along each axis; the smallest gives the normal
     axis = int(overlap.argmin())
     shared = np.maximum(-a.half, d - b.half) + np.minimum(a.half, d + b.half)
     return Touch(float(overlap[axis]), _unit(d, axis, 1.0 if d[axis] >= 0.0 else -1.0), 0.5 * shared)
 
 
 def _sphere_and_box(sphere: Body, box: Body, d: Floats) -> Touch:
-    nearest = np.clip(0.0, d - box.half, d + box.half)  # point of the box, seen from the sphere's centre
+    nearest = np.clip(0.0, d - box.half, d + box.half)  # point of the box, relative to the sphere's centre
     distance = float(np.linalg.norm(nearest))
     if distance > 0.0:
         return Touch(sphere.radius - distance, nearest / distance, nearest)
-    room = box.half - np.abs(d)  # the centre is inside: out through the nearest face
-    axis = int(room.argmin())
+    inside = box.half - np.abs(d)  # the centre is inside: the nearest face gives the normal
+    axis = int(inside.argmin())
     normal = _unit(d, axis, 1.0 if d[axis] >= 0.0 else -1.0)
-    return Touch(sphere.radius + float(room[axis]), normal, -float(room[axis]) * normal)
+    return Touch(sphere.radius + float(inside[axis]), normal, -float(inside[axis]) * normal)
 
 
 def _unit(like: Floats, axis: int, sign: float) -> Floats:
@@ -244,8 +244,8 @@ def _unit(like: Floats, axis: int, sign: float) -> Floats:
     return vector
 
 
-def only_corners(a: Body, b: Body, d: Floats, slop: float) -> bool:
-    """Whether two boxes share less than ``slop`` along more than one axis: tiles must not catch each other."""
+def is_corner_touch(a: Body, b: Body, d: Floats, slop: float) -> bool:
+    """True if two boxes overlap by less than ``slop`` along more than one axis: such touches of tiles are ignored."""
     if a.is_sphere or b.is_sphere:
         return False
     return int((a.half + b.half - np.abs(d) < slop).sum()) > 1
@@ -255,7 +255,7 @@ def only_corners(a: Body, b: Body, d: Floats, slop: float) -> bool:
 
 
 def bodies_of(world: World) -> list[Body]:
-    """Copies of all bodies with a collider, by entity id; ValueError for what the oracle does not know."""
+    """Copies of all bodies with a collider, by entity id; ValueError for unsupported features."""
     return [_body(world, entity) for entity in sorted(np.asarray(world.bodies.entity).tolist())]
 
 

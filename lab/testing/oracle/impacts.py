@@ -1,7 +1,7 @@
-"""The oracle's impacts: bounces at their time on the path, in the order of time, and a new look after each.
+"""The oracle's impacts: bounces at their time on the path, in order of time, with new predictions after each.
 
-A blow at time t changes a body's velocity by dv. It goes on as if it had travelled with dv all along and had come from
-dv t behind, so that its path stays one polynomial.
+An impact at time t changes a body's velocity by dv. The path is extended backwards as if the body had travelled with
+dv since the start of the step, from a start shifted by -dv t, so that it stays one polynomial.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ import numpy as np
 
 from ....framework import Settings
 from ...measure.body_shapes import Floats
-from .bodies import FAST, Body, Cluster, Pair, Touch, only_corners, touch
+from .bodies import FAST, Body, Cluster, Pair, Touch, is_corner_touch, touch
 from .sweeps import ROUNDING, Meeting, Way, is_swept, slides_over, sweep, way_of
 
-HALVINGS = 60  # of a step: below the rounding of its time
-QUICK = 1e-3  # of the step: what has lost energy and is struck again so soon goes on like that
-STUCK = 1 << 30  # impacts that no cap allows: whoever has stuck once goes on to stick
+HALVINGS = 60  # of a step: more than its time resolution
+QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
+STUCK = 1 << 30  # exceeds any cap on impacts: a body that has stuck once continues to stick
 
 
 @dataclass(frozen=True, eq=False)
 class Impact:
-    """A bounce that lies ahead. ``slide``: the change of sliding speed that friction brings, (d,).
+    """A predicted bounce. ``slide``: the change of the sliding velocity by friction, (d,).
 
-    kind: bounce; free, if no cap counts it; stick and stop, beyond the cap; cross, of what does not push
+    kind: bounce; free, if the cap does not count it; stick and stop, beyond the cap; cross, of a pair without response
     """
 
     pair: Pair
     time: float
-    speed: float  # that the bounce changes: (1 + e) times the approach
+    speed: float  # change of the normal velocity: (1 + e) times the approach
     normal: Floats
     slide: Floats
-    struck: tuple[int, int]  # how often its two bodies had been struck when this was foreseen
+    impact_counts: tuple[int, int]  # impact counts of its two bodies at the time of prediction
     kind: str
     impulse: float = field(init=False)  # N s, along the normal
 
@@ -47,24 +47,24 @@ class Impact:
 
     @property
     def stale(self) -> bool:
-        return self.struck != (self.pair.a.struck, self.pair.b.struck)
+        return self.impact_counts != (self.pair.a.impact_count, self.pair.b.impact_count)
 
 
 class Impacts:
-    """Lets bounce what bounces. sweeping: some pairs are looked at on their whole way, and what crosses is noted."""
+    """Resolves the impacts of a step. sweeping: some pairs are swept along their paths, and crossings are recorded."""
 
     def __init__(self, pairs: Sequence[Pair], settings: Settings, curved: bool, sweeping: bool) -> None:
-        self.done: list[Impact] = []  # the bounces, in order
-        self.capped = 0  # what the cap has kept from bouncing
+        self.done: list[Impact] = []  # in order of time
+        self.capped = 0  # impacts suppressed by the cap
         self._pairs, self._settings, self._curved, self._sweeping = pairs, settings, curved, sweeping
         self._queue: list[tuple[float, int, int, int, Impact]] = []
         self._number = itertools.count()
 
     def run(self) -> None:
-        """First those that may have met in the prediction."""
+        """Resolve all impacts in order of time."""
 
         def may_have_met(p: Pair) -> bool:
-            return self._sweeping or p.near or p.a.support is not None or p.b.support is not None
+            return self._sweeping or p.near or p.a.resting_prediction is not None or p.b.resting_prediction is not None
 
         self._look([p for p in self._pairs if may_have_met(p)], 0.0)
         while self._queue:
@@ -77,7 +77,7 @@ class Impacts:
             moved = [body for body in impact.pair.bodies if body.inverse_mass > 0.0]
             if impact.kind == "stop":
                 self.capped += 1
-                impact.pair.crossed = impact.pair.involved = True
+                impact.pair.crossed = impact.pair.has_contact = True
                 for body in moved:
                     if not body.stopped:
                         _stop(body, impact.time)
@@ -90,7 +90,7 @@ class Impacts:
                 self.done.append(impact)
             self._look([p for p in self._pairs if p.a in moved or p.b in moved], impact.time)
         for body in {body: None for pair in self._pairs for body in pair.bodies}:
-            body.aside = body.stopped or (self._sweeping and body.struck > 0 and _is_thrown(body))
+            body.excluded_from_rest = body.stopped or (self._sweeping and body.impact_count > 0 and _is_deflected(body))
 
     def _look(self, chosen: Sequence[Pair], since: float) -> None:
         for pair in chosen:
@@ -99,7 +99,8 @@ class Impacts:
                 heapq.heappush(self._queue, (impact.time, *pair.key, next(self._number), impact))
 
     def _foresee(self, pair: Pair, since: float) -> Impact | None:
-        """The pair's next impact: a touch, and an approach above the threshold; without restitution if swept only."""
+        """The pair's next impact: a touch with approach above the threshold; below it, without restitution, if
+        swept."""
         a, b, settings, dt = pair.a, pair.b, self._settings, self._settings.dt
         e, way = pair.restitution(settings), way_of(pair)
         swept = self._sweeping and is_swept(pair, way, settings)
@@ -115,12 +116,12 @@ class Impacts:
             if met is None:
                 return None
             swept = False
-            if only_corners(a, b, met.apart, pair.slop(settings)):  # from one thing onto the next
+            if is_corner_touch(a, b, met.apart, pair.slop(settings)):  # use the normal at the end of the step
                 met = replace(met, touch=last)
         normal = met.touch.normal
         time, approach = met.time, way.velocity(met.time)
         speed = float(np.linalg.norm(approach))
-        if not met.apart.any() and speed > 0.0:  # no direction between the centres: they part the way they came
+        if not met.apart.any() and speed > 0.0:  # coincident centres give no normal: use the direction of approach
             if pair.impulse > 0.0:
                 return None
             normal = -approach / speed
@@ -129,52 +130,52 @@ class Impacts:
             nothing = ROUNDING * sum(float(np.linalg.norm(body.path[0])) for body in pair.bodies)
         gain, left = 0.0, dt - time
         if not along < -pair.threshold(settings) - nothing and pair.pushes:
-            # Too slow to bounce, but what is fast must not end far past the surface: it goes there and stays.
+            # Too slow to bounce, but a fast body must not end far behind the surface: inelastic impact.
             curve = float(way.bend @ normal)
             fast = swept and way.length(left) > FAST * pair.size
             if not (fast and -(along + curve * left) * left > pair.slop(settings)):
                 return None
             e, gain = 0.0, max(0.0, -curve * left)
-        supported = a.support is not None or b.support is not None
+        supported = a.resting_prediction is not None or b.resting_prediction is not None
         if swept and pair.pushes and supported and slides_over(pair, way, met, normal, settings):
             return None
-        if not self._curved and e != 1.0:  # a straight path has the true speed in its middle only
+        if not self._curved and e != 1.0:  # a straight path has the true velocity only in its middle
             bend = (b.velocity - b.first_velocity) - (a.velocity - a.first_velocity)
             along = min(0.0, along + float(bend @ normal) * (time / dt - 0.5))
             if self._sweeping and pair.pushes and not along < -nothing:
-                return None  # the flight does not have it
+                return None  # no approach at the true velocity
         kind = self._kind(pair, e, time, along, way)
         if kind is None:
             self.capped += 1
             return None
         if kind == "stick":
-            return Impact(pair, time, -along, normal, np.zeros_like(normal), (a.struck, b.struck), kind)
+            return Impact(pair, time, -along, normal, np.zeros_like(normal), (a.impact_count, b.impact_count), kind)
         slide = np.zeros_like(normal)
         sliding = approach - normal * float(approach @ normal)
         fast, mu = float(np.linalg.norm(sliding)), pair.friction(settings)
         if mu > 0.0 and fast > 0.0:  # Coulomb: at most mu times the normal impulse
             slide = -sliding * min(1.0, -mu * (1.0 + e) * along / fast)
-        return Impact(pair, time, gain - (1.0 + e) * along, normal, slide, (a.struck, b.struck), kind)
+        return Impact(pair, time, gain - (1.0 + e) * along, normal, slide, (a.impact_count, b.impact_count), kind)
 
     def _strike(self, impact: Impact) -> None:
-        """Both bodies get their impulse at the time of impact and make the rest of the step with new velocities."""
+        """Apply the impulse to both bodies at the time of impact; they continue with new velocities."""
         pair = impact.pair
         change = pair.mass * (impact.speed * impact.normal + impact.slide)
         for body, sign in ((pair.a, -1.0), (pair.b, 1.0)):
             if body.inverse_mass > 0.0:
                 self._push(body, sign * body.inverse_mass * change, impact.time)
-                body.spent += impact.kind == "bounce"
+                body.counted_impacts += impact.kind == "bounce"
         _note(impact)
 
     def _stick(self, impact: Impact) -> list[Body]:
-        """A plastic impact of two clusters, which are one from then on; who is in it."""
+        """An inelastic impact of two clusters, which are merged; returns the movable members."""
         one, two = impact.pair.a.cluster, impact.pair.b.cluster
         for cluster, sign in ((one, -1.0), (two, 1.0)):
             dv = sign * cluster.inverse_mass * impact.impulse * impact.normal
             for body in cluster.members:
                 if body.inverse_mass > 0.0:
                     self._push(body, dv, impact.time)
-                    body.spent |= STUCK
+                    body.counted_impacts |= STUCK
         _note(impact)
         members = [body for body in (*one.members, *two.members) if body.inverse_mass > 0.0]
         grown = Cluster(members, one.fixed or two.fixed)
@@ -183,11 +184,11 @@ class Impacts:
         return members
 
     def _push(self, body: Body, dv: Floats, time: float) -> None:
-        """Damping acts on what a blow gives: in the last half kick; all the time; not at all where a straight path has
-        the velocity of the step's end already."""
+        """Change a body's velocity at ``time``. The damping after it depends on the flight: half of dt if event-driven;
+        the rest of the step on parabolas; none on straight paths, which have the end velocity."""
         dt = self._settings.dt
         fading = 0.5 * dt if self._settings.collision == "event_driven" else dt - time if self._curved else 0.0
-        body.struck, body.last = body.struck + 1, time
+        body.impact_count, body.last = body.impact_count + 1, time
         body.first_velocity = body.first_velocity + dv
         body.velocity = body.velocity + dv * math.exp(-body.damping * fading)
         body.position = body.position + dv * (dt - time)
@@ -195,17 +196,17 @@ class Impacts:
         body.path = body.path[0] + dv, body.path[1]
 
     def _kind(self, pair: Pair, e: float, time: float, along: float, way: Way) -> str | None:
-        """None for what is left to the contacts at rest, being beyond the cap, and too slow to get past them."""
+        """The kind of an impact; None if it is beyond the cap and too slow to tunnel: contacts at rest handle it."""
         if not pair.pushes:
             return "cross"
         a, b, left = pair.a, pair.b, self._settings.dt - time
         since = time - max(a.last, b.last)
         events = self._settings.collision == "event_driven" and self._sweeping
-        if not any(body.stopped or body.spent >= self._settings.impact_cap for body in pair.bodies):
+        if not any(body.stopped or body.counted_impacts >= self._settings.impact_cap for body in pair.bodies):
             driven = any(body.inverse_mass == 0.0 and body.path[0].any() for body in pair.bodies)
             return "free" if events and e == 1.0 and not driven and since > 0.0 else "bounce"
         moves = any(body.inverse_mass > 0.0 and not body.stopped for body in pair.bodies)
-        fast = way.length(left) > FAST * pair.size or any(map(_is_thrown, pair.bodies))
+        fast = way.length(left) > FAST * pair.size or any(map(_is_deflected, pair.bodies))
         if not (self._sweeping and moves and fast and -along * left > pair.slop(self._settings)):
             return None
         ends_up = e <= 0.0 or (e < 1.0 and since <= QUICK * self._settings.dt) or (events and since <= 0.0)
@@ -214,8 +215,8 @@ class Impacts:
 
 
 def _overlap(pair: Pair, since: float, settings: Settings) -> tuple[Meeting | None, Touch]:
-    """Of those that overlap at the end of the step: when they begin to, ``since`` if they do then already; and how
-    they touch at the end."""
+    """For a pair that overlaps at the end of the step: when the overlap begins, ``since`` if it exists then; and the
+    contact geometry at the end."""
     a, b, dt = pair.a, pair.b, settings.dt
 
     def at(time: float) -> tuple[float, Floats, Touch]:
@@ -224,7 +225,7 @@ def _overlap(pair: Pair, since: float, settings: Settings) -> tuple[Meeting | No
 
     found = at(dt)
     _, apart, last = found
-    if last.depth < 0.0 or only_corners(a, b, apart, pair.slop(settings)):
+    if last.depth < 0.0 or is_corner_touch(a, b, apart, pair.slop(settings)):
         return None, last
     early = at(since)
     if early[-1].depth >= 0.0:
@@ -241,20 +242,20 @@ def _overlap(pair: Pair, since: float, settings: Settings) -> tuple[Meeting | No
     return Meeting(time, met, apart), last
 
 
-def _is_thrown(body: Body) -> bool:
-    """Whether blows have changed its way so much that it seems to come from far off its start."""
+def _is_deflected(body: Body) -> bool:
+    """True if impacts have moved the extrapolated start of its path far from its true start."""
     return float(np.linalg.norm(body.seems_from - body.start)) > FAST * body.size
 
 
 def _note(impact: Impact) -> None:
     pair = impact.pair
     pair.impulse += impact.impulse
-    pair.normal, pair.involved = impact.normal, True
+    pair.normal, pair.has_contact = impact.normal, True
 
 
 def _stop(body: Body, time: float) -> None:
-    """It stays there until the step ends, whatever sticks to it, and keeps its velocity."""
-    body.stopped, body.struck, body.cluster.fixed = True, body.struck + 1, True
+    """Stop the body, and what sticks to it, until the step ends; it keeps its velocity."""
+    body.stopped, body.impact_count, body.cluster.fixed = True, body.impact_count + 1, True
     body.velocity = body.velocity_at(time)
     body.position = body.seems_from = body.at(time)
     body.path = np.zeros_like(body.velocity), np.zeros_like(body.velocity)

@@ -1,4 +1,4 @@
-"""The oracle's contacts at rest: which they are, and their geometry at the start of the step."""
+"""The oracle's contacts at rest: their detection, and their geometry at the start of the step."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import numpy as np
 
 from ....framework import Settings
 from ...measure.body_shapes import Floats
-from .bodies import Body, Pair, only_corners, touch
+from .bodies import Body, Pair, is_corner_touch, touch
 
-SEARCHES = 24  # for the place where a pair first touches
-ROUNDING = 1e-12  # of what was subtracted: a number this small may as well be zero
-SAME_PLACE = 1e-9  # of the size: an overlap of rounding errors is none
+SEARCHES = 24  # iterations of the search for the first overlap
+ROUNDING = 1e-12  # relative to the operands: smaller differences may be rounding
+SAME_PLACE = 1e-9  # of the size: smaller overlaps count as none
 
 
 @dataclass(eq=False)
 class Kept:
-    """What a contact at rest leaves for the next step: impulses (N s) of the last substep and of the whole step."""
+    """Warm start data of a contact at rest: impulses (N s) of the last substep and of the whole step."""
 
     normal: Floats
     impulse: float
@@ -29,11 +29,11 @@ class Kept:
 
 @dataclass(eq=False)
 class Resting:
-    """One contact in the solver: its geometry where the step began, and its impulses."""
+    """One contact in the solver: its geometry at the start of the step, and its impulses."""
 
     pair: Pair
     normal: Floats
-    gap: float  # where the step began; overlap is negative
+    gap: float  # at the start of the step; negative: overlap
     parting: bool  # its overlap needs no push
     friction: float
     tangent: Floats
@@ -41,7 +41,7 @@ class Resting:
     total: float = 0.0
     pushed: bool = False
     in_block: bool = False
-    doubtful: bool = False  # a number of rounding's size has decided what happens
+    doubtful: bool = False  # the result was decided by a number of the size of rounding
 
 
 class Moving:
@@ -51,10 +51,10 @@ class Moving:
         self.inverse_mass = body.inverse_mass
         self.velocity = body.first_velocity
         self.shift = self.acceleration = np.zeros_like(body.position)
-        self.held = self.loose = False
+        self.held = self.unsettled = False
         if self.inverse_mass > 0.0:
             self.shift = body.seems_from - body.start
-            support = 0.0 if body.support is None else body.support
+            support = 0.0 if body.resting_prediction is None else body.resting_prediction
             self.acceleration = (body.velocity - body.first_velocity - support) / dt
 
 
@@ -62,9 +62,9 @@ class Moving:
 
 
 def find_resting(pairs: Sequence[Pair], travels: float, settings: Settings) -> list[Resting]:
-    """Pairs nearer than the margin where they are now, but for those that bounce; in canonical order.
+    """Pairs within the margin at their present positions, without those that bounce; in canonical order.
 
-    travels: the way that a supporting force makes in a step, over dt times the velocity it gives.
+    travels: displacement by a constant force in a step, over dt times the velocity change.
     """
     found = [rest for pair in pairs if pair.pushes and (rest := _rests(pair, travels, settings)) is not None]
     return sorted(found, key=lambda rest: rest.pair.key)
@@ -73,8 +73,9 @@ def find_resting(pairs: Sequence[Pair], travels: float, settings: Settings) -> l
 def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     a, b, dt = pair.a, pair.b, settings.dt
     slop, margin, threshold = pair.slop(settings), pair.margin(settings), pair.threshold(settings)
-    struck, carried = a.struck + b.struck > 0, a.support is not None or b.support is not None
-    if a.aside or b.aside:
+    struck = a.impact_count + b.impact_count > 0
+    carried = a.resting_prediction is not None or b.resting_prediction is not None
+    if a.excluded_from_rest or b.excluded_from_rest:
         return None
     if not struck and not carried and pair.depth < -margin:
         return None
@@ -83,8 +84,9 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     if now.depth < -margin:
         if struck or not carried:
             return None
-        # Their supports may push too much in the prediction: do they meet without?
-        free = [x.position - (0.0 if x.support is None else travels * dt * x.support) for x in (a, b)]
+        # The resting prediction may push too much: do they meet without it?
+        places = ((a, a.position), (b, b.position))
+        free = [x if (dv := body.resting_prediction) is None else x - travels * dt * dv for body, x in places]
         now = touch(a, b, pair.between(*free))
         if now.depth < -margin:
             return None
@@ -93,24 +95,24 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
         speed = float((b.velocity - a.velocity) @ now.normal)
         touches = now.depth > (0.0 if bounced else SAME_PLACE * pair.size)
         if not touches and speed < -threshold:
-            return None  # an impact of the next step
+            return None  # will be an impact of the next step
         at_end, parting = speed > 0.0, speed > threshold and speed * dt > slop
         if bounced and speed > threshold and touch(a, b, pair.between(a.start, b.start)).depth < 0.0:
-            return None  # on its way out
-    if only_corners(a, b, apart, slop):
+            return None  # separating
+    if is_corner_touch(a, b, apart, slop):
         return None
-    gap, normal = entry(pair, at_end, slop)
+    gap, normal = first_overlap(pair, at_end, slop)
     if bounced and pair.normal is not None and float(normal @ pair.normal) <= 0.0:
-        normal = pair.normal  # coincident centres have parted: not back again
-    pair.normal, pair.involved = normal, True
+        normal = pair.normal  # coincident centres have separated: keep the direction
+    pair.normal, pair.has_contact = normal, True
     parting = parting or (bounced and gap > 0.0)
     return Resting(pair, normal, gap, parting, pair.friction(settings), np.zeros_like(normal))
 
 
-def entry(pair: Pair, at_end: bool, slop: float) -> tuple[float, Floats]:
-    """Gap where the step began and normal, both taken from the place where the two first touch in the step.
+def first_overlap(pair: Pair, at_end: bool, slop: float) -> tuple[float, Floats]:
+    """Gap at the start of the step, and normal, both for the geometry where the two first overlap in the step.
 
-    That is where the step began if they touch there, and where it ends if they touch nowhere, or if ``at_end``.
+    That is the start of the step if they overlap there, and the end if they never overlap, or if ``at_end``.
     """
     a, b = pair.bodies
     first = pair.between(a.start, b.start)
@@ -119,7 +121,7 @@ def entry(pair: Pair, at_end: bool, slop: float) -> tuple[float, Floats]:
     def look(t: float) -> tuple[float, Floats]:
         d = first + t * travel
         seen = touch(a, b, d)
-        corners = only_corners(a, b, d, slop)
+        corners = is_corner_touch(a, b, d, slop)
         return min(seen.depth, -slop) if corners else seen.depth, seen.normal
 
     def at_start(t: float, depth: float, normal: Floats) -> tuple[float, Floats]:
@@ -134,7 +136,7 @@ def entry(pair: Pair, at_end: bool, slop: float) -> tuple[float, Floats]:
         return at_start(1.0, depth, normal)
     for search in range(1, SEARCHES):
         rate = float(travel @ normal)
-        t = high + depth / rate if rate else math.nan  # where the plane of contact says, now and then the middle
+        t = high + depth / rate if rate else math.nan  # Newton step; bisection now and then
         if not low < t < high or search % 4 == 0:
             t = 0.5 * (low + high)
         depth_there, normal_there = look(t)

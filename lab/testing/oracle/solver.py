@@ -13,39 +13,39 @@ from ...measure.body_shapes import Floats
 from .bodies import Body, Pair
 from .rest import ROUNDING, Kept, Moving, Resting
 
-LIGHT = 10.0  # a body between two that have this many times its mass is squeezed
-SHOCK, SHOCK_PASSES, SHOCK_LEFT = 0.01, 16, 0.02  # of the size per step; at most; of the largest, when to stop
-DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap pushed out in position, part of it, and limit per step
+LIGHT = 10.0  # mass ratio from which a body between two heavier ones is solved in a 2x2 block
+SHOCK, SHOCK_PASSES, SHOCK_LEFT = 0.01, 16, 0.02  # sizes per step; passes at most; fraction of the largest, to stop
+DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap corrected in position, its fraction, limit per step
 
 
 def solve(
     contacts: list[Resting], memory: dict[tuple[int, int], Kept], settings: Settings, plastic: bool
 ) -> dict[Body, Moving]:
-    """Advance the bodies of ``contacts`` (in canonical order) from the start of the step; returns where to.
+    """Advance the bodies of ``contacts`` (in canonical order) from the start of the step; returns their motion.
 
-    memory: the contacts of the step before, by pair; plastic: nothing has bounced in this step. Those of the bodies
-    that no contact has pushed are not ``held``.
+    memory: the contacts of the previous step, by pair; plastic: the step had no bounce. Bodies that no contact has
+    pushed are not ``held``.
     """
     dt, substeps = settings.dt, settings.substeps
     h = dt / substeps
     bodies = {body: Moving(body, dt) for contact in contacts for body in contact.pair.bodies}
     contacts = by_colour(contacts)
-    any_loose = warm_start(contacts, bodies, memory)
+    any_unsettled = warm_start(contacts, bodies, memory)
     blocks = find_blocks(contacts)
     omega = 0.5 * math.pi / h  # a spring of a quarter of the substeps' rate, ten times overdamped
     damping = 20.0 + h * omega
     stiff = h * omega * damping
     soft = omega / damping, stiff / (1.0 + stiff), 1.0 / (1.0 + stiff)
     sweep = Sweep(contacts, blocks, bodies, h, soft)
-    shock = strike(contacts, bodies, dt) if plastic else 0.0
+    shock = detect_shock(contacts, bodies, dt) if plastic else 0.0
     for substep in range(substeps):
         for body in bodies.values():
             body.velocity = body.velocity + h * body.acceleration
         for contact in contacts:
             if contact.impulse > 0.0:
                 sweep.push(contact, contact.tangent + contact.impulse * contact.normal)
-        for _ in range(SHOCK_PASSES if shock else 4 if any_loose and substep == 0 else 0):
-            sweep.over(spread(contacts, bodies), biased=False)
+        for _ in range(SHOCK_PASSES if shock else 4 if any_unsettled and substep == 0 else 0):
+            sweep.over(propagate(contacts, bodies), biased=False)
             if sweep.largest < SHOCK_LEFT * shock:
                 break
         sweep.over(contacts, biased=True)
@@ -68,7 +68,7 @@ def solve(
 
 
 def by_colour(contacts: Sequence[Resting]) -> list[Resting]:
-    """Each contact takes the first colour that no body of its own that can move has had; sorted by colour."""
+    """Give each contact the first colour that its movable bodies have not used; return them sorted by colour."""
     used: dict[Body, set[int]] = {}
     coloured = []
     for contact in contacts:
@@ -82,9 +82,10 @@ def by_colour(contacts: Sequence[Resting]) -> list[Resting]:
 
 
 def warm_start(contacts: Sequence[Resting], bodies: dict[Body, Moving], memory: dict[tuple[int, int], Kept]) -> bool:
-    """Start with the last step's impulses, unless the normal has turned by 60 degrees.
+    """Start with the last step's impulses, unless the normal has turned by more than 60 degrees.
 
-    Bodies of contacts that are there no more are loose: their other contacts push too much. Returns whether any is.
+    Bodies of contacts that no longer exist are unsettled, because their other contacts push too much. Returns True if
+    there are any.
     """
     pairs = {contact.pair.key: contact for contact in contacts}
     by_entity = {body.entity: moving for body, moving in bodies.items()}
@@ -96,12 +97,12 @@ def warm_start(contacts: Sequence[Resting], bodies: dict[Body, Moving], memory: 
             continue
         for entity in key:
             if entity in by_entity:
-                by_entity[entity].loose = True
-    return any(moving.loose for moving in bodies.values())
+                by_entity[entity].unsettled = True
+    return any(moving.unsettled for moving in bodies.values())
 
 
-def strike(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: float) -> float:
-    """The bodies of contacts that close fast are loose; returns the largest such speed, 0 if there is none."""
+def detect_shock(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: float) -> float:
+    """Mark the bodies of fast closing contacts as unsettled; returns the largest such speed, 0 if there is none."""
     largest = 0.0
     for contact in contacts:
         a, b = (bodies[body] for body in contact.pair.bodies)
@@ -109,25 +110,25 @@ def strike(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: float) -
         contact.doubtful |= abs(speed * dt - contact.gap) <= ROUNDING * contact.pair.size
         if speed * dt > max(SHOCK * contact.pair.size, contact.gap):
             largest = max(largest, speed)
-            a.loose = b.loose = True
+            a.unsettled = b.unsettled = True
     return largest
 
 
-def spread(contacts: Sequence[Resting], bodies: dict[Body, Moving]) -> list[Resting]:
-    """The contacts of loose bodies; these make the bodies on their other sides loose for the next time."""
+def propagate(contacts: Sequence[Resting], bodies: dict[Body, Moving]) -> list[Resting]:
+    """The contacts of unsettled bodies; the bodies on their other sides become unsettled for the next pass."""
 
-    def lets_go(body: Body) -> bool:
-        return bodies[body].loose and body.inverse_mass > 0.0
+    def releases(body: Body) -> bool:
+        return bodies[body].unsettled and body.inverse_mass > 0.0
 
-    active = [contact for contact in contacts if any(map(lets_go, contact.pair.bodies))]
+    active = [contact for contact in contacts if any(map(releases, contact.pair.bodies))]
     for contact in active:
         for body in contact.pair.bodies:
-            bodies[body].loose = True
+            bodies[body].unsettled = True
     return active
 
 
 def push_out(contacts: Sequence[Resting], bodies: dict[Body, Moving], substeps: int) -> None:
-    """Move bodies that overlap deeply apart, a part of the way, without giving them speed."""
+    """Separate deeply overlapping bodies by a fraction of the overlap, without changing their velocities."""
     for contact in contacts:
         pair, n = contact.pair, contact.normal
         a, b = bodies[pair.a], bodies[pair.b]
@@ -143,7 +144,7 @@ def push_out(contacts: Sequence[Resting], bodies: dict[Body, Moving], substeps: 
 
 
 def find_blocks(contacts: Sequence[Resting]) -> list[tuple[Resting, Resting]]:
-    """Pairs of contacts that squeeze a light body between two heavy ones, from opposite sides."""
+    """Pairs of contacts on opposite sides of a light body between two heavy ones."""
     blocks = []
     seen: dict[Body, list[Resting]] = {}
     for contact in contacts:
@@ -174,33 +175,33 @@ def _other(body: Body, pair: Pair) -> Body:
 
 
 def outwards(contact: Resting, body: Body) -> Floats:
-    """The contact's normal, away from that body of its two."""
+    """The contact's normal, pointing away from that body."""
     return contact.normal if contact.pair.a is body else -contact.normal
 
 
 @dataclass(eq=False)
 class Sweep:
-    """One pass over contacts, again and again. soft: rate of the bias, factors of the mass and of the impulse."""
+    """Repeated passes over contacts. soft: rate of the bias, factors of the mass and of the impulse."""
 
     contacts: list[Resting]
     blocks: list[tuple[Resting, Resting]]
     bodies: dict[Body, Moving]
     h: float
     soft: tuple[float, float, float]
-    largest: float = 0.0  # change of a relative velocity in the last pass
+    largest: float = 0.0  # largest change of a relative velocity in the last pass
 
     def over(self, chosen: Sequence[Resting], biased: bool) -> None:
-        """Stop the approach of each chosen contact, then what slides; ``biased``: overlap is pushed apart too."""
+        """Solve the normal impulse of each chosen contact, then friction; ``biased``: overlap is corrected too."""
         self.largest = 0.0
         for contact in chosen:
             if not contact.in_block:
                 self._stop(contact, biased)
         for block in self.blocks:
             if block[0] in chosen or block[1] in chosen:
-                self._squeeze(*block, biased)
+                self._solve_block(*block, biased)
         for contact in chosen:
             if contact.friction > 0.0:
-                self._rub(contact)
+                self._solve_friction(contact)
 
     def push(self, contact: Resting, impulse: Floats) -> None:
         """Apply ``impulse`` to b and its opposite to a."""
@@ -213,15 +214,15 @@ class Sweep:
         return b.velocity - a.velocity
 
     def _wrong(self, contact: Resting, biased: bool) -> tuple[float, bool]:
-        """The speed that the contact should lose, and whether softly."""
+        """The velocity error of the contact, and whether it is corrected softly."""
         a, b = (self.bodies[body] for body in contact.pair.bodies)
         speed = float((b.velocity - a.velocity) @ contact.normal)
-        room = contact.gap + float((b.shift - a.shift) @ contact.normal)
-        contact.doubtful |= abs(room) <= ROUNDING * contact.pair.size
-        if room > 0.0:  # it may close within the substep
-            return speed + room / self.h, False
-        if biased and not contact.parting and room >= -DEEP * contact.pair.size:
-            return speed + self.soft[0] * room, True
+        separation = contact.gap + float((b.shift - a.shift) @ contact.normal)
+        contact.doubtful |= abs(separation) <= ROUNDING * contact.pair.size
+        if separation > 0.0:  # apart: it may close within the substep
+            return speed + separation / self.h, False
+        if biased and not contact.parting and separation >= -DEEP * contact.pair.size:
+            return speed + self.soft[0] * separation, True
         return speed, False
 
     def _stop(self, contact: Resting, biased: bool) -> None:
@@ -234,8 +235,8 @@ class Sweep:
         self.largest = max(self.largest, abs(contact.impulse - old) / contact.pair.mass)
         self.push(contact, (contact.impulse - old) * contact.normal)
 
-    def _rub(self, contact: Resting) -> None:
-        """Friction stops what slides, with at most mu times the impulse that presses."""
+    def _solve_friction(self, contact: Resting) -> None:
+        """Friction: reduce the sliding velocity with at most mu times the normal impulse."""
         velocity, n = self._velocity(contact), contact.normal
         pull = contact.tangent - contact.pair.mass * (velocity - n * float(velocity @ n))
         strength, limit = float(np.linalg.norm(pull)), contact.friction * contact.impulse
@@ -244,28 +245,28 @@ class Sweep:
         change, contact.tangent = pull - contact.tangent, pull
         self.push(contact, change)
 
-    def _squeeze(self, one: Resting, two: Resting, biased: bool) -> None:
-        """Both impulses at once, each at least 0 and 0 where its contact opens (linear complementarity)."""
+    def _solve_block(self, one: Resting, two: Resting, biased: bool) -> None:
+        """Solve both impulses together: each is at least 0, and 0 if its contact opens (linear complementarity)."""
         light = one.pair.a if one.pair.a in two.pair.bodies else one.pair.b
         wrong = np.array([self._wrong(contact, biased)[0] for contact in (one, two)])
         w = light.inverse_mass
         ends = [_other(light, c.pair).inverse_mass for c in (one, two)]
         cosine = float(outwards(one, light) @ outwards(two, light))
         old = np.array([one.impulse, two.impulse])
-        # how fast the two speeds change with the two impulses
+        # change of the two velocities per unit of the two impulses
         effect = np.array([[w + ends[0], cosine * w], [cosine * w, w + ends[1]]])
         change = np.linalg.solve(effect, -wrong)
         if (old + change < 0.0).any():
-            change = self._let_go(effect, wrong, old, 1)
-            if wrong[1] + float(effect[1] @ change) < 0.0:  # letting go of the second makes it close
-                change = self._let_go(effect, wrong, old, 0)
+            change = self._release(effect, wrong, old, 1)
+            if wrong[1] + float(effect[1] @ change) < 0.0:  # releasing the second contact makes it close
+                change = self._release(effect, wrong, old, 0)
         for contact, impulse in zip((one, two), change, strict=True):
             contact.impulse += float(impulse)
             self.push(contact, float(impulse) * contact.normal)
 
     @staticmethod
-    def _let_go(effect: Floats, wrong: Floats, old: Floats, gone: int) -> Floats:
-        """Changes of the impulses if that of contact ``gone`` becomes 0 and the other one holds alone."""
+    def _release(effect: Floats, wrong: Floats, old: Floats, gone: int) -> Floats:
+        """Changes of the impulses if that of contact ``gone`` becomes 0 and the other contact holds alone."""
         held, change = 1 - gone, np.empty(2)
         change[gone] = -old[gone]
         change[held] = max(-old[held], -(wrong[held] + effect[held, gone] * change[gone]) / effect[held, held])

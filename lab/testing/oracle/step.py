@@ -1,19 +1,19 @@
 """The whole step in plain Python, for small scenes: an oracle that the compiled systems must agree with.
 
 It is written from the description of the step, not from the kernels: one object per body, one per pair, no tables, no
-compilation, every pair tested. It takes about a millisecond per body and step. What it does, in this order, is what
-docs/collisions.md describes::
+compilation, every pair tested. It takes about a millisecond per body and step. The order of its stages is described in
+docs/collisions.md::
 
-    free flight -> pairs whose motions come near -> what touches there -> supports keep pushing in the prediction
-    -> impacts in order of time -> contacts at rest, solved in substeps -> the contacts as they are then
+    free flight -> pairs whose motions come near -> contacts at the end of flight -> resting prediction
+    -> impacts in order of time -> contacts at rest, solved in substeps -> final contacts
 
-Where bodies are swept along their paths (``Settings.collision``, ``RigidBody.ccd``) every pair is looked at, all the
-way, and again after each impact of one of its bodies.
+If bodies are swept along their paths (``Settings.collision``, ``RigidBody.ccd``), every pair is tested along its whole
+path, and again after each impact of one of its bodies.
 
-It knows spheres and boxes in 2D and 3D, turned or with an offset, one collider per body; gravity, constant forces and
-damping; explicit and semi-implicit Euler and velocity Verlet, and the flight between events; restitution, friction,
+Supported: spheres and boxes in 2D and 3D, turned or with an offset, one collider per body; gravity, constant forces and
+damping; explicit and semi-implicit Euler and velocity Verlet, and event-driven flight; restitution, friction,
 kinematic bodies, sensors, layers.
-It knows no force systems, no systems of the game, no other shapes.
+Not supported: force systems, user systems, other shapes.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from .rest import ROUNDING, Kept, find_resting
 from .solver import solve
 
 INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet")
-CURVED = ("velocity_verlet", "flight")  # paths that are parabolas where something acts
-NEIGHBOURS = 0.1  # of the smallest half extent: how much wider the boxes around the motion are
-SAME_PLACE = 1e-9  # of the size: a gap that is none
+CURVED = ("velocity_verlet", "flight")  # methods whose paths are parabolas under a force
+NEIGHBOURS = 0.1  # of the smallest half extent: enlargement of the boxes around the motion
+SAME_PLACE = 1e-9  # of the size: smaller gaps count as none
 
 
 @dataclass(frozen=True)
 class OracleContact:
-    """A pair that touches at the end of the step or pushed each other in it; the normal points from a to b."""
+    """A pair that touches at the end of the step or had an impulse in it; the normal points from a to b."""
 
     depth: float
     normal: Floats
@@ -47,10 +47,10 @@ class OracleContact:
 
 
 class Oracle:
-    """A copy of a small world as it is between two steps; :meth:`step` goes on from there without any compiled code.
+    """A copy of a small world between two steps; :meth:`step` advances it without any compiled code.
 
     world
-        not changed; its settings and gravity are those of now. ValueError for what the oracle does not know
+        not changed; its present settings and gravity are used. ValueError for unsupported features
     """
 
     def __init__(self, world: World) -> None:
@@ -68,30 +68,30 @@ class Oracle:
         self.contacts: dict[tuple[int, int], OracleContact] = {}
         self.impacts: list[Impact] = []  # of the last step, in order; with pair, time, normal, impulse
         self.capped_impacts = 0  # of the last step
-        self.doubts: list[tuple[int, int]] = []  # pairs about which rounding decided in the last step
+        self.doubts: list[tuple[int, int]] = []  # pairs decided by rounding in the last step
         self._by_entity = {body.entity: body for body in self.bodies}
         self._memory = _memory_of(world, set(self._by_entity))
 
     def position(self, entity: int) -> Floats:
-        """(d,) m; KeyError for an entity that is no body."""
+        """(d,) m; KeyError for an entity that is not a body."""
         return self._by_entity[entity].position
 
     def velocity(self, entity: int) -> Floats:
-        """(d,) m/s; KeyError for an entity that is no body."""
+        """(d,) m/s; KeyError for an entity that is not a body."""
         return self._by_entity[entity].velocity
 
     def run(self, steps: int) -> None:
-        """That many steps."""
+        """Take that many steps."""
         for _ in range(steps):
             self.step()
 
     def step(self) -> None:
-        """One step of ``settings.dt``."""
+        """Take one step of ``settings.dt``."""
         settings, dt = self.settings, self.settings.dt
         moving = [body for body in self.bodies if body.kind != "static"]
         sweeping = settings.collision != "discrete" or any(body.ccd for body in moving)
         curved = self._method in CURVED and self._something_acts()
-        # what a constant force displaces, over dt dv
+        # displacement by a constant force, over dt dv
         travels = 0.5 if curved else 0.0 if self._method == "explicit_euler" else 1.0
         for body in self.bodies:
             body.begin()
@@ -100,7 +100,7 @@ class Oracle:
         for pair in pairs:
             pair.depth = _touch_now(pair).depth
             pair.near = pair.depth >= (-pair.margin(settings) if pair.pushes else 0.0)
-        self._expect_support(travels, curved)
+        self._predict_resting(travels, curved)
         impacts = Impacts(pairs, settings, curved, sweeping)
         impacts.run()
         self.impacts, self.capped_impacts = impacts.done, impacts.capped
@@ -113,7 +113,7 @@ class Oracle:
         return bool(self.gravity.any() or any(body.damping or body.constant_force.any() for body in freely))
 
     def _pairs_that_may_meet(self, sweeping: bool) -> list[Pair]:
-        """Layers that meet, not both static; where nobody is swept the boxes around their motions overlap, too."""
+        """Pairs whose layers meet, not both static; without sweeping, the boxes around their motions must overlap."""
         pairs = []
         for index, a in enumerate(self.bodies):
             for b in self.bodies[index + 1 :]:
@@ -125,8 +125,8 @@ class Oracle:
                     pairs.append(Pair(a, b, pushes=movable and not (a.sensor or b.sensor)))
         return pairs
 
-    def _expect_support(self, travels: float, curved: bool) -> None:
-        """Bodies at rest do not fall: the last step's impulses act again, relaxed once, and never pull."""
+    def _predict_resting(self, travels: float, curved: bool) -> None:
+        """The resting prediction: the last step's impulses act again, relaxed once, and never pull."""
         dt = self.settings.dt
         free = {body: body.velocity for body in self.bodies}
         pushes = []
@@ -139,7 +139,7 @@ class Oracle:
             if parting > 0.0:
                 _kick(pair, -min(kept.total, parting * pair.mass) * kept.normal)
         for body in {body: None for pair, _ in pushes for body in pair.bodies if body.inverse_mass > 0.0}:
-            dv = body.support = body.velocity - free[body]
+            dv = body.resting_prediction = body.velocity - free[body]
             body.position = body.position + travels * dt * dv
             line, curve = body.path
             if curved:
@@ -148,7 +148,7 @@ class Oracle:
                 body.path = line + travels * dv, curve
 
     def _hold_what_rests(self, pairs: Sequence[Pair], travels: float) -> None:
-        """Solve the contacts at rest; who was pushed goes where the solver says, the others fly on freely."""
+        """Solve the contacts at rest; pushed bodies follow the solver, the others keep their free flight."""
         contacts = find_resting(pairs, travels, self.settings)
         in_order = pairwise(self.impacts)
         self.doubts = [two.pair.key for one, two in in_order if two.time - one.time <= ROUNDING * two.time]
@@ -159,10 +159,10 @@ class Oracle:
         for body in self.bodies:
             if body in held:
                 body.position, body.velocity = body.start + solved[body].shift, solved[body].velocity
-            elif body.support is not None:
+            elif body.resting_prediction is not None:
                 if not body.stopped:
-                    body.position = body.position - travels * self.settings.dt * body.support
-                body.velocity = body.velocity - body.support
+                    body.position = body.position - travels * self.settings.dt * body.resting_prediction
+                body.velocity = body.velocity - body.resting_prediction
         self._memory = {
             contact.pair.key: Kept(contact.normal, contact.impulse, contact.tangent, contact.total)
             for contact in contacts
@@ -171,7 +171,7 @@ class Oracle:
 
 
 def _memory_of(world: World, known: set[int]) -> dict[tuple[int, int], Kept]:
-    """What the world's contacts at rest have left for the next step, as impulses of steps as they are now."""
+    """Warm start data of the world's contacts at rest, as impulses for the present step length."""
     memory = world.snapshot().tracking[1]
     dt = world.settings.dt
     whole, part = dt / memory.step, dt / world.settings.substeps / memory.substep
@@ -203,7 +203,7 @@ def _kick(pair: Pair, impulse: Floats) -> None:
 
 
 def _contacts(pairs: Sequence[Pair]) -> dict[tuple[int, int], OracleContact]:
-    """What touches at the end, pushed or crossed; a gap of rounding is none between those that push each other."""
+    """Contacts at the end, pairs with impulse and crossings; solid pairs with a gap of rounding count as touching."""
     found = {}
     for pair in pairs:
         now, pushed = _touch_now(pair), pair.impulse > 0.0
@@ -218,7 +218,7 @@ def assert_agrees(world: World, oracle: Oracle, tolerance: float = 1e-9) -> None
     first difference.
 
     tolerance
-        of the scene's own scales: the step, the largest coordinate, speed and impulse among what moves
+        relative to the scene's scales: the step, the largest coordinate, speed and impulse of moving bodies
     """
     steps = world.step_count, oracle.step_count
     assert steps[0] == steps[1], f"the world is at step {steps[0]}, its oracle at {steps[1]}"

@@ -1,9 +1,9 @@
-"""The oracle's sweeps: where two bodies first touch on their ways through a step, found by looking at many moments.
+"""The oracle's sweeps: the first touch of two bodies on their paths through a step, found by sampling the gap.
 
-Nothing is solved for: the gap between the two is measured with the oracle's plain ``touch``. It changes no faster than
-they move, so a stretch of time in whose middle it is wider than they go from there holds no touch; other stretches are
-halved. Along a straight way the gap of convex shapes is convex in time, and along a parabola it is all but that within
-a small part of the step: there golden sections find where it is least, and halving when it closes.
+No equation is solved: the gap is measured with the oracle's plain ``touch``. It changes no faster than the bodies move,
+so an interval contains no touch if its middle has a larger gap than they can travel from there; other intervals are
+halved. Along a straight path the gap of convex shapes is convex in time; along a parabola it is nearly so within a
+small part of the step. There golden section search finds its minimum, and bisection the time when it closes.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ import numpy as np
 
 from ....framework import Settings
 from ...measure.body_shapes import Floats
-from .bodies import FAST, Pair, Touch, only_corners, touch
+from .bodies import FAST, Pair, Touch, is_corner_touch, touch
 
 ROUNDING = 4e-16  # of a distance
-NEARLY = 1e-9  # of the size: whether so narrow a gap closes is for rounding to say
-PARTS = 64  # of a step, in which a parabola is as good as straight
+NEARLY = 1e-9  # of the size: whether a gap this narrow closes is decided by rounding
+PARTS = 64  # of a step, within which a parabola counts as straight
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SECTIONS, HALVINGS = 90, 70
 
 
 @dataclass(frozen=True)
 class Way:
-    """b's path as a sees it within the step: start + speed t + bend t^2."""
+    """b's path relative to a within the step: start + speed t + bend t^2."""
 
     start: Floats
     speed: Floats
@@ -40,13 +40,13 @@ class Way:
         return self.speed + 2.0 * t * self.bend
 
     def length(self, span: float) -> float:
-        """How far it leads within ``span`` seconds, at most."""
+        """Upper bound of its length within ``span`` seconds."""
         return float(np.linalg.norm(self.speed)) * span + float(np.linalg.norm(self.bend)) * span * span
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """The first touch: when, how, and b's centre from a's. ``at_corner``: what becomes of it is seen at the end."""
+    """The first touch: time, geometry, and b's centre from a's. ``at_corner``: decided by the end of the step."""
 
     time: float
     touch: Touch
@@ -60,7 +60,7 @@ def way_of(pair: Pair) -> Way:
 
 
 def is_swept(pair: Pair, way: Way, settings: Settings) -> bool:
-    """All are if events drive everything; else what is fast, in a discrete world only if one of the two has ccd."""
+    """True if event-driven; else for fast pairs, in a discrete world only if one of the two has ccd."""
     if settings.collision == "event_driven":
         return True
     asked = settings.collision == "continuous" or pair.a.ccd or pair.b.ccd
@@ -75,20 +75,20 @@ def sweep(pair: Pair, way: Way, since: float, settings: Settings) -> Meeting | N
         return None
     apart = way.at(time)
     met = touch(a, b, apart)
-    if not only_corners(a, b, apart, edge):
+    if not is_corner_touch(a, b, apart, edge):
         return Meeting(time, met, apart)
     speed = float(np.linalg.norm(way.velocity(time)))
     further = time + 2.0 * edge / speed if speed > 0.0 else math.inf
-    if further <= until:  # what they run into just behind the corner is what they touch
+    if further <= until:  # use the contact just behind the corner
         there = touch(a, b, way.at(further))
-        if there.depth >= 0.0 and not only_corners(a, b, way.at(further), edge):
+        if there.depth >= 0.0 and not is_corner_touch(a, b, way.at(further), edge):
             return Meeting(time, there, apart)
     return Meeting(time, met, apart, at_corner=True)
 
 
 def slides_over(pair: Pair, way: Way, met: Meeting, normal: Floats, settings: Settings) -> bool:
-    """Whether what is supported and meets something on its way gets past it: the plane it touches would have to let it
-    in by twice the edge zone within the step, and there it must not be deeper than that zone."""
+    """True if a supported body passes over what it meets: the contact plane would have to let it in by twice the edge
+    zone within the step, and there its depth must not exceed that zone."""
     edge, left = pair.edge(settings), settings.dt - met.time
     ahead = met.time + _closes(2.0 * edge, float(way.velocity(met.time) @ normal), float(way.bend @ normal))
     depth = touch(pair.a, pair.b, way.at(ahead)).depth if ahead <= settings.dt else -math.inf
@@ -98,7 +98,7 @@ def slides_over(pair: Pair, way: Way, met: Meeting, normal: Floats, settings: Se
 
 
 def _closes(gap: float, rate: float, bend: float) -> float:
-    """When a gap that changes so is 0 first; infinity: never. The larger root first, for it suffers no cancellation."""
+    """First zero of a gap with this rate and curvature; inf: never. The larger root comes first: no cancellation."""
     if bend == 0.0:
         return -gap / rate if rate < 0.0 else math.inf
     inside = rate * rate - 4.0 * bend * gap
@@ -122,29 +122,29 @@ def _first_touch(pair: Pair, way: Way, since: float, until: float) -> float | No
         return _first_in(pair, gap, way, [since, until])
     rate = float(way.velocity(since) @ touch(pair.a, pair.b, way.at(since)).normal)
     if 0.0 < now <= 4.0 * ROUNDING * places and abs(rate) <= NEARLY * way.length(span) / span:
-        pair.doubtful = True  # whether they touch still: on a way that bends back it makes an odd time of a small gap
+        pair.doubtful = True  # whether they still touch: on a curved path a small gap gives an arbitrary time
     if now > ROUNDING * float(np.linalg.norm(way.at(since))):
         edges = [since + span * k / PARTS for k in range(PARTS)]
         return _first_in(pair, gap, way, [*edges, until])
     if abs(rate) <= NEARLY * way.length(span) / span and (pair.a.is_sphere or pair.b.is_sphere):
-        pair.doubtful = True  # whether they part, as curved surfaces may, or go on touching
+        pair.doubtful = True  # whether they separate, as curved surfaces may, or keep touching
     if rate <= 0.0:
         return since
-    # They touch and part: their way may lead back. Looked for from where they are surely farther apart than before.
+    # They touch and separate, but may return. Search from where they are surely farther apart than before.
     level = min(now, 0.0)
     sure = 1e-13 * max(places, float(np.linalg.norm(way.at(since))))
     edges = [since + span * 2.0**-k for k in range(40, 0, -1) if rate * span * 2.0**-k > sure]
     edges = [*edges, *(since + span * k / PARTS for k in range(PARTS // 2 + 1, PARTS)), until]
-    if gap(edges[0]) <= level:  # so slowly that they do not come apart
+    if gap(edges[0]) <= level:  # too slow to separate
         return since
     again = _first_in(pair, lambda t: gap(t) - level, way, edges)
-    if again is not None and level < -NEARLY * pair.size:  # back to the same overlap: which that is depends on the look
+    if again is not None and level < -NEARLY * pair.size:  # the time of return to that overlap depends on sampling
         pair.doubtful = True
     return again
 
 
 def _first_in(pair: Pair, gap: Callable[[float], float], way: Way, edges: list[float]) -> float | None:
-    """The first moment at which the gap closes, within stretches of time in each of which it has one least value."""
+    """The first time at which the gap closes, in intervals with one minimum each."""
     stretches = _near(gap, way, edges, 0, len(edges) - 1)
     apart = bool(stretches) and gap(edges[0]) > NEARLY * pair.size
     for low, high in stretches:
@@ -169,7 +169,7 @@ def _first_in(pair: Pair, gap: Callable[[float], float], way: Way, edges: list[f
 def _near(
     gap: Callable[[float], float], way: Way, edges: list[float], first: int, last: int
 ) -> list[tuple[float, float]]:
-    """The stretches between neighbouring edges that may hold a touch."""
+    """The intervals between neighbouring edges that may hold a touch."""
     low, high = edges[first], edges[last]
     fastest = float(np.linalg.norm(way.speed)) + 2.0 * float(np.linalg.norm(way.bend)) * high
     if gap(0.5 * (low + high)) > 0.5 * fastest * (high - low):
@@ -181,7 +181,7 @@ def _near(
 
 
 def _least(gap: Callable[[float], float], low: float, high: float) -> float:
-    """Where the gap is least, or somewhere it is closed."""
+    """The time of the smallest gap, or any time at which it is closed."""
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_left, at_right = gap(left), gap(right)
     for _ in range(SECTIONS):
