@@ -1,4 +1,4 @@
-"""The built-in components: where a body is, how it moves, what it collides with."""
+"""The built-in components: a body's position, motion and collision shape."""
 
 from .colliders import ALL_LAYERS, AABBCollider, Collider, SphereCollider
 from .rigid_body import RigidBody

@@ -1,4 +1,4 @@
-"""Colliders: simple shapes around what is drawn."""
+"""Colliders: simple shapes that approximate what is drawn."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ..framework.data.component import Component
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
-# Arguments, checked as fields are.
+# Arguments, checked like fields.
 LOWER = Column(item="vector", owner="AABBCollider", name="from_bounds lower")
 UPPER = Column(item="vector", owner="AABBCollider", name="from_bounds upper")
 
 
 class Collider(Component, abstract=True):
-    """What every collider has besides its shape.
+    """The fields of every collider besides its shape.
 
     offset
-        (d,) m, of the shape's centre from the Transform's position, turned with it
+        (d,) m, the shape's centre relative to the Transform's position, turned with it
     restitution
-        relative speed after / before an impact; 1 keeps energy, below 1 loses, above 1 gains
+        relative speed after over before an impact; 1 conserves energy, below 1 loses, above 1 gains
     friction
-        coefficient; None takes the partner's
+        coefficient; None: use the other body's coefficient
     sensor
         reports contacts and does not react to them
     layer, mask
@@ -43,15 +43,15 @@ class Collider(Component, abstract=True):
     layer = column(1, dtype=int)
     mask = column(ALL_LAYERS, dtype=int)
 
-    rotates: ClassVar[bool] = False  # whether its functions need the body's axes in the world, as ``shape.axes``
-    dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # of the worlds it can be in
-    convex: ClassVar[bool] = True  # without dents: the straight line between any two points of it is inside
+    rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``
+    dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # dimensions of the worlds that support it
+    convex: ClassVar[bool] = True  # the straight line between any two of its points lies inside
 
     @classmethod
     def sample(cls, **common: Any) -> Self:
-        """Some collider of this type, half a unit in every measure it demands; for compiling ahead and checks.
+        """A collider of this type with all required sizes 0.5, for compilation in advance and for checks.
 
-        A shape that cannot be made of halves has a ``sample`` of its own.
+        A shape that needs other values overrides ``sample``.
         """
         demanded = {name: 0.5 for name, field in cls.columns.items() if field.default is REQUIRED}
         return cls(**demanded, **common)
@@ -95,7 +95,7 @@ class SphereCollider(Collider):
 
 
 class AABBCollider(Collider):
-    """A box whose sides stay parallel to the axes; when the Transform turns, it stretches around the turned box.
+    """A box whose sides stay parallel to the axes; a turned Transform enlarges it to hold the turned box.
 
     half_extents
         (d,) m, half the size along each axis; zero is allowed
@@ -144,7 +144,7 @@ class AABBCollider(Collider):
 
     @staticmethod
     def turned(shape, axes):
-        """Half extents around the turned box: |R| h (Ericson, Real-Time Collision Detection, 4.2.6)."""
+        """Half extents of the box around the turned one: |R| h (Ericson, Real-Time Collision Detection, 4.2.6)."""
         half = shape.half_extents
         result = half
         for k in range(len(half)):

@@ -1,4 +1,4 @@
-"""RigidBody: mass, velocity and what acts on a body."""
+"""RigidBody: mass, velocity and forces of a body."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..framework.data.component import Component
 from ..framework.data.table import KINDS
 
 Kind = Literal["dynamic", "kinematic", "static"]
-# Arguments, checked as fields are.
+# Arguments, checked like fields.
 FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
 IMPULSE = Column(item="vector", owner="RigidBody", name="apply_impulse")
 
@@ -55,8 +55,8 @@ class RigidBody(Component, flat=True):
     kind = dataclasses.replace(column("dynamic", choices=KINDS), on_write=_kind_written)
     max_linear_speed = column(None, optional=True, minimum=0.0)
     ccd = column(False, dtype=bool)
-    applied_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # until the window's end
-    applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False)  # that applied_force was set in
+    applied_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # until the frame ends
+    applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False)  # frame of applied_force
     step_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # for one step
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Transform: where a body is and how it is turned."""
+"""Transform: position and rotation of a body."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..framework.data.component import Component
 
 
 def _teleport(table: Any, row: int) -> None:
-    """An assigned position is no movement: nothing is swept, interpolation starts anew."""
+    """An assigned position is a teleport: no sweep, and interpolation restarts."""
     if "previous_position" in table.arrays:
         table.arrays["previous_position"][row] = table.arrays["position"][row]
 
@@ -20,8 +20,8 @@ def _teleport(table: Any, row: int) -> None:
 class Transform(Component, flat=True):
     """Position in metres, (d,), and rotation: an angle in radians in 2D, a unit quaternion (w, x, y, z) in 3D.
 
-    Rotation is set by the game, never simulated; it stretches boxes and turns offsets. Assigning ``position`` is a
-    teleport. Of a dynamic or kinematic body ``position`` is a writable view.
+    Rotation is set by the game, never simulated; it enlarges boxes and turns offsets. Assigning ``position`` is a
+    teleport. For a dynamic or kinematic body ``position`` is a writable view.
     """
 
     __slots__ = ()
@@ -61,7 +61,7 @@ class Transform(Component, flat=True):
 
     def _get(self, axis: int) -> float:
         position = self.position
-        return float(position[axis] if np.ndim(position) else position)  # one number stands for all
+        return float(position[axis] if np.ndim(position) else position)  # a single number holds for all axes
 
     def _set(self, axis: int, value: float) -> None:
         position = np.array(self.position)
@@ -72,7 +72,7 @@ class Transform(Component, flat=True):
 
     @property
     def interpolated_position(self) -> np.ndarray:
-        """(d,) between the last two steps, as far as ``world.alpha`` says: what to draw."""
+        """(d,) between the last two steps, by ``world.alpha``: the position to draw."""
         store = self._store
         if store is None or "previous_position" not in store.arrays:
             return np.array(self.position)

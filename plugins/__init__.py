@@ -1,4 +1,4 @@
-"""Plugins that ship with carom; all stand on the public registry alone."""
+"""Plugins that ship with carom; all use only the public registry."""
 
 from .physics import Physics
 

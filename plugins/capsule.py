@@ -1,7 +1,7 @@
-"""A capsule: a segment along the body's y axis, and all that lies within a radius of it; in 2D a stadium.
+"""A capsule: all points within a radius of a segment along the body's y axis; in 2D a stadium.
 
-It meets every convex shape through its support function. With spheres and other capsules it does so in closed form:
-two capsules are two segments, their distance less both radii.
+It meets every convex shape through its support function. Pairs with spheres and other capsules are in closed form: two
+capsules are two segments, and their distance is that of the segments less both radii.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from .standard_sweeps import LATER, ball, down_at
 
 plugin = Plugin("capsule", version="1.0")
 
-CROSSING = 1e-8  # sine of the angle below which two segments count as parallel: where rounding has the better of it
-TOUCHING = 1e-12  # of the sizes: segments so near to each other have no direction between them
+CROSSING = 1e-8  # sine of the angle below which two segments count as parallel, because rounding dominates
+TOUCHING = 1e-12  # of the sizes: closer segments have no usable direction between them
 
 
 @plugin.shape(cost=2)
 class CapsuleCollider(Collider):
-    """All that lies within a radius of a segment along the body's y axis; it turns with the Transform.
+    """All points within a radius of a segment along the body's y axis; it turns with the Transform.
 
     radius
         m, 0 or more
@@ -73,16 +73,16 @@ class CapsuleCollider(Collider):
 
 @plugin.kernel
 def nearest_along(axis, half, d):
-    """How far along the segment of half length ``half`` its point nearest to d lies."""
+    """Position along the segment of half length ``half`` of its point nearest to d."""
     return max(-half, min(half, dot(axis, d)))
 
 
 @plugin.kernel
 def across(axis):
-    """Some unit vector at a right angle to a unit vector."""
+    """Any unit vector perpendicular to a unit vector."""
     if len(axis) == 2:
         return replace(replace(axis, 0, item(axis, 1)), 1, -item(axis, 0))
-    k = 0  # the axis of the world that it is farthest from
+    k = 0  # the world axis most perpendicular to it
     for j in range(1, len(axis)):
         k = j if abs(item(axis, j)) < abs(item(axis, k)) else k
     result = scale(axis, -item(axis, k))
@@ -92,7 +92,7 @@ def across(axis):
 
 @plugin.kernel
 def towards(normal, axis, d):
-    """The normal or its opposite, whichever looks towards d; if neither does, one that -d would turn round."""
+    """The normal or its opposite, whichever points towards d; if neither, by the axis, so that -d reverses it."""
     side = dot(normal, d)
     if side == 0.0:
         side = dot(axis, d)
@@ -113,10 +113,10 @@ def capsule_sphere(a, b, d):
 
 @plugin.sweep(CapsuleCollider, SphereCollider)
 def capsule_sphere_sweep(a, b, d, v):
-    """The sphere's centre against a rounded segment: an end, the sides and the other end in turn, until it touches."""
+    """The sphere's centre against a rounded segment: an end, the sides and the other end in order of the motion."""
     axis, half, reach = a.axes[1], a.half_height, a.radius + b.radius
     along, rate = dot(axis, d), dot(axis, v)
-    place, speed = (along if rate < 0.0 else -along), abs(rate)  # turned so that it goes down the segment
+    place, speed = (along if rate < 0.0 else -along), abs(rate)  # oriented so that the motion is down the segment
     enter, leave, time = down_at(place - half, speed), down_at(place + half, speed), 0.0
     for _ in range(3):
         beside = enter <= time < leave
@@ -135,9 +135,10 @@ def capsule_sphere_sweep(a, b, d, v):
 
 @plugin.kernel
 def crossing_plane(d, u, v, half_u, half_v):
-    """2D: (whether two segments cross, how far they then overlap, along which normal), d from one to the other.
+    """2D: (whether two segments cross, the depth of the overlap, its normal), d from one to the other.
 
-    The points of one less those of the other fill a parallelogram: whether the origin is in it, and the nearest side.
+    The points of one less those of the other form a parallelogram: tests if it contains the origin, and finds the
+    nearest side.
     """
     depth, normal = math.inf, across(u)
     for turn in range(2):
@@ -152,7 +153,7 @@ def crossing_plane(d, u, v, half_u, half_v):
 
 @plugin.kernel
 def common_normal(d, u, v):
-    """3D: (unit vector at right angles to both unit vectors, towards d; sine of the angle between them)."""
+    """3D: (unit vector perpendicular to both unit vectors, towards d; sine of the angle between them)."""
     last = len(d) - 1  # 2: an index that compiles in 2D, where this is never called
     x = item(u, 1) * item(v, last) - item(u, last) * item(v, 1)
     y = item(u, last) * item(v, 0) - item(u, 0) * item(v, last)
@@ -162,7 +163,7 @@ def common_normal(d, u, v):
     if sine <= TOUCHING:
         return towards(across(u), u, d), 0.0
     normal = divided(normal, sine)
-    normal = add_scaled(normal, u, -dot(normal, u))  # of nearly parallel ones the product is not exact
+    normal = add_scaled(normal, u, -dot(normal, u))  # for nearly parallel segments the product is inexact
     return towards(divided(normal, length(normal)), u, d), sine
 
 
@@ -170,21 +171,21 @@ def common_normal(d, u, v):
 def segment_gap(d, u, v, half_u, half_v):
     """(distance, unit normal, point of the first) of two segments, d from the middle of one to that of the other.
 
-    u, v: unit vectors along them. The best of these: each end with the other segment, and in 3D the nearest points of
-    the two lines. Each is a distance between true points, so that nearly parallel segments lose nothing.
+    u, v: unit vectors along them. The smallest of these: each end with the other segment, and in 3D the nearest points
+    of the two lines. Each is a distance between points of the segments, so nearly parallel segments lose no accuracy.
     """
     best, apart, point, axis, inner = math.inf, d, d, u, False
     normal, sine, s = d, 0.0, 0.0
     if len(d) == 3:
         normal, sine = common_normal(d, u, v)
     if sine > CROSSING:
-        s = dot(add_scaled(u, v, -dot(u, v)), d) / (sine * sine)  # where on the first line the second is nearest
+        s = dot(add_scaled(u, v, -dot(u, v)), d) / (sine * sine)  # nearest to the second line
     for turn in range(5 if sine > CROSSING and abs(s) <= half_u else 4):
-        if turn < 2:  # the ends of the second
+        if turn < 2:  # ends of the second
             other = add_scaled(d, v, -half_v if turn == 0 else half_v)
             foot = nearest_along(u, half_u, other)
             mine = scale(u, foot)
-        else:  # the ends of the first, and the lines
+        else:  # ends of the first, and the lines
             mine = scale(u, s if turn == 4 else (-half_u if turn == 2 else half_u))
             foot = nearest_along(v, half_v, sub(mine, d))
             other = add_scaled(d, v, foot)
@@ -192,14 +193,14 @@ def segment_gap(d, u, v, half_u, half_v):
         distance = length(between)
         if distance < best:
             best, apart, point = distance, between, mine
-            axis = u if turn < 2 else v  # the segment with the foot: if they touch, it is what is left
+            axis = u if turn < 2 else v  # the segment with the nearest point: gives the normal if they touch
             inner = abs(foot) < (half_u if turn < 2 else half_v)
     size = length(d) + half_u + half_v
     if best > TOUCHING * size:
-        if inner:  # a right angle, which rounding would spoil where the gap is small
+        if inner:  # make the normal exactly perpendicular: rounding matters if the gap is small
             apart = add_scaled(apart, axis, -dot(apart, axis))
         return best, divided(apart, length(apart)), point
-    if min(half_u, half_v) <= TOUCHING * size:  # a point: it leaves across the other
+    if min(half_u, half_v) <= TOUCHING * size:  # a point: the normal is perpendicular to the other
         axis = u if half_u >= half_v else v
     elif len(d) == 3:
         return best, normal, point
@@ -208,7 +209,7 @@ def segment_gap(d, u, v, half_u, half_v):
 
 @plugin.pair(CapsuleCollider, CapsuleCollider)
 def capsule_capsule(a, b, d):
-    """The distance of the segments, less both radii; in 2D segments may cross, and then overlap themselves."""
+    """The distance of the segments less both radii; in 2D segments may cross, and then overlap themselves."""
     u, v = a.axes[1], b.axes[1]
     distance, normal, point = segment_gap(d, u, v, a.half_height, b.half_height)
     if len(d) == 2:

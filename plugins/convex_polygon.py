@@ -1,4 +1,4 @@
-"""Convex polygons in 2D, turned by the Transform: triangles, oriented boxes, regular polygons, rounded ones."""
+"""Convex polygons in 2D, turned by the Transform: triangles, oriented boxes, regular and rounded polygons."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ..components.colliders import ALL_LAYERS, Collider
 from ..framework import Plugin, array_column, column
 from ..framework.vectors import add_scaled, dot, scale
 
-STRAIGHT = 1e-12  # sine of the turn at a corner below which it is none
+STRAIGHT = 1e-12  # sine of the turn at a corner; below it the corner counts as straight
 FULL_TURN = 2.0 * math.pi
 
 plugin = Plugin("convex_polygon", version="1.0")
 
 
 def wrong_with(vertices: np.ndarray) -> str | None:
-    """What keeps these corners from being a convex polygon, None if they are one; the order may be either."""
+    """Why these corners are not a convex polygon, None if they are one; in either order."""
     extent = np.abs(vertices - vertices[0]).max()
     if not extent > 0.0:
         return "must not be one point"
-    corners = vertices / extent  # any size, without overflow
+    corners = vertices / extent  # avoids overflow at any size
     edges = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(edges[:, 0], edges[:, 1])
     if not lengths.all():
@@ -47,7 +47,7 @@ def wrong_with(vertices: np.ndarray) -> str | None:
 
 
 def _counter_clockwise(vertices: Any) -> Any:
-    """Turned round if they run clockwise; what is no polygon as it is, for the column's own messages."""
+    """Reversed if clockwise; anything that is not a polygon is left for the column to report."""
     try:
         corners = np.asarray(vertices)
     except ValueError:  # rows of different lengths
@@ -68,9 +68,9 @@ class ConvexPolygonCollider(Collider):
     """A convex polygon in a 2D world; it turns with the Transform.
 
     vertices
-        (n, 2) m, three corners or more around the shape's centre, in either order; kept counter-clockwise
+        (n, 2) m, three or more corners around the shape's centre, in either order; stored counter-clockwise
     corner_radius
-        m, the polygon reaches that far beyond its corners and edges, which rounds the corners
+        m, the polygon extends this far beyond its corners and edges, which rounds the corners
     """
 
     __slots__ = ()
@@ -109,7 +109,7 @@ class ConvexPolygonCollider(Collider):
 
     @classmethod
     def regular(cls, n: int, radius: float, **common: Any) -> Self:
-        """A regular polygon of n corners on a circle; the first corner lies on the x axis."""
+        """A regular polygon of n corners on a circle; the first corner is on the x axis."""
         try:
             count = operator.index(n)
         except TypeError:

@@ -1,4 +1,4 @@
-"""A half-space: everything below a plane through the body's centre, without end. Ground that nobody falls off."""
+"""A half-space: everything below an infinite plane through the body's centre. Unbounded ground."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..framework.vectors import add, add_scaled, divided, dot, item, length, neg
 
 plugin = Plugin("half_space", version="1.0")
 
-TILT = 1e-6  # radians; a face that lies on the plane but for that touches it all over, not at a corner
+TILT = 1e-6  # radians; a face tilted by less lies flat on the plane and does not touch with one corner
 
 
 class DirectionColumn(Column):
@@ -33,10 +33,10 @@ class DirectionColumn(Column):
 
 @plugin.shape(cost=1)
 class HalfSpaceCollider(Collider):
-    """Everything below a plane through the body's centre; whatever is convex rests on it.
+    """Everything below a plane through the body's centre; any convex shape can rest on it.
 
     normal
-        (d,) out of the half-space, up for ground; of any length but 0. It turns with the Transform
+        (d,) out of the half-space, up for ground; any length but 0. It turns with the Transform
     """
 
     __slots__ = ()
@@ -77,17 +77,17 @@ def outwards(shape):
 
 @plugin.kernel
 def depth_below(b, d, down, support, rounding):
-    """How far the other's lowest point is below the plane."""
+    """Depth of the other's lowest point below the plane."""
     return rounding(b) + dot(add(d, support(b, down)), down)
 
 
 @plugin.pair(HalfSpaceCollider, Convex)
 def half_space_convex(a, b, d, support, rounding):
-    """Whatever is inside leaves upwards, however deep it is."""
+    """The normal always points out of the half-space, at any depth."""
     normal = outwards(a)
     down = negative(normal)
     depth = depth_below(b, d, down, support, rounding)
-    # The point is in the middle of what touches: looks a little to either side find opposite ends of a face.
+    # The point is the middle of the touching face: supports of slightly tilted directions give its opposite ends.
     tilt = scale(d, 0.0)
     for k in range(len(d)):
         tilt = replace(tilt, k, TILT / (1.0 + k))
@@ -98,7 +98,7 @@ def half_space_convex(a, b, d, support, rounding):
 
 @plugin.sweep(HalfSpaceCollider, Convex)
 def half_space_convex_sweep(a, b, d, v, support, rounding):
-    """The height of the lowest point over the speed at which it comes down."""
+    """The height of the lowest point over its downward speed."""
     down = negative(outwards(a))
     height, speed = -depth_below(b, d, down, support, rounding), dot(v, down)
     if height <= 0.0:
@@ -108,5 +108,5 @@ def half_space_convex_sweep(a, b, d, v, support, rounding):
 
 @plugin.pair(HalfSpaceCollider, HalfSpaceCollider)
 def two_half_spaces(a, b, d):
-    """They never meet: all but parallel ones overlap somewhere, and could never part."""
+    """Never a contact: two half-spaces overlap unless they are parallel, and could never separate."""
     return False, -math.inf, d, d

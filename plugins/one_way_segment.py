@@ -1,8 +1,8 @@
 """A segment that is solid from one side only, in 2D: jump through it from below, stand on it, slide off its ends.
 
-The segment meets every convex shape like any other. Between NARROW, which finds the contacts, and RESPONSE, which acts
-on them, a system switches off those of bodies that do not come from its front. Nothing is remembered for it that
-``world.snapshot()`` would not hold.
+The segment has contacts with every convex shape. Between NARROW, which finds the contacts, and RESPONSE, which acts on
+them, a system disables those of bodies that do not come from its front. It uses only state that ``world.snapshot()``
+contains.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from ..framework.vectors import add_scaled, dot, item, scale
 
 plugin = Plugin("one_way_segment", version="1.0")
 
-SLACK = 0.02  # of its height: who has sunk in no deeper, when it begins to touch, comes from the front all the same
-UPRIGHT = 0.5  # cosine: contacts that look more to the side than this are with the segment's ends
+SLACK = 0.02  # of its height: a body that begins to touch at most this deep counts as coming from the front
+UPRIGHT = 0.5  # cosine: contacts whose normal leans farther from the front are with the segment's ends
 FRONTS = ("left", "right")
 
 
 @plugin.kernel
 def in_world(shape, point):
-    """A point of the shape as it is in the world, relative to its centre."""
+    """A point of the shape relative to its centre, in world axes."""
     return add_scaled(scale(shape.axes[0], item(point, 0)), shape.axes[1], item(point, 1))
 
 
 @plugin.shape(cost=2)
 class OneWaySegmentCollider(Collider):
-    """A segment that holds what comes from its front and lets everything else pass; in 2D worlds.
+    """A segment that stops what comes from its front and lets everything else pass; in 2D worlds.
 
     start, end
         (2,) m, relative to the centre, turned with the Transform
     front
-        the side that is solid, as seen on the way from start to end: ``"left"`` or ``"right"``
+        the solid side, as seen along the direction from start to end: ``"left"`` or ``"right"``
     """
 
     __slots__ = ()
@@ -83,13 +83,13 @@ class OneWaySegmentCollider(Collider):
         return one if dot(one, direction) >= dot(two, direction) else two
 
 
-# Who was held when the last step ended, by world: (step, pairs). Read from the contacts, never from the step before.
+# Pairs in contact at the end of the last step, by world: (step, pairs). Derived from the contacts, not accumulated.
 _held: weakref.WeakKeyDictionary[World, tuple[int, set[tuple[int, int]]]] = weakref.WeakKeyDictionary()
 
 
 @plugin.system
 class WhoStands(System):
-    """Notes, as the step begins, who touched a one-way segment when the last one ended."""
+    """Records, at the start of a step, the pairs with a one-way segment that touched at the end of the last step."""
 
     phase = Phase.START
 
@@ -116,7 +116,7 @@ class OneWay(System):
         if chosen is None:
             return
         enabled = self.world.contacts.enabled
-        for of_second in (False, True):  # which of the two is the segment; two segments look at each other
+        for of_second in (False, True):  # which of the two is the segment; both if two segments meet
             rows = np.flatnonzero(chosen[of_second])
             if len(rows):
                 enabled[rows] &= self._holds(rows, of_second)
@@ -125,7 +125,7 @@ class OneWay(System):
         return _reason(self.world)
 
     def _holds(self, contacts: np.ndarray, of_second: bool) -> np.ndarray:
-        """Whether the segments of these contacts hold their partners."""
+        """True for contacts whose segment stops the other body."""
         world, bodies, found = self.world, self.world.bodies, self.world.contacts
         entities = [getattr(found, name)[contacts] for name in PAIR]
         if of_second:
@@ -138,20 +138,20 @@ class OneWay(System):
         start, end = (_turned(turn, getattr(fields, name)[segment]) for name in ("start", "end"))
         way = end - start
         size = np.hypot(*way.T)
-        with np.errstate(invalid="ignore", divide="ignore"):  # ends that have become one: no front, nothing is held
+        with np.errstate(invalid="ignore", divide="ignore"):  # equal ends: no front, nothing is stopped
             along = way / size[:, None]
         sign = np.where(fields.front[segment] == FRONTS.index("left"), 1.0, -1.0)[:, None]
         front = sign * np.stack((-along[:, 1], along[:, 0]), axis=1)
         corner = start + _turned(turn, fields.offset[segment])
-        # The other's lowest point over the segment's line when the step began, and where free flight leads.
+        # Height of the other's lowest point over the segment's line: at the start of the step, and after free flight.
         below = shapes.reach(-front)
         before, after = (
             shapes.centres(column) - column[segment] - corner for column in (bodies.previous_position, bodies.position)
         )
         low, lower = ((place * front).sum(axis=1) - below for place in (before, after))
         slack = SLACK * 2.0 * below
-        # Where along the segment the other is when it meets the line: who then is beside it, or hardly over its end,
-        # comes from the side.
+        # Position of the other along the segment when it meets the line. If it is beside the segment then, or barely
+        # over its end, it comes from the side.
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.where((low > 0.0) & (lower < 0.0), low / (low - lower), 0.0)[:, None]
         at = ((before + share * (after - before)) * along).sum(axis=1)
@@ -159,7 +159,7 @@ class OneWay(System):
         over = (shared > np.maximum(-low, 0.0)) | (lower >= 0.0)
         comes = (low >= 0.0) | ((low >= -slack) & (lower <= low))
         stands = self._stood(entities, of_second) & (low >= -np.where(below > 0.0, below, SLACK * size))
-        # Contacts with the ends are nobody's wall; but who has come deep from the front is held, wherever it is now.
+        # Contacts with the ends do not act; but a body that has come deep from the front is stopped wherever it is.
         normal = found.normal[contacts] * (-1.0 if of_second else 1.0)
         beside = ((normal * front).sum(axis=1) < UPRIGHT) & ~(comes & over & (lower < -slack))
         return (comes | stands) & over & ~beside | self._passive(segment, shapes)
@@ -172,18 +172,18 @@ class OneWay(System):
         return np.array([pair in held for pair in pairs], bool)
 
     def _passive(self, segment: np.ndarray, shapes: _Shapes) -> np.ndarray:
-        """Contacts of sensors push nobody, and are left alone."""
+        """True for contacts with a sensor, which have no response and are left unchanged."""
         return self.world.bodies.one_way_segment_collider.sensor[segment] | shapes.sensors()
 
 
 class _Shapes:
-    """The colliders that decide for some bodies: of several on one body the costliest."""
+    """The deciding collider of each of some bodies: the most expensive one, or the cheapest for "bounds"."""
 
     def __init__(self, world: World, rows: np.ndarray, entities: np.ndarray) -> None:
         self._world, self._rows, self._entities = world, rows, entities
-        self._samples: dict[int, Any] = {}  # parameters of those that are looked at one by one
+        self._samples: dict[int, Any] = {}  # parameters of shapes that are evaluated one by one
         shapes = sorted(world.registry.shapes.values(), key=lambda shape: (shape.cost, shape.component.__name__))
-        self._of: dict[type[Any], np.ndarray] = {}  # indices of the bodies by their collider
+        self._of: dict[type[Any], np.ndarray] = {}  # indices of the bodies by collider type
         taken = np.zeros(len(rows), bool)
         for shape in shapes if world.settings.geometry == "bounds" else reversed(shapes):
             has = world.bodies.has(shape.component)[self._rows] & ~taken
@@ -202,14 +202,14 @@ class _Shapes:
         return result
 
     def centres(self, positions: np.ndarray) -> np.ndarray:
-        """Of the shapes, (m, 2), with the bodies at these positions."""
+        """(m, 2) centres of the shapes for these body positions."""
         result = positions[self._rows].copy()
         for component, chosen in self._of.items():
             result[chosen] += _turned(self._turn[chosen], self._column(component, "offset"))
         return result
 
     def reach(self, directions: np.ndarray) -> np.ndarray:
-        """How far each shape reaches from its centre in its direction, a unit vector; (m,) m."""
+        """(m,) m, extent of each shape from its centre in its direction, a unit vector."""
         result = np.zeros(len(self._rows))
         for component, chosen in self._of.items():
             looks = directions[chosen]
@@ -224,7 +224,7 @@ class _Shapes:
         return result
 
     def _reach_of(self, component: type[Any], index: int, look: tuple[float, ...]) -> float:
-        """The same of one shape of any kind, with its own functions."""
+        """The extent of one shape of any kind, by its own functions."""
         if index not in self._samples:
             self._samples[index] = self._parameters(component, index)
         sample = self._samples[index]
@@ -234,7 +234,7 @@ class _Shapes:
         return float(np.dot(component.support(sample, look), look)) + rounding
 
     def _parameters(self, component: type[Any], index: int) -> Any:
-        """What the shape's functions get, as the body is turned."""
+        """The parameters for the shape's functions, with the body's rotation applied."""
         columns = self._world.registry.shapes[component].columns
         handle = self._world.component_for_entity(int(self._entities[index]), component)
         axes = self._turn[index]
@@ -280,5 +280,5 @@ def _tuple_type(component: type[Any], columns: tuple[str, ...]) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A field as shape functions get it: vectors as tuples, arrays as they are."""
+    """A field as passed to shape functions: vectors as tuples, arrays unchanged."""
     return tuple(value.tolist()) if isinstance(value, np.ndarray) and value.ndim == 1 else value

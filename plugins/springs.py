@@ -16,7 +16,7 @@ import numpy as np
 
 from ..framework import Bodies, CaromError, ForceSystem, NoPhysicsError, Phase, Plugin, System, World
 
-# Above it no integrator without a system of equations to solve holds a spring, see Springs.
+# Above it no explicit integrator holds a spring, see Springs.
 STABLE = 2.0
 
 
@@ -26,13 +26,13 @@ class Spring:
     a, b
         the entities
     rest_length
-        m, at least 0: the distance at which it neither pulls nor pushes
+        m, at least 0: the distance without force
     stiffness
         N/m, at least 0
     damping
-        N s/m, at least 0: of the speed at which the two part or approach
+        N s/m, at least 0: force per speed of separation or approach
     only_pulls
-        a rope: slack below its rest length, and never pushing
+        a rope: slack below its rest length, never pushes
     """
 
     __slots__ = ("_a", "_b", "_damping", "_only_pulls", "_rest_length", "_springs", "_stiffness")
@@ -92,21 +92,21 @@ class Spring:
 
     @property
     def connected(self) -> bool:
-        """Whether it acts: not removed, and neither body deleted."""
+        """True while it acts: not removed, and both bodies exist."""
         return self._springs is not None and self in self._springs
 
     @property
     def length(self) -> float:
-        """m, the distance of the two bodies now. CaromError if it is no longer connected."""
+        """m, the present distance of the two bodies. CaromError if it is no longer connected."""
         return self._now()[0]
 
     @property
     def tension(self) -> float:
-        """N, with which it pulls the two together now; negative: pushes. CaromError if it is no longer connected."""
+        """N, the present attractive force; negative: it pushes. CaromError if it is no longer connected."""
         return self._now()[1]
 
     def remove(self) -> None:
-        """Take it away. Removing it twice is fine."""
+        """Remove the spring. Removing it twice has no effect."""
         if self._springs is not None:
             self._springs._remove(self)
 
@@ -130,18 +130,18 @@ class Spring:
 class Springs(Plugin):
     """The springs of one world: ``World(Physics(), springs)``, then ``springs.connect(a, b, stiffness=...)``.
 
-    A step dt holds springs whose :attr:`highest_frequency` w fulfils dt w < 2 (semi-implicit Euler and velocity Verlet;
-    somewhat less with damping). A world whose springs are too stiff for its step says so in ``world.faults``.
+    A step dt holds springs whose :attr:`highest_frequency` w satisfies dt w < 2 (semi-implicit Euler and velocity
+    Verlet; somewhat less with damping). If springs are too stiff for the step, ``world.faults`` says so.
 
-    When a body goes, so do its springs, at the start of the next step; each one is told to the handlers of the event
-    ``spring_lost``. Springs are no part of a snapshot, just as settings are not: they have no state but their fields.
+    When a body is deleted, its springs are removed at the start of the next step, and the event ``spring_lost`` is sent
+    for each. Springs are not part of a snapshot, like settings: they have no state besides their fields.
     """
 
     def __init__(self) -> None:
         super().__init__("springs", version="1.0")
         self.world: World | None = None
         self._springs: dict[Spring, None] = {}
-        self._columns: _Columns | None = None  # of the springs as they are now
+        self._columns: _Columns | None = None  # of the present springs
 
         def spring_forces() -> ForceSystem:
             return SpringForces(self)
@@ -172,12 +172,12 @@ class Springs(Plugin):
         damping: float = 0.0,
         only_pulls: bool = False,
     ) -> Spring:
-        """Put a spring between two bodies; see :class:`Spring`. It acts from the next time forces are summed.
+        """Connect two bodies with a spring; see :class:`Spring`. It acts from the next evaluation of forces on.
 
         rest_length
-            None: the distance of the two as they are now
+            None: the present distance of the two
 
-        ValueError if an entity is no body, if both are the same, or if a number cannot be.
+        ValueError if an entity is not a body, if both are the same, or if a number is out of range.
         """
         world = self._world()
         for name, entity in (("a", a), ("b", b)):
@@ -207,10 +207,10 @@ class Springs(Plugin):
 
     @property
     def highest_frequency(self) -> float:
-        """rad/s, an upper bound of the frequencies at which the bodies swing; exact for a lone spring.
+        """rad/s, an upper bound of the oscillation frequencies of the bodies; exact for a single spring.
 
-        With D the sum of stiffnesses at a body and m its mass: the largest D/m + D'/m' of any two that a spring joins
-        (Gershgorin's circles of the springs' matrix). A step dt holds it if dt times this is below 2.
+        With D the sum of stiffnesses at a body and m its mass: the largest D/m + D'/m' of two connected bodies
+        (Gershgorin's circles of the springs' matrix). A step dt holds them if dt times this is below 2.
         """
         bodies = self._world().bodies
         return math.sqrt(self._current(bodies).rates(bodies)[0])
@@ -239,7 +239,7 @@ class Springs(Plugin):
         self._columns = None
 
     def _current(self, bodies: Bodies) -> _Columns:
-        """The springs' columns, made anew if springs or rows have changed."""
+        """The springs' columns, rebuilt if springs or rows have changed."""
         if self._columns is None or not self._columns.fits(bodies):
             self._columns = _Columns(list(self._springs), bodies)
         return self._columns
@@ -252,7 +252,7 @@ class Springs(Plugin):
 
 
 class _Columns:
-    """Springs as arrays, in an order that does not depend on who came first: by lower id, higher id, then fields."""
+    """Springs as arrays, sorted by lower id, higher id, then fields, independent of the order of creation."""
 
     def __init__(self, springs: list[Spring], bodies: Bodies) -> None:
         self.entity = bodies.entity.copy()
@@ -273,12 +273,12 @@ class _Columns:
         return np.array_equal(self.entity, bodies.entity)
 
     def tension(self, bodies: Bodies) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(length (n,), unit vector (n, d) from the lower to the higher id, force (n,) that pulls them together)."""
+        """(length (n,), unit vector (n, d) from the lower to the higher id, attractive force (n,))."""
         position, velocity = bodies.position, bodies.linear_velocity
         apart = position[self.high] - position[self.low]
         length = np.abs(apart[:, 0])
         for k in range(1, apart.shape[1]):
-            length = np.hypot(length, apart[:, k])  # no square of it can overflow
+            length = np.hypot(length, apart[:, k])  # avoids overflow of a square
         unit = np.divide(apart, length[:, None], out=np.zeros_like(apart), where=length[:, None] > 0)
         speed = ((velocity[self.high] - velocity[self.low]) * unit).sum(axis=1)
         tension = self.stiffness * (length - self.rest_length) + self.damping * speed
@@ -286,7 +286,7 @@ class _Columns:
         return length, unit, np.where(slack, 0.0, tension)
 
     def forces(self, bodies: Bodies) -> np.ndarray:
-        """(rows, d), on every body; each body's springs are summed in their order here."""
+        """(rows, d), the forces on all bodies; each body's springs are summed in the order of the columns."""
         _, unit, tension = self.tension(bodies)
         pull = tension[:, None] * unit
         rows, both = np.concatenate((self.low, self.high)), np.concatenate((pull, -pull))
@@ -298,8 +298,8 @@ class _Columns:
         return float((0.5 * self.stiffness * stretch * stretch).sum())
 
     def rates(self, bodies: Bodies) -> tuple[float, float]:
-        """Of stiffness (1/s^2) and of damping (1/s): the largest, over the springs, of what the springs at both ends
-        sum to, each divided by that end's mass. Whatever does not move weighs infinitely much."""
+        """The largest rates of stiffness (1/s^2) and damping (1/s): for each spring the sums of all springs at both of
+        its bodies, each divided by the body's mass, are added. Immovable bodies count as infinitely heavy."""
         inverse_mass = np.zeros(len(bodies))
         inverse_mass[bodies.dynamic.rows] = 1.0 / bodies.dynamic.mass
         ends = np.concatenate((self.low, self.high))
@@ -311,7 +311,7 @@ class _Columns:
 
 
 class SpringForces(ForceSystem):
-    """The pull of all springs."""
+    """The forces of all springs."""
 
     def __init__(self, springs: Springs) -> None:
         self._springs = springs
@@ -328,7 +328,7 @@ class SpringForces(ForceSystem):
 
 
 class LostSprings(System):
-    """Removes the springs of bodies that are gone, and says so; looks whether the step holds the others."""
+    """Removes the springs of deleted bodies and reports them; checks that the step holds the others."""
 
     phase = Phase.START
 
@@ -348,7 +348,7 @@ class LostSprings(System):
             self._look_at_step(columns, dt)
 
     def _look_at_step(self, columns: _Columns, dt: float) -> None:
-        """Semi-implicit Euler swings up from (dt w)^2 + 2 dt c/m = 4 on."""
+        """Record a fault if semi-implicit Euler is unstable: (dt w)^2 + 2 dt c/m > 4."""
         stiff, damped = columns.rates(self.world.bodies)
         if dt * dt * stiff + 2 * dt * damped >= STABLE**2:
             longest = 4.0 / (damped + math.sqrt(damped * damped + 4.0 * stiff))

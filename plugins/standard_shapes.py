@@ -1,8 +1,8 @@
-"""The built-in shapes, spheres and boxes, and how they meet; registered like anybody's.
+"""The built-in shapes, spheres and boxes, and their pairs; registered like those of any plugin.
 
 A pair function gets the parameters of a and b and the vector d from a's centre to b's, a tuple of 2 or 3 numbers. It
-returns (hit, depth, normal, point): whether they touch, how far they overlap (negative: how far they are apart), the
-unit normal from a to b and the point of contact relative to a's centre. Touching counts as a hit.
+returns (hit, depth, normal, point): whether they touch, the depth of the overlap (negative: minus the distance), the
+unit normal from a to b and the contact point relative to a's centre. Touching counts as a hit.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def axis_normal(like, axis, sign):
 
 @standard_shapes.pair(SphereCollider, SphereCollider)
 def sphere_sphere(a, b, d):
-    """Distance of the centres against the sum of the radii. Coincident centres part along the first axis."""
+    """Distance of the centres against the sum of the radii. Coincident centres separate along the first axis."""
     distance = length(d)
     depth = (a.radius + b.radius) - distance
     normal = divided(d, distance) if distance > 0.0 else axis_normal(d, 0, 1.0)
@@ -43,8 +43,8 @@ def sphere_sphere(a, b, d):
 
 @standard_shapes.pair(SphereCollider, AABBCollider)
 def sphere_box(a, b, d):
-    """Sphere against the nearest point of the box; a centre inside leaves through the nearest face."""
-    nearest = d  # of the box, seen from the sphere's centre
+    """Sphere against the nearest point of the box; for a centre inside, the nearest face gives the normal."""
+    nearest = d  # of the box, relative to the sphere's centre
     inside = True
     for k in range(len(d)):
         low, high = item(d, k) - item(b.half_extents, k), item(d, k) + item(b.half_extents, k)
@@ -71,7 +71,7 @@ def sphere_box(a, b, d):
 
 
 def box_corner(a, b, d, slop):
-    """Whether two boxes overlap by less than ``slop`` along more than one axis, or are as near: corners, or edges."""
+    """True if two boxes overlap by less than ``slop``, or have a gap, along more than one axis: corners or edges."""
     shallow = 0
     for k in range(len(d)):
         overlap = item(a.half_extents, k) + item(b.half_extents, k) - abs(item(d, k))
@@ -82,9 +82,9 @@ def box_corner(a, b, d, slop):
 
 @standard_shapes.pair(AABBCollider, AABBCollider, corner=box_corner)
 def box_box(a, b, d):
-    """On no axis may the intervals be apart (separating axes); the normal is the axis of least overlap.
+    """The boxes overlap if their intervals do on every axis (separating axes); the normal is the axis of least overlap.
 
-    The point is the centre of the region that both share.
+    The point is the centre of the overlap region.
     """
     axis, depth, sign = 0, math.inf, 1.0
     point = d

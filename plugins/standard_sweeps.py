@@ -1,8 +1,8 @@
-"""When two of the built-in shapes first touch, one of them moving straight: in closed form.
+"""Sweeps of the built-in shapes in closed form: the time of first touch for straight relative motion.
 
-A sweep gets the parameters of a and b, the vector d from a's centre to b's, and the way v that b moves relative to a.
-It returns (hit, time): time, from 0 to 1, is the part of the way after which they first touch; (True, 0.0) for what the
-pair's function calls touching at the start, (False, 0.0) for what does not touch on that way.
+A sweep gets the parameters of a and b, the vector d from a's centre to b's, and the displacement v of b relative to a.
+It returns (hit, time): time, from 0 to 1, is the fraction of v at the first touch. (True, 0.0): the pair's function
+reports a touch at the start. (False, 0.0): no touch during the motion.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import math
 from ..framework.compilation import inlined
 from ..framework.vectors import add_scaled, divided, dot, item, length, replace
 
-SURE = 1.0 - 1e-14  # times a sum of squares: what is left of it is less than the true one, however it was rounded
-TINY, HUGE = 1e-280, 1e280  # products of two squares: between these no digits are lost
-ROUNDING = 4e-16  # of place and size: how far rounding may move a box aside, past what it meets or through a seam
-LATER = 2.0  # than the end of the way
+SURE = 1.0 - 1e-14  # factor of a sum of squares: makes it less than the exact value, whatever the rounding
+TINY, HUGE = 1e-280, 1e280  # range of products of two squares in which no digits are lost
+ROUNDING = 4e-16  # of position and size: rounding may shift a box this far, past another box or into a seam
+LATER = 2.0  # a time after the end of the motion
 
 
 @inlined
 def largest(vector):
-    """The largest component, without its sign."""
+    """The largest absolute value of the components."""
     result = 0.0
     for k in range(len(vector)):
         result = max(result, abs(item(vector, k)))
@@ -31,21 +31,21 @@ def largest(vector):
 def ball(d, v, reach):
     """(hit, time) for a point that starts at d and moves by v, and a ball around the origin.
 
-    The first of the roots of a quadratic, without its two cancellations: the gap at the start is the numerator, and
-    the discriminant comes from the line's nearest point to the centre. What is clearly missed costs no division.
+    The first root of a quadratic, computed without cancellation: the numerator is the gap at the start, and the
+    discriminant comes from the point of the line nearest to the centre. Clear misses return before any division.
     """
     square, way, along = dot(d, d), dot(v, v), dot(d, v)
     both, inner = square * way, reach * reach
     plain = (both > TINY) & (both < HUGE) & (square > TINY)
     aside = both * SURE - along * along > inner * way
-    early = (along + way < 0.0) & ((square + way) * SURE + 2.0 * along > inner)  # it ends before it is nearest
+    early = (along + way < 0.0) & ((square + way) * SURE + 2.0 * along > inner)  # the end is before the nearest point
     if plain & (square * SURE > inner) & ((along >= 0.0) | aside | early):
         return False, 0.0
     distance = length(d)
     gap, far, unit = distance - reach, distance + reach, 1.0
     if gap <= 0.0:
         return True, 0.0
-    if not plain:  # in units of the sizes
+    if not plain:  # scale by the sizes
         size, speed = largest(d), largest(v)
         if speed == 0.0:
             return False, 0.0
@@ -63,32 +63,32 @@ def ball(d, v, reach):
 
 
 def sphere_sphere_sweep(a, b, d, v):
-    """The centre of one against a ball of both radii."""
+    """The centre of one sphere against a ball with the sum of the radii."""
     return ball(d, v, a.radius + b.radius)
 
 
 @inlined
 def fall(d, v, k):
-    """(height, speed) along axis k, turned so that it falls: the height after some time is height - speed * time."""
+    """(height, speed) along axis k, with the sign chosen so that the height at time t is height - speed * t."""
     return item(d, k) * (1.0 if item(v, k) < 0.0 else -1.0), abs(item(v, k))
 
 
 @inlined
 def fallen(gap, speed):
-    """When a gap on the way is closed; 0 if there is none, or if it is longer than the way. Without a branch."""
+    """When a gap is closed during the motion; 0 if there is no gap or if it is too long. Without a branch."""
     ahead = (gap > 0.0) & (gap <= speed)
     return (gap if ahead else 0.0) / (speed if ahead else 1.0)
 
 
 @inlined
 def down_at(height, speed):
-    """When something that falls is down to 0: at the start, at some time on the way, or later."""
+    """When a falling height reaches 0: at the start, during the motion, or LATER."""
     return 0.0 if height <= 0.0 else (height / speed if height < speed else LATER)
 
 
 def sphere_box_sweep(a, b, d, v):
-    """The centre against the box with faces farther out by the radius; where these meet, against edges and corners."""
-    radius, time, beside, apart, aside = a.radius, 0.0, 0, -1.0, -1.0  # how far, if at all
+    """The centre against the box with faces moved outwards by the radius; near edges and corners, against these."""
+    radius, time, beside, apart, aside = a.radius, 0.0, 0, -1.0, -1.0  # distances outside the box; negative: none
     for k in range(len(d)):
         height, speed = fall(d, v, k)
         half = item(b.half_extents, k)
@@ -112,8 +112,8 @@ def sphere_box_sweep(a, b, d, v):
             return False, 0.0
         if beside <= 1:
             return True, time
-    # Beside an edge or a corner, or inside. Along each axis the way leads into the box and out again; in between the
-    # distance is that of a point from a point, a line or a plane: of the axes along which it is outside.
+    # Beside an edge or a corner, or inside. Along each axis the motion enters the box's slab and leaves it. Between
+    # these times the distance is that of a point from a point, a line or a plane, in the axes outside their slab.
     for _ in range(2 * len(d) + 1):
         outside, pace, change = d, v, LATER
         for k in range(len(d)):
@@ -138,8 +138,8 @@ def sphere_box_sweep(a, b, d, v):
 
 
 def box_box_sweep(a, b, d, v):
-    """The last axis along which they come together tells when, if along the others they have not parted by then."""
-    time, apart, aside = 0.0, -1.0, -1.0  # how far, if at all
+    """The last axis on which the boxes come together gives the time, unless they separate on another axis by then."""
+    time, apart, aside = 0.0, -1.0, -1.0  # distances outside the boxes; negative: none
     for k in range(len(d)):
         height, speed = fall(d, v, k)
         reach = item(a.half_extents, k) + item(b.half_extents, k)

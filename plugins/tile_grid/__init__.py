@@ -1,8 +1,7 @@
-"""A map of square tiles in 2D as one static collider; what slides along its tiles feels no seams between them.
+"""A map of square tiles in 2D as one static collider; bodies slide along its tiles without catching on seams.
 
-Tiles have no sides of their own: a shape is tested against rectangles of tiles, as large as they come, so that where
-two tiles meet there is nothing to be caught at. Of all rectangles near the shape the one it is deepest in gives the
-contact.
+A shape is tested against maximal rectangles of tiles instead of single tiles, so that edges between two tiles do not
+exist. The rectangle with the deepest overlap gives the contact.
 """
 
 from ...framework import Convex
@@ -16,7 +15,7 @@ __all__ = ["TileGridCollider", "cells_of_text", "plugin"]
 
 @plugin.pair(TileGridCollider, Convex)
 def tile_grid_convex(a, b, d, support, rounding):
-    """Kept out of the kernels that call it: it is long, and they are several."""
+    """Not inlined: it is long and has several callers."""
     return deepest_contact(a, b, d, support, rounding)
 
 

@@ -1,7 +1,7 @@
-"""The cells of a map: what users give for them, and the sums that a collider keeps of them.
+"""The cells of a map: the accepted inputs, and the sums that a collider stores.
 
-How many tiles a rectangle of the map holds is known from four sums, whatever its size: looking for tiles, and for the
-rectangles they make, takes the logarithm of the distance, and never as long as the map is large.
+Four sums give the number of tiles in any rectangle of the map. So finding tiles, and the rectangles they form, takes
+time proportional to the logarithm of the distance, not to the size of the map.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-EMPTY = " ."  # characters of a map that are no tile
+EMPTY = " ."  # characters of a map that are not tiles
 
 
 def cells_of_text(text: str | Iterable[str], *, empty: str = EMPTY) -> np.ndarray:
-    """A map as drawn, lines of text from top to bottom, as cells: a tile for every character that is not in ``empty``.
+    """Cells of a map drawn as text, lines from top to bottom: a tile for every character that is not in ``empty``.
 
-    Lines may be shorter than others. Of a string empty lines before the first and after the last are left out, and so
-    is what all its lines are indented by.
+    Lines may have different lengths. For a string, empty lines before the first and after the last line are removed,
+    and so is the common indentation.
     """
     if isinstance(text, str):
         lines = textwrap.dedent(text).splitlines()
@@ -36,7 +36,7 @@ def cells_of_text(text: str | Iterable[str], *, empty: str = EMPTY) -> np.ndarra
 
 
 def tiles_of(cells: Any) -> np.ndarray:
-    """Cells as bool; ValueError if they are no map."""
+    """Cells as bool; ValueError if they are not a map."""
     if isinstance(cells, str) or (isinstance(cells, (list, tuple)) and cells and isinstance(cells[0], str)):
         return cells_of_text(cells)
     try:
@@ -50,7 +50,7 @@ def tiles_of(cells: Any) -> np.ndarray:
 
 
 def sums_of(tiles: np.ndarray) -> np.ndarray:
-    """The number of columns; then, per corner of a cell, how many tiles are below and left of it, lowest row first."""
+    """The number of columns; then, per corner of a cell, the number of tiles below and left of it, lowest row first."""
     rows, columns = tiles.shape
     sums = np.zeros((rows + 1, columns + 1))
     sums[1:, 1:] = tiles[::-1].cumsum(axis=0).cumsum(axis=1)
@@ -58,7 +58,7 @@ def sums_of(tiles: np.ndarray) -> np.ndarray:
 
 
 def tiles_of_sums(sums: np.ndarray) -> np.ndarray:
-    """The other way round."""
+    """The inverse of :func:`sums_of`."""
     corners = sums[1:].reshape(-1, int(sums[0]) + 1)
     return np.diff(np.diff(corners, axis=0), axis=1)[::-1] > 0.0
 

@@ -1,4 +1,4 @@
-"""The plugin, and the collider that it is about."""
+"""The plugin and its collider."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ plugin = Plugin("tile_grid", version="1.0")
 FACES = ("all", "floors", "walls")
 ALL, FLOORS, WALLS = range(3)
 
-# An argument, checked as fields are.
+# Arguments, checked like fields.
 LOWER = Column(item="vector", owner="TileGridCollider", name="lower")
 
 
@@ -25,15 +25,15 @@ class TileGridCollider(Collider):
     """A map of square tiles in a 2D world. It does not turn with the Transform.
 
     cells
-        (rows, columns), true or not zero where there is a tile, or text, see :func:`cells_of_text`; the first row is
-        the top one, as maps are drawn
+        (rows, columns), true or not zero for a tile, or text, see :func:`cells_of_text`; the first row is the top one,
+        as maps are drawn
     tile_size
-        m, the sides of a tile
+        m, side length of a tile
     faces
         ``"all"``; ``"floors"``: floors and ceilings only; ``"walls"``: walls only, see :meth:`floors_and_walls`
     lower
-        (2,) m, where the map's lower left corner lies, from the Transform's position; without it the map's middle lies
-        at ``offset``
+        (2,) m, the map's lower left corner relative to the Transform's position; None: the map's centre is at
+        ``offset``
     """
 
     __slots__ = ()
@@ -70,10 +70,10 @@ class TileGridCollider(Collider):
 
     @classmethod
     def floors_and_walls(cls, cells: Any, tile_size: float, **common: Any) -> tuple[Self, Self]:
-        """The map as two colliders, to be given to two entities: its floors and ceilings, and its walls.
+        """The map as two colliders, for two entities: its floors and ceilings, and its walls.
 
-        Two bodies have one contact. A body that is pushed against a wall and stands on the floor needs two, which it
-        has with two entities, and then stands still. Both share their memory.
+        Two bodies have only one contact. A body that is pushed against a wall and stands on the floor needs two, so
+        that it stands still; two entities provide them. Both colliders share their memory.
         """
         return cls(cells, tile_size, faces="floors", **common), cls(cells, tile_size, faces="walls", **common)
 
@@ -94,7 +94,7 @@ class TileGridCollider(Collider):
         self.sums = sums_of(tiles)
 
     def centre_of(self, row: int, column: int) -> np.ndarray:
-        """(2,) m, the middle of a cell, from the Transform's position; row 0 is the top one."""
+        """(2,) m, the centre of a cell, relative to the Transform's position; row 0 is the top one."""
         rows, columns = self.cells.shape
         if not (0 <= row < rows and 0 <= column < columns):
             raise ValueError(f"TileGridCollider.centre_of: the map has {rows} rows and {columns} columns, "

@@ -1,6 +1,6 @@
-"""Rectangles of cells: columns x0 to x1, rows y0 to y1 (from below), the ends not included.
+"""Rectangles of cells: columns x0 to x1, rows y0 to y1 (from below), with exclusive ends.
 
-How many tiles they hold, how far they can grow, and the shapes they make.
+Counting their tiles, growing them, and their shapes.
 """
 
 from __future__ import annotations
@@ -8,21 +8,21 @@ from __future__ import annotations
 from ...framework.compilation import part
 from .collider import ALL, FLOORS, plugin
 
-WAITING = 64  # blocks of tiles still to be looked at: two for each halving of the map
-SLANT = 1e-9  # radians; a face that leans by less is none but parallel to the tiles
-TIE = 1e-9  # of a tile: which of two contacts is deeper is no matter then
+WAITING = 64  # capacity of the stack of blocks to search: two for each halving of the map
+SLANT = 1e-9  # radians; faces that lean by less count as parallel to the tiles
+TIE = 1e-9  # of a tile: contacts whose depths differ by less count as equally deep
 
 
 @plugin.kernel
 def tiles_in(sums, stride, x0, y0, x1, y1):
-    """How many tiles a rectangle holds."""
+    """The number of tiles in a rectangle."""
     low, high = 1 + y0 * stride, 1 + y1 * stride
     return (sums[high + x1, 0] - sums[high + x0, 0]) - (sums[low + x1, 0] - sums[low + x0, 0])
 
 
 @plugin.kernel
 def full(sums, stride, x0, y0, x1, y1):
-    """Whether all its cells are tiles."""
+    """True if all its cells are tiles."""
     return tiles_in(sums, stride, x0, y0, x1, y1) == (x1 - x0) * (y1 - y0)
 
 
@@ -40,9 +40,9 @@ def moved_side(x0, y0, x1, y1, side, way):
 
 @part
 def grown(sums, stride, x0, y0, x1, y1, side, room):
-    """A rectangle full of tiles with one side moved outwards, at most by ``room``, as long as it stays full."""
+    """A rectangle full of tiles with one side moved outwards, by at most ``room``, as far as it stays full."""
     low, high = 0, max(room, 0)
-    step = high  # most often it can grow all the way, or not at all
+    step = high  # most often it can grow by all or by nothing
     while low < high:
         u0, v0, u1, v1 = moved_side(x0, y0, x1, y1, side, step)
         if full(sums, stride, u0, v0, u1, v1):
@@ -55,7 +55,7 @@ def grown(sums, stride, x0, y0, x1, y1, side, room):
 
 @plugin.kernel
 def cell_at(way, count):
-    """The cell in which a place lies, in tiles from the map's edge; at the edge for one outside of the map, or NaN."""
+    """The cell of a coordinate, in tiles from the map's edge; the edge cell for one outside the map, or NaN."""
     if not way > 0.0:
         return 0
     if way >= count:
@@ -65,7 +65,7 @@ def cell_at(way, count):
 
 @plugin.kernel
 def gaps(low, high, first, last, tile):
-    """How far the interval low to high, in metres, is from cells first to last (negative: inside), from both sides."""
+    """Distance, in metres, of the interval low to high from cells first to last, on both sides (negative: inside)."""
     return low - last * tile, first * tile - high
 
 
@@ -82,7 +82,7 @@ def sharp(half):
 
 @plugin.kernel
 def halved(waiting, count, x0, y0, x1, y1, right_first, upper_first):
-    """Put both halves of a rectangle, cut across its longer side, where ``count`` is; the first one goes on top."""
+    """Push both halves of a rectangle, cut across its longer side, at index ``count``; the first one goes on top."""
     cut_x, cut_y = x1, y1  # of the left or lower half
     if x1 - x0 >= y1 - y0:
         cut_x = (x0 + x1) // 2
@@ -103,27 +103,27 @@ def halved(waiting, count, x0, y0, x1, y1, right_first, upper_first):
 
 @plugin.kernel
 def box_around(b, support, around):
-    """Left, right, lower and upper end of a shape, from its centre."""
+    """Left, right, lower and upper end of a shape, relative to its centre."""
     left, right = support(b, (-1.0, 0.0))[0] - around, support(b, (1.0, 0.0))[0] + around
     return left, right, support(b, (0.0, -1.0))[1] - around, support(b, (0.0, 1.0))[1] + around
 
 
 @plugin.kernel
 def rectangle(x0, y0, x1, y1, tile, middle):
-    """Its half extents, and its middle from that of the map."""
+    """Its half extents, and its centre relative to that of the map."""
     extent = (0.5 * (x1 - x0) * tile, 0.5 * (y1 - y0) * tile)
     return extent, (0.5 * (x0 + x1) * tile - middle[0], 0.5 * (y0 + y1) * tile - middle[1])
 
 
 @plugin.kernel
 def faces_like(n, faces):
-    """Whether a contact with that normal is with the faces that count."""
+    """True if a contact with that normal belongs to the selected faces."""
     return faces == ALL or (abs(n[1]) >= abs(n[0])) == (faces == FLOORS)
 
 
 @plugin.kernel
 def solid(sums, stride, x0, y0, x1, y1):
-    """Whether cells are all tiles; what lies beyond the map is none."""
+    """True if the cells are all tiles; there are none beyond the map."""
     if x0 < 0 or y0 < 0 or x1 >= stride or 1 + (y1 + 1) * stride > len(sums):
         return False
     return full(sums, stride, x0, y0, x1, y1)
@@ -131,7 +131,7 @@ def solid(sums, stride, x0, y0, x1, y1):
 
 @part
 def hidden(sums, stride, x0, y0, x1, y1, n, column0, row0, column1, row1):
-    """Whether the face, or the corner, at which a shape meets a rectangle borders on other tiles.
+    """True if the face or corner where a shape meets a rectangle is internal: it borders on other tiles.
 
     n: the contact's normal; column0 to row1: the cells under the shape's box.
     """

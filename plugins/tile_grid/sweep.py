@@ -1,4 +1,4 @@
-"""When a shape that moves first touches a tile."""
+"""The time when a moving shape first touches a tile."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from .rectangles import (
     tiles_in,
 )
 
-LOOKS = 100  # for the time of a touch; a graze takes about 30
-ROUNDING = 4e-16  # of the distance: a gap smaller than that is none
+LOOKS = 100  # iterations for the time of a touch; a graze takes about 30
+ROUNDING = 4e-16  # of the distance: smaller gaps count as none
 
 
 @plugin.kernel
 def passing(low, high, v, start, stop, enter, leave):
-    """The part of the time from ``enter`` to ``leave`` in which low to high, moving by v, is over start to stop."""
+    """The part of the time from ``enter`` to ``leave`` in which low to high, moving by v, overlaps start to stop."""
     if v == 0.0:
         return enter, leave if high >= start and low <= stop else -1.0
     one, two = (start - high) / v, (stop - low) / v
@@ -36,9 +36,9 @@ def passing(low, high, v, start, stop, enter, leave):
 
 @part
 def first_touch(a, b, d, v, support, rounding):
-    """When a shape that moves first touches a tile: through all rectangles full of tiles on its way, nearest first.
+    """When a moving shape first touches a tile, by testing all rectangles of tiles along its path, nearest first.
 
-    With each it is found as between convex shapes: a plane lies in the gap, and it is free to move up to that.
+    Each is found as between convex shapes: a plane lies in the gap, and motion up to the plane is safe.
     """
     sums, tile = a.sums, a.tile_size
     columns = int(sums[0, 0])
