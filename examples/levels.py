@@ -1,7 +1,7 @@
-"""What levels of geometry cost and spare, measured: python examples/levels.py [bodies]
+"""Cost and savings of geometry levels, measured: python examples/levels.py [bodies]
 
-Boxes with spheres around them, of several proportions, and rocks of twelve circles, whose precise test is dear. All are
-sensors that drift through each other, so nothing but finding contacts takes time.
+Boxes of several proportions in spheres, and rocks of twelve circles, whose precise test is expensive. All are sensors
+that drift through each other, so that only finding contacts takes time.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ def rock_rock(a, b, d):
 
 
 def crowd(d, seed, n, room):
-    """n places with that much room each, and velocities of 1 m/s on each axis."""
+    """n positions with that much area or volume each, and velocities of 1 m/s on each axis."""
     rng = np.random.default_rng(seed)
     side = (n * room) ** (1 / d)
     return rng, Transform.many(rng.uniform(0, side, (n, d))), RigidBody.many(linear_velocity=rng.normal(0, 1, (n, d)))
 
 
 def boxes(d, proportion, geometry, with_spheres, n):
-    """Boxes of 1 m^d of that proportion, their long sides along any axis."""
+    """Boxes of 1 m^d of that proportion, their long sides along random axes."""
     world = World(Physics(dimensions=d), settings=Settings(geometry=geometry))
     rng, places, bodies = crowd(d, 1, n, 4.0 * proportion)
     half = np.full((n, d), 0.5 * proportion ** (-1 / d))
@@ -75,7 +75,7 @@ def rock_field(with_spheres, n):
 
 
 def measure(name, world):
-    """One row: candidates, first levels' tests and hits, false positives, contacts per step; time to find contacts."""
+    """Print one row: candidates, first levels' tests and hits, false positives, contacts per step; time per step."""
     for _ in range(3):
         world.step()
     world.reset_stats()

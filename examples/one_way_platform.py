@@ -1,8 +1,8 @@
 """A platform to jump through from below, to stand on, and to drop through: python examples/one_way_platform.py
 
-A system between NARROW, which finds the contacts, and RESPONSE, which acts on them, switches off those of bodies that
-come from below. It looks at where the body stood when the step began: a jump is the same at any frame rate, and what
-rests on the platform, sunk in by a hair, stays on it.
+A system between NARROW, which finds the contacts, and RESPONSE, which acts on them, disables those of bodies that come
+from below. It uses the body's position at the start of the step, so a jump is the same at any frame rate, and a body at
+rest on the platform stays on it although it overlaps slightly.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, Phase, System, World, column
 from carom.plugins import Physics
 
-SLACK = 0.05  # of the body's height: who stood no deeper than this counts as on top
+SLACK = 0.05  # of the body's height: a body no deeper than this counts as on top
 
 
 class Platform(Component):
-    """A mark: holds what comes from above, lets everything else pass."""
+    """Marks a platform: stops bodies from above, lets all others pass."""
 
 
 class Drops(Component):
-    """Whoever has it falls through platforms until that time of the world."""
+    """Lets its entity fall through platforms until that time of the world."""
 
     until = column(0.0)
 
@@ -49,12 +49,12 @@ class OneWay(System):
         before, now = bodies.previous_position[rows, 1], bodies.position[rows, 1]
         half, platform_half = half_height(world, body), half_height(world, platform)
         gap = (before[0] - half) - (before[1] + platform_half)
-        rise = (now[0] - before[0]) - (now[1] - before[1])  # as the platform sees it
+        rise = (now[0] - before[0]) - (now[1] - before[1])  # relative to the platform
         return gap >= -SLACK * 2 * half and rise <= 0.1 * SLACK * 2 * half
 
 
 def half_height(world, entity):
-    """Half the height of the collider that decides (of a box in a sphere, the box); offsets are left out here."""
+    """Half the height of the deciding collider (of a box in a sphere, the box); offsets are ignored here."""
     box = world.try_component(entity, AABBCollider)
     return world.component_for_entity(entity, SphereCollider).radius if box is None else box.half_extents[1]
 

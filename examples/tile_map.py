@@ -1,7 +1,7 @@
 """A character runs and jumps over a tile map: python examples/tile_map.py
 
-The map is drawn as text. It stands in the world as two entities, floors and walls, so that a character who leans
-against a wall stands still on the floor. Balls roll about on the same map.
+The map is drawn as text. In the world it is two entities, floors and walls, so that a character who leans against a
+wall stands still on the floor. Balls roll about on the same map.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LAYER_CHARACTER, LAYER_REST = 2, 1
 
 
 def places(mark):
-    """The middle of the cells that hold the mark, in metres from the lower left corner of the map."""
+    """The centres of the cells that hold the mark, in metres from the lower left corner of the map."""
     lines = MAP.split()
     return [(x + 0.5, len(lines) - y - 0.5) for y, line in enumerate(lines) for x, c in enumerate(line) if c == mark]
 
