@@ -1,7 +1,7 @@
 """carom.scenes: one library of scenes for tests, benchmarks, the lab and demonstrations.
 
-Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` takes the scene's
-own default. The same protocol holds for a file given to ``carom run FILE.py``.
+Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` selects the scene's
+own default. A file given to ``carom run FILE.py`` follows the same protocol.
 
 >>> from carom import scenes
 >>> world = scenes.get("billiards").build(seed=3)
@@ -82,7 +82,7 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> Scene:
-    """The scene called ``name``; KeyError, with the names there are, for an unknown one."""
+    """The scene called ``name``; KeyError, with the known names, for an unknown one."""
     try:
         return _SCENES[name]
     except KeyError:

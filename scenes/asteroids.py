@@ -1,7 +1,7 @@
 """A field of drifting asteroids in three sizes, bouncing off each other and off the edge of space.
 
-No gravity and restitution 1: kinetic energy stays what it is. A large rock weighs about 25 times a small one,
-so this is also the everyday test of unequal masses: a small one that is hit from behind must fly forwards.
+No gravity and restitution 1: kinetic energy is conserved. A large rock is about 25 times as heavy as a small one,
+so this also tests unequal masses: a small one that is hit from behind must fly forwards.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The break in pool: a cue ball at 8 m/s into a rack of fifteen, seen from above, on a table without pockets.
 
-Sizes in metres and kilograms of the real game. The balls lose 5 % of their speed of approach in each impact
-and slow down on the cloth (a damping rate: the simplest stand-in for rolling friction). The cue ball crosses
+Sizes and masses of the real game, in metres and kilograms. Each impact loses 5 % of the approach speed, and the
+balls slow down on the cloth (by damping, the simplest approximation of rolling friction). The cue ball crosses
 its own radius in 1/280 s, hence the small time step.
 """
 
@@ -46,7 +46,7 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
         settings=settings or replace(Settings.balanced(), dt=1 / 960),
     )
     enclose(world, (0.0, 0.0), (LENGTH, WIDTH), thickness=CUSHION, restitution=RESTITUTION)
-    cue = np.array([[0.25 * LENGTH, WIDTH / 2 + 0.004]])  # a little off centre, as anybody's break
+    cue = np.array([[0.25 * LENGTH, WIDTH / 2 + 0.004]])  # a little off centre, as in a real break
     velocities = np.zeros((16, 2))
     velocities[0, 0] = BREAK_SPEED
     world.create_entities(

@@ -1,8 +1,8 @@
-"""Elastic balls bounce on the ground for 20 seconds: the question is what becomes of their energy.
+"""Elastic balls bounce on the ground for 20 seconds: a test of energy conservation.
 
 The "bouncing" test of SimBenchmark (RSL, ETH Zurich) with one row of its balls: 10 kg, radius 0.1 m, 2 m apart so
-that they never meet, centres 5 m above the ground. Each has the energy m g h = 490.5 J at all times; SimBenchmark's
-error is the mean over all steps of (E - E0)^2, of its 49 balls together, which is 49^2 times that of one ball.
+that they never meet, centres 5 m above the ground. The energy of each is m g h = 490.5 J at all times. SimBenchmark's
+error is the mean over all steps of (E - E0)^2, for its 49 balls together, which is 49^2 times that of one ball.
 """
 
 from __future__ import annotations

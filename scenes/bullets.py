@@ -1,12 +1,12 @@
-"""Bullets in a tin: small spheres at 1000 metres/s that nothing may lose.
+"""Small spheres at 1000 metres/s in a closed box, none of which may escape.
 
-A thousand spheres of radius 0.05 fly about in a box of 50 metres, among 200 pillars, and hit each other. In a step of
-1/60 s each goes 17 metres: through a wall a hundredth of a metre thick, through several pillars and past dozens of
-other bullets. All of it is elastic, without gravity, so the bodies' energy must stay what it is, and all of them
+A thousand spheres of radius 0.05 move in a box of 50 metres, among 200 pillars, and hit each other. In a step of
+1/60 s each moves 17 metres: through a wall a hundredth of a metre thick, through several pillars and past dozens of
+other bullets. All shapes are elastic, without gravity, so kinetic energy is conserved, and all bodies must stay
 inside.
 
-The settings are the caller's, but where collisions would only be looked for at the end of a step nothing of that is
-seen: without settings the scene sweeps.
+The settings are the caller's, but discrete collisions would miss nearly all impacts; without settings the scene is
+continuous.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SIDE = 50.0
 WALL = 0.01  # thickness
 PILLARS = 200
 PILLAR_RADIUS = 0.5
-FREE = 1.0  # from a pillar's axis: nearer bullets start there, on the same side of it
+FREE = 1.0  # from a pillar's axis: bullets nearer than this start there instead, on the same side of it
 MARGIN = 5.0  # shown around the box
 
 
@@ -41,7 +41,7 @@ def lattice(n: int, dimensions: int) -> NDArray[np.float64]:
 
 
 def directions(n: int, dimensions: int, seed: int) -> NDArray[np.float64]:
-    """``n`` unit vectors, evenly spread (Archimedes: the height of a point of the sphere is evenly spread too)."""
+    """``n`` unit vectors, evenly spread (Archimedes: the height of a point on the sphere is evenly spread too)."""
     draws = uniform(2 * n, seed).reshape(n, 2)
     angle = 2 * np.pi * draws[:, 0]
     flat = np.stack([np.cos(angle), np.sin(angle)], axis=1)

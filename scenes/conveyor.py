@@ -1,8 +1,7 @@
-"""A conveyor belt of slats that really move: crates drop on it, ride along and fall into a bin.
+"""A conveyor belt of moving slats: crates drop on it, ride along and fall into a bin.
 
-Nothing slides underneath while standing still: the belt is a row of kinematic boxes with a velocity, and friction
-makes the crates follow. A slat that has passed the end is put back at the start, as if it had come round below. The
-bin's floor is slick, so that a crate makes room for the next one.
+The belt is a row of kinematic boxes with a velocity, and friction makes the crates follow. A slat that has passed the
+end is put back at the start. The bin's floor has little friction, so that a crate makes room for the next one.
 """
 
 from __future__ import annotations
@@ -24,14 +23,14 @@ LENGTH, SLAT, THICKNESS = 16.0, 1.0, 0.5  # metres; the belt's upper face is at 
 SPEED = 2.0
 FRICTION, GRAVITY = 0.6, 9.81
 EVERY = 0.75  # seconds between crates
-DROP = ((1.5, 2.0), (2.5, 2.5))  # where they appear
+DROP = ((1.5, 2.0), (2.5, 2.5))  # where they are created
 EXTENTS = (0.3, 0.6)
 BIN = (LENGTH, LENGTH + 12.0)
 DEPTH = 5.0
 
 
 class Belt(System):
-    """Puts slats that have passed the end back at the start; they keep their distances."""
+    """Moves slats that have passed the end back to the start, without changing their spacing."""
 
     phase = Phase.START
 
@@ -57,7 +56,7 @@ class Chute(System):
 
     def process(self, dt: float) -> None:
         time = self.world.time
-        k = math.ceil(time / EVERY - 1e-9)  # the next to drop: in this step, or in a later one
+        k = math.ceil(time / EVERY - 1e-9)  # the next crate: in this step, or in a later one
         if k < len(self.places) and EVERY * k < time + dt * (1 - 1e-6):
             half = self.half_extents[k]
             self.world.create_entity(

@@ -1,8 +1,8 @@
 """Newton's cradle without the strings: equal elastic balls in a line; as many fly off as arrive.
 
-Each line is an experiment of its own: of its five balls the first k arrive together at 1 m/s, the others lie at
-rest. One impact at a time hands the velocity on from ball to ball, so in the end the last k fly off at 1 m/s and
-the others lie still, whatever the gap between them, none at all included.
+Each line is a separate experiment: of its five balls the first k arrive together at 1 m/s, the others are at rest.
+The impacts pass the velocity on from ball to ball, one at a time. In the end the last k fly off at 1 m/s and the
+others are at rest, for any gap between the balls, including none.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .protocol import Scene
 from .sizes import real, whole
 
 BALLS = 5
-APPROACH = 3.0  # metres, free, between the balls that arrive and those at rest
+APPROACH = 3.0  # metres, gap between the balls that arrive and those at rest
 BETWEEN_LINES = 2.0
 SPEED = 1.0
 
@@ -28,7 +28,7 @@ def build(
 ) -> World:
     """One line for each k in ``arriving``, the first one lowest, created ball by ball from left to right.
 
-    ``gap`` metres between neighbours, of those at rest and of those that arrive; ``seed`` changes nothing.
+    ``gap``: metres between neighbours, both at rest and arriving; ``seed`` changes nothing.
     """
     gap = real(gap, "gap")
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings.balanced())

@@ -1,8 +1,7 @@
-"""A ball falls from 4.9 m and bounces lower each time, until it lies on the floor.
+"""A ball falls from 4.9 m and bounces lower each time, until it rests on the floor.
 
-With restitution e the apex after n bounces is 4.9 e^(2n) m. The first impact is at T = sqrt(2 h / g), close to 1 s,
-the n-th at T (1 + 2 e (1 - e^(n - 1)) / (1 - e)), and infinitely many later all is over, at T (1 + e) / (1 - e):
-after 9 s if e = 0.8.
+With restitution e the apex after n bounces is 4.9 e^(2n) m. The first impact is at T = sqrt(2 h / g), about 1 s, the
+n-th at T (1 + 2 e (1 - e^(n - 1)) / (1 - e)). The limit for infinitely many is T (1 + e) / (1 - e): 9 s if e = 0.8.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ def impact_times(restitution: float, count: int) -> list[float]:
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, restitution: float = RESTITUTION) -> World:
-    """A ball of 1 kg and ``restitution``, which the floor has too, at rest; ``seed`` changes nothing."""
+    """A ball of 1 kg, initially at rest; ``restitution`` applies to ball and floor; ``seed`` changes nothing."""
     restitution = real(restitution, "restitution")
     settings = settings or Settings.balanced().replace(integrator="velocity_verlet", collision="continuous")
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)

@@ -1,8 +1,8 @@
 """The elastic gas of :mod:`carom.scenes.gas2d` thirty times as fast, between walls only 0.2 thick.
 
-A disc crosses up to three and a half of its diameters in a step of 1/60 s, and the wall several times over:
-with collisions looked for only at the end of a step, bodies pass through each other and out of the box. The
-scene shows what the kind of collision and the step cost and save; try ``--set dt=1/960``.
+A disc crosses up to three and a half of its diameters in a step of 1/60 s, and the wall several times over.
+With discrete collisions bodies pass through each other and out of the box. The scene shows the cost and benefit
+of the collision mode and the step; try ``--set dt=1/960``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from .protocol import Scene
 BODIES = 1000
 SPEED_UP = 30.0  # velocity components between -150 and 150 metres/s
 WALL = 0.2  # thickness
-MARGIN = 25.0  # shown around the box: where those that jump through the wall are
+MARGIN = 25.0  # shown around the box, for bodies that have tunnelled through the wall
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES) -> World:

@@ -1,6 +1,6 @@
-"""Bodies without colliders that fall: nothing but forces and integration, the floor under every other figure.
+"""Bodies without colliders that fall: only forces and integration, the lower limit of the cost of a step.
 
-Each starts on a lattice of pitch 2 with velocity components between -5 and 5 and flies its parabola.
+Each starts on a lattice of pitch 2 with velocity components between -5 and 5 and flies on a parabola.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .random_numbers import uniform
 from .sizes import whole
 
 BODIES = 10_000
-PER_ROW = 317  # whatever the number of bodies
+PER_ROW = 317  # for any number of bodies
 PITCH = 2.0
 GRAVITY = 9.81
 SECONDS = 2.0

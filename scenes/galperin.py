@@ -1,9 +1,9 @@
-"""Galperin's blocks: a heavy block drives a light one against a wall, and the impacts spell out pi.
+"""Galperin's blocks: a heavy block drives a light one against a wall, and the number of impacts gives the digits of pi.
 
-The light block, mass 1, lies at rest 1 metre from the wall; the heavy one, mass 100^digits, comes from 1 metre
-further on at 1 m/s. All impacts are elastic and nothing rubs. There are 3, 31, 314, ... of them: pi to as many
+The light block, mass 1, is at rest 1 metre from the wall; the heavy one, mass 100^digits, comes from 1 metre
+further on at 1 m/s. All impacts are elastic and without friction. There are 3, 31, 314, ... of them: pi to as many
 digits (G. Galperin, Playing pool with pi, 2003). More than a hundred fall into the same hundredth of a second, so
-this is a scene of many impacts in one step, and its own settings allow 1,000 of them.
+this scene tests many impacts in one step, and its own settings allow 1,000 of them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class ImpactCounter(System):
 
 
 def impacts(digits: int) -> int:
-    """How many impacts there are: ceil(pi / atan(sqrt(m / M))) - 1."""
+    """The number of impacts: ceil(pi / atan(sqrt(m / M))) - 1."""
     return math.ceil(math.pi / math.atan(10.0**-digits)) - 1
 
 

@@ -1,10 +1,10 @@
 """An elastic gas in a box, 2D and 3D: equal discs or spheres that only bounce, from one to hundreds of
 thousands.
 
-The benchmark scene: no gravity, restitution 1, so kinetic energy must stay what it is. Radius 0.5, density 1.
+The benchmark scene: no gravity, restitution 1, so kinetic energy is conserved. Radius 0.5, density 1.
 Discs fill a quarter of the area, spheres a tenth of the volume. Each body starts in its own cell of a
-lattice, moved at random by as much as keeps neighbours apart, with velocity components between -5 and 5.
-Other scenes take this start and change one thing: mixed2d, fastgas and player_query.
+lattice, displaced at random without touching its neighbours, with velocity components between -5 and 5.
+Other scenes use this start and change one thing: mixed2d, fastgas and player_query.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .sizes import ceil_root, whole
 from .walls import enclose
 
 RADIUS = 0.5
-FILLING = {2: 0.25, 3: 0.1}  # the share of the area or volume that the bodies take up
+FILLING = {2: 0.25, 3: 0.1}  # fraction of the area or volume that the bodies fill
 BODY_VOLUME = {2: math.pi / 4, 3: math.pi / 6}  # of a body of diameter 1; also its mass
 BODIES = {2: 1000, 3: 10_000}
 
@@ -49,7 +49,7 @@ def initial_state(n: int, dimensions: int, seed: int = 0) -> tuple[NDArray[np.fl
     spacing = side(n, dimensions) / cells
     index = np.arange(n)
     cell = np.stack([index // cells**axis % cells for axis in range(dimensions)], axis=1)
-    draws = uniform(n * 2 * dimensions, seed).reshape(n, 2, dimensions)  # body by body: its jitter, its velocity
+    draws = uniform(n * 2 * dimensions, seed).reshape(n, 2, dimensions)  # per body: displacement, velocity
     jitter = 0.45 * (spacing - 2 * RADIUS)
     positions = (cell + 0.5) * spacing + jitter * (2 * draws[:, 0] - 1)
     velocities = -5 + 10 * draws[:, 1]
@@ -57,7 +57,7 @@ def initial_state(n: int, dimensions: int, seed: int = 0) -> tuple[NDArray[np.fl
 
 
 def empty_box(settings: Settings | None, n: int, dimensions: int, thickness: float = 1.0) -> World:
-    """The world for ``n`` bodies, no gravity, with its elastic walls and nothing in it."""
+    """An empty world for ``n`` bodies, without gravity, with its elastic walls."""
     length = side(whole(n, "n"), dimensions)
     settings = settings or Settings.balanced()
     world = World(Physics(dimensions=dimensions, gravity=(0.0,) * dimensions), settings=settings)
@@ -82,7 +82,7 @@ def _gas(settings: Settings | None, seed: int, n: int, dimensions: int) -> World
 
 
 def view(n: int, dimensions: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The box and its walls: what a picture of it shows."""
+    """The region to draw: the box and its walls."""
     return (-1.0,) * dimensions, (side(n, dimensions) + 1.0,) * dimensions
 
 

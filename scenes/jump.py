@@ -1,8 +1,8 @@
 """The jump arc of a platform game: 4 pixels a frame upwards against 0.125 pixels a frame squared of gravity,
 at 60 Hz.
 
-Its true apex is v0^2 / 2g = 64 pixels, four tiles of 16; the hero clears a wall three tiles high and lands 96
-pixels further on. The integrators disagree about the apex (explicit Euler 66, semi-implicit Euler 62,
+Its exact apex is v0^2 / 2g = 64 pixels, four tiles of 16; the hero clears a wall three tiles high and lands 96
+pixels further on. The integrators differ in the apex (explicit Euler 66, semi-implicit Euler 62,
 velocity Verlet 64), so try ``--set integrator=explicit_euler`` and ``--set dt=1/30``.
 """
 

@@ -1,8 +1,7 @@
 """Moving platforms: a lift takes a stack of crates up and down, a ferry carries one from side to side.
 
-Both are kinematic: they go where they want, as if infinitely heavy, and what stands on them goes along. The lift
-accelerates with at most 0.25 g, so nothing comes off it; the ferry with half of what friction can pass on, so
-nothing slides.
+Both are kinematic: contacts do not change their motion, and the crates on them follow. The lift accelerates with at
+most 0.25 g, so the crates stay on it; the ferry with half of the limit of friction, so its crate does not slide.
 """
 
 from __future__ import annotations
@@ -34,12 +33,12 @@ class Shuttle(Component):
     period = column(1.0, positive=True)
 
     def place(self, time: float) -> NDArray[np.float64]:
-        """Where it is at ``time``."""
+        """Its position at ``time``."""
         return np.asarray(self.start) + np.asarray(self.travel) * (1 - math.cos(2 * math.pi * time / self.period)) / 2
 
 
 class Drive(System):
-    """Gives each Shuttle the velocity that takes it where it must be at the end of the step."""
+    """Gives each Shuttle the velocity that leads to its position at the end of the step."""
 
     phase = Phase.START
 
@@ -62,7 +61,7 @@ def _crate(world: World, x: float, y: float) -> int:
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, crates: int = CRATES) -> World:
-    """``crates`` on the lift and one on the ferry, all at rest on them; ``seed`` changes nothing.
+    """``crates`` on the lift and one on the ferry, all at rest relative to them; ``seed`` changes nothing.
 
     Created in this order: ground, lift, ferry, the lift's crates from the lowest up, the ferry's crate.
     """

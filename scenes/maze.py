@@ -1,8 +1,8 @@
-"""A maze and a thousand that wander in it: discs and boxes that bounce off its walls and off each other.
+"""A thousand discs and boxes that bounce off the walls of a maze and off each other.
 
-The maze has one way, and no loop, between any two of its cells (cut by walking at random to cells not yet seen,
-and back where there are none). Straight runs of wall are one long static box, so the level is a few hundred boxes
-of very unequal length. Restitution 1, no gravity: kinetic energy must stay what it is.
+The maze has exactly one path between any two of its cells (made by a random walk to unvisited cells, with
+backtracking). Straight runs of wall are one long static box, so the level is a few hundred boxes
+of very unequal length. Restitution 1, no gravity: kinetic energy is conserved.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ def wall_boxes(side: int, random: np.random.Generator) -> tuple[NDArray[np.float
     """Centres and half extents, (m, 2) each, of all walls, the outer ones included."""
     right, above = cut(side, random)
     boxes = []
-    for axis, walls in enumerate((right, above.T)):  # the rows of each: lines of wall across that axis
-        lines = np.concatenate([np.ones((1, side), bool), walls])  # and the outer one before the first cell
+    for axis, walls in enumerate((right, above.T)):  # lines of wall perpendicular to that axis
+        lines = np.concatenate([np.ones((1, side), bool), walls])  # with the outer wall before the first cell
         for line, start, end in runs(lines):
             centre, half = np.empty(2), np.empty(2)
             centre[axis], half[axis] = line * CELL, WALL / 2
@@ -72,7 +72,7 @@ def wall_boxes(side: int, random: np.random.Generator) -> tuple[NDArray[np.float
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = MOVERS) -> World:
-    """``n`` movers, each in a cell of its own of a square maze that is just large enough, discs first."""
+    """``n`` movers, each in a separate cell of the smallest square maze that holds them, discs first."""
     side = ceil_root(whole(n, "n"), 2)
     random = np.random.default_rng(seed)
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings.balanced())

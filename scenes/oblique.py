@@ -1,8 +1,8 @@
-"""One disc strikes another off centre: after one impact, where each is and how fast, in round numbers.
+"""One disc hits another off centre: positions and velocities after one impact, in round numbers.
 
-The first comes from (-3, 0.6) at 1 m/s along x, the second lies at the origin. Both have radius 0.5, so they touch
-after 2.2 s, when the first is at (-0.8, 0.6), which is also the impact's normal. Equal masses and restitution 1 give
-the velocities (0.36, 0.48) and (0.64, -0.48), and after 3 s the places (-0.512, 0.984) and (0.512, -0.384).
+The first comes from (-3, 0.6) at 1 m/s along x, the second is at rest at the origin. Both have radius 0.5, so they
+touch after 2.2 s, when the first is at (-0.8, 0.6); the impact's normal is (0.8, -0.6). Equal masses and restitution 1
+give the velocities (0.36, 0.48) and (0.64, -0.48), and after 3 s the positions (-0.512, 0.984) and (0.512, -0.384).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SPEED = 1.0
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, mass: float = 1.0, restitution: float = 1.0) -> World:
-    """A disc of 1 kg meets one of ``mass`` kg; ``restitution`` of both. ``seed`` changes nothing."""
+    """A disc of 1 kg hits one of ``mass`` kg; ``restitution`` of both. ``seed`` changes nothing."""
     mass, restitution = real(mass, "mass", above=True), real(restitution, "restitution")
     settings = settings or Settings.balanced().replace(collision="continuous")
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)

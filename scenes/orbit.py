@@ -1,7 +1,7 @@
-"""A planet on an ellipse around a sun at the origin: GM = 1, semi-major axis 1, so one turn takes 2 pi seconds.
+"""A planet on an ellipse around a sun at the origin: GM = 1, semi-major axis 1, so one orbit takes 2 pi seconds.
 
-It starts where it is nearest to the sun and fastest, at (1 - e, 0) with the speed sqrt((1 + e) / (1 - e)) upwards
-(Kepler's ellipse; e is the eccentricity). After each turn it must be back there. Its energy is -1/2 whatever e is,
+It starts at the perihelion, where it is fastest, at (1 - e, 0) with the speed sqrt((1 + e) / (1 - e)) upwards
+(Kepler's ellipse; e is the eccentricity). After each orbit it must be back there. Its energy is -1/2 for any e,
 its angular momentum sqrt(1 - e^2).
 """
 
@@ -30,7 +30,7 @@ class Sun(ForceSystem):
         bodies.force[:] -= bodies.mass[:, None] * x / (x * x).sum(axis=1, keepdims=True) ** 1.5
 
     def potential_energy(self, bodies: Any) -> float:
-        """-m / r, J: 0 far away."""
+        """-m / r, J: 0 at infinity."""
         x = bodies.position
         return -float((bodies.mass / (x * x).sum(axis=1) ** 0.5).sum())
 

@@ -1,8 +1,8 @@
 """A pile, 2D and 3D: discs or spheres fall into a bin and come to rest.
 
 The benchmark of contacts at rest: restitution 0, no friction, gravity 9.81 along y. Radius 0.5, density 1. The
-bodies start at rest on a lattice with gaps of 0.2, each moved by up to 0.09 along every axis. The bin has a
-floor, sides and no lid.
+bodies start at rest on a lattice with gaps of 0.2, each displaced by up to 0.09 along every axis. The bin has a
+floor and sides, but no lid.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ def pile3d(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES[3
 
 
 def width(n: int, dimensions: int) -> float:
-    """Of the bin, metres."""
+    """Width of the bin, metres."""
     return PITCH * n ** (1 / dimensions)
 
 
 def layers(n: int, dimensions: int) -> int:
-    """How many bodies lie above each other at the start."""
+    """Number of layers at the start."""
     return -(-n // floor_root(n, dimensions) ** (dimensions - 1))
 
 

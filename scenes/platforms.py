@@ -1,6 +1,6 @@
 """Crates rain on platforms: they land, slide to a stop, or slip over the edge and land further down.
 
-What most levels of a game are about: boxes of several sizes and masses on static ledges, with friction and a
+Typical for game levels: boxes of several sizes and masses on static ledges, with friction and a
 little bounce. Crates that miss every platform end on the ground between the walls.
 """
 
@@ -28,16 +28,16 @@ PLATFORMS = (  # from x, to x, height of the top
 )
 THICKNESS = 0.6
 PER_ROW = 10
-LOWEST = HEIGHT - 6.0  # where the lowest row of crates starts
-PITCH = (3.8, 2.2)  # from place to place in a row, from row to row
+LOWEST = HEIGHT - 6.0  # height of the lowest row of crates at the start
+PITCH = (3.8, 2.2)  # distance within a row, distance of the rows
 EXTENTS = (0.35, 0.75)  # half the width, half the height
 DRIFT = 6.0  # metres/s, at most, to either side
 FRICTION, RESTITUTION, GRAVITY = 0.15, 0.3, 9.81
-IMPACTS = 32  # of a crate in a step, at most: one caught between two others bounces to and fro many times
+IMPACTS = 32  # per crate and step, at most: a crate between two others may bounce to and fro many times
 
 
 def _top(n: int) -> float:
-    """Of the walls: above the highest crate."""
+    """Height of the walls: above the highest crate."""
     return max(HEIGHT, LOWEST + PITCH[1] * math.ceil(n / PER_ROW))
 
 

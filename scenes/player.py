@@ -1,7 +1,7 @@
-"""One player among 10,000 objects: it asks what is near, and ploughs through what is in its way.
+"""One player among 10,000 objects, with a range query in each step and contacts with what is in its way.
 
-The scene of spatial partitions: each step the player's radar makes one query that must not look at all
-10,000, and its own body collides with the few that it meets. The objects, discs and boxes, lie at rest until
+The scene for the broad phase: each step the player's radar makes one query that must not examine all
+10,000 objects, and its body collides with the few that it meets. The objects, discs and boxes, are at rest until
 they are pushed.
 """
 
@@ -18,19 +18,19 @@ from .protocol import Scene
 from .walls import enclose
 
 OBJECTS = 10_000
-PER_ROW = 101  # a lattice of 10,201 places; the 201 nearest to the player stay free, a clearing to start from
+PER_ROW = 101  # a lattice of 10,201 places; the 201 nearest to the player stay empty
 SPACING = 2.0  # metres between places
 SIDE = PER_ROW * SPACING
 PLAYER_RADIUS, PLAYER_MASS = 2.0, 40.0
 SPEED = 40.0  # metres/s
 LAP_RATE = 0.3  # radians/s along the eight
-THRUST = 8.0  # 1/s: how fast the player's velocity follows the wish
+THRUST = 8.0  # 1/s: rate at which the player's velocity follows the desired one
 RADAR_RADIUS = 8.0
 DRAG = 1.5  # 1/s, of the objects
 
 
 class Pilot(System):
-    """Flies the player along a figure of eight: a force in proportion to the velocity that is missing."""
+    """Flies the player along a figure of eight: a force proportional to the velocity error."""
 
     phase = Phase.START
 

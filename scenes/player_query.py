@@ -1,6 +1,6 @@
-"""Where is what: the gas of :mod:`carom.scenes.gas2d` at rest, and places from which to ask.
+"""Queries: the gas of :mod:`carom.scenes.gas2d` at rest, and places for queries.
 
-The scene of queries: nothing moves, so all time goes into the questions. ``places`` gives 1,000 points spread
+Nothing moves, so all time is spent in the queries. ``places`` gives 1,000 points spread
 over the box.
 """
 
@@ -24,7 +24,7 @@ def places(n: int = BODIES, count: int = QUERIES, seed: int = 0) -> NDArray[np.f
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES) -> World:
-    """``n`` discs where the gas' discs start, at rest."""
+    """``n`` discs at rest, at the start positions of the gas."""
     world = gas.empty_box(settings, n, 2)
     positions, velocities = gas.initial_state(n, 2, seed)
     gas.add_spheres(world, positions, np.zeros_like(velocities))

@@ -1,4 +1,4 @@
-"""What a scene is: a function that builds a world, and what a reader or a picture needs to know about it."""
+"""The scene protocol: a function that builds a world, and the data needed to describe and draw it."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Build(Protocol):
 class Scene:
     """One scene of the library.
 
-    ``seconds`` is the simulated time after which the scene has shown what it is about; ``view`` is the part
-    of space worth drawing, as its lower and upper corner (one number per dimension each).
+    ``seconds`` is the recommended simulated time; ``view`` is the part of space to draw, as its lower and upper
+    corner (one number per dimension each).
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""A pyramid of unit boxes: each row of one box less stands on the row below, half a box to the side.
+"""A pyramid of unit boxes: each row has one box less than the row below and is offset by half a box.
 
 Restitution 0, mass 1, gravity 9.81. It must stand, with friction 0.6 and without. A spacing
 of 1.1 leaves gaps between the boxes of a row.

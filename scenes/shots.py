@@ -1,12 +1,13 @@
-"""Shots, one lane below the other, that tell the kinds of collision apart: what each of them sees of a fast ball.
+"""Fast balls in lanes, one below the other, that show how each collision mode treats them.
 
-Each ball goes two metres in a step of 1/60 s and is half a metre wide. All of it is elastic and without gravity, so
-where every ball ought to be is known exactly. From the top:
+Each ball moves two metres in a step of 1/60 s and is half a metre wide. All shapes are elastic and there is no gravity,
+so the exact position of every ball is known. From the top:
 
 - graze: a ball touches the edge of a post between two steps.
 - wall: a ball and a wall a tenth of a metre thick.
 - head on: two balls that are past each other when the step ends.
-- ghost: a target behind a shield. At the end of a step the ball is inside the target, and has never been there.
+- ghost: a target behind a shield. At the end of a step the free path of the ball is inside the target, which the shield
+  prevents it from reaching.
 - pace: two balls of the same speed to the right, one of them to and fro between two plates, which it hits twice in
   a step. Neither gets ahead, unless a body that meets something loses the rest of its step.
 
@@ -21,23 +22,23 @@ from ..plugins import Physics
 from .protocol import Scene
 from .walls import block
 
-START = 1.0  # x of what comes from the left
+START = 1.0  # x of balls that come from the left
 SPEED = 120.0
 RADIUS = 0.25
 THICKNESS = 0.1
 
 GRAZE, WALL, HEAD_ON, GHOST, FREE, PLATES = 9.5, 7.5, 5.7, 3.7, 1.7, 0.0  # heights of the lanes
-POST, POST_RADIUS, OFF_CENTRE = 8.0, 0.5, 0.72  # it is touched at the normal (7, 24) / 25
+POST, POST_RADIUS, OFF_CENTRE = 8.0, 0.5, 0.72  # the contact normal is (7, 24) / 25
 WALL_FACE = 7.95
 OPPOSITE = 15.0  # where the ball from the right starts
 SHIELD_FACE, TARGET, TARGET_RADIUS = 7.55, 9.4, 0.5
-REACH = 0.6  # of walls and shields, up and down from the lane
-APART = 1.5  # the plates
+REACH = 0.6  # extent of walls and shields above and below the lane
+APART = 1.5  # distance of the plates
 END = 16.0
 
 
 def build(settings: Settings | None = None, seed: int = 0) -> World:
-    """Lane by lane from the top, of each first what stands, then the balls from the left; ``seed`` changes nothing."""
+    """Lanes from the top, in each the static shapes first, then the balls from the left; ``seed`` changes nothing."""
     settings = settings or Settings.balanced().replace(collision="continuous")
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
 

@@ -1,4 +1,4 @@
-"""How large a scene is: checked numbers, and roots of whole numbers without rounding."""
+"""Checked numbers for scene sizes, and integer roots without rounding."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def whole(value: Any, name: str, least: int = 1) -> int:
-    """``value`` as an int; TypeError if it is no whole number, ValueError below ``least``, both naming it."""
+    """``value`` as an int; TypeError if it is not a whole number, ValueError below ``least``, both with its name."""
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         raise TypeError(f"{name} must be a whole number, got {value!r}")
     number = value.__index__()

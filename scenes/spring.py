@@ -1,8 +1,8 @@
-"""A body on a spring: one swing a second, for ever, or less and less of it with ``damping``.
+"""A body on a spring: one oscillation per second, undamped or with ``damping``.
 
 It starts at (1, 0) at rest, so x(t) = cos(omega t), omega = sqrt(stiffness / mass) = 2 pi 1/s. With a damping rate c
-the amplitude falls as exp(-c t / 2) and omega becomes sqrt(stiffness / mass - c^2 / 4). Methods differ in what they
-make of amplitude, frequency and energy.
+the amplitude falls as exp(-c t / 2) and omega becomes sqrt(stiffness / mass - c^2 / 4). Integrators differ in
+amplitude, frequency and energy.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class SpringToOrigin(ForceSystem):
         bodies.force[:] -= self.damping * bodies.mass[:, None] * bodies.linear_velocity
 
     def potential_energy(self, bodies: Any) -> float:
-        """Of the spring, J; drag has none."""
+        """Energy of the spring, J; drag has none."""
         return 0.5 * self.stiffness * float((bodies.position**2).sum())
 
 

@@ -1,7 +1,7 @@
 """A tower: boxes of side 1, or balls of diameter 1, one exactly above the other.
 
-What stands must stay: no sinking, no shaking, no drift. ``top_mass`` makes the topmost body heavier than the
-others, which is hard on a solver that passes impulses on from contact to contact.
+It must stay in place: no sinking, no shaking, no drift. ``top_mass`` makes the topmost body heavier than the
+others, which is difficult for an iterative solver.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A level that does not move: 10,000 static boxes, and 1,000 discs that bounce between them.
 
-What never moves should cost next to nothing. The boxes, 1 by 1, leave lanes 3 wide; each disc starts near the
-middle of a place where two lanes cross. Restitution 1, no gravity: kinetic energy must stay what it is.
+Static shapes should cost almost nothing. The boxes, 1 by 1, leave lanes 3 wide; each disc starts near the
+middle of a crossing of two lanes. Restitution 1, no gravity: kinetic energy is conserved.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from .sizes import ceil_root, whole
 from .walls import enclose
 
 DISCS = 1000
-BOXES_A_SIDE = 100  # for 1,000 discs; ten boxes to a disc whatever their number
+BOXES_A_SIDE = 100  # for 1,000 discs; ten boxes per disc for any number
 PITCH = 4.0  # from box to box
-EVERY = 3  # a disc starts at each third crossing, along x and along y
+EVERY = 3  # a disc starts at every third crossing, along x and along y
 JITTER = 0.5
 
 

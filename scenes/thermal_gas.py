@@ -1,9 +1,9 @@
-"""A gas of elastic discs at a temperature: what it does on average is known from statistical mechanics.
+"""A gas of elastic discs at a temperature: its averages are known from statistical mechanics.
 
-Unlike gas2d it starts with Maxwell's velocities at kT = 1 (mass 1), so it need not become warm: discs of diameter 1
-on a lattice that fill a share ``eta`` of a square. Pressure and collision rate then tell whether impacts are found
-where and when they should be, which energy alone does not: a gas that misses collisions keeps that too. For
-eta = 0.3 the pressure is 2.063 n kT / area (virial series of hard discs, Clisby and McCoy, 2006), taken with the area
+Unlike gas2d it starts with Maxwell's velocities at kT = 1 (mass 1), so it needs no warm-up: discs of diameter 1
+on a lattice that fill a fraction ``eta`` of a square. Pressure and collision rate show whether impacts are found at
+the right place and time; energy does not, because a gas that misses collisions conserves it too. For
+eta = 0.3 the pressure is 2.063 n kT / area (virial series of hard discs, Clisby and McCoy, 2006), with the area
 that the centres can reach, and each disc collides 2.4 times a second.
 """
 
@@ -24,7 +24,7 @@ from .walls import enclose
 BODIES = 400
 ETA = 0.3
 RADIUS = 0.5
-THICKNESS = 10.0  # of the walls: deep enough that large steps of a discrete world lose nobody
+THICKNESS = 10.0  # of the walls: enough for large steps of a discrete world
 
 
 def side(n: int, eta: float) -> float:
@@ -33,7 +33,7 @@ def side(n: int, eta: float) -> float:
 
 
 def initial_state(n: int, eta: float, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions and velocities, (n, 2) each: a square lattice, row by row; no momentum, kinetic energy n."""
+    """Positions and velocities, (n, 2) each: a square lattice, row by row; zero momentum, kinetic energy n."""
     per_row = floor_root(n, 2)
     index = np.arange(n)
     cells = np.stack([index % per_row, index // per_row], axis=1).astype(np.float64)
@@ -45,7 +45,7 @@ def initial_state(n: int, eta: float, seed: int = 0) -> tuple[NDArray[np.float64
 
 
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES, eta: float = ETA) -> World:
-    """``n`` discs, a square number, that fill ``eta`` of the box, up to pi / 4; ``seed`` chooses the velocities.
+    """``n`` discs, a square number, that fill ``eta`` of the box, at most pi / 4; ``seed`` chooses the velocities.
 
     The walls are entities 1 to 4.
     """

@@ -1,4 +1,4 @@
-"""Static walls around a rectangle or a cuboid, as most scenes need them."""
+"""Static walls around a rectangle or a cuboid."""
 
 from __future__ import annotations
 
