@@ -1,4 +1,4 @@
-"""What esper knows against what the table knows."""
+"""Comparison of esper's components with the rows of the table."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Charge(Component):
 
 
 def matches_esper(world):
-    """Every body's row says what the components say that esper has, and nothing else is in the table."""
+    """Every body's row equals esper's components, and the table has no other rows."""
     bodies = world.bodies
     expected = [
         e

@@ -1,4 +1,4 @@
-"""The ``carom`` command in an empty folder, a scene file for it, and what it answers."""
+"""The ``carom`` command in an empty folder, a scene file for it, and its output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ``carom`` command in an empty folder, a plugin that is good, and those that ship."""
+"""The ``carom`` command in an empty folder, a good plugin, and the plugins that ship with carom."""
 
 from __future__ import annotations
 

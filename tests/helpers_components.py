@@ -1,4 +1,4 @@
-"""Components of a game's own: one with a single column, and one with every option that a column has."""
+"""User components: one with a single column, and one with every option of columns."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Everything(Component):
 
 
 def full(d=2):
-    """A world with one body that has everything."""
+    """A world with one body that has all components."""
     world = make_world(d)
     e = ball(world, 0.0)
     world.add_component(e, Everything(5.0, push=(1.0, 2.0, 3.0)[:d]))

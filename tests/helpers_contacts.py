@@ -1,4 +1,4 @@
-"""What is told of contacts: events as they happen, ids of rows."""
+"""Reports of contacts: events in order, ids of rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Worlds whose bits are compared, and all of their bits."""
+"""Worlds whose states are compared bit by bit, and all of their bits."""
 
 from __future__ import annotations
 

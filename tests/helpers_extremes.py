@@ -1,4 +1,4 @@
-"""What section C of the accuracy list is tried on."""
+"""Bodies and settings for section C of the accuracy list."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Who meets whom, and who is pushed, as it is told in every path of a step.
+"""Filters of contacts, observed in every path of a step: which pairs meet, and which have a response.
 
 The paths: contacts found (NARROW), impacts, contacts at rest, begin, stay, end, handlers, ``contacts.of`` and
-``pairs``, queries. What is not pushed must move exactly as if the other were not there, to the last bit.
+``pairs``, queries. A body without response must move exactly as if the other did not exist, to the last bit.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def up(d, height):
 
 
 def listen(world):
-    """Events as (name without ``contact_``, a, b), as they happen."""
+    """Events as (name without ``contact_``, a, b), in order."""
     told = []
     for name in EVENTS:
         world.on(name, lambda contact, name=name: told.append((name[8:] or name, contact.entity_a, contact.entity_b)))
@@ -31,7 +31,7 @@ def pairs(rows):
 
 
 def assert_same_motion(world, other, entities):
-    """The same bits: of entities that have the same ids in both worlds."""
+    """Equal bits for entities that have the same ids in both worlds."""
     for entity in entities:
         np.testing.assert_array_equal(position(world, entity), position(other, entity))
         np.testing.assert_array_equal(velocity(world, entity), velocity(other, entity))

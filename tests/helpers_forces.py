@@ -1,4 +1,4 @@
-"""Bodies for forces to act on, and functions called in a phase of the step."""
+"""Bodies for tests of forces, and functions called in a phase of the step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ DT = 0.125  # a power of two: sums of steps are exact
 
 
 def body(world, mass=1.0, velocity=(0.0, 0.0), *, at=(0.0, 0.0), **kwargs):
-    """A new body's RigidBody."""
+    """The RigidBody of a new body."""
     rigid = RigidBody(mass, velocity, **kwargs)
     world.create_entity(Transform(at), rigid)
     return rigid

@@ -1,4 +1,4 @@
-"""Elastic discs in a square box, and what statistical mechanics says of them: B20 of the accuracy list."""
+"""Elastic discs in a square box, and their averages by statistical mechanics: B20 of the accuracy list."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from carom.scenes import thermal_gas
 
 N, ETA, RADIUS = thermal_gas.BODIES, thermal_gas.ETA, thermal_gas.RADIUS
 BULK = 2.0632  # Z of hard discs at eta = 0.3, virial series of Clisby and McCoy
-REFERENCE = 2.088  # the same of N = 400 in this box, in measures that the centres can reach: exact event dynamics
+REFERENCE = 2.088  # Z of N = 400 in this box, with the area that the centres can reach: exact event dynamics
 RATE = 2.399  # collisions of each disc per unit time at kT = m = sigma = 1: 2 sqrt(pi) rho sigma g
-FINITE_RATE = 1.031  # walls keep centres out of a layer of R, so the gas is denser by up to sigma / L
+FINITE_RATE = 1.031  # walls exclude centres from a layer of R, so the gas is denser by up to sigma / L
 
 
 def gas(dt: float, seed: int, n: int = N, **settings: Any) -> tuple[World, float]:
@@ -32,7 +32,7 @@ class Measured:
 
 
 def measure(world: World, side: float, seconds: float, discard: float = 20.0) -> Measured:
-    """Run until each disc has collided ``discard`` times, then measure; nobody may escape."""
+    """Run until each disc has collided ``discard`` times, then measure; no disc may escape."""
     dt = world.settings.dt
     n, energy, deepest, drift, wall, hits = len(world.bodies.dynamic), world.kinetic_energy(), 0.0, 0.0, 0.0, 0
     warm_up, steps = int(discard / RATE / dt), int(seconds / dt)

@@ -1,4 +1,4 @@
-"""Bodies with levels of geometry: a box with a sphere around it, and what is counted of them."""
+"""Bodies with geometry levels: a box with a sphere around it, and their counters."""
 
 from __future__ import annotations
 

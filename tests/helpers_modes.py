@@ -1,4 +1,4 @@
-"""Worlds whose impacts are taken at their true time: the modes, bullets, what struck whom when."""
+"""Worlds with impacts at their true time: the modes, bullets, and recorded impacts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
 
 MODES = ("continuous", "event_driven")
-SWEPT = (*MODES, "ccd")  # the last: a discrete world, and bullets that ask for it
+SWEPT = (*MODES, "ccd")  # the last: a discrete world whose bullets have ccd
 
 each_mode = pytest.mark.parametrize("mode", MODES)
 each_sweep = pytest.mark.parametrize("mode", SWEPT)
@@ -44,7 +44,7 @@ def bullet(
 
 @dataclass
 class Impacts:
-    """Impacts in the order in which ``contacts.impacts`` told them; times from the start of the world."""
+    """Impacts in the order of ``contacts.impacts``; times from the start of the world."""
 
     time: np.ndarray
     entity_a: np.ndarray
@@ -58,7 +58,7 @@ class Impacts:
 
 
 def strikes(world: World, steps: int) -> Impacts:
-    """Run that many steps; all impacts on the way."""
+    """Run that many steps; returns all impacts of them."""
     d, dt = world.dimensions or 2, world.settings.dt
     parts: list[tuple[np.ndarray, ...]] = [
         (np.empty(0), np.empty(0, int), np.empty(0, int), np.empty((0, d)), np.empty((0, d)), np.empty(0))

@@ -1,4 +1,4 @@
-"""Worlds in each of which other kernels run, and which these are."""
+"""Worlds that run different kernels, and the expected kernels of each."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def with_system():
 
 
 def resting(d=2, friction=None, restitution=0.0, shape=ball, handler=False, rotation=None):
-    """Falls two centimetres onto the floor; one that bounces as well, if any does."""
+    """A body falls two centimetres onto the floor, and a bouncing one as well if any restitution is set."""
     world = make_world(d, gravity=9.81)
     floor(world)
     turned = {} if rotation is None else {"rotation": rotation}
@@ -111,7 +111,7 @@ def resting(d=2, friction=None, restitution=0.0, shape=ball, handler=False, rota
 
 
 def on_each_other():
-    """Spheres alone: one falls onto a static one."""
+    """Only spheres: one falls onto a static one."""
     world = make_world(gravity=9.81)
     ball(world, (0.0, 0.0), kind="static")
     ball(world, (0.0, 1.02))
@@ -146,7 +146,7 @@ def crowd(count, still=0, radii=(0.5,)):
     return world
 
 
-# What runs: everything that can be called in the scene, no more.
+# Expected kernels: all that can be called in the scene, and no others.
 FALLS = AROUND | FALL
 HITS = FALLS | SHAPES | CONTACTS | {"test_all"}
 CROWD = AROUND | {"any_force", "drift"} | SHAPES | CONTACTS

@@ -1,8 +1,8 @@
-"""Brute force for queries and casts: what is known of many bodies, and how far apart they are.
+"""Brute force for queries and casts: distances and overlaps of many bodies.
 
 The oracle for casts is a bisection: the gap between two convex bodies, one of which moves along a straight line, is a
-convex function of the way, so a ternary search brackets its minimum and a bisection finds where it first is zero. Gaps
-below GRAZE at the minimum are grazes, of which either answer is right.
+convex function of the distance moved, so a ternary search brackets its minimum and a bisection finds its first zero.
+If the minimum is below GRAZE, hit and miss are both right.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ GRAZE = 1e-7  # relative to the sizes here, all about 1
 
 
 class Bodies:
-    """What the oracle knows: spheres (radius) and boxes (half extents) at places, by entity."""
+    """The oracle's data: spheres (radius) and boxes (half extents) at places, by entity."""
 
     def __init__(self, entity, centre, half, sphere):
         self.entity = np.asarray(entity)
         self.centre = np.asarray(centre, float)
-        self.half = np.asarray(half, float)  # (n, d); of a sphere its radius
+        self.half = np.asarray(half, float)  # (n, d); the radius for a sphere
         self.sphere = np.asarray(sphere, bool)
 
     def gap(self, centres, half, sphere):
@@ -38,7 +38,7 @@ class Bodies:
         return np.where(self.sphere, around, (d - half - self.half).max(axis=1))
 
     def depth_of_point(self, point):
-        """How deep inside each body the point is; negative outside."""
+        """Depth of the point inside each body; negative outside."""
         d = np.abs(self.centre - point)
         outside = -np.linalg.norm(np.maximum(d - self.half, 0.0), axis=1)
         inside = (self.half - d).min(axis=1)
@@ -47,7 +47,7 @@ class Bodies:
         )
 
     def cast(self, start, direction, length, half, sphere):
-        """(ways to the first touch, inf for none; least gaps on the way), each (n,)."""
+        """(distances to the first touch, inf for none; smallest gaps), each (n,)."""
 
         def gap(t):
             return self.gap(start + t[:, None] * direction, half, sphere)
@@ -73,7 +73,7 @@ class Bodies:
 
 
 def scene(d, n, seed, sizes="even", kinds=("dynamic", "static", "kinematic")):
-    """A world of n spheres and boxes and what the oracle knows of it; every third is turned, a fifth is a sensor."""
+    """A world of n spheres and boxes with the oracle's data; every third is turned, a fifth is a sensor."""
     rng = np.random.default_rng(seed)
     side = 2.5 * n ** (1 / d)
     places = rng.random((n, d)) * side

@@ -1,4 +1,4 @@
-"""Bodies at rest: towers of boxes and balls, and how well they stand."""
+"""Bodies at rest: towers of boxes and balls, and measures of their stability."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from worlds import box
 
 G = 9.81
-SLOP = 0.005  # of a size: the overlap that is left alone
+SLOP = 0.005  # of a size: the overlap that is not corrected
 
 
 def tower(world, count, *, x=0.0, bottom=0.5, pitch=1.0, maker=box, masses=None, **collider):
@@ -27,12 +27,12 @@ def heights(world, entities):
 
 
 def overlaps(world, entities):
-    """Of a tower of unit bodies, from the floor upwards: floor to first, first to second and so on, metres."""
+    """Overlaps, metres, in a tower of unit bodies, from the floor upwards."""
     return 1.0 - np.diff(heights(world, entities), prepend=-0.5)
 
 
 def speed(world):
-    """The greatest of any moving body's velocity components."""
+    """The largest velocity component of any moving body."""
     return float(np.abs(world.bodies.dynamic.linear_velocity).max())
 
 
@@ -45,7 +45,7 @@ def depths(world):
 
 
 def soft_overlap(load, effective_mass, settings, g=G):
-    """What a contact at rest gives way under a load, metres: load g / (effective_mass w^2).
+    """Overlap of a contact at rest under a load, metres: load g / (effective_mass w^2).
 
     w, the frequency of the soft contact, is a quarter of the substeps' rate; effective_mass: of the two bodies, 1 /
     (1/m_a + 1/m_b).

@@ -1,4 +1,4 @@
-"""Systems and plain processors that write down when they run, of several types and phases."""
+"""Systems and plain processors that record their calls, of several types and phases."""
 
 from __future__ import annotations
 

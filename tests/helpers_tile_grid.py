@@ -1,4 +1,4 @@
-"""Worlds for maps of tiles, and the boxes of all their tiles."""
+"""Worlds for tile maps, and the boxes of all their tiles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def distances(points, low, high):
 
 
 def make_world(gravity=(0, -10), others=False):
-    """With spheres and tiles alone, or with all shapes of the tests in each, so that they share their compiled code."""
+    """A world with only spheres and tiles, or with all shapes of the tests, so that tests share compiled code."""
     world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin, tile_grid.plugin)
     world.create_entity(Transform((0, -5000)), SphereCollider(1.0))
     if others:

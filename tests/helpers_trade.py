@@ -1,4 +1,4 @@
-"""A trade of accuracy for speed that nobody ran: errors are powers of the step, so every figure is known before."""
+"""An artificial trade of accuracy for speed: errors are powers of the step, so every figure is known in advance."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def smooth(timed: bool = True, against: bool = True) -> CaseTrade:
 
 
 def bouncing() -> CaseTrade:
-    """The scene that others have published: an exact method, one of order 2, one that is off the theory."""
+    """The scene with published results: an exact method, one of order 2, one that differs from theory."""
     plan = (
         ("velocity verlet, event driven", "event_driven", 0.0, math.inf),
         ("semi-implicit Euler, continuous", "continuous", 2.0, 2.0),
@@ -143,7 +143,7 @@ def bouncing() -> CaseTrade:
 
 
 def crowded() -> CaseTrade:
-    """More curves than there are colours: all integrators in all modes at two levels of geometry."""
+    """More curves than colours: all integrators in all modes at two geometry levels."""
     curves = []
     for name, collision, geometry in itertools.product(
         METHODS, ("discrete", "continuous", "event_driven"), ("precise", "bounds")
@@ -156,7 +156,7 @@ def crowded() -> CaseTrade:
 
 
 def refused() -> CaseTrade:
-    """A case of which nothing was measured."""
+    """A case that was not measured."""
     return CaseTrade(
         scene="my_scene.py",
         target="games/my_scene.py",

@@ -1,4 +1,4 @@
-"""Scene files of users, for the tests of `carom trade`: each as short as can be, in 2D, of a kind of its own."""
+"""User scene files for the tests of `carom trade`: each minimal, in 2D, and of a different kind."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def build(settings, seed=0):
     return world
 '''
 
-# A process of its own dies when it builds the scene: the first so many times.
+# Kills its own process when it builds the scene: the first few times.
 DEADLY = BALL.replace(
     "    world = World",
     '''    marks = Path(__file__).with_suffix(".marks")
@@ -86,13 +86,13 @@ DEADLY = BALL.replace(
 
 
 def scene_file(folder: Path, text: str, name: str = "mine.py", first_line: str = "A scene of one's own.") -> str:
-    """Write it; the path as the command line would have it."""
+    """Write the file; returns its path as typed on the command line."""
     path = folder / name
     path.write_text(HEAD.format(first_line=first_line) + text, encoding="utf-8")
     return str(path)
 
 
 def dies(task: object) -> None:
-    """In place of `perform`: ends its process, which must not be that of the tests."""
+    """Replaces `perform`: kills its process, which must not be that of the tests."""
     assert multiprocessing.parent_process() is not None
     os.kill(os.getpid(), signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""What test_workers.py lets worker processes do: they can import this module, as pytest puts its folder on the path."""
+"""Tasks for test_workers.py: worker processes can import this module, as pytest adds its folder to the path."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 from carom.framework.compilation import log
 from carom.lab.jobs import workers
 
-DEADLINE = 60.0  # s; only a failing test waits so long
+DEADLINE = 60.0  # s; reached only by failing tests
 
 
 class Task(NamedTuple):
-    """Which function below to call, a folder for marks of what has run, and a number."""
+    """The function below to call, a folder for marks of completed calls, and a number."""
 
     what: str
     folder: str
@@ -31,12 +31,12 @@ class Awkward(Exception):  # noqa: N818
 
 
 def marks(folder: Path) -> list[str]:
-    """Which tasks have begun, and how often: `3` and `3 again`."""
+    """The started tasks and their counts: `3` and `3 again`."""
     return sorted(path.name for path in folder.iterdir())
 
 
 def until(condition: Any) -> None:
-    """Wait for it, but not for ever."""
+    """Wait for the condition, up to DEADLINE."""
     end = time.monotonic() + DEADLINE
     while not condition():
         assert time.monotonic() < end
@@ -52,7 +52,7 @@ def alive(pid: int) -> bool:
 
 
 def perform(task: Task) -> Any:
-    """Leave a mark with the process id, and do what the task says."""
+    """Write a mark with the process id, and do what the task says."""
     path = Path(task.folder) / str(task.number)
     first = not path.exists()
     if not first:
@@ -68,7 +68,7 @@ def square(task: Task, first: bool) -> int:
 
 
 def wait_for_others(task: Task, first: bool) -> int:
-    """Lasts as long as the tasks before it need to begin."""
+    """Return when the tasks before it have begun."""
     until(lambda: len(marks(Path(task.folder))) == task.number)
     return task.number**2
 

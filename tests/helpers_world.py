@@ -1,4 +1,4 @@
-"""Components and systems that are none of carom's, and a watch over the contexts of esper."""
+"""Components and systems that are not carom's, and a check of esper's contexts."""
 
 from __future__ import annotations
 

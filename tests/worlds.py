@@ -1,4 +1,4 @@
-"""What the tests share beyond the kit that users have, carom.lab.testing: dimensions, and what any impact must keep."""
+"""Shared test helpers beyond the users' kit carom.lab.testing: dimensions, and the invariants of any impact."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.s
 
 
 class Conserved:
-    """What no impact may change: bodies, momentum; and energy, which none with e <= 1 may raise.
+    """Invariants of impacts: bodies, momentum; and energy, which impacts with e <= 1 may not raise.
 
     Forces and partners that are not dynamic change momentum: ``momentum=False``. Tolerances: rounding of the sums,
-    1e-12 of what is summed.
+    1e-12 of the summed values.
     """
 
     def __init__(self, world):

@@ -1,4 +1,4 @@
-"""All with all: the definition of an overlapping pair, for whatever boxes there are, NaN and infinities included."""
+"""All against all: the definition of an overlapping pair, for any boxes, NaN and infinities included."""
 
 from __future__ import annotations
 

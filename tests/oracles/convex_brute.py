@@ -1,4 +1,4 @@
-"""How deep two hulls of a few points overlap, from the definition: every axis, every pair of features.
+"""Overlap depth of two hulls of a few points by definition: every axis, every pair of features.
 
 Points are arrays (n, v, d), n poses of v points; all pairs and triples of points count as edges and faces, which adds
 candidates that are never better than the true ones.
@@ -21,14 +21,14 @@ def _dots(a, b):
 
 
 def _units(axes):
-    """(units, whether they are axes at all); what is left of parallel edges is not."""
+    """(units, whether they are valid axes); the product of parallel edges is not."""
     size = np.linalg.norm(axes, axis=-1, keepdims=True)
     with np.errstate(all="ignore"):
         return axes / size, np.isfinite(1.0 / size[..., 0])
 
 
 def _axes(a, b):
-    """Candidates for the normal of the face at which the overlap is least: (n, axes, d)."""
+    """Candidates for the normal of least overlap: (n, axes, d)."""
     if a.shape[2] == 2:
         return np.stack([np.stack((p[:, 1] - q[:, 1], q[:, 0] - p[:, 0]), 1) for p, q in _pairs(a) + _pairs(b)], 1)
     found = []
@@ -48,12 +48,12 @@ def _direction(points, i, j):
 
 
 def overlap_along(a, b, axes):
-    """How far b has to move along each axis (n, ..., d), a unit vector, to be beyond a."""
+    """Distance that b has to move along each axis (n, ..., d), a unit vector, to be beyond a."""
     return np.einsum("nvd,n...d->nv...", a, axes).max(1) - np.einsum("nvd,n...d->nv...", b, axes).min(1)
 
 
 def penetration(a, b):
-    """The least overlap over all axes, both ways, and its axis; for hulls that touch, or (a bound) do not."""
+    """The least overlap over all axes in both directions, and its axis; exact for touching hulls, else a bound."""
     axes, valid = _units(_axes(a, b))
     axes = np.concatenate((axes, -axes), 1)
     overlaps = np.where(np.tile(valid, 2), overlap_along(a, b, np.nan_to_num(axes)), np.inf)
@@ -112,17 +112,17 @@ def _between_lines(p, q, r, s):
 
 
 def meet(a, b):
-    """(depth, vector): the overlap and its axis, or minus the distance and the way between the nearest points."""
+    """(depth, vector): the overlap and its axis, or minus the distance and the vector between the nearest points."""
     depth, axis = penetration(a, b)
     distance, way = separation(a, b)
-    apart = (depth < 0.0) | np.isinf(depth)  # without edges and faces nothing holds anything
+    apart = (depth < 0.0) | np.isinf(depth)  # without edges and faces there is no overlap
     return np.where(apart, -distance, depth), np.where(apart[:, None], way, axis)
 
 
 def least_overlap(overlap, d):
-    """The least value of ``overlap`` (units (m, d) -> (m,)) over all directions: many of them, then ever finer.
+    """The least value of ``overlap`` (units (m, d) -> (m,)) over all directions, by refinement of many directions.
 
-    It serves any convex shapes, apart or not.
+    Works for any convex shapes, separate or overlapping.
     """
     if d == 2:
         angle = np.linspace(0, 2 * np.pi, 4001)

@@ -23,7 +23,7 @@ def velocity_verlet(x, v, t, h, acceleration):
 
 
 def verlet_part(x, v, a, t, h, acceleration):
-    """a: the acceleration at the start; returns the one at the end too, where velocity is predicted by v + a h."""
+    """a: the acceleration at the start; also returns the one at the end, with velocity predicted as v + a h."""
     x = x + h * v + h * h / 2 * a
     end = acceleration(x, v + h * a, t + h)
     return x, v + h / 2 * (a + end), end
@@ -41,7 +41,7 @@ def rk4(x, v, t, h, acceleration):
 
 
 def yoshida4(x, v, t, h, acceleration):
-    """Verlet steps of lengths w1, w0, w1 (Yoshida 1990, eq. 4.4); the force where two of them meet is taken once."""
+    """Verlet steps of lengths w1, w0, w1 (Yoshida 1990, eq. 4.4); the force between two of them is evaluated once."""
     w1 = 1 / (2 - 2 ** (1 / 3))
     a = acceleration(x, v, t)
     for w in (w1, 1 - 2 * w1, w1):

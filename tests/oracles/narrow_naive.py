@@ -1,6 +1,6 @@
-"""How two shapes meet, written to be read: numpy, one pair at a time, no attention to speed.
+"""Contact geometry of two shapes, written for readability: numpy, one pair at a time, not optimized.
 
-Each function returns (depth, normal from a to b or None where several would do, point or None): depth is positive in
+Each function returns (depth, normal from a to b or None if several are right, point or None): depth is positive in
 overlap, 0 in touch, negative apart. A shape is a tuple (centre, radius) or (centre, half extents, rotation).
 """
 
@@ -54,7 +54,7 @@ def sphere_box(a, radius, b, half):
     room, axis, sign = min(faces)
     others = sorted(face[0] for face in faces)
     if others[1] - others[0] <= 1e-9 * (1 + max(half)):
-        return radius + room, None, None  # two faces as near: either is right
+        return radius + room, None, None  # two faces are equally near: either is right
     normal = np.zeros(len(a))
     normal[axis] = -sign
     point = a.copy()
@@ -71,5 +71,5 @@ def box_box(a, half_a, b, half_b):
     point = (lower + upper) / 2
     others = np.sort(overlap)
     if others[1] - others[0] <= 1e-9 * (1 + max(np.abs(others))) or a[axis] == b[axis]:
-        normal = None  # two axes overlap as little, or the centres are level: either side is right
+        normal = None  # two axes overlap equally, or the centres are level: either side is right
     return overlap[axis], normal, point

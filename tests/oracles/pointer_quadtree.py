@@ -1,6 +1,6 @@
-"""The textbook's quadtree with pointers: split until a node holds one body, descend only where boxes touch.
+"""A textbook quadtree with pointers: split until a node holds one body, descend only where boxes touch.
 
-Plain and slow on purpose; the oracle for the implicit tree. Works in any dimension (2^d children per node).
+Simple and slow on purpose; the oracle for the implicit tree. Works in any dimension (2^d children per node).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-DEPTH_CAP = 24  # coincident bodies would be split for ever
+DEPTH_CAP = 24  # coincident bodies would be split without end
 
 
 @dataclass
