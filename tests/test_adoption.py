@@ -1,4 +1,4 @@
-"""What esper knows and what the table knows: components replaced, removed, added again; ids used again; kinds."""
+"""esper's components against the table: components replaced, removed, added again; ids reused; kinds."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ world = helpers_adoption.world  # a fixture
 
 
 class Health:
-    """No component of carom's."""
+    """A component that is not carom's."""
 
 
-# -- components come, go, are replaced -----------------------------------------------------------
+# -- components added, removed, replaced -------------------------------------------------------
 
 
 @pytest.mark.parametrize("plain", [False, True], ids=["facade", "plain esper"])
@@ -53,7 +53,7 @@ def test_components_are_replaced_removed_and_added_again(world, plain):
 
 
 def test_a_component_may_be_replaced_by_one_that_has_been_adopted_before(world):
-    """Swapped, moved, or taken from another entity: no new handle shows that anything happened."""
+    """Swapped, moved, or taken from another entity: no new handle indicates the change."""
     a, b, c = (ball(world, 5.0 * x, mass=x + 1.0) for x in range(3))
     world.step()
     first, second = world.component_for_entity(a, RigidBody), world.component_for_entity(b, RigidBody)
@@ -150,7 +150,7 @@ def test_a_body_without_transform_is_an_error_that_names_the_entity_until_it_is_
 
 
 def test_nothing_is_disturbed_by_what_cannot_be_taken_in(world):
-    """What was right among the changes is taken in once the rest is mended."""
+    """Valid changes are adopted once the others are corrected."""
     ball(world, 0.0)
     before = world.state_hash()
     with world:

@@ -1,4 +1,4 @@
-"""What esper knows and what the table knows: changes in the middle of a step, and many of them."""
+"""esper's components against the table: changes in the middle of a step, and many of them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_entities_may_be_deleted_in_any_phase(world, where, immediate):
 
 @pytest.mark.parametrize("immediate", [False, True])
 def test_entities_may_be_deleted_by_an_event_handler(world, immediate):
-    """ACCURACY C25: no contact of what is gone, and an end for every begin."""
+    """ACCURACY C25: no contact of deleted entities, and an end for every begin."""
     ids = [ball(world, 0.9 * x) for x in range(5)]
     log = []
 
@@ -120,7 +120,7 @@ def test_components_changed_inside_a_step_count_from_the_next(world):
 
 
 def test_any_sequence_of_changes_leads_to_what_esper_has():
-    """Random operations, plain and through the facade, with a look at every row after each round."""
+    """Random operations, with plain esper and through the facade; every row is checked after each round."""
     rng = np.random.default_rng(7)
     world = make_world()
     make = {
@@ -132,7 +132,7 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
     }
     types = list(make)
     alive: list[int] = []
-    spare: list[Component] = []  # handles that have been in use before
+    spare: list[Component] = []  # handles that have been used before
     for _ in range(60):
         for _ in range(int(rng.integers(1, 12))):
             action = rng.integers(6)
@@ -165,7 +165,7 @@ def test_any_sequence_of_changes_leads_to_what_esper_has():
 
 @pytest.mark.slow
 def test_a_thousand_come_and_go_per_step_among_ten_thousand():
-    """The step stays in proportion to what changes: the table is put in order once, whatever the number."""
+    """The time is proportional to the changes: the table is reordered once, for any number of them."""
     world = make_world()
     rng = np.random.default_rng(3)
 
@@ -194,7 +194,7 @@ def test_nothing_changed_costs_next_to_nothing_whatever_the_size():
     world = make_world()
     world.create_entities(20_000, Transform.many(0.0), RigidBody.many())
     world.bodies  # noqa: B018
-    prefab = RigidBody()  # held by the game and never adopted: no reason to look at anything
+    prefab = RigidBody()  # held by the game and never adopted: must not trigger a check
     synchronize = world._pipeline.synchronize
     runs = []
     for _ in range(20):

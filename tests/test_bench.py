@@ -1,6 +1,6 @@
-"""``carom bench``: what is timed and what is not, results that can be kept, and the command.
+"""``carom bench``: the timed steps, results as records, and the command.
 
-Nothing here asserts a time: on a busy machine any figure is possible. What is asserted is what the figures mean.
+Nothing here asserts a time, because any time is possible on a busy machine. The tests check the meaning of the figures.
 """
 
 from __future__ import annotations
@@ -97,7 +97,8 @@ def test_tables_have_all_their_cells(result):
 
 
 def test_settings_of_a_subject_are_used_kept_and_named():
-    """Swept, no disc leaves the box that some leave without; the settings of all others stay the default ones."""
+    """Swept, no disc leaves the box that some leave otherwise; the settings of other subjects stay at their
+    defaults."""
     window = (Window("", 0, 40),)
     swept = Subject("fastgas", window, variant="swept", settings={"collision": "continuous"}, sizes=(100,))
     plain = Subject("fastgas", window, variant="plain", sizes=(100,), targets={("", 0): 1 / 3})
@@ -119,7 +120,7 @@ def test_carom_alone(no_pymunk):
     assert bench_report.tables(alone)[0].rows[0][2:6] == ("-",) * 4
 
 
-def test_questions_find_the_same_in_both_engines():
+def test_queries_find_the_same_in_both_engines():
     """But for boxes: pymunk tests the bounding boxes of the discs, and finds a few more."""
     rows = bench(subjects(["player_query"]), (300,), repeats=1).rows
     assert [row.window for row in rows] == [question.name for question in QUESTIONS]

@@ -1,4 +1,4 @@
-"""``carom bench modes``: the same bodies with each kind of collision; how long it takes is for the benchmark to say."""
+"""``carom bench modes``: the same bodies in each collision mode; times are left to the benchmark itself."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def test_each_scene_has_each_kind_with_its_ratio_to_discrete_within_repeats(resu
 
 
 def test_what_an_impact_takes_is_of_the_step_and_of_the_loop_in_it(result):
-    """All bodies of fastgas meet something in a step, so each step has impacts, and the kernel of that name takes them.
+    """All bodies of fastgas have impacts in a step, so each step has impacts, and the kernel of that name handles them.
 
-    A pile that has just begun to fall has fewer than one a step: no figure then.
+    A pile that has just begun to fall has fewer than one per step: no figure then.
     """
     for kind, cost in costs_of(result, "fastgas 100").items():
         assert cost.rounds >= 1
@@ -69,7 +69,7 @@ def test_what_an_impact_takes_is_of_the_step_and_of_the_loop_in_it(result):
 
 
 def test_what_was_swept_keeps_its_energy_and_stays_inside(result):
-    """Discrete loses discs through the thin wall; the others lose nothing. A pile's energy is that left, in joules."""
+    """Discrete loses discs through the thin wall; the others lose none. A pile's energy is what is left, in joules."""
     fast = costs_of(result, "fastgas 100")
     assert fast["discrete"].escaped > 0
     for kind in KINDS[1:]:
@@ -156,7 +156,7 @@ def test_the_courses_are_told_apart_and_only_what_is_shown_is_limited():
 
 
 @pytest.mark.parametrize(("scene", "bodies", "side"), [("fastgas", 100, math.sqrt(100 * math.pi)), ("bullets", 50, 50)])
-def test_who_passes_a_wall_on_any_side_has_escaped(scene, bodies, side):
+def test_a_body_beyond_a_wall_on_any_side_has_escaped(scene, bodies, side):
     """The outer faces of walls 0.2 and 0.01 thick around a square."""
     world = Course(scene, bodies).build("discrete", 0)
     outer = bench_modes.outer_box(world)

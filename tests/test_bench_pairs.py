@@ -1,4 +1,4 @@
-"""``carom bench pairs``: the same contacts by both roads, and a ratio; how large it is, is for the benchmark to say."""
+"""``carom bench pairs``: equal contacts from both kernels, and a ratio; its size is left to the benchmark."""
 
 from __future__ import annotations
 

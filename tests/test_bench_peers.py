@@ -30,7 +30,7 @@ def plane(gravity=(0.0, 0.0)) -> World:
 
 
 def test_every_subject_translates():
-    """Number, places, velocities and kinetic energy of the bodies are what the scene says, in both engines."""
+    """Number, positions, velocities and kinetic energy of the bodies are those of the scene, in both engines."""
     for subject in SUITE:
         size = 5 if subject.size_option == "rows" else 40
         world = scenes.get(subject.scene).build(None, 3, **subject.build_options(size))  # type: ignore[call-arg]
@@ -49,7 +49,7 @@ def test_a_disc_and_a_box_fall_and_bounce_alike(index):
     """Dropped from 3 m with restitution 1, both engines bring them back near 3 m after 2 sqrt(2 h / g) = 1.4 s.
 
     pymunk finds the contact up to a step late (v dt = 0.12 m) and moves with the old velocity, carom with the new one
-    (g t dt / 2 = 0.1 m at 1.4 s): half a metre apart is the most that could be.
+    (g t dt / 2 = 0.1 m at 1.4 s): they can differ by half a metre at most.
     """
     world = plane((0.0, -9.81))
     world.create_entity(Transform((0, -0.5)), AABBCollider((20, 0.5), restitution=1.0))
@@ -137,7 +137,7 @@ def bodies_of(kinds: str, half: np.ndarray) -> BodyArrays:
 
 
 def overlap_of_two(a: str, b: str, place_a, place_b, half_a, half_b) -> float:
-    """In plain words: discs by their centres, boxes by the axis of least overlap, a disc by its way out of a box."""
+    """Reference: discs by their centres, boxes by the axis of least overlap, a disc by its way out of a box."""
     if a == b == "o":
         return half_a[0] + half_b[0] - math.dist(place_a, place_b)
     apart = [abs(p - q) for p, q in zip(place_a, place_b, strict=True)]
@@ -174,7 +174,7 @@ def test_overlaps_are_those_of_all_pairs(seed):
 
 
 def test_quality_counts_what_left_and_how_far_it_went():
-    """Three discs in a box of 10: one stays, one is thrown through the wall, one is no number any more."""
+    """Three discs in a box of 10: one stays, one leaves through the wall, one is not finite any more."""
     world = plane()
     enclose(world, (0, 0), (10, 10))
     places = Transform.many([(1, 1), (5, 5), (8, 8)])

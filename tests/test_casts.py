@@ -29,7 +29,7 @@ def check_cast(hits, one, bodies, way, least, tolerance):
     for hit in hits:
         index = int(np.flatnonzero(bodies.entity == hit.entity)[0])
         if clear[index]:
-            # a way is as uncertain as the gap, divided by the slope with which it closes
+            # the distance is as uncertain as the gap, divided by the slope with which it closes
             slack = tolerance * (1.0 + 1.0 / math.sqrt(abs(least[index])))
             assert hit.distance == pytest.approx(way[index], abs=slack)
     if hits:
@@ -125,7 +125,7 @@ def test_b13_nearly_a_graze(below):
 
 
 def test_b13_tangent_and_beyond():
-    for hit in swept_sphere(2.0):  # either answer is right, the place must be
+    for hit in swept_sphere(2.0):  # hit and miss are both right, the place must be correct
         nearest = np.clip((-5.0 + hit.distance, 2.0, 0.0), -1.0, 1.0)
         assert np.linalg.norm((-5.0 + hit.distance, 2.0, 0.0) - nearest) == pytest.approx(1.0, abs=1e-9)
     assert swept_sphere(2.0 + 1e-9) == []
@@ -160,7 +160,7 @@ def test_b13_radius_zero_is_a_ray():
 @both_dimensions
 @pytest.mark.parametrize("gap", [1e-15, 1e-12, 1e-6])
 def test_b14_nearly_touching_spheres(d, gap):
-    """The way is the gap, to the rounding of the start itself."""
+    """The distance is the gap, to the rounding of the start itself."""
     world = make_world(d)
     ball(world, 0, radius=1.0)
     start = np.zeros(d)
@@ -182,7 +182,7 @@ def test_b14_far_start():
 @pytest.mark.parametrize("scale", [1e-150, 1e-9, 1e9, 1e150])
 @both_dimensions
 def test_casts_at_extreme_sizes(d, scale):
-    """Powers of ten, so the answers differ from those at size 1 by rounding alone."""
+    """Powers of ten, so the results differ from those at size 1 by rounding alone."""
     world = make_world(d)
     ball(world, (3 * scale, 0.25 * scale, 0)[:d], radius=scale)
     box(world, (6 * scale, 0.0, 0)[:d], half=scale, kind="static")
@@ -258,7 +258,7 @@ def test_the_shape_of_a_plugin_is_met_and_casts():
 
     @plugin.pair(RhombusCollider, SphereCollider)
     def rhombus_sphere(a, b, d):
-        """Separating planes along the faces only: a bound of the distance, as plugins may give."""
+        """Separating planes along the faces only: a bound of the distance, which plugins may return."""
         x, y = (1.0 if d[0] >= 0.0 else -1.0), (1.0 if d[1] >= 0.0 else -1.0)
         normal = (x * 0.7071067811865476, y * 0.7071067811865476)
         depth = 0.7071067811865476 * (a.reach - abs(d[0]) - abs(d[1])) + b.radius
@@ -280,12 +280,12 @@ def test_the_shape_of_a_plugin_is_met_and_casts():
     assert hit.distance == pytest.approx(3.5, rel=1e-15)
     assert world.query_point((5.4, 0.5)) == [gem]
     assert world.query_point((5.6, 0.5)) == []
-    assert world.query_aabb((4, -1), (6, 1)) == []  # no plugin has said how boxes meet it
+    assert world.query_aabb((4, -1), (6, 1)) == []  # there is no pair with boxes
     world.close()
 
 
 def test_geometry_setting_counts():
-    """Questions are answered by the level that contacts come from."""
+    """Queries use the same level as contacts."""
     world = World(Physics(), settings=Settings())
     world.create_entity(Transform((5, 0)), SphereCollider(1.5), AABBCollider((1.0, 1.0)))
     assert world.ray_cast((0, 0), (1, 0))[0].distance == 4.0

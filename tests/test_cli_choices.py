@@ -1,4 +1,4 @@
-"""What users of the ``carom`` command choose: a scene or a file, its settings, seconds, seed."""
+"""Arguments of the ``carom`` command: a scene or a file, its settings, seconds, seed."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_the_seed_reaches_the_scene_and_equal_seeds_give_equal_bits(carom):
 
 
 def test_a_file_imports_its_neighbours_and_tells_how_long_it_runs(carom, tmp_path, ball):
-    (tmp_path / "components.py").write_text("SPEED = 3.0\n")  # a name that carom has a package of, too
+    (tmp_path / "components.py").write_text("SPEED = 3.0\n")  # also the name of a package of carom
     text = ball.read_text().replace("def build", "from components import SPEED\nSECONDS = 0.2\n\ndef build")
     ball.write_text(text.replace("RigidBody(mass=2.0)", "RigidBody(linear_velocity=(SPEED, 0))"))
     report = report_of(carom("run", "ball.py", "--json", "--no-pictures"))

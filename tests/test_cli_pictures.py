@@ -1,4 +1,4 @@
-"""What ``carom run`` draws: bodies at the end, their paths, and parts of them."""
+"""Pictures of ``carom run``: final state, paths, and parts of them."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_an_empty_world_is_drawn_too(carom, tmp_path):
 def test_bodies_created_on_the_way_and_kinematic_ones_are_traced():
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)))
     lift = world.create_entity(Transform((0, 0)), RigidBody(kind="kinematic", linear_velocity=(0, 1)))
-    world.create_entity(Transform((9, 0)), RigidBody())  # stays where it is
+    world.create_entity(Transform((9, 0)), RigidBody())  # does not move
     created = []
 
     def create(step: int) -> None:
@@ -132,7 +132,7 @@ def test_bodies_created_on_the_way_and_kinematic_ones_are_traced():
 
 
 def test_a_short_run_keeps_the_corners_of_its_paths():
-    """A ball to and fro between two walls, a box against a wall: where the ball turned, and the paths through it."""
+    """A ball to and fro between two walls, a box against a wall: the turning points, and the paths through them."""
     settings = Settings(collision="continuous")
     with World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings) as world:
         for x in (-1.75, 1.75):

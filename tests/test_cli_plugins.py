@@ -1,4 +1,4 @@
-"""``carom plugins``, ``carom plan`` and ``--plugin``, as plugin authors meet them."""
+"""``carom plugins``, ``carom plan`` and ``--plugin`` for plugin authors."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def build(settings=None, seed=0):
 
 
 def offer(folder: Path, name: str, points: dict[str, str], monkeypatch, version: str = "0.7") -> None:
-    """Make it look as if a package were installed that offers these."""
+    """Simulate an installed package that offers these."""
     info = folder / f"{name}-{version}.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
@@ -67,7 +67,7 @@ def test_the_list_names_version_package_and_what_each_adds(carom, tmp_path, monk
         assert part in row
 
 
-def test_broken_ones_are_shown_and_stop_nobody(carom, tmp_path, monkeypatch):
+def test_broken_ones_are_shown_and_do_not_stop_the_command(carom, tmp_path, monkeypatch):
     site = tmp_path / "site"
     site.mkdir()
     (site / "good_balls.py").write_text(BALL)

@@ -1,4 +1,4 @@
-"""``carom plugins check``, as plugin authors meet it: what passes, and what is found."""
+"""``carom plugins check`` for plugin authors: plugins that pass, and findings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ carom = helpers_cli_plugins.carom  # a fixture
 
 @pytest.fixture
 def check(carom, tmp_path):
-    """Checks the good plugin with some of its text replaced; returns (exit code, what was printed)."""
+    """Check the good plugin with some of its text replaced; returns (exit code, output)."""
 
     def run(*changes: tuple[str, str]) -> tuple[int, str]:
         text = BALL if not changes else BALL.replace("    radius = ", "    dimensions = (2,)\n    radius = ")
@@ -31,7 +31,7 @@ def check(carom, tmp_path):
     return run
 
 
-@pytest.mark.slow  # 2D and 3D, worlds and all; of the fast tests test_plugin_package.py checks a good one
+@pytest.mark.slow  # 2D and 3D, worlds and all; test_plugin_package.py is the fast test of a good plugin
 def test_a_good_plugin_passes(check):
     code, said = check()
     assert code == 0, said
@@ -44,7 +44,7 @@ DEPTH = "    depth = a.radius + b.radius - distance\n"
 SPHERE = "def ball_sphere(a, b, d):\n    distance = length(d)\n" + DEPTH
 TWIN = "def ball_ball(a, b, d):\n    distance = length(d)\n" + DEPTH
 RETURN = "    return depth >= 0.0, depth, normal, scale(normal, a.radius - 0.5 * depth)\n"
-MISTAKES = {  # what passes at registration, and what the check says of it
+MISTAKES = {  # mistakes that pass registration, and the expected finding
     "depth of equal sizes only": (
         (SPHERE, SPHERE.replace("b.radius", "a.radius")),
         ("but their boxes do not", "make bounds enclose the whole shape"),
@@ -206,7 +206,7 @@ def test_other_things_are_checked_too(carom, tmp_path):
     assert "ok" in row_of(result.stdout, "broad phase all")
     assert "1 finding" in row_of(result.stdout, "broad phase nearly all")
     assert "it misses the pair of rows" in result.stdout
-    assert "world" not in result.stdout  # what is wrong already need not fail once more
+    assert "world" not in result.stdout  # a known defect is not reported again by a world
 
 
 def test_a_system_that_fails_is_found_by_a_world_with_it(carom, tmp_path):
@@ -254,7 +254,7 @@ def ball_stranger(a, b, d):
     assert "plugin two: nothing found" in result.stdout
 
 
-# -- what ships, checked as everybody's is --------------------------------------------------------
+# -- shipped plugins, checked like any other ------------------------------------------------------
 
 
 def test_the_built_in_shapes_pass_the_check(carom):

@@ -1,4 +1,4 @@
-"""How the ``carom`` command says no: one line that names the mistake and its place."""
+"""Errors of the ``carom`` command: one line that names the mistake and its place."""
 
 from __future__ import annotations
 

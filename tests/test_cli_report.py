@@ -1,4 +1,4 @@
-"""What ``carom run`` prints of a run: energy, bodies that escaped, faults, times of the step."""
+"""Output of ``carom run``: energy, bodies that escaped, faults, times of the step."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_to_jump_over_an_obstacle_is_no_escape(carom):
 
 
 def test_the_worlds_faults_are_shown(carom, ball):
-    """A body between two elastic walls that leave it no room bounces more often than a step allows."""
+    """A body between two elastic walls without space to move bounces more often than a step allows."""
     text = ball.read_text().replace(
         "SphereCollider(radius=0.5)", "SphereCollider(radius=0.5, restitution=1.0)"
     )

@@ -1,4 +1,4 @@
-"""The cache of compiled kernels: found again by other processes, never stale, never in the way."""
+"""The cache of compiled kernels: reused by other processes, never stale, never an obstacle."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Program:
         )  # fmt: skip
 
     def run(self, seed="0", **environment) -> tuple[float, float, int, int, str]:
-        """What both kernels return, how many were compiled and how many loaded, and the hash of the first."""
+        """Results of both kernels, numbers of compiled and loaded kernels, and the hash of the first."""
         return self.result(self.start(seed, **environment))
 
     def result(self, process: subprocess.Popen) -> tuple[float, float, int, int, str]:
@@ -93,7 +93,7 @@ def program(tmp_path):
 
 
 def test_a_second_process_loads_what_the_first_has_compiled(program):
-    """Kernels made by a factory, closures over one another: what numba's own cache never finds again."""
+    """Kernels made by a factory, closures over each other: numba's own cache never finds these again."""
     first = program.run(seed="1")
     assert first[:4] == (9.0, 109.0, 2, 0)
     assert len(program.files()) == 2
@@ -115,7 +115,7 @@ def test_an_edit_in_a_function_of_another_file_is_noticed(program, old, new, exp
     program.helpers = program.helpers.replace(old, new)
     assert program.run()[:3] == (expected, expected + 100.0, 2)
     program.helpers = HELPERS
-    assert program.run()[:3] == (9.0, 109.0, 0)  # and taking it back finds the old one
+    assert program.run()[:3] == (9.0, 109.0, 0)  # undoing the edit finds the old one
 
 
 def test_an_edit_of_a_comment_compiles_nothing(program):
@@ -135,7 +135,7 @@ def flipped(content: bytes) -> bytes:
     [lambda _: b"", lambda _: b"garbage" * 20, lambda content: content[: len(content) // 2], flipped],
     ids=["empty", "garbage", "cut short", "one bit"],
 )
-def test_a_damaged_file_is_compiled_anew_and_replaced(program, damage):
+def test_a_damaged_file_is_compiled_again_and_replaced(program, damage):
     program.run()
     for path in program.files():
         path.write_bytes(damage(path.read_bytes()))
@@ -149,7 +149,7 @@ def test_without_any_folder_to_write_to_everything_works_and_nothing_is_kept(pro
     nowhere = str(blocked / "x")
     program.cache = Path(nowhere)
     environment = {"XDG_CACHE_HOME": nowhere, "HOME": nowhere, "TMPDIR": nowhere}
-    # tempfile falls back to the current folder if TMPDIR is of no use
+    # tempfile falls back to the current folder if TMPDIR is unusable
     code = f"import tempfile; tempfile.tempdir = {nowhere!r}\n"
     program.main = code + program.main
     for _ in range(2):
@@ -228,7 +228,7 @@ def test_the_folder_can_be_counted_and_emptied(monkeypatch, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
 
 
-# -- saying so -------------------------------------------------------------------------------------------------------
+# -- messages --------------------------------------------------------------------------------------------------------
 
 
 def test_the_first_wait_says_in_one_line_what_is_happening_and_later_ones_nothing(program):
@@ -260,7 +260,7 @@ def clear_folder(program):
         path.unlink()
 
 
-def test_who_listens_shows_it_himself(monkeypatch, tmp_path, caplog):
+def test_a_listener_replaces_the_output(monkeypatch, tmp_path, caplog):
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(compilation.log, "announced", False)
     monkeypatch.setattr(compilation.log, "listeners", [lambda name: None])

@@ -1,4 +1,4 @@
-"""Classes of components: what their constructors take, names that are refused, and their columns by name."""
+"""Component classes: constructor arguments, refused names, and their columns by name."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_assigning_to_a_column_writes_into_it():
     assert world.component_for_entity(e, RigidBody).linear_velocity.tolist() == [1.0, 2.0]
     assert world.component_for_entity(e, RigidBody).mass == 2.0
     assert world.component_for_entity(e, Charge).value == 6.0
-    for x in range(100):  # another array by now: nothing old may have stuck to ``bodies``
+    for x in range(100):  # the array has been reallocated: ``bodies`` must not hold the old one
         ball(world, x + 5.0)
     assert len(world.bodies.mass) == len(bodies.mass) == 101
     with pytest.raises(AttributeError):

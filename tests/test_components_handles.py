@@ -161,7 +161,7 @@ def test_handles_of_deleted_entities_keep_their_last_values():
     assert transform.entity is None
     assert transform.position.tolist() == [2.0, 1.0]
     assert (body.mass, body.kind) == (1.0, "dynamic")
-    transform.x = -1.0  # its own by now: nobody else moves
+    transform.x = -1.0  # unbound by now: no other body moves
     assert transform.x == -1.0
     assert world.bodies.position.tolist() == [[50.0, 0.0]]
     assert world.bodies.entity.tolist() == [other]
@@ -221,7 +221,7 @@ def test_a_component_of_another_world_is_an_error_that_says_copy():
         here.step()
     assert stolen.entity == e
     assert there.bodies.entity.tolist() == [e]
-    there.close()  # then it is free
+    there.close()  # then it can be used
     here.step()
     assert len(here.bodies) == 2
 

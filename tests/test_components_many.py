@@ -1,4 +1,4 @@
-"""Many components at once: what is broadcast, ids in a row, errors that name field and row."""
+"""Many components at once: broadcasting, consecutive ids, errors that name field and row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wrong values of components are refused where they are given, and so are mistakes that would be lost in silence."""
+"""Wrong component values are refused where they are given, and so are mistakes that would otherwise be silent."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_the_wrong_dimension_is_refused_at_the_call_or_at_the_next_step(componen
     with pytest.raises(ValueError, match=rf"entity {survivor}: {name}"):
         world.add_component(survivor, component())
     before = world.state_hash()
-    with world:  # plain esper cannot know: then the step says which entity
+    with world:  # plain esper cannot check it: the next step names the entity
         e = esper.create_entity(Transform((0, 0)), RigidBody())
         esper.add_component(e, component())
     with pytest.raises(ValueError, match=rf"entity {e}: {name}"):
@@ -157,7 +157,7 @@ def test_forces_and_impulses_are_checked(call, value):
     assert world.state_hash() == before
 
 
-# -- mistakes that would be lost in silence ------------------------------------------------------
+# -- mistakes that would otherwise be silent ------------------------------------------------------
 
 
 def test_classes_and_lists_are_no_components():

@@ -1,4 +1,4 @@
-"""Events of contacts and their handlers: begin, stay, end, impacts; they never depend on the frame rate."""
+"""Contact events and their handlers: begin, stay, end, impacts; independent of the frame rate."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_deleting_everything_ends_everything():
 
 
 def test_handlers_run_in_order_and_are_kept_alive():
-    """In the order they were added; a lambda that nobody else holds stays (esper alone would lose it)."""
+    """In the order of addition; a lambda without other references is kept (esper alone would lose it)."""
     world = make_world()
     called = []
     for name in "abc":
@@ -189,7 +189,7 @@ def test_a_handler_may_take_itself_or_others_away():
 
 @pytest.mark.parametrize("immediate", [False, True])
 def test_a_handler_may_delete_and_create(immediate):
-    """Deleting a body in the middle of the step's events harms nothing; its end comes in the next step."""
+    """Deleting a body while the step's events are delivered is safe; its end comes in the next step."""
     world = make_world()
     told = []
     listen(world, told)

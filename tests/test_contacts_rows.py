@@ -1,4 +1,4 @@
-"""``world.contacts``, what a game reads after a step and may write: columns, pairs and of, enabled."""
+"""``world.contacts``, which a game reads after a step and may write: columns, pairs and of, enabled."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_pairs_of_one_kind_come_once():
 
 @pytest.mark.parametrize("immediate", [False, True])
 def test_pairs_skip_the_deleted_also_while_iterating(immediate):
-    """A missile that hits three enemies is gone after the first; deleted ones do not come at all."""
+    """A missile that hits three enemies is deleted after the first; pairs with deleted entities do not appear."""
     world = make_world()
     missile = ball(world, 0.0)
     world.add_component(missile, Missile())
@@ -146,7 +146,7 @@ def test_pairs_skip_the_deleted_also_while_iterating(immediate):
 
 
 def test_of_looks_from_the_entity():
-    """The normal points away from the one asked about: what does it stand on."""
+    """The normal points away from the given entity, as needed to test what it stands on."""
     world = make_world(gravity=9.81)
     ground = floor(world)
     player = ball(world, (0, 0.5))
@@ -164,7 +164,7 @@ def test_of_looks_from_the_entity():
 
 
 class OneWay(System):
-    """Platforms that hold only what comes from above: contacts of those moving up are switched off."""
+    """Platforms that stop only bodies from above: contacts of bodies that move up are disabled."""
 
     phase = Phase.NARROW
 
@@ -201,8 +201,8 @@ def test_one_way_platform():
     assert [name for name, *_ in told] == ["contact_begin"]
 
 
-def test_disabled_contacts_push_nobody_and_end():
-    """Switched off in the middle of a bounce at e = 1: no impulse; switched off while touching: the contact ends."""
+def test_disabled_contacts_have_no_response_and_end():
+    """Disabled in the middle of a bounce at e = 1: no impulse; disabled while touching: the contact ends."""
     world = make_world()
     a, b = ball(world, -0.51, 1.0, restitution=1.0), ball(world, 0.51, -1.0, restitution=1.0)
     rest = ball(world, (0, 50)), ball(world, (0.9, 50))
@@ -231,7 +231,7 @@ def test_disabled_contacts_push_nobody_and_end():
 
 
 def test_a_record_of_a_contact_cannot_be_written():
-    """The error says what can: the column."""
+    """The error names the column to write instead."""
     world = make_world()
     ball(world, 0.0)
     ball(world, 0.5)

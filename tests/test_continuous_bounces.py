@@ -11,7 +11,7 @@ from helpers_modes import along, mode_world, positions, rows_of, strikes, veloci
 from worlds import ball, floor, run
 
 DT, G = 1 / 60, 9.81
-# Where the path is the parabola: Verlet; the event-driven flight, whatever the integrator.
+# Methods whose path is the parabola: Verlet; event-driven flight with any integrator.
 exact = pytest.mark.parametrize(
     ("mode", "integrator"), [("continuous", "velocity_verlet"), ("event_driven", "semi_implicit_euler")]
 )
@@ -41,7 +41,7 @@ def bounce_errors(mode, integrator, dt, d=2):
     + [pytest.param(dt, 2, marks=pytest.mark.slow) for dt in (1e-4, 4e-4)],
 )
 def test_a1_energy_at_every_step(mode, integrator, dt, d):
-    """Mean (E - E0)^2 below 1e-16 E0^2, and as many bounces as there are, one every 2 sqrt(2 h / g)."""
+    """Mean (E - E0)^2 below 1e-16 E0^2, and the right number of bounces, one every 2 sqrt(2 h / g)."""
     errors, hits = bounce_errors(mode, integrator, dt, d)
     assert errors.mean() < 1e-16 * (10 * G * 5.0) ** 2
     assert hits == math.floor((20 / math.sqrt(2 * 4.9 / G) - 1) / 2) + 1 == 10
@@ -88,7 +88,7 @@ def test_b11_times_and_flights(mode, integrator):
             speeds.append(speeds[-1] * e)
         sure = sum(speed > 1.05 * 2 * G * DT for speed in speeds)
         if e == 0:
-            continue  # contacts of e = 0 may go to the solver for contacts at rest
+            continue  # contacts of e = 0 may be left to the solver for contacts at rest
         np.testing.assert_allclose(times[:sure], predicted[:sure], rtol=1e-11)
         assert len(times) <= sum(speed > 0.95 * 2 * G * DT for speed in speeds)
         if sure == len(speeds):
@@ -100,8 +100,8 @@ def test_b11_times_and_flights(mode, integrator):
     [("continuous", "semi_implicit_euler"), ("continuous", "velocity_verlet"), ("event_driven", "velocity_verlet")],
 )
 def test_b11_rest_after_the_zeno_time(mode, integrator):
-    """All is over at T0 (1+e)/(1-e); then v = 0 and nothing sinks. What the threshold leaves out lasts 2 * 2 dt / (1-e)
-    at most, half a step of Euler's lag more; rest shows at a step's end."""
+    """The bounces end at T0 (1+e)/(1-e); then v = 0 without sinking. Bounces below the threshold would last at most
+    2 * 2 dt / (1-e), half a step of Euler's lag more; rest is detected at a step's end."""
     world, balls = dropped(mode, integrator)
     balls, e = balls[:10], E_SWEEP[:10]
     over = math.sqrt(2 * DROP / G) * (1 + e) / (1 - e)
@@ -120,7 +120,7 @@ def test_b11_rest_after_the_zeno_time(mode, integrator):
 
 @exact
 def test_b11_zeno_without_a_threshold_ends(mode, integrator):
-    """Threshold 0: infinitely many impacts in a finite time. The step stays bounded, nothing sinks, and all is over."""
+    """Threshold 0: infinitely many impacts in a finite time. The step stays bounded, nothing sinks, and they end."""
     world, balls = dropped(mode, integrator, restitution_threshold=0.0, max_impacts_per_step=8)
     balls, e = balls[:10], E_SWEEP[:10]
     over = math.sqrt(2 * DROP / G) * (1 + e) / (1 - e)
@@ -159,9 +159,9 @@ def test_b12_energy(mode, integrator, rate):
 
 @pytest.mark.parametrize("rate", [60, 240])
 def test_b12_apex_of_even_bounces(rate):
-    """Semi-implicit Euler keeps v^2/2 + g y - g dt v/2 in flight, and so the apex of the flight's parabola. The sweep
-    with the step's own v is turned round by the next bounce: every second flight is the same, 1e-10; the others differ
-    by up to u dt."""
+    """Semi-implicit Euler conserves v^2/2 + g y - g dt v/2 in flight, and so the apex of the flight's parabola. The
+    error of the sweep, which uses the step's own v, is reversed by the next bounce: every second flight is equal to
+    1e-10; the others differ by up to u dt."""
     world = mode_world("continuous", gravity=G, dt=1 / rate)
     floor(world)
     rows = rows_of(world, [ball(world, (2.0 * k, h + 0.1), radius=0.1, restitution=1.0) for k, h in enumerate(HEIGHTS)])

@@ -1,5 +1,5 @@
 """Section C of the accuracy list in the continuous and the event-driven mode: sizes, places, steps and units at the
-ends of their range, contacts that only just are, and equal ids, equal bits."""
+ends of their range, barely touching contacts, and equal bits for equal ids."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def test_c4_sizes_from_1e_minus_9_to_1e9(mode, d):
 @each_mode
 @pytest.mark.parametrize("offset", [0.0, 1e5, 1e7, 1e9, 1e12, 1e15])
 def test_c6_head_on_far_from_the_origin(mode, d, offset):
-    """64 m/s and dt of 1/64: a metre a step, which an ulp of 1e15 (0.125) can tell. Exchange exact everywhere; where,
-    to an ulp of the place for each of the steps and the impact."""
+    """64 m/s and dt of 1/64: one metre per step, resolved by an ulp of 1e15 (0.125). The exchange is exact everywhere;
+    positions to an ulp for each of the steps and the impact."""
     world = mode_world(mode, d, dt=1 / 64)
     place = np.full(d, offset)
     a = ball(world, place - along(d, 3.5), 64.0, restitution=1.0)
@@ -64,7 +64,7 @@ def test_c6_head_on_far_from_the_origin(mode, d, offset):
 
 @each_mode
 def test_c6_where_a_metre_is_lost(mode):
-    """At 1e16 an ulp is 2 m. Whatever is found there is finite, and neither lost nor faster."""
+    """At 1e16 an ulp is 2 m. Any result must be finite, without lost or faster bodies."""
     world = mode_world(mode, dt=1 / 64)
     a, b = (ball(world, (1e16 + x, 0.0), v, restitution=1.0) for x, v in ((-8.0, 64.0), (8.0, -64.0)))
     kept = Conserved(world)
@@ -87,13 +87,13 @@ def test_c7_steps_from_1e_minus_9_to_10(mode, integrator, dt, steps):
     run(world, steps)
     u = math.sqrt(4.0**2 + 2 * G * 3.0)
     since = (4.0 + u) / G  # from the throw to the first impact
-    late = (steps * dt + (2 * u / G - since)) % (2 * u / G)  # as if it had started from the floor
+    late = (steps * dt + (2 * u / G - since)) % (2 * u / G)  # equivalent time for a start at the floor
     assert velocity(world, thrown)[1] == pytest.approx(u - G * late, abs=1e-10)
     assert position(world, thrown)[1] - 0.1 == pytest.approx(u * late - G * late**2 / 2, abs=1e-10)
     assert position(world, thrown)[0] == pytest.approx(steps * dt, rel=1e-13)
 
 
-# -- only just -------------------------------------------------------------------------------------
+# -- barely touching -------------------------------------------------------------------------------
 
 
 @mostly_2d
@@ -103,7 +103,7 @@ def test_c7_steps_from_1e_minus_9_to_10(mode, integrator, dt, steps):
 @pytest.mark.parametrize("speed", [1.0, 1000.0])
 @pytest.mark.parametrize(("sign", "impacts"), [(0.0, 0), (1.0, 0), (-1.0, 1)])
 def test_c14_touching_exactly(mode, d, first, second, speed, sign, impacts):
-    """At rest or separating no impulse, approaching one impact at the start of the step, and no repeat of it."""
+    """At rest or separating no impulse, approaching one impact at the start of the step, without repetition."""
     world = mode_world(mode, d)
     a = first(world, 0.0, restitution=1.0)
     b = second(world, 1.0, sign * speed, restitution=1.0)
@@ -119,10 +119,10 @@ def test_c14_touching_exactly(mode, d, first, second, speed, sign, impacts):
 @each_mode
 @pytest.mark.parametrize("beside", [-1e-6, -1e-9, -1e-12, -1e-16, 1e-16, 1e-12, 1e-9])
 def test_c15_grazing(mode, d, beside):
-    """b = sigma (1 + beside): the deflection is 2 acos(b / sigma), 2.8e-6 at 1e-12; a miss does nothing.
+    """b = sigma (1 + beside): the deflection is 2 acos(b / sigma), 2.8e-6 at 1e-12; a miss changes nothing.
 
-    Rounding of the squares is some eps, so of acos some eps / |beside| / 2. What is nearer than 1e-12 may be found or
-    missed, but where it is found it must touch: 1e-9. Here |v.n| = 1.4e-6 |v|, the last that counts.
+    Rounding of the squares is some eps, so some eps / |beside| / 2 for acos. Within 1e-12 hit and miss are both
+    right, but a hit must be a touch: 1e-9. Here |v.n| = 1.4e-6 |v|, the last that counts.
     """
     world = mode_world(mode, d)
     ball(world, along(d), kind="static", restitution=1.0)
@@ -179,7 +179,7 @@ def brawl(mode, *, turn=lambda v: v, length=1.0, time=1.0, mass=1.0, order=None,
 @mostly_2d
 @each_mode
 def test_c22_repeated_and_permuted(mode, d):
-    """The same bits when run again, and when the same ids came about in another order; impacts included."""
+    """The same bits when repeated, and when the same ids were created in another order; impacts included."""
     x, v, hits = brawl(mode, d=d)
     assert len(hits) > 80
     for order in (None, np.random.default_rng(0).permutation(40).tolist(), list(range(39, -1, -1))):
@@ -222,8 +222,8 @@ def test_c24_other_units(mode, length, time, mass):
 @mostly_2d
 @each_mode
 def test_c23_galilean(mode, d):
-    """A velocity added to all: relative motion the same to 1e-9, some impacts for each later. Rounding of 700 m, 1e-13,
-    which every impact amplifies by 2 r / sigma, r the way between two: about ten."""
+    """A velocity added to all: equal relative motion to 1e-9, after a few impacts for each body. Rounding of 700 m is
+    1e-13, and every impact amplifies it by 2 r / sigma, r the distance between two impacts: about ten."""
 
     def cluster(drift):
         world = mode_world(mode, d)
@@ -273,7 +273,7 @@ def test_a_restored_snapshot_goes_on_with_the_same_bits(mode, d):
 
 @each_mode
 def test_empty_and_lonely_worlds(mode):
-    """C25: no bodies, none that is moved by impacts, one, and one without a collider."""
+    """C25: no bodies, none that impacts can move, one, and one without a collider."""
     world = make_world(gravity=G, collision=mode)
     run(world, 3)
     cart = ball(world, (0.0, 50.0), 600.0, kind="kinematic")

@@ -1,5 +1,5 @@
-"""Impacts of what flies on parabolas, at the time of the closed form: onto static geometry, at the very top, and
-between two bodies that are accelerated differently."""
+"""Impacts of bodies on parabolas, at the time of the closed form: on static geometry, at the apex, and
+between two bodies with different accelerations."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ G = 9.81
 @pytest.mark.parametrize("dt", [1.0, 1 / 60])
 @pytest.mark.parametrize("target", ["floor", "ball", "face", "corner", "box on box"])
 def test_parabolas_onto_static_geometry(mode, integrator, dt, target, d):
-    """Traced back 0.9 s from where it touches, so time, normal and point are known; 1e-12, dt = 1 s holds it all."""
+    """Traced back 0.9 s from the touch, so time, normal and point are known; to 1e-12, in a single step of 1 s."""
     gravity = np.array(along(d, 1.5, -G, 0.5))
     world = mode_world(mode, d, gravity, dt=dt, integrator=integrator, restitution_threshold=0.0)
-    normal = np.array(along(d, 0.6, -0.8))  # from the body to what it strikes
+    normal = np.array(along(d, 0.6, -0.8))  # from the body to the static shape
     if target in ("floor", "face", "box on box"):
         normal = np.array(along(d, 0.0, -1.0) if target == "floor" else along(d, 1.0))
     centre, size = np.array(along(d, 3.0, 2.0, 1.0)), 0.7
@@ -57,8 +57,8 @@ def test_parabolas_onto_static_geometry(mode, integrator, dt, target, d):
 @pytest.mark.parametrize("dt", [0.25, 1.0])
 @pytest.mark.parametrize("target", ["ball", "box"])
 def test_the_top_of_a_parabola_touches_a_ceiling(mode, dt, target, d):
-    """It would reach ``over`` too far, and be back within the step: met at (v0 - sqrt(2 g over)) / g, or not at all if
-    over < 0. Rounding of the height, 1e-16, moves the time by that over the speed sqrt(2 g over)."""
+    """Its apex would be ``over`` too high: it meets the ceiling at (v0 - sqrt(2 g over)) / g, and not at all if over <
+    0. Rounding of the height, 1e-16, changes the time by that over the speed sqrt(2 g over)."""
     g, v0, top = 8.0, 0.88, 0.88**2 / 16
     for over in (1e-3, 1e-6, 1e-9, 1e-12, -1e-12, -1e-9):
         world = mode_world(mode, d, g, dt=dt, integrator="velocity_verlet", restitution_threshold=0.0)
@@ -76,7 +76,7 @@ def test_the_top_of_a_parabola_touches_a_ceiling(mode, dt, target, d):
     [("continuous", "velocity_verlet"), ("continuous", "rk4"), ("event_driven", "semi_implicit_euler")],
 )
 def test_two_bodies_on_different_parabolas(mode, integrator, dt):
-    """One falls with g and a constant force, the other with a quarter of g: their distance is a parabola of its own."""
+    """One falls with g and a constant force, the other with a quarter of g: their distance is a parabola too."""
     world = mode_world(mode, gravity=G, dt=dt, integrator=integrator, restitution_threshold=0.0)
     upper = RigidBody(1.0, constant_force=(0.0, -3.0))
     world.create_entity(Transform((0.0, 5.0)), upper, SphereCollider(0.2, restitution=1.0))

@@ -15,7 +15,7 @@ from worlds import EPS, ball, both_dimensions, box, floor, make_world, position,
 DT, G = 1 / 60, 9.81
 RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]
 makers = pytest.mark.parametrize("maker", [ball, box])
-# Where the path is the parabola: Verlet; the event-driven flight, whatever the integrator.
+# Methods whose path is the parabola: Verlet; event-driven flight with any integrator.
 exact = pytest.mark.parametrize(
     ("mode", "integrator"), [("continuous", "velocity_verlet"), ("event_driven", "semi_implicit_euler")]
 )
@@ -26,7 +26,7 @@ exact = pytest.mark.parametrize(
 
 @exact
 def test_a9_elastic_drop_that_ends_at_the_floor(mode, integrator):
-    """It meets the floor after 1 s but for rounding, and is back where it was after another."""
+    """It meets the floor after 1 s up to rounding, and is back at its start after another."""
     world = mode_world(mode, gravity=G, integrator=integrator)
     floor(world, 1.0)
     sphere = ball(world, (0.0, 0.5 + G / 2), restitution=1.0)
@@ -38,8 +38,8 @@ def test_a9_elastic_drop_that_ends_at_the_floor(mode, integrator):
 
 
 def test_a9_elastic_drop_with_semi_implicit_euler():
-    """It touches after 60 steps (sum of 1 to 60 shares g dt^2) and is turned round at the end of that step or at the
-    start of the next, with 60 or 61 shares of speed. The apex is that of 59 or of 61: off by u dt, no more."""
+    """It touches after 60 steps (sum of 1 to 60 times g dt^2) and is reflected at the end of that step or at the
+    start of the next, with 60 or 61 times the speed g dt. The apex is that of 59 or of 61: off by at most u dt."""
     world = mode_world("continuous", gravity=G)
     floor(world, 1.0)
     share = G * DT
@@ -68,7 +68,7 @@ def test_a9_spheres_meet_while_they_fall(mode, d):
 @both_dimensions
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 def test_a9_boxes_at_120_metres_a_second(mode, d):
-    """Half 0.5, at -+1, towards each other: they meet after dt / 4. Discrete they have changed places."""
+    """Half extent 0.5, at -+1, towards each other: they meet after dt / 4. In discrete mode they swap places."""
     for e in (1.0, 0.0):
         world = make_world(d, collision=mode)
         pair = [box(world, -1.0, 120.0, restitution=e), box(world, 1.0, -120.0, restitution=e)]
@@ -128,7 +128,7 @@ def test_a10_stack_on_wide_ground(mode):
 def test_b9_two_bodies(mode, d, maker):
     """v1' = v1 - (1+e) m2/(m1+m2) w, v2' = v2 + (1+e) m1/(m1+m2) w: 4 eps of the speeds, of the momentum for it.
 
-    Each pair on a lane of its own; they meet after 2/150 s, and complete this step and two more.
+    Each pair is on a separate lane; they meet after 2/150 s, and complete this step and two more.
     """
     world = mode_world(mode, d)
     v1, v2, toi, end = 100.0, -50.0, 2 / 150, 3 * DT
@@ -145,7 +145,7 @@ def test_b9_two_bodies(mode, d, maker):
             assert abs(Fraction(velocity(world, entity)[0]) - after) <= 4 * EPS * (abs(v1) + abs(v2)), (e, ratio)
             assert (velocity(world, entity)[1:] == 0).all()
             place = start + before * toi + float(after) * (end - toi)
-            assert position(world, entity)[0] == pytest.approx(place, abs=1e-13)  # eps of ten metres, and then some
+            assert position(world, entity)[0] == pytest.approx(place, abs=1e-13)  # some eps of ten metres
         total = Fraction(velocity(world, a)[0]) + m2 * Fraction(velocity(world, b)[0])
         assert abs(total - (Fraction(v1) + m2 * Fraction(v2))) <= 4 * EPS * (abs(v1) + ratio * abs(v2))
 
@@ -155,7 +155,7 @@ def test_b9_two_bodies(mode, d, maker):
 @makers
 @pytest.mark.parametrize(("kind", "speed"), [("static", 0.0), ("kinematic", 0.0), ("kinematic", -50.0)])
 def test_b9_infinite_ratio(mode, d, maker, kind, speed):
-    """v1' = v2 - e (v1 - v2); the wall keeps its course to the bit."""
+    """v1' = v2 - e (v1 - v2); the wall's velocity is unchanged to the bit."""
     world = mode_world(mode, d)
     pairs = []
     for lane, e in enumerate((0.0, 0.5, 1.0, 1.5)):
@@ -188,8 +188,8 @@ OBLIQUE = {
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 3, 1.0, 5.0])
 @pytest.mark.parametrize("radius", [0.5, 0.2])
 def test_b10_oblique_impact(mode, d, dt, radius):
-    """Over 16 phases of the step, which may hold the whole scene: time, normal, point and state after to rounding of
-    lanes up to 600 m away (1e-13)."""
+    """Over 16 phases of the step, which may contain the whole scene: time, normal, point and final state to the
+    rounding of lanes up to 600 m away (1e-13)."""
     start, toi, normal, cases = OBLIQUE[d]
     for e, m2, v1, v2 in cases:
         world = mode_world(mode, d, dt=dt)
@@ -260,13 +260,13 @@ def test_a_piston_drives_a_ball(mode, d, maker):
 
 @exact
 def test_a_lift_throws_a_ball(mode, integrator):
-    """A lift goes up at 2 m/s and takes the balls on its way: in its frame each bounce is e times the last."""
+    """A lift goes up at 2 m/s and hits balls on its way: in its frame each bounce has e times the speed of the last."""
     world = mode_world(mode, gravity=G, integrator=integrator)
     box(world, (0.0, -0.5), (0.0, 2.0), half=(50.0, 0.5), kind="kinematic")
     e = np.array([0.5, 0.8, 1.0])
     balls = [ball(world, (2.0 * k, 3.1), radius=0.1, restitution=r) for k, r in enumerate(e)]
     run(world, 60)
-    # Relative to the lift: height 3, falling at 2 at first. It strikes with u, flies off with e u.
+    # Relative to the lift: height 3, falling at 2 at first. Impact speed u, speed after it e u.
     u = math.sqrt(2**2 + 2 * G * 3.0)
     left = 1.0 - (u - 2) / G
     np.testing.assert_allclose(velocities(world, balls)[:, 1], 2 + e * u - G * left, rtol=1e-12)
@@ -278,7 +278,7 @@ def test_a_lift_throws_a_ball(mode, integrator):
 @each_mode
 @pytest.mark.parametrize(("speed", "bounces"), [(99.0, False), (101.0, True)])
 def test_threshold_of_what_is_fast(mode, d, speed, bounces):
-    """Above the threshold the full restitution; below it the body stops at the wall and does not tunnel."""
+    """Above the threshold full restitution; below it the body stops at the wall and does not tunnel."""
     world = mode_world(mode, d, restitution_threshold=100.0)
     box(world, 0.0, half=along(d, 0.05, 5.0, 5.0), kind="static")
     mover = ball(world, -1.0, speed, radius=0.1, restitution=0.8)
@@ -291,7 +291,7 @@ def test_threshold_of_what_is_fast(mode, d, speed, bounces):
 
 @each_mode
 def test_what_is_slow_but_tiny_does_not_tunnel(mode):
-    """Its approach of 0.16 m/s is below the default threshold of 2 g dt, but its way of 3 mm a step is 13 times its
+    """Its approach of 0.16 m/s is below the default threshold of 2 g dt, but it moves 3 mm per step, 13 times its
     size, and the sheet is thinner still: no bounce, it stays on top."""
     world = mode_world(mode, gravity=G, integrator="velocity_verlet")
     box(world, (0.0, -5e-5), half=(1.0, 5e-5), kind="static")
@@ -304,7 +304,7 @@ def test_what_is_slow_but_tiny_does_not_tunnel(mode):
 @exact
 @pytest.mark.parametrize(("factor", "bounces"), [(1.9, False), (2.1, True)])
 def test_default_threshold_is_twice_gravitys_share(mode, integrator, factor, bounces):
-    """Thrown down from close by, so that it strikes within the step, with just less or more than 2 g dt."""
+    """Thrown down from nearby, so that the impact is within the step, at slightly less or more than 2 g dt."""
     world = mode_world(mode, gravity=G, integrator=integrator)
     floor(world)
     gap = G * DT**2 / 2
@@ -334,7 +334,7 @@ def test_c9_restitution_at_and_above_its_ends(mode, d, e):
 
 @each_mode
 def test_c9_gain_between_walls_is_capped(mode):
-    """e = 1.5 between two walls: impacts would go on without end in a finite time. Capped, said, finite, inside."""
+    """e = 1.5 between two walls: infinitely many impacts in a finite time. Capped, reported, finite, inside."""
     world = mode_world(mode, max_impacts_per_step=8)
     for x in (-1.0, 2.0):
         box(world, x, half=(1.0, 9.0), kind="static")

@@ -1,5 +1,5 @@
-"""Random scenes against a plain reference that takes one impact after the other: balls and boxes of all sizes and
-masses, static, kinematic and dynamic, from slow to far across the scene in a step."""
+"""Random scenes against a plain reference that handles impacts one by one: balls and boxes of all sizes and
+masses, static, kinematic and dynamic, from slow to crossing the scene in a step."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def balls_meet(offset, w, sizes):
 
 
 def boxes_meet(offset, w, sizes):
-    """The same of boxes: the last axis to meet decides, unless another has parted by then."""
+    """The same for boxes: the last axis to meet decides, unless another has separated by then."""
     reach, enter, leave, axis = sizes[0] + sizes[1], -INFINITE, INFINITE, 0
     for k in range(len(offset)):
         if w[k] == 0:
@@ -66,7 +66,7 @@ def reference(meet, x, v, sizes, masses, e, end):
 
 
 def scattered(rng, d, apart):
-    """Up to eight bodies that do not overlap and fly inwards, sizes over a decade, masses over four; one can move."""
+    """Up to eight bodies without overlap that fly inwards, sizes over a decade, masses over four; one can move."""
     n = int(rng.integers(3, 9))
     sizes = 10 ** rng.uniform(-1, 0, (n, d))
     masses, kinds = 10 ** rng.uniform(-2, 2, n), ["dynamic"] * n
@@ -80,7 +80,7 @@ def scattered(rng, d, apart):
         place = rng.uniform(-width, width, d)
         if all(apart(place - other, sizes[len(x)], sizes[k]) for k, other in enumerate(x)):
             x.append(place)
-        width *= 1.01  # until there is room
+        width *= 1.01  # until they fit
     x = np.array(x)
     v = (-x * rng.uniform(0, 4, (n, 1)) + rng.normal(size=(n, d)) * width) * 10 ** rng.uniform(0, 2)
     v[np.array(kinds) == "static"] = 0.0
@@ -91,10 +91,10 @@ def scattered(rng, d, apart):
 @each_sweep
 @pytest.mark.parametrize("shape", ["balls", "boxes"])
 def test_as_the_reference(mode, d, shape):
-    """40 scenes in three steps of 1.7, 17 or 83 ms: the same impacts, times to 1e-9 of the way, states to 1e-8.
+    """40 scenes in three steps of 1.7, 17 or 83 ms: the same impacts, times to 1e-9 of the path, states to 1e-8.
 
-    Bouncing between curved bodies amplifies rounding about tenfold with every impact; scenes of more than a dozen are
-    left out. A pair that misses or meets within rounding would show as another count: none of these seeds has one.
+    Impacts of curved bodies amplify rounding about tenfold; scenes with more than a dozen are left out. A pair decided
+    by rounding would change the count: none of these seeds has one.
     """
     compared = 0
     for seed in range(40):
@@ -129,8 +129,8 @@ def test_as_the_reference(mode, d, shape):
 @pytest.mark.parametrize("cap", [1, 2])
 @pytest.mark.parametrize("pillar", [False, True])
 def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
-    """50 clusters of three to eight elastic bullets out of each other's reach, one or two impacts each in a step: who
-    is stopped keeps its velocity, so momentum (without a pillar amidst them) and energy of every cluster are kept to
+    """50 separate clusters of three to eight elastic bullets, with one or two impacts each in a step: stopped bodies
+    keep their velocity, so momentum (without a pillar among them) and energy of every cluster are conserved to
     rounding."""
     world = mode_world("continuous", d, max_impacts_per_step=cap)
     clusters = []

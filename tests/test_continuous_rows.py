@@ -1,5 +1,5 @@
-"""Swept bodies against rows of things: pushed and struck rows, seams of floors, maps of tiles; and what acts on bodies
-around a bounce, damping and forces."""
+"""Swept bodies against rows of bodies: pushed rows, impacts on rows, seams of floors, tile maps; and damping and
+forces around a bounce."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ G = 10.0
 @each_sweep
 @pytest.mark.parametrize("gap", [0.0, 0.01, 0.5])
 @pytest.mark.parametrize("speed", [10.0, 30.0, 300.0])
-def test_a_kinematic_ram_loses_nobody(mode, gap, speed):
-    """Five plastic balls are driven along: none behind it, their order kept, each as fast as the ram, or a little
-    faster where the solver for contacts at rest has taken the blow (up to a quarter in rows, docs/limitations.md)."""
+def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
+    """Five plastic balls are pushed along: none ends up behind it, their order is kept, each is as fast as the ram, or
+    a little faster where the solver for contacts at rest takes the impact (up to a quarter in rows,
+    docs/limitations.md)."""
     world = mode_world(mode, max_impacts_per_step=64)
     row = [bullet(world, k * (0.2 + gap), 0.0, radius=0.1) for k in range(5)]
     ram = bullet(world, -0.5, speed, half=(0.02, 1.0), kind="kinematic")
@@ -41,9 +42,9 @@ def test_a_kinematic_ram_loses_nobody(mode, gap, speed):
 @each_mode
 @pytest.mark.parametrize("mass", [1.0, 1000.0])
 @pytest.mark.parametrize("speed", [30.0, 300.0])
-def test_a_plastic_blow_on_a_row(mode, mass, speed):
-    """All go on together: v M / (M + 5), so the energy is M / (M + 5) of what it was; momentum to rounding. Where the
-    solver for contacts at rest takes the blow, a few per cent of the speed are between them."""
+def test_a_plastic_impact_on_a_row(mode, mass, speed):
+    """All move together: v M / (M + 5), so the energy is M / (M + 5) of the initial one; momentum to rounding. Where
+    the solver for contacts at rest takes the impact, speeds differ by a few per cent."""
     world = mode_world(mode)
     row = [bullet(world, 0.2 * k, 0.0, radius=0.1) for k in range(5)]
     ram = bullet(world, -0.5, speed, half=(0.02, 1.0), mass=mass)
@@ -60,7 +61,7 @@ def test_a_plastic_blow_on_a_row(mode, mass, speed):
 @each_sweep
 @pytest.mark.parametrize(("shape", "size", "speed"), [("ball", 0.25, 25.0), ("ball", 0.1, 12.0), ("box", 0.1, 50.0)])
 def test_what_rests_on_a_row_of_boxes_does_not_catch_on_its_seams(mode, shape, size, speed):
-    """No friction: it keeps its speed, and its height within the slop of what rests (0.005 of its size)."""
+    """No friction: speed is kept, and height within the slop of contacts at rest (0.005 of its size)."""
     world = mode_world(mode, gravity=G)
     for k in range(-2, 60):
         box(world, (2.0 * k, -0.5), half=(1.0, 0.5), kind="static")
@@ -119,7 +120,7 @@ def test_no_shot_passes_the_wall_of_a_map(faces, settings):
 
 @pytest.mark.slow  # maps of tiles take long to compile
 def test_what_falls_beside_a_wall_of_tiles_falls_on():
-    """A centimetre of air between: nothing stops it, however fast it is."""
+    """A centimetre of air between: it is not stopped at any speed."""
     cells = np.zeros((100, 2), bool)
     cells[:, 1] = True
     world = tile_world(cells, gravity=G, collision="continuous", integrator="velocity_verlet")
@@ -159,8 +160,8 @@ class Spring(ForceSystem):
 
 @pytest.mark.slow
 def test_a_spring_with_a_wall_is_of_second_order_in_event_driven_worlds():
-    """Half an oscillator: an elastic wall at its middle, x = |cos 2t|. At half the step a quarter of the error, over 12
-    phases, which still scatter; a method of first order has a half."""
+    """Half an oscillator: an elastic wall at its centre, x = |cos 2t|. Half the step gives a quarter of the error, over
+    12 phases, with some scatter; a first-order method would give a half."""
     errors = []
     for rate in (60, 120, 240):
         square = 0.0

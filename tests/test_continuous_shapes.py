@@ -1,5 +1,5 @@
-"""Bullets of shapes that plugins bring: capsules, convex polygons, half-spaces, one-way segments. They come from far
-away, so that every one of them would tunnel if it were not swept."""
+"""Bullets of plugin shapes: capsules, convex polygons, half-spaces, one-way segments. They come from far
+away, so that each of them would tunnel without sweeping."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SHAPES = {
 
 
 def reach(shape, direction):
-    """The furthest point of a shape that is there only once in that direction: a corner, or where a cap ends."""
+    """The farthest point of a shape in a direction where it is unique: a corner, or the end of a cap."""
     if shape == "ball":
         return 0.15 * direction
     if shape == "capsule":
@@ -49,7 +49,7 @@ def reach(shape, direction):
     return corners[np.argmax(corners @ direction)]
 
 
-# a, b, normal from a to b, where they touch as seen from a and from b. Of two shapes with corners one shows a face.
+# a, b, normal from a to b, contact point relative to a and to b. Of two shapes with corners one touches with a face.
 MEETINGS = [
     ("capsule", "ball", n := np.array((0.6, 0.8)), reach("capsule", n), reach("ball", -n)),
     ("capsule", "ball", n := np.array((1.0, 0.0)), np.array((0.1, 0.15)), reach("ball", -n)),
@@ -64,11 +64,11 @@ MEETINGS = [
 
 @each_sweep
 def test_every_pair_meets_where_it_should(mode):
-    """All pairs at once, each on a lane, e = 1 and 0.5, 100 to 30,000 m/s, traced back from where they touch.
+    """All pairs at once, each on a lane, e = 1 and 0.5, 100 to 30,000 m/s, traced back from the touch.
 
-    A plane parts them until then. There is no closed form for most: the time is that at which the depth is zero to
-    rounding of the way (1e-12 of it), which moves nothing by more; normals of polygons and caps come from a search and
-    are good to 1e-7.
+    A plane separates them until then. Most have no closed form: the time is that at which the depth is zero to
+    the rounding of the path (1e-12 of it), which causes no larger errors; normals of polygons and caps are found by
+    iteration and accurate to 1e-7.
     """
     world = shaped_world(mode, capsule.plugin, convex_polygon.plugin)
     rng, expected = np.random.default_rng(4), []
@@ -106,7 +106,7 @@ def test_every_pair_meets_where_it_should(mode):
 @each_sweep
 @pytest.mark.parametrize("e", [0.0, 1.0])
 def test_a_half_space_holds_bullets(mode, e):
-    """A slope without end: balls and boxes at 1e2 to 1e5 m/s straight at it. They stop there or come back."""
+    """An infinite slope: balls and boxes at 1e2 to 1e5 m/s straight at it. They stop there or bounce back."""
     world = shaped_world(mode, half_space.plugin)
     n = np.array((-0.6, 0.8))
     world.create_entity(Transform((0.0, 0.0)), HalfSpaceCollider(n, restitution=e))
@@ -132,7 +132,7 @@ def test_a_half_space_holds_bullets(mode, e):
 @each_sweep
 @pytest.mark.parametrize("e", [0.0, 1.0])
 def test_a_one_way_segment_in_the_way_of_bullets(mode, e):
-    """From the front at 600 m/s, 10 m a step: held, or thrown back. From behind: the same bits as with nothing."""
+    """From the front at 600 m/s, 10 m per step: stopped or reflected. From behind: the same bits as without it."""
     for start, speed in ((6.0, -600.0), (-6.0, 600.0)):
         world = shaped_world(mode, one_way_segment.plugin)
         free = shaped_world(mode, one_way_segment.plugin)
@@ -158,7 +158,7 @@ def test_a_one_way_segment_in_the_way_of_bullets(mode, e):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_a_polygon_that_flies_onto_a_capsule_on_the_ground(mode):
-    """Under gravity, e = 0: everything ends at rest above the ground, whatever it is made of."""
+    """Under gravity, e = 0: all bodies end at rest above the ground, for any pair of shapes."""
     world = shaped_world(mode, capsule.plugin, convex_polygon.plugin, half_space.plugin, gravity=(0.0, -9.81))
     world.create_entity(Transform((0.0, 0.0)), HalfSpaceCollider((0.0, 1.0), friction=0.5))
     lower = bullet(world, (0.0, 0.3), 0.0, collider=SHAPES["capsule"](0.0))

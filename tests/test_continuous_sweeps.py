@@ -1,5 +1,5 @@
-"""Nothing jumps through anything: B13, B15 and C5 of the accuracy list as worlds, bullets against bullets, and against
-what stands, filters or lets pass. Continuous, event-driven, and bodies with ``ccd`` in a discrete world."""
+"""No tunnelling: B13, B15 and C5 of the accuracy list as worlds, bullets against bullets and against static shapes,
+filters and disabled contacts. Continuous, event-driven, and bodies with ``ccd`` in a discrete world."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ SWEEPS = [
 @pytest.mark.parametrize("drift", [0.0, 0.75])
 @pytest.mark.parametrize("case", range(len(SWEEPS)))
 def test_b13_sphere_against_box(mode, unit, drift, case):
-    """All within one step of 3 s: |dt| <= 1e-12 |p| / |v|, the reflected velocity, the rest of the way. Also with both
-    carried along, so that the box moves too; and in 2D where the case is flat."""
+    """All within one step of 3 s: |dt| <= 1e-12 |p| / |v|, the reflected velocity, the rest of the path. Also with a
+    common velocity added, so that the box moves too; and in 2D where the case is flat."""
     (y, z), toi, normal = SWEEPS[case]
     for d in (3,) if z else (2, 3):
         world = mode_world(mode, d, dt=3.0)
@@ -77,9 +77,10 @@ def test_b13_sphere_against_box(mode, unit, drift, case):
 @both_dimensions
 @each_sweep
 def test_b13_tangent_point_and_overlap(mode, d):
-    """A tangent touches without impulse; a point is a ray; who overlaps is dealt with at t = 0, if it approaches.
+    """A tangent touches without impulse; a point is a ray; overlapping bodies have their impact at t = 0 if they
+    approach.
 
-    Rounding of the squares leaves the tangent a cosine of sqrt(eps) at most: 3e-8 of the speed, taken twice, and more.
+    Rounding of the squares gives the tangent a cosine of at most sqrt(eps): 3e-8 of the speed, taken twice, and more.
     """
     world = mode_world(mode, d, dt=3.0)
     box(world, along(d), half=1.0, kind="static")
@@ -130,7 +131,7 @@ def test_c5_thin_wall(mode, d):
 
 
 def test_c5_without_it_bullets_pass():
-    """The same wall discrete: at 100 m/s a step of 1.7 m leads through it. What is tested here can fail."""
+    """The same wall in discrete mode: at 100 m/s a step of 1.7 m leads through it. Shows that the test can fail."""
     world = make_world()
     box(world, 0.05, half=(0.05, 1e3), kind="static")
     bullets = [ball(world, (-0.1 - 0.3 * k, 2.0 * k), 100.0, radius=0.1, restitution=1.0) for k in range(8)]
@@ -145,7 +146,7 @@ def test_c5_without_it_bullets_pass():
 @each_mode
 @pytest.mark.parametrize("radius", [0.0, 0.1])
 def test_b15_a_thousand_passes(mode, d, radius):
-    """Between walls with room for 1 m, 1000 m/s: after 60 steps 1000 impacts, and where it started, to rounding."""
+    """Between walls 1 m apart at 1000 m/s: after 60 steps 1000 impacts, and the start position, to rounding."""
     world = mode_world(mode, d, max_impacts_per_step=100)
     for side in (-1, 1):
         box(world, side * (0.5 + radius + 0.5), half=along(d, 0.5, 5.0, 5.0), kind="static")
@@ -161,7 +162,7 @@ def test_b15_a_thousand_passes(mode, d, radius):
 @both_dimensions
 @pytest.mark.parametrize(("mode", "e"), [("continuous", 1.0), ("continuous", 0.9), ("event_driven", 0.9)])
 def test_b15_beyond_the_cap(mode, e, d):
-    """Sixteen passes a step and a cap of eight: it is said, and the ball stays between the walls, at speed."""
+    """Sixteen passes per step and a cap of eight: reported, and the ball stays between the walls, at speed."""
     world = mode_world(mode, d, max_impacts_per_step=8)
     for side in (-1, 1):
         box(world, side * 1.1, half=along(d, 0.5, 5.0, 5.0), kind="static")
@@ -180,7 +181,7 @@ def test_b15_beyond_the_cap(mode, e, d):
 
 @pytest.mark.parametrize(("mode", "e"), [("continuous", 1.0), ("event_driven", 0.999), ("ccd", 1.0)])
 def test_b15_beyond_the_default_cap(mode, e):
-    """Hundreds of passes a step with no cap given: said as well, and inside for as long as it goes on."""
+    """Hundreds of passes per step with the default cap: reported as well, and always inside."""
     world = mode_world(mode)
     for side in (-1, 1):
         box(world, side * 1.1, half=(0.5, 5.0), kind="static")
@@ -207,7 +208,7 @@ def test_b15_elastic_impacts_are_not_capped_when_event_driven():
 
 
 def meet(rng, d, shapes):
-    """Where b is relative to a when they touch, and the normal from a to b. Balls of 0.1, boxes of half 0.1."""
+    """Position of b relative to a at the touch, and the normal from a to b. Balls of 0.1, boxes of half extent 0.1."""
     normal = rng.normal(size=d)
     normal /= np.linalg.norm(normal)
     if shapes == "ball, ball":
@@ -228,11 +229,11 @@ def meet(rng, d, shapes):
 @each_sweep
 @pytest.mark.parametrize("shapes", ["ball, ball", "box, box", "box, ball: face", "box, ball: corner"])
 def test_two_bullets_meet(mode, d, shapes):
-    """40 pairs, traced back from where they touch within the step: time, normal, velocities and places after.
+    """40 pairs, traced back from a touch within the step: time, normal, velocities and final positions.
 
     At 1e3 to 1e5 m/s they come from up to 3 km away and overlap for less than 1e-4 of the step. The tangential planes
-    part them before, for both are convex. Rounding: eps of the way, divided by the size for the normal of what is
-    curved, by the cosine of 0.3 at least for the time.
+    separate them before, because both are convex. Rounding: eps of the path, divided by the size for the normal of
+    curved shapes, by the cosine of at least 0.3 for the time.
     """
     rng = np.random.default_rng(d)
     world = mode_world(mode, d)
@@ -274,7 +275,7 @@ def test_two_bullets_meet(mode, d, shapes):
 
 
 def field(with_bullets):
-    """A discrete world: slow balls and boxes that bounce about, thin plates further on, two bullets at the plates."""
+    """A discrete world: slow balls and boxes that bounce about, thin plates, and two bullets at the plates."""
     world = make_world()
     rng = np.random.default_rng(3)
     slow = []
@@ -293,7 +294,7 @@ def field(with_bullets):
 
 
 def test_one_bullet_in_a_discrete_world():
-    """It strikes the first plate after 9.94 ms: 1 kg on 3 kg, e = 1: -500 and 500; that plate drives the second, e = 0.
+    """It hits the first plate after 9.94 ms: 1 kg on 3 kg, e = 1: -500 and 500; that plate hits the second, e = 0.
     The bullet without ccd passes all of them. Slow bodies elsewhere: the same bits as without bullets."""
     world, slow, plates, bullets = field(True)
     without, same, *_ = field(False)
@@ -309,7 +310,7 @@ def test_one_bullet_in_a_discrete_world():
 
 @each_sweep
 def test_a_bullet_and_its_partners_partners(mode):
-    """A bullet strikes a ball that had nothing near it, which then flies into another far away, all in one step."""
+    """A bullet hits a ball that had nothing near it, which then hits another one far away, all in one step."""
     world = mode_world(mode)
     chain = [bullet(world, -10.0, 6000.0, restitution=1.0)]
     chain += [bullet(world, 20.0 * k, 0.0, restitution=1.0) for k in range(4)]
@@ -324,7 +325,7 @@ def test_a_bullet_and_its_partners_partners(mode):
     assert velocities(world, chain)[:, 0].tolist() == pytest.approx([0, 0, 0, 0, -6000], abs=1e-9)
 
 
-# -- who is not meant ------------------------------------------------------------------------------
+# -- excluded pairs --------------------------------------------------------------------------------
 
 
 class Disable(System):
@@ -370,7 +371,7 @@ def shot(mode, *, disable=False, plugins=(), wall_is=None, **bullet_is) -> tuple
     ids=["disabled", "filtered", "bullet's mask", "wall's mask", "sensor bullet", "sensor wall"],
 )
 def test_bullets_pass_what_they_do_not_meet(mode, why):
-    """The same bits as without a wall in the way; with it and nothing else, the bullet comes back."""
+    """The same bits as without a wall in the way; with the wall enabled, the bullet comes back."""
     x, v, hits = shot(mode)
     assert len(hits) == 1
     assert v.tolist() == [-1000.0, 3.0]

@@ -121,14 +121,14 @@ def check_against_brute_force(a, b, offsets, eps=EPS):
     core = met.depth - rounded
     slack = size + rounded
     assert (abs(core - depth) / slack).max() < eps
-    # The direction is as good as the depth: the overlap along it is the depth. Where corners or edges are nearly in
-    # touch it depends on the rounding of their distance.
+    # The direction is as accurate as the depth: the overlap along it is the depth. If corners or edges nearly touch,
+    # it depends on the rounding of their distance.
     tilt = np.where(core < 0, 1e-14 * size / np.maximum(abs(core), 1e-300), 0)
     along = convex_brute.overlap_along(a.points, moved, met.normal)
     assert (abs(along - core) / size - tilt).max() < eps
     apart = depth < 0
     error = np.linalg.norm(met.normal + way / np.where(apart, depth, 1)[:, None], axis=1)
-    # 1e12 sizes apart, the brute force cannot tell which points are nearest: their distances are the same double.
+    # At 1e12 sizes the brute force cannot find the nearest points: their distances are the same double.
     assert (error * -depth / slack)[apart].max(initial=0) < max(eps, 1e-11)
     level = np.einsum("nvd,nd->nv", a.points, met.normal).max(1) + a.radii - met.depth / 2
     assert (abs(np.einsum("nd,nd->n", met.point, met.normal) - level) / slack - tilt).max() < eps
@@ -239,7 +239,7 @@ def test_coincident_centres_and_cores_without_extent(d):
     flat = box_corners(np.array(y))  # a segment, as a box
     assert meet_one(flat, flat, zero).depth == 0.0
     assert meet_one(box_corners(np.zeros(d)), cube, np.multiply(x, 0.75)).depth == 0.25
-    # Two capsules along one line, side by side within each other, and end to end.
+    # Two capsules on one line, overlapping side by side, and end to end.
     for offset, depth in ((0.0, 0.75), (1.5, 0.75), (2.0, 0.75), (2.5, 0.25)):
         met = meet_one([negated(y), y], [negated(y), y], np.multiply(y, offset), 0.5, 0.25)
         assert met.depth == depth

@@ -67,7 +67,7 @@ class Plain:
 
 
 def mixed_scene(world, use):
-    """Spheres and boxes thrown at each other over a floor, while things come and go; yields after each step."""
+    """Spheres and boxes thrown at each other over a floor, with creation and deletion; yields after each step."""
     world.add_system(Swirl())
     rng = np.random.default_rng(11)
     use.create(Transform((0.0, -0.5)), AABBCollider((30.0, 0.5), restitution=0.3))
@@ -101,7 +101,7 @@ def test_plain_esper_gives_the_same_bits_as_the_facade(integrator):
         assert worlds[0].state_hash() == worlds[1].state_hash()
         contacts += len(worlds[0].contacts.impacts)
     assert worlds[0].step_count == STEPS
-    assert contacts > 50  # there was something to differ in
+    assert contacts > 50  # there was something to compare
     assert np.isfinite(worlds[0].bodies.position).all()
 
 

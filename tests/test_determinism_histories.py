@@ -16,7 +16,7 @@ N = 60
 
 
 def parts(e):
-    """What the body with that id consists of: a function of the id alone."""
+    """The components of the body with that id: a function of the id alone."""
     rng = np.random.default_rng(e)
     kind = ("dynamic", "dynamic", "dynamic", "kinematic", "static")[e % 5]
     shape = AABBCollider(rng.uniform(0.2, 0.5, 2), restitution=0.5) if e % 3 else SphereCollider(0.4, restitution=0.9)
@@ -30,7 +30,7 @@ def straight(world):
 
 
 def with_others_that_went(world):
-    """Ids after N are taken by bodies that were there for a while."""
+    """Ids after N are used by temporary bodies."""
     straight(world)
     extra = [box(world, (50.0 + 2 * x, 50.0), 1.0) for x in range(150)]  # so many that the tables grow
     world.bodies  # noqa: B018
@@ -58,7 +58,7 @@ def components_late_and_out_of_order(world):
 
 
 def bodies_changed_their_minds(world):
-    """Other kinds, other colliders and masses first; one detour over a component type that nobody has in the end."""
+    """First other kinds, colliders and masses; one detour over a component type that is removed again."""
     for e in range(1, N + 1):
         world.create_entity(Transform((9.0 * e, 0.0)), RigidBody(7.0, kind="static"), SphereCollider(2.0), Charge(e))
     world.bodies  # noqa: B018
@@ -75,7 +75,7 @@ def bodies_changed_their_minds(world):
 
 
 def in_bulk(world):
-    """Neighbours of one make at once, the rest singly."""
+    """Consecutive bodies with equal components in bulk, the rest one by one."""
     e = 1
     while e <= N:
         stop = e + 1
@@ -119,15 +119,15 @@ def expected():
 
 @pytest.mark.parametrize("build", HISTORIES, ids=lambda build: build.__name__)
 def test_any_history_with_the_same_ids_gives_the_same_bits(build, expected):
-    """ACCURACY C22: the order in which bodies came, and what was there before, changes nothing."""
+    """ACCURACY C22: the order of creation, and deleted bodies, change nothing."""
     got = run_history(build)
     assert got[0] == expected[0]
     assert got[1] == expected[1]
-    assert got[2] == expected[2] > 1000  # there was something to differ in
+    assert got[2] == expected[2] > 1000  # there was something to compare
 
 
 def test_deleting_in_the_midst_of_a_run_leaves_no_trace_in_those_out_of_reach():
-    """Bodies far away come and go all the time: rows move in every step."""
+    """Distant bodies are created and deleted all the time: rows move in every step."""
 
     def run(disturb):
         world = settled()
@@ -148,7 +148,7 @@ def test_deleting_in_the_midst_of_a_run_leaves_no_trace_in_those_out_of_reach():
 
 
 def test_presets_differ_and_settings_reach_the_bits():
-    """A test that could not fail would pass here too: other settings are other bits."""
+    """A test that cannot fail would pass here too: other settings must give other bits."""
 
     def run(settings):
         world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=settings)

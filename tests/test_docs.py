@@ -1,7 +1,7 @@
-"""The manual is true: every Python block of README.md and docs/ runs, and every link between pages leads somewhere.
+"""The manual is correct: every Python block of README.md and docs/ runs, and every link between pages is valid.
 
-The blocks of one page run in order and share one namespace, as a reader would paste them. They are compiled under the
-page's own name and lines, so a traceback shows the line of the page.
+The blocks of one page run in order and share one namespace, as if pasted by a reader. They are compiled with the
+page's name and lines, so a traceback shows the line of the page.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from carom.framework import World
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^(?P<indent> *)(?P<marks>`{3,}|~{3,})(?P<info>[^`]*)$")
-MARKS = ("no-run", "game")  # not to be run; a part of a game whose lines are counted
-LINK = re.compile(r"\]\(\s*(?P<target>[^()\s]*(?:\([^()\s]*\)[^()\s]*)*)[^()]*\)")  # of links in links both
+MARKS = ("no-run", "game")  # not run; a part of a game whose lines are counted
+LINK = re.compile(r"\]\(\s*(?P<target>[^()\s]*(?:\([^()\s]*\)[^()\s]*)*)[^()]*\)")  # nested links: both
 
 
 @dataclass
 class Block:
-    """A fenced block: what stands behind the fence, the number of its first line, its text."""
+    """A fenced block: the text after the fence, the number of its first line, its content."""
 
     info: list[str]
     line: int
@@ -65,7 +65,7 @@ def split(text: str, name: str) -> tuple[list[Block], list[str]]:
 
 
 def python_blocks(page: Path) -> list[Block]:
-    """Those to run. A misspelt mark is an error: it would take a block out of the tests without a word."""
+    """The blocks to run. A misspelt mark is an error, because it would silently exclude a block."""
     blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
     for block in blocks:
         info = block.info[:1] + [mark for mark in block.info[1:] if mark not in MARKS]
@@ -110,7 +110,7 @@ def namespace(monkeypatch, tmp_path):
         if isinstance(value, World):
             value.close()
     esper.switch_world("default")
-    for left in set(esper.list_worlds()) - worlds:  # of functions, that no name of the page holds
+    for left in set(esper.list_worlds()) - worlds:  # left by functions: no name of the page holds them
         esper.delete_world(left)
 
 
@@ -189,7 +189,7 @@ def test_the_scene_file_page_has_every_option():
 
 @pytest.mark.slow  # over a minute of compiling where the cache is empty
 def test_the_package_of_the_shape_page_can_be_built_found_and_tested(tmp_path):
-    """Its files as the page has them, built into a wheel, in a folder where Python looks; then the page's commands."""
+    """The files as on the page, built into a wheel and put on Python's path; then the page's commands."""
     blocks, _ = split((ROOT / "docs" / "write-a-shape.md").read_text(encoding="utf-8"), "write-a-shape.md")
     source, site = tmp_path / "source", tmp_path / "site"
     source.mkdir()
@@ -212,7 +212,7 @@ def test_the_package_of_the_shape_page_can_be_built_found_and_tested(tmp_path):
     wheel = run_python("-c", build, folder=source).strip().splitlines()[-1]
     with zipfile.ZipFile(tmp_path / wheel) as archive:
         archive.extractall(site)
-    (source / "diamond.py").unlink()  # what counts is what was installed
+    (source / "diamond.py").unlink()  # the test must use the installed file
     assert "3 passed" in run_python("-m", "pytest", "-q", "-p", "no:cacheprovider", folder=source)
     listed = run_python("-m", "carom", "plugins")
     assert re.search(r"diamond +1\.0 +carom-diamond +shapes DiamondCollider; pairs DiamondCollider and Sphere", listed)
@@ -232,7 +232,7 @@ def links(page: Path) -> list[tuple[int, str]]:
 
 
 def anchors(page: Path) -> set[str]:
-    """The names under which a page's headings can be linked to, made as code hosts make them."""
+    """The anchors of a page's headings, generated as code hosts do."""
     _, prose = split(page.read_text(encoding="utf-8"), name_of(page))
     found: set[str] = set()
     for line in prose:
@@ -249,7 +249,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def dead_links(page: Path, root: Path = ROOT) -> list[str]:
-    """The page's relative links that lead nowhere, with their lines."""
+    """The page's relative links that are dead, with their lines."""
     dead = []
     for line, target in links(page):
         if re.match(r"[a-z][a-z0-9+.-]*:", target):

@@ -1,4 +1,4 @@
-"""The uniform grid against brute force: the same exact sets as the tree, or no answer where it does not suit."""
+"""The uniform grid against brute force: the same exact sets as the tree, or None where it is not suitable."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def brute_force(lower, upper, inside):
 
 
 def check(lower, upper, inside, grid=None):
-    """None if the grid does not suit, else the number of pairs, after comparing them with brute force."""
+    """None if the grid is not suitable, else the number of pairs, after comparing them with brute force."""
     grid = grid or EvenGrid(lower.shape[1])
     others = np.arange(inside, len(lower), dtype=np.int32)
     found = grid.pairs(lower, upper, frame_of(lower[:inside], upper[:inside]), inside, others)
@@ -74,7 +74,7 @@ def test_lattices_lines_and_touching(d, data):
 
 @both_dimensions
 def test_full_cells(d):
-    """More objects in a row of cells than are looked at together, up to the limit of a cell, and beyond it none."""
+    """More objects in a row of cells than are processed together, up to the limit of a cell, and None beyond it."""
     rng = np.random.default_rng(2)
     spread = rng.random((2000, d)) * 2000 ** (1 / d) * 2
     for crowd in (12, 30, 60):
@@ -105,7 +105,7 @@ def test_what_does_not_suit(d):
 
 @both_dimensions
 def test_output_grows(d):
-    """Each of 1,000 boxes meets 40 that are not in the grid: ten times the room there is at first."""
+    """Each of 1,000 boxes meets 40 that are not in the grid: ten times the initial capacity."""
     centre = np.random.default_rng(4).random((1040, d)) * 2 * 1000 ** (1 / d)
     lower, upper = centre - 0.1, centre + 0.1
     lower[1000:], upper[1000:] = -1.0, 1e3

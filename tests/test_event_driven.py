@@ -1,5 +1,5 @@
-"""``Settings(collision="event_driven")``: all impacts of a step in the order of time. B16 and B17 of the accuracy list,
-sequences without end, piles, simultaneous impacts; flight exact under gravity, of second order under other forces."""
+"""``Settings(collision="event_driven")``: all impacts of a step in order of time. B16 and B17 of the accuracy list,
+infinite sequences, piles, simultaneous impacts; flight exact under gravity, of second order under other forces."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ makers = pytest.mark.parametrize("maker", [ball, box])
 @pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
 @pytest.mark.parametrize("arriving", [1, 2, 3, 4])
 def test_b16_cradle(mode, maker, speed, gap, arriving):
-    """k arrive, k leave, one impact after the other at any gap; also at 2 m a step, when all is over within one.
+    """k arrive, k leave, one impact after the other at any gap; also at 2 m per step, when all is over within one.
 
-    Equal bodies exchange velocities: but for their widths they pass through each other, so places at any time are the
-    sorted free flights plus the widths.
+    Equal bodies exchange velocities: apart from their widths they pass through each other, so positions at any time are
+    the sorted free flights plus the widths.
     """
     world = mode_world(mode, max_impacts_per_step=20)
     start = np.arange(5) * (1 + gap)
@@ -53,7 +53,7 @@ def test_b16_cradle(mode, maker, speed, gap, arriving):
 
 
 def check_galperin(settings, digits, seconds):
-    """Count ceil(pi / atan(sqrt(m/M))) - 1; impact j at 2 - 1 / (sqrt(M) tan(j atan(sqrt(m/M)))), which is where the
+    """Count ceil(pi / atan(sqrt(m/M))) - 1; impact j at 2 - 1 / (sqrt(M) tan(j atan(sqrt(m/M)))), where the
     straight line of the unfolded wedge crosses the j-th copy of its side; energy 1e-9."""
     world = galperin.build(settings, digits=digits)
     energy = world.kinetic_energy()
@@ -96,8 +96,8 @@ def test_b17_galperin_3141592(digits):
 
 @both_dimensions
 @each_mode
-def test_impacts_are_told_in_the_order_of_time(mode, d):
-    """A crowd of fast balls and boxes in a closed room: within each step ordered by (time, a, b), impulses positive,
+def test_impacts_are_reported_in_the_order_of_time(mode, d):
+    """Many fast balls and boxes in a closed room: within each step ordered by (time, a, b), impulses positive,
     normals of length 1, times within the step."""
     world = mode_world(mode, d, max_impacts_per_step=1000)
     for axis in range(d):
@@ -131,8 +131,8 @@ def test_impacts_are_told_in_the_order_of_time(mode, d):
 @each_mode
 @pytest.mark.parametrize("upper_first", [False, True])
 def test_simultaneous_impacts_are_taken_one_after_the_other(mode, upper_first):
-    """A ball strikes two at the same moment, mirror images: the pair of smaller ids first, as if it came alone; then
-    the other with what is left. n1.n2 = 1/2: the impulses are v cos 30 and half of it."""
+    """A ball hits two mirror images at the same moment: first the pair of smaller ids, as if it were alone; then
+    the other with the remaining velocity. n1.n2 = 1/2: the impulses are v cos 30 and half of it."""
     world = mode_world(mode)
     cue = bullet(world, -3.0, 300.0, radius=0.5, restitution=1.0)
     up, down = (math.cos(math.pi / 6), 0.5), (math.cos(math.pi / 6), -0.5)
@@ -147,17 +147,17 @@ def test_simultaneous_impacts_are_taken_one_after_the_other(mode, upper_first):
     np.testing.assert_allclose(velocities(world, [cue, *pair]), expected, atol=1e-9)
 
 
-# -- sequences without end -------------------------------------------------------------------------
+# -- infinite sequences ----------------------------------------------------------------------------
 
 
 @each_mode
 @pytest.mark.parametrize("speed", [1.0, 100.0])
 def test_inelastic_collapse_ends(mode, speed):
-    """A line of 20 with e = 0.3 that closes on itself: infinitely many impacts in a finite time. Bounded work in every
-    step, nobody through anybody, momentum kept, energy never raised, and in the end nobody approaches.
+    """A line of 20 with e = 0.3 that contracts: infinitely many impacts in a finite time. Bounded work in every
+    step, no body passes another, momentum conserved, energy never raised, and in the end no body approaches another.
 
-    A row that is pressed together overlaps for a moment, the deeper the faster, and is thrown apart a little, as in the
-    discrete mode: a limit of the solver for contacts at rest. Nobody gets past another.
+    A row that is pressed together overlaps for a moment, the deeper the faster, and is pushed apart a little, as in the
+    discrete mode: a limit of the solver for contacts at rest. No body passes another.
     """
     world = mode_world(mode)
     start = 1.2 * np.arange(20)
@@ -179,7 +179,7 @@ def test_inelastic_collapse_ends(mode, speed):
 @pytest.mark.parametrize(("count", "speed"), [(10, 60.0), (10, 600.0), (4, 1000.0)])
 @pytest.mark.parametrize("e", [0.0, 0.3])
 def test_a_row_collapses_against_a_wall(mode, e, count, speed):
-    """Balls thrown at a wall one behind the other: most of the energy is gone, nobody gets past another or the wall,
+    """Balls thrown at a wall in a row: most of the energy is lost, no ball passes another or the wall,
     whose middle is at 20.5: at most half a ball is in it for a moment."""
     world = mode_world(mode)
     box(world, 20.5, half=(0.5, 5.0), kind="static")
@@ -195,7 +195,7 @@ def test_a_row_collapses_against_a_wall(mode, e, count, speed):
 
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_a_pile_comes_to_rest(e):
-    """60 discs fall into a bin: at rest after 8 s, nobody outside, overlap below 2 % of a size."""
+    """60 discs fall into a bin: at rest after 8 s, none outside, overlap below 2 % of a size."""
     world = pile2d.build(Settings(collision="event_driven"), n=60)
     world.bodies.sphere_collider.restitution[:] = e
     run(world, 480)
@@ -211,7 +211,7 @@ def test_a_pile_comes_to_rest(e):
 @makers
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_a_stack_stands(mode, d, maker, e):
-    """Five above each other, dropped from a hand's breadth each: still after 4 s, no drift, within the slop."""
+    """Five above each other, each dropped from 0.1 m: still after 4 s, no drift, within the slop."""
     world = mode_world(mode, d, G)
     floor(world)
     stack = [maker(world, along(d, 0.0, 0.5 + 1.05 * (k + 1)), restitution=e) for k in range(5)]
@@ -228,8 +228,8 @@ def test_a_stack_stands(mode, d, maker, e):
 @both_dimensions
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 7, 1.0, 5.0])
 def test_flight_is_the_exact_parabola(d, dt):
-    """Gravity, its scale, constant forces, forces applied for a step: rounding at any dt, same bits whatever the
-    integrator is called."""
+    """Gravity, its scale, constant forces, forces applied for a step: rounding at any dt, the same bits for any
+    integrator setting."""
     found = []
     for integrator in ("semi_implicit_euler", "rk4"):
         world = make_world(d, G, dt=dt, collision="event_driven", integrator=integrator)
@@ -258,7 +258,8 @@ class Anchor(ForceSystem):
 
 
 def deviation(n, exact, *systems, gravity=0.0, **body):
-    """From the exact (position, velocity) after 1 s in n steps, of a body of 1 kg from (1, 0) with (0.5, 2)."""
+    """Deviation from the exact (position, velocity) after 1 s in n steps, of a body of 1 kg from (1, 0) with (0.5,
+    2)."""
     world = make_world(gravity=gravity, dt=1 / n, collision="event_driven")
     for system in systems:
         world.add_system(system())
@@ -268,8 +269,8 @@ def deviation(n, exact, *systems, gravity=0.0, **body):
 
 
 def test_other_forces_are_of_second_order():
-    """Spring: half a kick at both ends of the step. Under gravity too, and with damping: half the step, a quarter of
-    the error, within 5 %; without gravity the damped velocity is exact."""
+    """Spring: half a kick at both ends of the step. Also under gravity and with damping: half the step gives a quarter
+    of the error, within 5 %; without gravity the damped velocity is exact."""
     x, v = np.array((1.0, 0.0)), np.array((0.5, 2.0))
     sag = np.array((0.0, -G / 4))
     spring = [
@@ -292,7 +293,7 @@ def test_other_forces_are_of_second_order():
 
 @pytest.mark.parametrize(("n", "mass"), list(itertools.product((1, 2, 5), (1.0, 8.0))))
 def test_free_bodies_keep_their_course(n, mass):
-    """Nothing acts: n bodies pass far from each other at any dt, to the rounding of one product."""
+    """No forces: n bodies pass far from each other at any dt, to the rounding of one product."""
     world = make_world(dt=0.3, collision="event_driven")
     bodies = [ball(world, (0.0, 5.0 * k), (7.0, 0.0), mass=mass, restitution=1.0) for k in range(n)]
     run(world, 10)

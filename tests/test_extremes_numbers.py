@@ -1,5 +1,5 @@
-"""Section C of the accuracy list: masses, restitutions, sizes, speeds that are extreme or impossible. Either the stated
-answer or an error at the call; in every case what is finite stays so, and no body is lost."""
+"""Section C of the accuracy list: extreme or impossible masses, restitutions, sizes, speeds. Either the stated
+result or an error at the call; in every case finite bodies stay finite, and no body is lost."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_c8_masses_that_cannot_be_are_rejected(mass):
 @pytest.mark.parametrize("ratio", [1e12, 1e-12, 1e15, 1e-15])
 @pytest.mark.parametrize("e", [0.5, 1.0])
 def test_c8_mass_ratios_between_walls(ratio, e):
-    """A light body rattles between a heavy one and a wall: never through, and no energy comes of it."""
+    """A light body bounces between a heavy one and a wall: it never tunnels, and energy does not grow."""
     world = make_world()
     wall = box(world, (0.0, 0.0), kind="static", restitution=e)
     light, heavy = ball(world, 1.1, 0.0, restitution=e), ball(world, 2.5, -0.5, mass=ratio, restitution=e)
@@ -64,7 +64,7 @@ def test_c9_restitution_above_one_gains():
 @makers
 @pytest.mark.parametrize("tiny", [1e-310, 5e-324])
 def test_c10_denormal_sizes_and_velocities(maker, tiny):
-    """No NaN and no crash; a neighbour of ordinary size is left alone or bounces as it should."""
+    """No NaN and no crash; a neighbour of ordinary size is not affected or bounces as it should."""
     world = make_world()
     size = {"radius" if maker is ball else "half": tiny}
     maker(world, (0.0, 5.0), tiny, restitution=1.0, **size)
@@ -89,7 +89,7 @@ def test_c10_denormal_masses():
 
 @nowhere
 def test_c11_rejected_at_the_call(bad):
-    """Position, velocity, force, impulse, size, step: the error names the field; an adopted body's the entity too."""
+    """Position, velocity, force, impulse, size, step: the error names the field; for an adopted body the entity too."""
     for make in (
         lambda: Transform((bad, 0.0)),
         lambda: RigidBody(linear_velocity=(0.0, bad)),
@@ -127,7 +127,7 @@ def test_c11_steps_must_be_positive(dt):
 @nowhere
 @pytest.mark.parametrize("name", ["position", "linear_velocity"])
 def test_c11_written_into_columns_it_stays_with_its_body(bad, name):
-    """Columns are not checked when written: the fault is reported, everybody else moves as without that body."""
+    """Columns are not checked when written: the fault is reported, all others move as without that body."""
     worlds = [make_world(), make_world()]
     for world in worlds:
         rng = np.random.default_rng(6)
@@ -147,7 +147,7 @@ def test_c11_written_into_columns_it_stays_with_its_body(bad, name):
 
 @both_dimensions
 def test_c12_huge_velocities(d):
-    """v . v overflows at 1e154: bounces of 1e200 and 1e300 still exchange velocities; and 1e308 harms nobody."""
+    """v . v overflows at 1e154: bounces of 1e200 and 1e300 still exchange velocities; 1e308 affects no other body."""
     for speed in (1e150, 1e200, 1e300):
         world = make_world(d, dt=1e-3 / speed)
         a, b = ball(world, -0.501, speed, restitution=1.0), ball(world, 0.501, -speed)
@@ -166,7 +166,7 @@ def test_c12_huge_velocities(d):
 
 @pytest.mark.parametrize("offset", [0.0, 1e5, 1e7, 1e9])
 def test_head_on_far_from_the_origin(offset):
-    """Exchange is exact wherever it happens; where it happens is known to an ulp of the offset."""
+    """The exchange is exact at any offset; its position is known to an ulp of the offset."""
     world = make_world()
     a, b = ball(world, offset - 0.6, 1.0, restitution=1.0), ball(world, offset + 0.6, -1.0, restitution=1.0)
     run(world, 30)
@@ -226,7 +226,7 @@ def test_c13_points_bounce(d, maker, size):
 @pytest.mark.parametrize("second", [ball, box])
 @pytest.mark.parametrize(("relative", "impacts"), [(0.0, 0), (1.0, 0), (-1.0, 1)])
 def test_c14_touching_exactly(d, first, second, relative, impacts):
-    """At rest or separating no impulse, approaching one impact at the start of the step, and no repeat of it."""
+    """At rest or separating no impulse, approaching one impact at the start of the step, without repetition."""
     world = make_world(d)
     a, b = first(world, 0.0, restitution=1.0), second(world, 1.0, relative, restitution=1.0)
     kept, seen = Conserved(world), []

@@ -1,5 +1,5 @@
-"""Section C of the accuracy list: odd places, in each other or far away, and bodies that come and go;
-in every case no body is lost, momentum is kept and energy not raised."""
+"""Section C of the accuracy list: extreme positions, overlapping or far away, and bodies created and deleted;
+in every case no body is lost, momentum is conserved and energy not raised."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from worlds import EPS, Conserved, ball, both_dimensions, box, make_world, posit
 @makers
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_c1_coincident_at_rest(d, maker, e):
-    """They part along the first axis, in position alone: momentum and left-over speed are 0, the slop remains."""
+    """They separate along the first axis, in position alone: momentum and residual speed are 0, the slop remains."""
     world = make_world(d)
     a, b = maker(world, 0.25, restitution=e), maker(world, 0.25, restitution=e)
     kept = Conserved(world)
@@ -32,7 +32,7 @@ def test_c1_coincident_at_rest(d, maker, e):
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("w", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (3.0, -4.0, 0.0), (-1e-3, 2e-3, 0.0)])
 def test_c2_coincident_with_relative_velocity(d, w, e):
-    """The normal is -w: at e = 1 equal bodies exchange velocities, else e w is left; then they part for good."""
+    """The normal is -w: at e = 1 equal bodies exchange velocities, else e w is left; then they separate for good."""
     world = make_world(d)
     w = np.array(w[:d])
     a, b = ball(world, (0.0,) * d, w / 2, restitution=e), ball(world, (0.0,) * d, -w / 2, restitution=e)
@@ -43,7 +43,7 @@ def test_c2_coincident_with_relative_velocity(d, w, e):
     run(world, 240)
     if e:
         np.testing.assert_allclose(velocity(world, b) - velocity(world, a), e * w, atol=1e-13 * np.linalg.norm(w))
-    parted = e * np.linalg.norm(w) * 241 * DT  # so far with the speed left, else pushed apart
+    parted = e * np.linalg.norm(w) * 241 * DT  # distance with the residual speed, else pushed apart
     least = min(0.99, parted * (1 - 1e-9)) if e else 0.99
     assert np.linalg.norm(position(world, b) - position(world, a)) > least
     kept.check()
@@ -52,7 +52,7 @@ def test_c2_coincident_with_relative_velocity(d, w, e):
 @makers
 @pytest.mark.parametrize("e", [0.0, 1.0])
 def test_c21_overlapping_with_equal_velocities(maker, e):
-    """Nothing to divide by: the overlap is repaired, both keep their velocity."""
+    """No relative velocity: the overlap is corrected, both keep their velocity."""
     world = make_world()
     a, b = maker(world, 0.0, (3.0, 1.0), restitution=e), maker(world, 0.7, (3.0, 1.0), restitution=e)
     kept = Conserved(world)
@@ -65,9 +65,9 @@ def test_c21_overlapping_with_equal_velocities(maker, e):
 
 
 def test_a_heap_of_overlapping_bodies_spreads_slowly():
-    """500 discs thrown into 10 x 10: deep overlap is pushed out in position, so hardly any speed comes of it.
+    """500 discs created in 10 x 10: deep overlap is corrected in position, so it creates hardly any speed.
 
-    The limit on the speed is that of a reference implementation on this heap: 1.5 sizes a second.
+    The limit of the speed is that of a reference implementation on this heap: 1.5 sizes a second.
     """
     world = make_world()
     for place in np.random.default_rng(1).uniform(0, 10, (500, 2)):
@@ -102,7 +102,7 @@ def test_c18_on_split_lines_on_edges_and_outside(d, spacing):
 
 
 def test_c18_bodies_outside_still_collide():
-    """Two leave the crowd behind at high speed and meet far away."""
+    """Two bodies leave all others at high speed and meet far away."""
     world = make_world()
     for place in np.random.default_rng(0).uniform(0, 50, (200, 2)):
         ball(world, place, radius=0.1, kind="kinematic")
@@ -125,7 +125,7 @@ def test_c20_one_ulp_apart(d):
     assert len(world.contacts) == 1
 
 
-# -- coming and going ----------------------------------------------------------------------------
+# -- creation and deletion -----------------------------------------------------------------------
 
 
 def test_c25_no_bodies_and_one_body():
@@ -143,7 +143,7 @@ def test_c25_no_bodies_and_one_body():
 
 @pytest.mark.parametrize("immediate", [False, True])
 def test_c25_removed_in_the_middle_of_a_collision(immediate):
-    """The stale contact is gone, the partner flies on free."""
+    """The stale contact is removed, the other body continues in free flight."""
     world = make_world()
     a, b = ball(world, 0.0), ball(world, 0.8)
     run(world, 2)
@@ -157,7 +157,7 @@ def test_c25_removed_in_the_middle_of_a_collision(immediate):
 
 @pytest.mark.parametrize("e", [0.0, 1.0])
 def test_c25_added_inside_another(e):
-    """It is pushed out in position; no speed comes of it."""
+    """It is pushed out in position, without gaining speed."""
     world = make_world()
     box(world, 0.0, half=1.0, kind="static", restitution=e)
     run(world, 2)

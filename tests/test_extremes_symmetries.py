@@ -48,7 +48,7 @@ def brawl(gravity=9.81, turn=lambda v: v, length=1.0, time=1.0, mass=1.0, shuffl
 
 
 def test_c22_repeated_and_permuted():
-    """The same bits when run again, and when the same ids came about in another order."""
+    """The same bits when repeated, and when the same ids were created in another order."""
     x, v, impacts = brawl()
     assert impacts > 30
     for shuffle in (False, True):

@@ -1,4 +1,4 @@
-"""Who meets whom, and who is pushed: ``contacts.enabled``, in every path of a step."""
+"""Filters of contacts: ``contacts.enabled``, in every path of a step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from carom.framework import Phase, System
 
 
 class Disable(System):
-    """Clears ``enabled`` in the steps that ``when(step)`` names, of the contacts of one entity or of all."""
+    """Clears ``enabled`` in the steps selected by ``when(step)``, for the contacts of one entity or of all."""
 
     phase = Phase.NARROW
 
@@ -30,7 +30,7 @@ class Disable(System):
 
 @both_dimensions
 def test_a_disabled_impact_does_not_happen(d):
-    """Two balls fly through each other, to the last bit as if they were alone; nobody is told."""
+    """Two balls fly through each other, to the last bit as if they were alone; no event is sent."""
     world = make_world(d)
     a, b = ball(world, -1.0, 2.0, restitution=1.0), ball(world, 1.0, -2.0, restitution=1.0)
     off = Disable()
@@ -45,7 +45,7 @@ def test_a_disabled_impact_does_not_happen(d):
 
 @both_dimensions
 def test_only_the_contact_that_is_disabled_is_out(d):
-    """A ball between two walls that it strikes in one step: the one it may pass, the other sends it back."""
+    """A ball between two walls that it hits in one step: it may pass one, the other reflects it."""
     world = make_world(d)
     gate = box(world, 0.3, half=0.1, kind="static", restitution=1.0)
     wall = box(world, 0.5, half=0.1, kind="static", restitution=1.0)
@@ -63,8 +63,8 @@ def test_only_the_contact_that_is_disabled_is_out(d):
 @both_dimensions
 @pytest.mark.parametrize("shape", [ball, box])
 def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
-    """At rest, disabled for one step: in it the body falls as in free flight (v = -g dt, no warm start left of the
-    support), the pair ends; enabled again it begins and holds, and the body is where it was."""
+    """At rest, disabled for one step: in it the body falls as in free flight (v = -g dt, without warm start from the
+    support), the pair ends; enabled again it begins and holds, and the body is at its old position."""
     world = make_world(d, gravity=10.0)
     ground = floor(world)
     body = shape(world, up(d, 0.5))
@@ -78,7 +78,7 @@ def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
     assert velocity(world, body)[1] == pytest.approx(before - 10 * DT, rel=1e-12)
     assert position(world, body)[1] == pytest.approx(height + (before - 10 * DT) * DT, rel=1e-12)
     assert told == [("end", ground, body)]
-    assert pairs(world.contacts) == [(ground, body)]  # the row stays, and says that it is off
+    assert pairs(world.contacts) == [(ground, body)]  # the row stays, marked as disabled
     assert world.contacts.enabled.tolist() == [False]
     assert world.contacts.of(body) == []
     assert list(world.contacts.pairs(RigidBody, Transform)) == []
@@ -94,7 +94,7 @@ def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
 
 
 def test_a_stack_on_a_disabled_contact_falls_together():
-    """Three boxes; what holds the lowest is off: all fall freely, and hold on to each other without impulse."""
+    """Three boxes; the contact below the lowest is disabled: all fall freely, in contact without impulse."""
     world = make_world(gravity=10.0)
     ground = floor(world)
     stack = [box(world, (0.0, 0.5 + k)) for k in range(3)]
@@ -108,8 +108,8 @@ def test_a_stack_on_a_disabled_contact_falls_together():
 
 @both_dimensions
 def test_a_pair_disabled_from_the_start_never_begins(d):
-    """Forty boxes fall onto a floor that is off for them, each a little higher: whatever the gap at the end of a step
-    is, none is held for a moment, before it overlaps or after. No begin, stay, end; another box is held."""
+    """Forty boxes fall onto a floor that is disabled for them, each a little higher: for any gap at the end of a step,
+    none is stopped, before it overlaps or after. No begin, stay, end; another box is stopped."""
     world = make_world(d, gravity=10.0)
     ground = floor(world)
     places = [(3.0 * k, 1.0 + 0.004 * k, 0.0)[:d] for k in range(40)]
@@ -133,7 +133,7 @@ def test_a_pair_disabled_from_the_start_never_begins(d):
 
 
 def test_a_disabled_sensor_is_not_touched():
-    """Nor does it come back when its pair is looked at again because the body has bounced."""
+    """Nor is it found when its pair is tested again after a bounce of the body."""
     world = make_world()
     wall = box(world, 0.75, half=(0.25, 3), kind="static", restitution=1.0)
     sensor = box(world, 0.0, half=(0.5, 3), kind="static", sensor=True)

@@ -1,4 +1,4 @@
-"""Who meets whom, and who is pushed: a one-way platform, made of ``contacts.enabled``."""
+"""Filters of contacts: a one-way platform, made with ``contacts.enabled``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def one_way_world(**settings):
 @pytest.mark.parametrize("collider", [AABBCollider((0.4, 0.5)), SphereCollider(0.5)], ids=["box", "sphere"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
-    """Up through it as in free flight, whatever the gap below it at the end of a step; then at rest on it. The contact
+    """Up through it as in free flight, for any gap below it at the end of a step; then at rest on it. The contact
     begins once."""
     world, _, platform, _ = one_way_world()
     world.component_for_entity(platform, AABBCollider).half_extents = (30, 0.25)
@@ -42,7 +42,7 @@ def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
     told = listen(world)
     world.step()
     told.clear()
-    for step in range(2, 33):  # nearly to the top of their ways, 3.5 to 4.8 m up
+    for step in range(2, 33):  # nearly to their apexes, 3.5 to 4.8 m up
         world.step()
         for player, speed in zip(players, speeds, strict=True):
             assert velocity(world, player)[1] == pytest.approx(speed - 20 * DT * step, abs=1e-9)
@@ -59,7 +59,7 @@ def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
 
 @pytest.mark.parametrize("speed", [9.5, 8.0, 7.0, 6.0])
 def test_a_jump_that_does_not_reach_falls_back(speed):
-    """With the feet below its upper side at the top of the jump it is not lifted: it falls back as it came."""
+    """If the feet are below its top at the apex, the body is not lifted: it falls back through it."""
     world, ground, platform, _ = one_way_world()
     player = world.create_entity(Transform((0, 0.5)), RigidBody(linear_velocity=(0, speed)), AABBCollider((0.4, 0.5)))
     top = 0.0
@@ -91,7 +91,7 @@ def test_the_same_jump_at_any_frame_rate(rate):
 @pytest.mark.parametrize("dt", [1 / 30, 1 / 60, 1 / 240])
 @pytest.mark.parametrize("height", [3.0, 10.0])
 def test_it_holds_what_falls_at_any_step(dt, height):
-    """Landing at 4 to 17 m/s, at 0.6 m to 2 cm a step: caught, and at rest."""
+    """Landing at 4 to 17 m/s, at 0.6 m to 2 cm per step: stopped, and at rest."""
     world, _, platform, _ = one_way_world(dt=dt)
     player = world.create_entity(Transform((0, height)), RigidBody(), AABBCollider((0.4, 0.5)))
     run(world, round(6 / dt))
@@ -109,8 +109,8 @@ def test_it_is_walked_through_from_the_side():
     assert position(world, walker) == pytest.approx((4, 1.9), abs=0.01)
 
 
-def test_who_stands_on_it_may_drop():
-    """For a fifth of a second platforms do not hold the player: free fall at once, and down to the floor."""
+def test_a_body_on_it_may_drop():
+    """For a fifth of a second platforms do not support the player: free fall at once, and down to the floor."""
     world, ground, platform, example = one_way_world()
     player = world.create_entity(Transform((1, 2.5)), RigidBody(), AABBCollider((0.4, 0.5)), example["Drops"]())
     run(world, 60)

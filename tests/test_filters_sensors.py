@@ -1,4 +1,4 @@
-"""Who meets whom, and who is pushed: sensors, layers and masks, in every path of a step."""
+"""Filters of contacts: sensors, layers and masks, in every path of a step."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_a_sensor_between_bouncing_bodies_changes_nothing(d, shape):
 
 @both_dimensions
 @pytest.mark.parametrize("mine", [False, True])
-def test_a_sensor_that_falls_or_lies_below_holds_nobody(d, mine):
+def test_a_sensor_that_falls_or_lies_below_supports_nothing(d, mine):
     """A sensor falls through the floor, and a body through a sensor floor: free fall, v = -g t and the discrete sum."""
     world = make_world(d, gravity=10.0)
     ground = floor(world, sensor=not mine)
@@ -58,7 +58,7 @@ def test_a_sensor_that_falls_or_lies_below_holds_nobody(d, mine):
 
 @both_dimensions
 def test_a_sensor_on_a_body_at_rest(d):
-    """In, on and just under the floor: a body at rest is as without; one that it does not reach never begins."""
+    """In, on and just under the floor: a body at rest is unchanged; a sensor that it does not touch never begins."""
 
     def scene(*tops):
         world = make_world(d, gravity=10.0)
@@ -81,8 +81,8 @@ def test_a_sensor_on_a_body_at_rest(d):
 
 
 def test_a_sensor_behind_a_wall_is_not_touched_by_what_bounces_off_it():
-    """At 60 m/s the ball would come to be a metre behind the wall: it is back where it came from instead, and there it
-    is that it touches a sensor."""
+    """At 60 m/s the free flight of the ball would end a metre behind the wall: it is reflected instead, and touches
+    a sensor on the near side."""
     world = make_world()
     wall = box(world, (0.0, 0.0), half=(0.25, 3), kind="static", restitution=1.0)
     for x in (0.8, -0.9):
@@ -110,8 +110,8 @@ def test_sensors_meet_sensors_and_kinematic_bodies_and_are_found_by_queries():
 
 
 def test_a_body_may_become_a_sensor_and_back_between_steps():
-    """At rest on the floor; a sensor for ten steps: it falls freely and stays in touch; then solid, it is pushed out
-    upwards without being shot up."""
+    """At rest on the floor; a sensor for ten steps: it falls freely and stays in contact; then solid, it is pushed out
+    upwards without gaining speed."""
     world = make_world(gravity=10.0)
     floor(world)
     body = box(world, (0.0, 0.5))
@@ -135,7 +135,7 @@ def test_a_body_may_become_a_sensor_and_back_between_steps():
 @both_dimensions
 @pytest.mark.parametrize("refuses", [0, 1])
 def test_one_mask_that_refuses_is_enough(d, refuses):
-    """Impacts and rest, either way round: the two pass through each other, and neither an event nor a contact tells."""
+    """Impacts and rest, in either order: the two pass through each other, without event or contact."""
     masks = [{"layer": 1, "mask": 3}, {"layer": 2, "mask": 3}]
     masks[refuses]["mask"] = 4
     world = make_world(d, gravity=10.0)
@@ -155,7 +155,7 @@ def test_one_mask_that_refuses_is_enough(d, refuses):
 
 
 def test_layers_changed_between_steps_let_go_and_catch_again():
-    """A body at rest that its floor no longer meets falls freely in that very step: nothing of the support is left."""
+    """A body at rest whose floor is excluded by its mask falls freely in that very step, without support."""
     world = make_world(gravity=10.0)
     ground = floor(world)
     body = box(world, (0.0, 0.5))
@@ -176,7 +176,7 @@ def test_layers_changed_between_steps_let_go_and_catch_again():
 
 
 def test_layers_changed_by_a_system_hold_from_broad_phase_on():
-    """Written as whole columns before NARROW they are this step's."""
+    """Whole columns written before NARROW are used in this step."""
 
     class Ghost(System):
         phase = Phase.FORCES

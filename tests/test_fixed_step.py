@@ -1,4 +1,4 @@
-"""The fixed step behind a variable frame rate: C7, C26 of the accuracy list, the chapter's "never a variable step"."""
+"""The fixed step with a variable frame rate: C7, C26 of the accuracy list, the chapter's "never a variable step"."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from carom.framework.schedule.clock import Clock
 
 
 def busy_world(**settings):
-    """Springs, damping, a bouncing ball on a floor, a force from outside: something of everything."""
+    """Springs, damping, a bouncing ball on a floor, an external force."""
     world = make_world(gravity=9.81, **settings)
     floor(world, restitution=0.5)
     ball(world, (0.0, 2.0), (0.3, 0.0), restitution=0.7)
@@ -36,7 +36,7 @@ def frames_of(name):
     return [*rng.exponential(1 / 80, 100), 0.0, 0.1, 1e-9]
 
 
-# -- the same states whatever the frames ---------------------------------------------------------
+# -- the same states for any frames --------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_plain_esper_gives_the_same_bits(hashes_by_step):
 
 @pytest.mark.parametrize("rate", FRAME_RATES)
 def test_number_of_steps(rate):
-    """After n frames exactly floor(n 60 / rate) steps: frames add up to steps, whatever their sum rounds to."""
+    """After n frames exactly floor(n 60 / rate) steps, whatever the rounding of the sum of frames."""
     world = make_world()
     for n in range(1, 5 * rate + 1):
         world.advance(1 / rate)
@@ -117,7 +117,7 @@ def test_alpha_lies_between_zero_and_one():
     for frame in frames_of("irregular"):
         world.advance(frame)
         assert 0.0 <= world.alpha <= 1.0
-    world.settings = world.settings.replace(dt=1e-6)  # what has gathered is more than a step now
+    world.settings = world.settings.replace(dt=1e-6)  # the accumulated time is more than a step now
     assert world.alpha == 1.0
 
 
@@ -171,7 +171,7 @@ def test_interpolation_before_the_first_step_and_before_adoption():
 
 @pytest.mark.parametrize("kind", ["dynamic", "kinematic", "static"])
 def test_a_teleport_restarts_interpolation(kind):
-    """Nothing is drawn between the old and the new place, neither at once nor after the next step."""
+    """No drawn position lies between the old and the new one, neither at once nor after the next step."""
     world = make_world()
     transform = Transform((0, 0))
     world.create_entity(transform, RigidBody(1.0, (60.0, 0.0), kind=kind))
@@ -200,7 +200,7 @@ def test_a_frame_of_five_seconds(cap):
     assert world.time == steps / 60
     assert world.stats().counters["dropped_steps"] == 300 - steps
     assert world.alpha == pytest.approx(0.25, abs=1e-9)
-    assert world.advance(0.75 / 60) == 1  # no debt from the long frame
+    assert world.advance(0.75 / 60) == 1  # no backlog from the long frame
     assert world.stats().counters["dropped_steps"] == 300 - steps
 
 
@@ -213,7 +213,7 @@ def test_dropped_steps_add_up():
 
 @pytest.mark.parametrize("seconds", [1e9, 1e20, 1e300, 1.7e308])
 def test_frames_beyond_all_measure(seconds):
-    """C26: bounded work, and less than a step is left whatever the sum rounds to."""
+    """C26: bounded work, and less than a step is left for any rounding of the sum."""
     world = make_world()
     assert world.advance(seconds) == 8
     assert 0.0 <= world.alpha <= 1.0
@@ -224,7 +224,7 @@ def test_frames_beyond_all_measure(seconds):
 
 @pytest.mark.parametrize("seconds", [-1e-9, -1.0, math.nan, math.inf, -math.inf, "0.1", None, [0.1]])
 def test_seconds_that_are_none_are_refused(seconds):
-    """C11: at the call, and the clock stands still."""
+    """C11: at the call, and the time does not change."""
     world = make_world()
     world.advance(0.5 / 60)
     state = world.clock.state()
@@ -255,7 +255,7 @@ def test_time_gathers_no_rounding():
 
 
 def test_frames_of_a_long_session_give_every_step():
-    """144 frames a second for 2 hours: 60 steps a second, none lost, none too many."""
+    """144 frames a second for 2 hours: exactly 60 steps a second."""
     clock = Clock(1 / 60)
     taken = 0
     for n in range(1, 144 * 7200 + 1):
@@ -266,7 +266,7 @@ def test_frames_of_a_long_session_give_every_step():
 
 
 def test_replacing_other_settings_leaves_time_exact():
-    """Only a new dt starts a new count; a game that turns another dial every step gathers no rounding either."""
+    """Only a new dt starts a new count; a game that changes another setting in every step has no rounding either."""
     world = make_world()
     for n in range(1, 1001):
         world.settings = world.settings.replace(substeps=1 + n % 2)
@@ -300,7 +300,7 @@ def test_a_changed_step_takes_what_has_gathered():
 
 
 def test_nothing_of_this_can_be_done_inside_a_step():
-    """Settings, gravity, step and advance are refused there, and the clock does not notice."""
+    """Settings, gravity, step and advance are refused there, and the clock is not affected."""
 
     class Meddler(System):
         def process(self, dt):
@@ -323,7 +323,7 @@ def test_nothing_of_this_can_be_done_inside_a_step():
 
 
 def test_frames_after_a_step_that_failed():
-    """The time of steps that were not taken is not lost: the world comes out as without the failure."""
+    """The time of steps that were not taken is not lost: the world ends in the same state as without the failure."""
 
     class FailsOnce(System):
         failed = False

@@ -1,4 +1,4 @@
-"""Gravity, constant forces, impulses and applied forces: what acts on which body, and when."""
+"""Gravity, constant forces, impulses and applied forces: when they act, and on which bodies."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_impulse_acts_at_once():
 
 @pytest.mark.parametrize("phase", list(Phase))
 def test_impulse_inside_a_system_acts_once(phase):
-    """Whatever the phase: after enough steps the velocity holds one impulse per step and no more."""
+    """In any phase: after enough steps the velocity contains exactly one impulse per step."""
     world = make_world(dt=DT)
     rigid = body(world, 2.0)
     world.add_system(Calls(phase, lambda: rigid.apply_impulse((1.0, 0.0))))
@@ -85,7 +85,7 @@ def test_force_applied_in_a_system_acts_for_one_step(method, phase, with_force_s
     """dv = F dt / m per call: in this step up to INTEGRATION's start, in the next one after it."""
     world = make_world(dt=DT, integrator=method)
     rigid = body(world, 2.0)
-    if with_force_system:  # then the stages sum the forces anew
+    if with_force_system:  # then the stages sum the forces again
         world.add_system(SpringAndDrag())
         world.create_entity(Transform((0, 5)), RigidBody(), Oscillator(1.0, 0.0))
     calls = []
@@ -110,7 +110,7 @@ def test_force_applied_in_a_system_acts_for_one_step(method, phase, with_force_s
 
 
 def test_force_applied_before_integration_acts_in_this_step():
-    """A system placed before Integration, in its phase, is not too late."""
+    """A system placed before Integration, in its phase, is early enough."""
     world = make_world(dt=DT)
     rigid = body(world)
     world.add_system(Calls(Phase.INTEGRATION, lambda: rigid.apply_force((1.0, 0.0))), before="Integration")
@@ -148,7 +148,7 @@ def test_force_applied_outside_holds_for_one_step_of_step():
 
 @pytest.mark.parametrize("hz", [2, 4, 8, 16])
 def test_force_of_every_frame_does_not_depend_on_the_frame_rate(hz):
-    """A key held down for 4 s: v = F t / m whatever the frame rate; 8 steps a second."""
+    """A key held down for 4 s: v = F t / m at any frame rate; 8 steps a second."""
     world = make_world(dt=DT)
     rigid = body(world, 2.0)
     for _ in range(4 * hz):

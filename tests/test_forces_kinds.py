@@ -29,7 +29,7 @@ def test_speed_limit(method):
 
 @all_methods
 @pytest.mark.parametrize("speed", [1e3, 1e200, 1e308])
-def test_speed_limit_holds_after_a_blow(method, speed):
+def test_speed_limit_holds_after_an_impulse(method, speed):
     """C12: the direction is kept and nothing overflows, in the very next step too."""
     world = make_world(dt=DT, integrator=method)
     rigid = body(world, max_linear_speed=5.0)
@@ -41,7 +41,7 @@ def test_speed_limit_holds_after_a_blow(method, speed):
 
 @all_methods
 def test_drag_does_not_see_more_than_the_limit(method):
-    """A blow of 1e6 m/s against a drag that is stable at the cap: it slows down and never turns round."""
+    """An impulse of 1e6 m/s against a drag that is stable at the limit: it slows down and never reverses."""
     world = make_world(dt=DT, integrator=method)
     rigid = RigidBody(max_linear_speed=5.0)
     world.create_entity(Transform((0, 0)), rigid, Oscillator(0.0, 1.0))
@@ -86,7 +86,7 @@ def test_kinematic_bodies_move_by_their_velocity_alone(method):
 @pytest.mark.parametrize("kind", ["kinematic", "static"])
 @pytest.mark.parametrize("inside", [False, True])
 def test_pushes_on_other_kinds_are_not_kept_for_later(kind, inside):
-    """A body that was pushed in vain does not jump once it becomes dynamic."""
+    """A body that was pushed without effect does not jump when it becomes dynamic."""
     world = make_world(dt=DT)
     rigid = body(world, kind=kind)
     world.step()

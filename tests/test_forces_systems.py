@@ -1,4 +1,4 @@
-"""Force systems: on which bodies they act, how often they are asked, and the energy they report."""
+"""Force systems: the bodies they act on, the number of their calls, and the energy they report."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Charge(Component):
 
 
 class Field(ForceSystem):
-    """A uniform field, and a record of what it saw."""
+    """A uniform field that records its calls."""
 
     requires = (RigidBody, Charge)
 
@@ -91,7 +91,7 @@ def test_calls_per_step_and_their_times(method):
 
 @all_methods
 def test_forces_without_force_systems_are_summed_once(method):
-    """Nothing depends on the state: one evaluation a step whatever the method."""
+    """Nothing depends on the state: one evaluation per step for any method."""
     world = make_world(gravity=10.0, dt=DT, integrator=method)
     body(world)
     run(world, 3)
@@ -181,13 +181,13 @@ def test_energies_and_momentum():
     assert world.potential_energy() == gravity_and_constant - 3.0 * 2.0 * 2.0
     world.add_system(SpringAndDrag())  # no body has an Oscillator: nothing to add
     assert world.potential_energy() == gravity_and_constant - 12.0
-    assert not field.calls  # a potential needs no forces
+    assert not field.calls  # a potential does not need the forces
     assert make_world().potential_energy() == 0.0
     assert make_world().momentum().tolist() == [0.0, 0.0]
 
 
 def test_energy_does_not_depend_on_the_history():
-    """Summed in the order of the ids: equal bits however the bodies came about."""
+    """Summed in the order of the ids: equal bits for any history of the bodies."""
     rng = np.random.default_rng(4)
     values = rng.normal(size=(6, 4)) * 10.0 ** rng.integers(-6, 6, (6, 1))
     straight, detour = make_world(gravity=9.81), make_world(gravity=9.81)

@@ -1,4 +1,4 @@
-"""Dry friction: at most mu times the normal force, against the sliding; below that nothing slides."""
+"""Dry friction: at most mu times the normal force, against the sliding; below that no sliding."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_pushed_box(d, direction, force):
     ],
 )  # fmt: skip
 def test_mixing(first, second, rule, mixed):
-    """None takes the partner's value, then the rule applies (multiply: its square); 0 if both have none."""
+    """None uses the other body's value, then the rule applies (multiply: its square); 0 if both are None."""
     world = make_world(gravity=G, friction_mixing=rule)
     floor(world, friction=first)
     body = box(world, (0, 0.5), (5.0, 0), friction=second)
@@ -87,9 +87,9 @@ def test_a_bounce_with_friction(d, mu, e):
 
 
 def test_between_two_bodies_it_keeps_momentum():
-    """A box slides on a plank on a smooth floor: mu m g one way and the other, until both go on together."""
+    """A box slides on a plank on a smooth floor: mu m g in both directions, until both move together."""
     world = make_world(gravity=G)
-    floor(world, friction=0.0)  # None would take the plank's
+    floor(world, friction=0.0)  # None would use the plank's value
     plank = box(world, (0, 0.5), half=(5, 0.5), mass=3.0, friction=0.3)
     crate = box(world, (-3, 1.5), (4.0, 0), friction=0.3)
     kept = Conserved(world)
@@ -104,7 +104,7 @@ def test_between_two_bodies_it_keeps_momentum():
 
 @both_dimensions
 def test_a_belt_carries(d):
-    """A kinematic floor at 2 m/s takes what stands on it along with mu g, up to its speed, and no further."""
+    """A kinematic floor at 2 m/s accelerates a box on it with mu g, up to its own speed."""
     world = make_world(d, gravity=G)
     box(world, (0, -0.5, 0)[:d], along(d, 2.0), half=(50, 0.5, 50)[:d], kind="kinematic", friction=0.5)
     body = box(world, (0, 0.5, 0)[:d])
@@ -116,7 +116,7 @@ def test_a_belt_carries(d):
 
 @pytest.mark.parametrize("speed", [(0, 1.0), (0, -1.0), (3.0, 2.0), (0, 30.0)])
 def test_a_platform_lifts_and_lowers(speed):
-    """Two boxes on it stay where they stand, to the give of the contact."""
+    """Two boxes on it stay in place, up to the compliance of the contact."""
     world = make_world(gravity=G)
     platform = box(world, (0, -0.5), speed, half=(5, 0.5), kind="kinematic", friction=0.9)
     ids = [box(world, (0, y), speed, friction=0.9) for y in (0.5, 1.5)]
@@ -129,7 +129,7 @@ def test_a_platform_lifts_and_lowers(speed):
 
 
 def test_a_kinematic_box_pushes_a_row():
-    """Five boxes at mu = 0.5 before it: all go on at its speed."""
+    """Five boxes with mu = 0.5 in front of it: all move at its speed."""
     world = make_world(gravity=G)
     floor(world, friction=0.5)
     pusher = box(world, (-3, 0.5), 2.0, kind="kinematic")
@@ -146,7 +146,7 @@ def test_a_kinematic_box_pushes_a_row():
 @both_dimensions
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_boxes_slide_over_seams(d, e):
-    """A floor of single tiles without friction takes nothing: same velocity, no impact."""
+    """A frictionless floor of single tiles: same velocity, no impact."""
     world = make_world(d, gravity=G)
     rows = (0.0,) if d == 2 else (-0.7, 0.3, 1.3)
     for x in range(45):
@@ -171,7 +171,7 @@ def test_a_box_falls_along_a_wall_of_tiles(e):
 
 
 def test_friction_holds_a_tower_on_a_shaken_floor():
-    """A floor to and fro with at most half of mu g: the tower goes with it."""
+    """A floor oscillates with at most half of mu g: the tower moves with it."""
     world = make_world(gravity=G)
     ground = box(world, (0, -0.5), half=(20, 0.5), kind="kinematic", friction=0.6)
     ids = tower(world, 3, friction=0.6)

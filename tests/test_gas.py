@@ -1,5 +1,5 @@
-"""B20: an elastic gas. Energy alone proves nothing (a gas that misses collisions keeps it too), so the pressure on the
-walls and the collision rate are compared with statistical mechanics."""
+"""B20: an elastic gas. Energy alone proves nothing (a gas that misses collisions conserves it too), so the pressure on
+the walls and the collision rate are compared with statistical mechanics."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from worlds import make_world
 from carom.components import RigidBody, SphereCollider, Transform
 
 FINITE = 1.013  # in centre-accessible measures N = 400 stays within 1.3 % of the bulk
-CAP = 100  # impacts of a body in a step: not what is judged here
+CAP = 100  # impacts per body and step: not tested here
 
 
 @pytest.mark.parametrize("dt", [0.3, 0.1, 0.03])

@@ -16,7 +16,7 @@ from helpers_modes import MODES, each_mode
 @pytest.mark.parametrize("dt", [0.3, 0.1])
 def test_pressure_and_rate(mode, dt):
     """30,000 collisions: relative noise of Z 2 / sqrt(30000), 3 sigma 3.5 %; of the rate less. Energy: 1e-11. Without
-    gravity and with e = 1 nothing rests, so nothing may overlap: to the rounding of the box's 32 m."""
+    gravity and with e = 1 there are no contacts at rest, so no overlap: to the rounding of the box's 32 m."""
     world, side = gas(dt, seed=1, collision=mode, max_impacts_per_step=1000)
     found = measure(world, side, 62.0)
     assert found.collisions > 28_000

@@ -1,4 +1,4 @@
-"""Levels around several kinds of objects: the oracle by closed forms, the engine by the oracle, and the command."""
+"""The geometry study: the oracle against closed forms, the engine against the oracle, and the command."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from carom.plugins.convex_polygon import wrong_with
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
 SQUARE = np.array(((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)))
-CHEAP = ("sphere", "box", "sphere then box")  # compiled by other tests too; polygons compile for long
+CHEAP = ("sphere", "box", "sphere then box")  # shared with other tests; polygons take long to compile
 ROUND_AND_TALL = tuple(thing for thing in OBJECTS if thing.name in ("asteroid", "humanoid"))
 every_object = pytest.mark.parametrize("thing", OBJECTS, ids=lambda thing: thing.name)
 
 
 def sampling_error(share, hits):
-    """Four standard errors of a share among so many."""
+    """Four standard errors of a share of that many."""
     return 4 * math.sqrt(share * (1 - share) / hits)
 
 
@@ -92,7 +92,7 @@ def test_unit_squares_in_circles():
 @every_object
 @pytest.mark.parametrize("turned", [False, True])
 def test_shares_of_random_offsets_are_ratios_of_areas(thing, turned):
-    """Where circles hit, polygons do in proportion to the areas of the offsets."""
+    """Among circle hits, polygons hit in proportion to the areas of the offsets."""
     rng, count = np.random.default_rng(7), 20_000
     reach = 2 * thing.circle[1]
     distance, angle = reach * np.sqrt(rng.uniform(size=count)), rng.uniform(-math.pi, math.pi, count)
@@ -152,7 +152,7 @@ def result():
 
 
 def check_counts(result):
-    """No misses, and false positives as the areas say."""
+    """No misses, and the false positives predicted by the areas."""
     assert len(result.costs) == len(result.cases) * len(result.options)
     for cost in result.costs:
         assert cost.misses == 0
@@ -164,19 +164,19 @@ def check_counts(result):
         assert len(cost.nanoseconds.values) == result.repeats
         if cost.expected_share is not None:
             expected = cost.expected_share
-            edge = 0.01  # of a crowd that ends somewhere: its outer objects have fewer neighbours
+            edge = 0.01  # objects at the edge of the crowd have fewer neighbours
             assert cost.share == pytest.approx(expected, abs=edge + sampling_error(expected, cost.hits))
 
 
 def test_no_misses_and_shares_as_the_areas_say(result):
     check_counts(result)
     sphere, box = (result.cost("asteroid", True, option).share for option in ("sphere", "box"))
-    assert sphere < 0.15 < 0.4 < box  # a circle fits what is round
+    assert sphere < 0.15 < 0.4 < box  # a circle fits round objects
     sphere, box = (result.cost("humanoid", False, option).share for option in ("sphere", "box"))
-    assert box < 0.2 < 0.5 < sphere  # a box fits what stands upright
+    assert box < 0.2 < 0.5 < sphere  # a box fits upright boxes
     for thing in ("asteroid", "humanoid"):
         both, box = (result.cost(thing, True, option).share for option in ("sphere then box", "box"))
-        assert both < box  # the circle cuts the stretched box's corners off
+        assert both < box  # the circle cuts off the corners of the enlarged box
 
 
 def test_the_share_does_not_depend_on_the_density(result):
@@ -193,7 +193,7 @@ def test_a_seed_gives_the_same_counts():
 
 
 def test_levels_before_the_precise_shape(result):
-    """The precise level reports what truly overlaps; the first level lets pass what it would report alone."""
+    """The precise level reports the true overlaps; the first level accepts what it would report alone."""
     whole = study(options=tuple(OPTIONS))
     check_counts(whole)
     assert [cost for cost in counts(whole) if cost[2] in CHEAP] == counts(result)
@@ -265,7 +265,7 @@ def test_the_false_positive_in_the_picture_is_one(turned):
         placed(thing.corners, np.array([at]), np.array([turn]))
         for at, turn in zip((offset, (0, 0)), turns, strict=True)
     )
-    assert overlaps(one, other) < -0.02  # to be seen as apart
+    assert overlaps(one, other) < -0.02  # visibly apart
     if level == "sphere":
         assert turns == (0, 0)
         assert math.hypot(*offset) < 1.9 * thing.circle[1]
@@ -278,7 +278,7 @@ def test_the_false_positive_in_the_picture_is_one(turned):
 
 @pytest.fixture
 def carom(monkeypatch, result):
-    """The command with a study that is done already; returns what to call with arguments."""
+    """The command with a finished study; returns a function to call with arguments."""
     cli = Commands("carom")
     cli.add_command(geometry_command.geometry_command)
     asked = []

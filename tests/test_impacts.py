@@ -1,5 +1,5 @@
-"""Impacts of the discrete mode against closed forms: B9, B10, B11, B12, B16 of the accuracy list, and the two ways to
-bounce wrongly: sticking together, and sending both bodies backwards."""
+"""Impacts of the discrete mode against closed forms: B9, B10, B11, B12, B16 of the accuracy list, and two typical
+defects: sticking together, and sending both bodies backwards."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ integrators = pytest.mark.parametrize(
 )
 
 
-# -- the two failures ----------------------------------------------------------------------------
+# -- the two defects -----------------------------------------------------------------------------
 
 
 @makers
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_stuck_pair(maker, e):
-    """Slow bodies overlap for many frames: they bounce once and part, instead of being turned round every frame."""
+    """Slow bodies overlap for many frames: they bounce once and separate, without a reversal in every frame."""
     world = make_world()
     a, b = maker(world, -0.35, 0.1, restitution=e), maker(world, 0.35, -0.1, restitution=e)  # 0.3 deep: 90 frames
     kept, gaps, speeds = Conserved(world), [], []
@@ -33,17 +33,17 @@ def test_stuck_pair(maker, e):
         world.step()
         gaps.append(position(world, b)[0] - position(world, a)[0])
         speeds.append(velocity(world, b)[0] - velocity(world, a)[0])
-    # Restitution: relative speed after = e times before, from the first frame on, and no frame turns it again.
+    # Restitution: relative speed after = e times before, from the first frame on, never reversed again.
     np.testing.assert_allclose(speeds, 0.2 * e, atol=1e-15)
     assert (np.diff(gaps) >= 0).all()
-    assert gaps[-1] >= (0.7 + 0.2 * e * 200 * DT if e else 0.99) - 1e-12  # e = 0: pushed out but for the slop
+    assert gaps[-1] >= (0.7 + 0.2 * e * 200 * DT if e else 0.99) - 1e-12  # e = 0: pushed out up to the slop
     kept.check()
 
 
 @makers
 @pytest.mark.parametrize("mass", [1.0, 10.0, 0.1])
 def test_rear_end_catch_up(maker, mass):
-    """A faster body catches a slower one: both go on forwards, with the speeds of the closed form (B9)."""
+    """A faster body catches a slower one: both continue forwards, with the speeds of the closed form (B9)."""
     world = make_world()
     a, b = maker(world, 0.0, 5.0, mass=mass, restitution=0.2), maker(world, 1.5, 2.0, restitution=0.2)
     kept = Conserved(world)
@@ -85,7 +85,7 @@ def test_two_body_impact(d, e, ratio):
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0, 1.5])
 @pytest.mark.parametrize(("kind", "speed"), [("static", 0.0), ("kinematic", 0.0), ("kinematic", -0.5)])
 def test_infinitely_heavy_partner(d, maker, e, kind, speed):
-    """B9 for m2 -> infinity: v1' = v2 - e (v1 - v2), v2' = v2; the partner keeps its course to the bit."""
+    """B9 for m2 -> infinity: v1' = v2 - e (v1 - v2), v2' = v2; its velocity is unchanged to the bit."""
     world = make_world(d)
     a = maker(world, -0.51, 1.0, restitution=e)
     b = maker(world, 0.51, speed, kind=kind)
@@ -97,7 +97,7 @@ def test_infinitely_heavy_partner(d, maker, e, kind, speed):
 
 @makers
 def test_plastic_impact_is_over_within_its_step(maker):
-    """e = 0: the whole momentum m v is taken in the step of the contact, the body stands where it touches."""
+    """e = 0: the whole momentum m v is exchanged in the step of the contact, the body stops where it touches."""
     world = make_world()
     wall = box(world, 0.0, kind="static")
     a = maker(world, -1.01, 1.0, mass=2.0)
@@ -108,7 +108,7 @@ def test_plastic_impact_is_over_within_its_step(maker):
 
 
 def test_kinematic_bodies_pass_through_each_other_and_through_walls():
-    """Neither reacts to anything: contacts are reported, nothing is pushed."""
+    """Neither reacts: contacts are reported, without response."""
     world = make_world()
     a, b = ball(world, -1, 1, kind="kinematic"), ball(world, 1, -1, kind="kinematic")
     wall = box(world, 0, kind="static")
@@ -144,7 +144,7 @@ def test_oblique_impact(d, dt, radius):
     direction = np.eye(d)[0]
     for e, m2, v1, v2 in cases:
         world = make_world(d, dt=dt)
-        lanes = 10.0 * np.arange(64)[:, None] * np.eye(d)[1]  # one pair each, out of reach of the others
+        lanes = 10.0 * np.arange(64)[:, None] * np.eye(d)[1]  # one pair each, too far apart to interact
         shifts = np.arange(64) / 64 * dt
         first = [
             ball(world, start - shift * direction + lane, 1.0, radius=radius, restitution=e)
@@ -182,7 +182,8 @@ def test_state_at_three_seconds():
 @both_dimensions
 @integrators
 def test_impact_time_on_the_path_of_the_integrator(d, integrator):
-    """A ball falls on a floor: sqrt(2 h / g) where the path is the parabola; a line's time, to O(dt), with Euler.
+    """A ball falls on a floor: sqrt(2 h / g) where the path is the parabola; a straight line's time, to O(dt), with
+    Euler.
 
     A lagging Euler height is wrong by g dt t / 2, so the time by dt / 2, and the chord within the step by less than dt.
     """
@@ -205,10 +206,11 @@ def test_impact_time_on_the_path_of_the_integrator(d, integrator):
 @integrators
 @makers
 def test_bouncing_ball_comes_to_rest(maker, integrator):
-    """Impacts die out at T0 (1+e)/(1-e) (Zeno), from any height; then the ball stands: no sinking, v = 0.
+    """Impacts end at T0 (1+e)/(1-e) (Zeno), from any height; then the ball is at rest: no sinking, v = 0.
 
-    An approach below 2 g dt is no bounce: what that leaves out lasts 2 * 2 dt / (1-e) at most. Euler's threshold is on
-    the speed of the path, up to g dt / 2 from that of the flight. Rest shows at a step's end: two steps more.
+    An approach below 2 g dt is not a bounce: the omitted bounces last 2 * 2 dt / (1-e) at most. Euler's threshold
+    applies to the speed of the path, up to g dt / 2 from that of the flight. Rest is detected at a step's end: two
+    steps more.
     """
     h, g = np.repeat(np.linspace(0.1, 8.0, 25), 10), 9.81
     e = np.tile(np.arange(10) / 10, 25)
@@ -222,14 +224,14 @@ def test_bouncing_ball_comes_to_rest(maker, integrator):
         world.step()
         heights = world.bodies.position[rows, 1] - 0.5
         lowest = min(lowest, heights.min())
-        rest[(np.abs(world.bodies.linear_velocity[rows]) > 1e-9).any(axis=1)] = step * DT  # it moved: not yet
+        rest[(np.abs(world.bodies.linear_velocity[rows]) > 1e-9).any(axis=1)] = step * DT  # it moved: not at rest
         if step % 60 == 0:
             before = heights
     assert lowest > -0.005  # the slop
     left_out = (5 if integrator in LAG else 4) / (1 - e) * DT
     assert (rest >= over - left_out - 2 * DT).all()
     assert (rest <= over + 2 * DT).all()
-    np.testing.assert_allclose(heights, before, rtol=0, atol=1e-12)  # no creeping
+    np.testing.assert_allclose(heights, before, rtol=0, atol=1e-12)  # no drift
     assert (np.abs(heights) < 0.005).all()
 
 
@@ -249,7 +251,7 @@ def test_a_floor_takes_any_number_of_impacts():
 def test_flights_follow_the_square_of_restitution(e, integrator):
     """Apex n = h e^(2 n): energy of flight n, in units of m g h.
 
-    Right to rounding where the path is the parabola. Euler (with the energy it keeps, see B12) takes the speed from
+    Right to rounding where the path is the parabola. Euler (with the energy it conserves, see B12) takes the speed from
     the chord's middle: each bounce is off by (1 - e^2) (g s)^2 / 2, s up to dt / 2 from there; at e = 1 it reflects the
     chord: up to u dt.
     """
@@ -279,11 +281,11 @@ def test_flights_follow_the_square_of_restitution(e, integrator):
 @integrators
 @pytest.mark.parametrize("rate", [60, 240])
 def test_no_energy_drift_of_a_bouncing_ball(integrator, rate):
-    """100 s (40 s at 240 Hz) at e = 1 from five heights: the energy that the method keeps in flight may not drift.
+    """100 s (40 s at 240 Hz) at e = 1 from five heights: the energy that the method conserves in flight may not drift.
 
-    Verlet, RK4 and Yoshida fly the parabola: E = v^2/2 + g y, 1e-10. Euler keeps v^2/2 + g y -+ g dt v/2 (explicit,
-    semi-implicit) in flight; a bounce moves it by g u (dt - 2 t), t the time in the step, so up to u dt of the height:
-    a cycle. Drift: mean of the last ten bounces against that of the first ten, 2 % as B12 asks.
+    Verlet, RK4 and Yoshida follow the parabola: E = v^2/2 + g y, 1e-10. Euler conserves v^2/2 + g y -+ g dt v/2
+    (explicit, semi-implicit) in flight; a bounce changes it by g u (dt - 2 t), t the time in the step, so up to u dt of
+    the height: a cycle. Drift: mean of the last ten bounces against that of the first ten, 2 % as B12 requires.
     """
     g, dt = 9.81, 1 / rate
     heights = np.array([4.9, 3.1, 2.7, 6.3, 8.8])
@@ -319,7 +321,7 @@ def test_no_energy_drift_of_a_bouncing_ball(integrator, rate):
 @pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
 @pytest.mark.parametrize("arriving", [1, 2, 3, 4])
 def test_cradle_gives_the_sequential_answer(maker, gap, arriving):
-    """k balls arrive, k leave. Equal bodies on a line exchange velocities, so without their widths they pass through
+    """k balls arrive, k leave. Equal bodies on a line exchange velocities, so apart from their widths they pass through
     each other: positions at any time are the sorted free flights plus the widths."""
     world = make_world()
     count = 5
@@ -338,7 +340,7 @@ def test_cradle_gives_the_sequential_answer(maker, gap, arriving):
 
 
 def test_impacts_beyond_the_cap_are_counted_and_reported():
-    """With one impact per body and step the cradle cannot be finished in the step: it is said, and nothing is lost."""
+    """With one impact per body and step the cradle cannot be finished in the step: reported, and nothing is lost."""
     world = make_world(max_impacts_per_step=1)
     for x, v in ((-1.005, 1.0), (0.0, 0.0), (1.0, 0.0), (2.0, 0.0)):
         ball(world, x, v, restitution=1.0)
@@ -385,22 +387,22 @@ def test_restitution_threshold(speed, bounces):
 
 @pytest.mark.parametrize(("factor", "bounces"), [(1.9, False), (2.1, True)])
 def test_default_threshold_is_twice_gravitys_share(factor, bounces):
-    """2 |a| dt: of a contact at rest gravity alone makes |a| dt of approach in every step."""
+    """2 |a| dt: in a contact at rest gravity alone creates an approach of |a| dt in every step."""
     world = make_world(gravity=9.81)
     floor(world)
     share = 9.81 * DT
-    a = ball(world, (0.0, 0.5), (0.0, -(factor - 1) * share), restitution=1.0)  # the step adds one share
+    a = ball(world, (0.0, 0.5), (0.0, -(factor - 1) * share), restitution=1.0)  # the step adds g dt once
     world.step()
     assert len(world.contacts.impacts) == bounces
     assert (velocity(world, a)[1] > 0) == bounces
 
 
 def test_a_ball_whose_step_ends_in_touch_bounces_all_the_same():
-    """30 steps of 5/60 lead from x = 0 to touching at 2.5 exactly but for rounding: the bounce is the next step's."""
+    """30 steps of 5/60 lead from x = 0 to a touch at exactly 2.5 up to rounding: the bounce is in the next step."""
     world = make_world()
     box(world, (3.0, 4.0), half=(0.0, 2.0), kind="static", restitution=1.0)
     for number in range(40):
-        ball(world, (-10.0 * number, 400.0 + number), 0.0)  # others change the rounding, not the answer
+        ball(world, (-10.0 * number, 400.0 + number), 0.0)  # others change the rounding, not the result
     mover = ball(world, (0.0, 4.0), (5.0, 0.0))
     run(world, 40)
     assert velocity(world, mover)[0] == pytest.approx(-5.0, rel=1e-12)
@@ -408,8 +410,8 @@ def test_a_ball_whose_step_ends_in_touch_bounces_all_the_same():
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
-def test_what_stands_still_does_not_inherit_the_motion_of_who_is_gone(integrator):
-    """A body is deleted and a static one gets its row: an elastic ball still bounces off that with all its speed."""
+def test_a_static_body_does_not_inherit_the_motion_of_a_deleted_one(integrator):
+    """A body is deleted and a static one gets its row: an elastic ball still bounces off it at full speed."""
     world = make_world(integrator=integrator)
     mover = ball(world, 0.0, 1.0, restitution=1.0)
     gone = ball(world, (0.0, 50.0), (-100.0, 0.0), restitution=1.0)

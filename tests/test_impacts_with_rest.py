@@ -1,6 +1,6 @@
-"""Impacts and rest in one step: bodies that bounce on what rests, and come to rest themselves.
+"""Impacts and rest in one step: bodies that bounce on bodies at rest, and come to rest themselves.
 
-Neither may disturb the other: a support does not give way, a blow passes through a stack, no energy comes of it.
+Neither may disturb the other: a support does not yield, an impact travels through a stack, no energy is created.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ def at(d, *place):
 @both_dimensions
 @makers
 def test_rebound_and_rest_for_every_restitution(d, maker):
-    """B11 and A10, e = 0 to 1: a drop of 2 m rebounds to e^2 of it, and all is over at T0 (1 + e)/(1 - e).
+    """B11 and A10, e = 0 to 1: a drop of 2 m rebounds to e^2 of it, and the bounces end at T0 (1 + e)/(1 - e).
 
     The apex between two samples is missed by up to g dt^2 / 8, the impact's place in the step makes e^2 wrong by (1 -
-    e^2) (g dt)^2 / 8 / (g h): 2e-4 together; at e = 1 the lag's cycle of u dt: together A10's 0.05 is kept. Rest: v = 0
-    exactly, half a metre up but for what the contact gives way, no creeping, no sinking at any time.
+    e^2) (g dt)^2 / 8 / (g h): 2e-4 together; at e = 1 the lag's cycle of u dt: together within A10's 0.05. Rest: v = 0
+    exactly, at half a metre up to the compliance of the contact, no drift, no sinking at any time.
     """
     e, h = np.arange(11) / 10, 2.0
     world = make_world(d, gravity=G)
@@ -81,20 +81,20 @@ def test_substeps_change_nothing_for_what_only_bounces(rate, substeps):
     assert velocity(world, entity).tolist() == velocity(reference, entity).tolist()
     highest = np.array(heights_seen)
     apexes = highest[1:-1][(highest[1:-1] >= highest[:-2]) & (highest[1:-1] > highest[2:])]
-    # Sampling and the lag's two-cycle: up to u dt = 3.3 % for a single apex, the mean of two moves by far less.
+    # Sampling and the lag's two-cycle: up to u dt = 3.3 % for a single apex; the mean of two changes far less.
     tenth = len(apexes) // 8 // 2 * 2
     assert apexes[-tenth:].mean() == pytest.approx(apexes[:tenth].mean(), rel=2e-3)
     assert abs(apexes / 4.9 - 1).max() < math.sqrt(2 * G * 4.9) * DT / 4.9
 
 
-# -- on what rests -------------------------------------------------------------------------------
+# -- on bodies at rest ---------------------------------------------------------------------------
 
 
 @both_dimensions
 def test_a_resting_box_does_not_give_way(d):
-    """A ball with e = 1 on a box of 1e6 kg at rest: 1.000 +- 0.002 of the height, bounce after bounce.
+    """A ball with e = 1 on a box of 1e6 kg at rest: 1.000 +- 0.002 of the height in every bounce.
 
-    The box is so heavy that the blows do not lift it (of 100 kg it would take 4 % each time, by momentum alone).
+    The box is so heavy that the impacts do not lift it (with 100 kg it would take 4 % each time, by momentum alone).
     """
     world = make_world(d, gravity=G)
     floor(world)
@@ -114,10 +114,10 @@ def test_a_resting_box_does_not_give_way(d):
 @both_dimensions
 @pytest.mark.parametrize("e_floor", [0.0, 0.5, 1.0])
 def test_a_ball_falls_on_a_ball_at_rest(d, e_floor):
-    """No energy is gained; overlaps stay below 2 %; all comes to rest, but what loses nothing anywhere (e = 1).
+    """Energy does not grow; overlaps stay below 2 %; all bodies come to rest, unless e = 1 everywhere.
 
-    A ball with e = 1 on one on a floor with e = 0: the floor takes all, for the lower ball is pressed into it. If
-    floor and ball have e = 1 the lag's cycle shows: g u dt = 2.9 % of the energy, u the impact speed, and it goes on.
+    A ball with e = 1 on one on a floor with e = 0: the floor takes all, because the lower ball is pressed into it. If
+    floor and ball have e = 1 the lag's cycle shows: g u dt = 2.9 % of the energy, u the impact speed, and it continues.
     """
     for e in (1.0, 0.8, 0.5):
         world = make_world(d, gravity=G)
@@ -137,7 +137,8 @@ def test_a_ball_falls_on_a_ball_at_rest(d, e_floor):
 
 
 def test_elastic_bodies_above_each_other_bounce_for_ever():
-    """All e = 1, 20 s: the lag's cycle, and no drift: the last quarter's mean energy as the first's to 0.5 %."""
+    """All e = 1, 20 s: the lag's cycle without drift: the mean energies of the last and first quarter agree to 0.5
+    %."""
     world = make_world(gravity=G)
     floor(world, 1.0)
     ball(world, (0, 0.5), restitution=1.0)
@@ -155,9 +156,10 @@ def test_elastic_bodies_above_each_other_bounce_for_ever():
     ("mass", "e", "deepest"), [(1.0, 0.0, 0.048), (1.0, 0.5, 0.003), (100.0, 0.0, 0.39), (100.0, 0.5, 0.26)]
 )
 def test_a_stack_is_hit_from_above(d, mass, e, deepest):
-    """Five boxes, and a ball with e = 0.5 falls four metres onto them: no energy gained, overlap within bounds, rest.
+    """Five boxes, and a ball with e = 0.5 falls four metres onto them: energy does not grow, overlap within bounds,
+    rest.
 
-    With a hundred times the mass of a box it presses them deep into each other for a moment, a documented limit.
+    A ball of a hundred times a box's mass presses them deep into each other for a moment, a documented limit.
     """
     world = make_world(d, gravity=G)
     floor(world)
@@ -181,9 +183,9 @@ def test_a_stack_is_hit_from_above(d, mass, e, deepest):
 @pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
 @pytest.mark.parametrize("arriving", [1, 2])
 def test_a_cradle_that_has_rested(d, maker, gap, arriving):
-    """B16: five on a floor, under gravity, k arrive at 1 m/s: k leave, one impact at a time, whatever the gap.
+    """B16: five on a floor, under gravity, k arrive at 1 m/s: k leave, one impact at a time, at any gap.
 
-    Contacts at rest with the floor in the same steps change nothing along it: 0 and 1 to rounding.
+    Contacts at rest with the floor in the same steps do not change the motion along it: 0 and 1 to rounding.
     """
     world = make_world(d, gravity=G)
     floor(world)
@@ -196,10 +198,10 @@ def test_a_cradle_that_has_rested(d, maker, gap, arriving):
     np.testing.assert_allclose(speeds[:, 1:], 0.0, rtol=0, atol=1e-12)
 
 
-def test_a_plastic_blow_on_a_row_keeps_momentum_and_makes_no_energy():
-    """e = 0: one box hits a row of n that touch: M / (M + n) of its speed for all, if they went on together.
+def test_a_plastic_impact_on_a_row_keeps_momentum_and_makes_no_energy():
+    """e = 0: one box hits a touching row of n: M / (M + n) of its speed for all, if they moved together.
 
-    One and two do, to 1e-3. In longer rows the push-out throws the far end ahead: a documented limit.
+    One and two do, to 1e-3. In longer rows the push-out accelerates the far end: a documented limit.
     """
     for count, spread in ((1, 1e-12), (2, 1e-3), (5, 0.3)):
         for mass in (1.0, 5.0, 100.0):
@@ -217,8 +219,8 @@ def test_a_plastic_blow_on_a_row_keeps_momentum_and_makes_no_energy():
 
 @pytest.mark.parametrize(("count", "kept"), [(1, 0.0), (2, 1e-7), (5, 1e-3), (10, 0.01), (20, 0.05)])
 def test_a_plastic_row_runs_into_a_wall(count, kept):
-    """e = 0, all boxes touch: everything should stop. The energy kept is a documented limit; 20 % of it without the
-    passes that let a shock travel."""
+    """e = 0, all boxes touch: everything should stop. The remaining energy is a documented limit; 20 % of it without
+    the passes that propagate a shock."""
     world = make_world()
     box(world, (count + 1.0, 0.0), half=(0.5, 5.0), kind="static")
     for k in range(count):
@@ -230,7 +232,7 @@ def test_a_plastic_row_runs_into_a_wall(count, kept):
 
 @pytest.mark.parametrize(("count", "rise"), [(2, 1e-3), (5, 0.02), (10, 0.1), (20, 0.1)])
 def test_a_plastic_tower_falls(count, rise):
-    """A tower whose boxes touch falls two metres, e = 0: no box ends up, or comes, higher than it stands."""
+    """A tower of touching boxes falls two metres, e = 0: no box ends up, or gets, higher than when it stands."""
     world = make_world(gravity=(0, -9.81))
     box(world, (0.0, -0.5), half=(50.0, 0.5), kind="static")
     ids = [box(world, (0.0, 2.5 + k)) for k in range(count)]
@@ -245,10 +247,10 @@ def test_a_plastic_tower_falls(count, rise):
 
 @pytest.mark.parametrize("e", [0.3, 0.8])
 def test_a_cooling_gas_does_not_stall(e):
-    """No forces, threshold 0: the gas clusters, and impacts within one step would go on without end.
+    """No forces, threshold 0: the gas clusters, and impacts within one step would continue without end.
 
-    They are capped: at most 8 a body, what is beyond is reported and held. Clusters are held by soft contacts: those
-    may give back up to a thousandth of the energy in a step, no more, and not for long.
+    They are capped at 8 per body; the rest is counted and suppressed. Clusters are held by soft contacts, which
+    may return up to a thousandth of the energy in a step, and not for long.
     """
     world = make_world(restitution_threshold=0.0)
     rng = np.random.default_rng(4)

@@ -1,6 +1,6 @@
 """Integrators under constant force and on springs: A7, B1 to B3, C7 of the accuracy list.
 
-A linear problem's n-step answer is a matrix power, so the engine is compared at rounding, not at truncation.
+A linear problem's n-step result is a matrix power, so the engine is compared at rounding, not at truncation.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def test_jump_arc(method, v0, g, hz, ee, si, others):
         assert scale - g * dt * dt / 8 <= apex * (1 + 1e-12)
         assert apex <= scale * (1 + 1e-12)
     if whole:
-        assert abs(height[landing]) <= 1e-12 * scale  # back on the ground at that very step, not one sooner
+        assert abs(height[landing]) <= 1e-12 * scale  # back on the ground in exactly that step
         assert (height[1:landing] > 1e-6 * scale).all()
         assert positions[landing, 0] == pytest.approx(vx * (2 * n0 + sign) * dt, rel=1e-12)
 
@@ -121,7 +121,7 @@ def test_extreme_steps_keep_the_closed_form(method, dt):
 
 @all_methods
 def test_substeps_never_change_free_flight(method):
-    """Substeps are the solver's: the same bits with any number of them."""
+    """Substeps belong to the solver: the same bits with any number of them."""
     paths = [throw(method, 1 / 60, 50, v0=12.0, g=9.81, substeps=n)[0] for n in (1, 4, 32)]
     assert np.array_equal(paths[0], paths[1])
     assert np.array_equal(paths[0], paths[2])
@@ -152,7 +152,7 @@ def test_fiedler_damped_spring_gains_energy_with_explicit_euler():
     ("dt", "kept", "rk4_phase", "si_phase"), [(0.1, 0.95945, -0.0619, 2.2162), (0.25, 0.025847, None, 15.29)]
 )
 def test_fiedler_undamped_spring(dt, kept, rk4_phase, si_phase):
-    """A7 (d): k = 15 for 90 s: RK4 keeps the phase and loses energy, SI the reverse."""
+    """A7 (d): k = 15 for 90 s: RK4 conserves the phase and loses energy, SI the reverse."""
     omega = math.sqrt(15.0)
     z, steps = omega * dt, round(90 / dt)
     n = np.arange(steps + 1)
@@ -192,7 +192,7 @@ def check_symplectic_bands(method, steps, tenth, tolerance):
         energy = (velocities[..., 0] ** 2 + Z**2 * positions[..., 0] ** 2) / Z**2
         assert (energy >= low * (1 - tolerance)).all()
         assert (energy <= high * (1 + tolerance)).all()
-        # and the whole band is used: samples this dense come near both ends
+        # and the whole band is covered: dense samples come near both ends
         np.testing.assert_allclose(energy.min(axis=0), low, rtol=5e-3)
         np.testing.assert_allclose(energy.max(axis=0), high, rtol=5e-3)
         if method == "semi_implicit_euler":
@@ -239,7 +239,7 @@ def test_undamped_spring_energy_per_step(method, factor):
 
 
 def test_yoshida_keeps_the_energy_of_a_spring():
-    """B2's band for the fourth order: a symplectic method's energy swings by O(z^4) and does not drift."""
+    """B2's band for the fourth order: a symplectic method's energy oscillates by O(z^4) and does not drift."""
     z = np.array([0.05, 0.1, 0.2])
     ratio = energy_ratio(*record(oscillators("yoshida4", 1.0, z**2), 3000), z**2)
     early, late = np.abs(ratio[:1500] - 1).max(axis=0), np.abs(ratio[1500:] - 1).max(axis=0)
@@ -292,8 +292,8 @@ class Pushes(ForceSystem):
 
 @all_methods
 def test_forces_that_depend_on_time(method):
-    """Stages see their own time: x'' = 6 t from rest gives x = t^3, which RK4 and Yoshida integrate exactly; the others
-    as the textbook does."""
+    """Stages use their own time: x'' = 6 t from rest gives x = t^3, which RK4 and Yoshida integrate exactly; the others
+    equal the textbook."""
     dt, steps = 0.125, 40
     world = make_world(dt=dt, integrator=method)
     world.create_entity(Transform((0, 0)), RigidBody())

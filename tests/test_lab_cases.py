@@ -1,4 +1,4 @@
-"""What the laboratory makes of a scene before it measures: its kind, its reference, its steps, what it watches."""
+"""Cases of the lab: kind, reference, steps and observation of a scene."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_a_closed_form_is_used_for_what_it_knows_only():
 
 
 def test_steps_that_a_run_has_no_room_for_are_left_out():
-    """A search cannot promise a step that it has never taken whole."""
+    """A search cannot return a step that it has never taken whole."""
     assert max(case_of("spring", seconds=0.1).steps) <= 0.1 / 3
     with pytest.raises(Problem, match="no room"):
         case_of("spring", seconds=0.1, steps=(0.1,))
@@ -128,7 +128,7 @@ def test_runs_of_one_setting_have_keys_of_their_own():
 
 
 def test_drift_is_what_moves_after_the_fall():
-    """A ball falls 5 m in 1 s, lies for the rest of 4 s and has not drifted: less than the slop of a hundredth."""
+    """A ball falls 5 m in 1 s, rests for the other 4 s and does not drift: less than the slop of a hundredth."""
     world = world_of(Settings())
     world.create_entity(Transform((0, -0.5)), AABBCollider((5, 0.5)))
     world.create_entity(Transform((0, 5.5)), RigidBody(), SphereCollider(0.5))
@@ -160,8 +160,8 @@ def test_pymunk_gets_forces_of_its_own_time():
 
 
 def test_a_reference_of_a_spring_against_a_wall_knows_how_good_it_is():
-    """x = -cos until it meets the wall in the middle, where it turns at full speed: |cos| for ever. The two methods and
-    twice the step must not agree much better than the first of them is right."""
+    """x = -cos until it meets the wall in the middle, where it is reflected at full speed: |cos| from then on. The two
+    methods and twice the step must not agree much better than the first of them is right."""
 
     class Pull(ForceSystem):
         def add_forces(self, bodies, time):
@@ -184,8 +184,8 @@ def test_a_reference_of_a_spring_against_a_wall_knows_how_good_it_is():
 
 
 def test_a_search_walks_back_where_it_has_jumped_too_far():
-    """A damped spring: no theory tells the order. Its choice costs at most 1.3 times the cheapest step that holds,
-    found here by hand among the halvings of the ladder."""
+    """A damped spring: theory gives no order. Its choice costs at most 1.3 times the cheapest step that holds,
+    found here among the halvings of the ladder."""
 
     def build(settings, seed=0):
         world = world_of(settings, 0.0)
@@ -207,7 +207,7 @@ def test_a_search_walks_back_where_it_has_jumped_too_far():
 
 
 def trap(settings, seed=0):
-    """Nine elastic discs swing around the origin and meet; nothing stands still, and nothing has a height."""
+    """Nine elastic discs swing around the origin and meet; there are no static bodies and there is no height."""
 
     class Trap(ForceSystem):
         def add_forces(self, bodies, time):

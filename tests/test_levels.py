@@ -1,4 +1,4 @@
-"""Levels of geometry: several colliders on one body, cheap first; a pair hits if every level hits."""
+"""Geometry levels: several colliders on one body, cheap first; a pair hits if every level hits."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def depth_of(shape_a, shape_b):
-    """Of two shapes (kind, centre, size), by the oracle."""
+    """Depth of two shapes (kind, centre, size), by the oracle."""
     if (shape_a[0], shape_b[0]) == ("box", "sphere"):
         shape_a, shape_b = shape_b, shape_a
     return getattr(narrow_naive, f"{shape_a[0]}_{shape_b[0]}")(*shape_a[1:], *shape_b[1:])[0]
 
 
 def crowd(d, turned, seed):
-    """150 bodies: spheres, boxes, and boxes in spheres that more than hold them; and their shapes in the world."""
+    """150 bodies: spheres, boxes, and boxes in larger spheres; and their shapes in the world."""
     rng = np.random.default_rng(seed)
     world, shapes = make_world(d), {}
     for k in range(150):
@@ -54,8 +54,8 @@ def crowd(d, turned, seed):
 @both_dimensions
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_pair_hits_if_every_level_hits(d, turned):
-    """Contacts, their depth and the counters, by the definition: level k of one against level k of the other, the last
-    one standing in where a body has fewer. Turned boxes stick out of their spheres in places."""
+    """Contacts, their depth and the counters, by definition: level k of one against level k of the other; a body with
+    fewer levels uses its last one. Some turned boxes are not inside their spheres."""
     world, shapes = crowd(d, turned, 5 + d)
     world.run(Phase.NARROW)
     expected, first_hits, wrong, stuck_out = {}, 0, 0, 0
@@ -88,7 +88,7 @@ def test_a_pair_hits_if_every_level_hits(d, turned):
 
 
 class Found(System):
-    """What NARROW has found, step by step."""
+    """Records the contacts found by NARROW in each step."""
 
     phase = Phase.NARROW
 
@@ -103,8 +103,8 @@ class Found(System):
 
 @both_dimensions
 def test_levels_change_the_cost_and_not_what_is_found(d):
-    """A heap of boxes, bouncing ones among them, falls together. From the same state every step finds the same bits
-    with spheres around the boxes: contacts and what is near, depth, normal and point."""
+    """A heap of boxes, some bouncing, falls together. From the same state every step finds the same bits
+    with spheres around the boxes: contacts and near pairs, depth, normal and point."""
 
     def heap(with_spheres):
         rng = np.random.default_rng(3)
@@ -137,7 +137,7 @@ def test_levels_change_the_cost_and_not_what_is_found(d):
 
 
 def test_what_the_first_level_hits_is_counted():
-    """Two squares corner to corner: their circles overlap, they do not. Then nearer, then far apart."""
+    """Two squares corner to corner: their circles overlap, the squares do not. Then nearer, then far apart."""
     world = make_world()
     a = levelled(world, 0.0, kind="kinematic")
     b = levelled(world, (1.2, 0.5), kind="kinematic")
@@ -168,7 +168,7 @@ def test_bodies_with_one_level_are_tested_once():
 
 @both_dimensions
 def test_the_last_level_gives_contact_and_material(d):
-    """Restitution, normal and time of impact are the box's: the sphere around it is there for nothing else."""
+    """Restitution, normal and time of impact are the box's: the sphere around it only rejects pairs."""
     world = make_world(d)
     a = levelled(world, -1.0, 1.0, sphere={"restitution": 0.2, "friction": 3.0}, restitution=1.0)
     b = levelled(world, 1.0, -1.0)
@@ -207,8 +207,9 @@ def test_a_level_off_the_centre_turns_with_the_body(d):
 
 @pytest.mark.parametrize("restitution", [0.0, 1.0])
 def test_a_level_that_is_outgrown_keeps_them_apart(restitution):
-    """A square turned by 45 degrees stretches to twice its area; its circle leaves the corners out. A ball on a line
-    through such a corner, 0.8 from the centre, flies on, whether it would rest or bounce; else it cannot."""
+    """A square turned by 45 degrees is enlarged to twice its area; its circle does not enclose the corners. A ball on a
+    line through such a corner, 0.8 from the centre, flies on, at rest speed or bouncing speed; otherwise it could
+    not."""
     for spheres in ([SphereCollider(math.sqrt(0.5))], []):
         world = make_world()
         world.create_entity(Transform((0, 0), math.pi / 4), *spheres, AABBCollider((0.5, 0.5), restitution=restitution))
@@ -222,7 +223,8 @@ def test_a_level_that_is_outgrown_keeps_them_apart(restitution):
 
 
 def test_bounds_stops_at_the_first_level():
-    """Corner to corner two squares hit by their circles; the contact is that of the circles, nothing else is tested."""
+    """Corner to corner two squares hit by their circles; the contact is that of the circles, no further test is
+    done."""
     world = make_world(geometry="bounds")
     levelled(world, 0.0, layer=2, mask=2, sensor=True, sphere={"sensor": True})
     levelled(world, (1.2, 0.5), layer=2, mask=2, sensor=True, sphere={"sensor": True})
@@ -230,7 +232,7 @@ def test_bounds_stops_at_the_first_level():
     world.step()
     assert world.contacts.depth[0] == pytest.approx(2 * math.sqrt(0.5) - 1.3, abs=4 * EPS)
     np.testing.assert_allclose(world.contacts.normal, [(12 / 13, 5 / 13)], atol=4 * EPS)
-    assert len(world.contacts) == 1  # layer, mask and sensor are those of the last level all the same
+    assert len(world.contacts) == 1  # layer, mask and sensor are still those of the last level
     assert velocity(world, 1).tolist() == [0, 0]
     assert [world.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
     (line,) = [line for line in str(world.plan()).splitlines() if "NarrowPhase" in line]
@@ -250,7 +252,7 @@ def test_geometry_can_be_changed_between_steps():
 
 
 def test_what_stands_still_keeps_its_offset_when_the_kernels_change():
-    """Preparing for other shapes in the middle of a run makes the levels anew: static bodies are boxed again."""
+    """Preparing for other shapes in the middle of a run rebuilds the levels: static bodies are boxed again."""
     world = make_world(gravity=10.0)
     ground = world.create_entity(Transform((0, 5)), AABBCollider((5, 0.5), offset=(0, -5.5)))
     body = box(world, (0.0, 0.5))
@@ -261,7 +263,7 @@ def test_what_stands_still_keeps_its_offset_when_the_kernels_change():
     assert world.query_point((0.0, -0.9)) == [ground]
 
 
-def test_a_query_asks_the_last_level():
+def test_a_query_uses_the_last_level():
     world = make_world()
     entity = levelled(world, 0.0)
     world.step()
@@ -269,7 +271,7 @@ def test_a_query_asks_the_last_level():
     assert world.query_point((0.0, 0.6)) == []  # in the circle, not in the square
 
 
-def test_the_plan_tells_of_levels():
+def test_the_plan_shows_levels():
     world = make_world()
     levelled(world, 0.0)
     world.step()

@@ -1,4 +1,4 @@
-"""Levels of geometry: which must enclose which, and what is checked of the shapes of plugins."""
+"""Geometry levels: which must enclose which, and the checks of plugin shapes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from carom.framework.errors import UnhandledPairError
 from carom.framework.vectors import divided
 from carom.plugins import Physics
 
-# -- what must enclose what ----------------------------------------------------------------------
+# -- enclosure -----------------------------------------------------------------------------------
 
 
 @both_dimensions
 @pytest.mark.parametrize("scale", [1.0, 1e-9, 1e9])
 def test_a_sphere_must_hold_the_corners_of_the_box(d, scale):
-    """To a millionth of its radius, wherever the two are; 1e-5 short is an error that says by how much."""
+    """To a millionth of its radius, at any offset of the two; 1e-5 short is an error that states the difference."""
     half, gap = np.array([0.3, 0.4, 1.2])[:d] * scale, np.array([0.1, -0.2, 0.3])[:d] * scale
     for offset in (np.zeros(d), gap):
         reach = np.linalg.norm(half + np.abs(offset))
@@ -39,8 +39,8 @@ def test_a_sphere_must_hold_the_corners_of_the_box(d, scale):
             assert f"AABBCollider, which sticks out by {(1 - factor) * reach:.4g}:" in str(error.value)
 
 
-def test_what_does_not_fit_is_told_again_until_it_does():
-    """Nothing is taken in before; a larger sphere, or none, mends it."""
+def test_what_does_not_fit_is_reported_again_until_it_does():
+    """Nothing is adopted before; a larger sphere, or none, corrects it."""
     world = make_world()
     ball(world, 9.0)
     first = levelled(world, 0.0, radius=0.7)
@@ -76,7 +76,7 @@ def test_a_collider_that_comes_later_is_checked_against_those_that_are_there():
 
 
 def test_it_is_checked_once():
-    """What the game changes afterwards is its own affair, as the turns of bodies are."""
+    """Later changes by the game are not checked, like rotations of bodies."""
     world = make_world()
     entity = levelled(world, 0.0, rotation=0.6)
     world.step()
@@ -124,11 +124,11 @@ def test_sensor_and_solid_do_not_mix():
     assert world.step_count == 2
 
 
-# -- shapes of others ----------------------------------------------------------------------------
+# -- plugin shapes -------------------------------------------------------------------------------
 
 
 class DiscCollider(Collider):
-    """A sphere by another name, which costs more."""
+    """A sphere by another name, with a higher cost."""
 
     dimensions = (2,)
     reach = column(minimum=0.0)
@@ -175,7 +175,7 @@ def nested(world, place, *, radius=1.5, half=1.0, reach=0.9):
 
 
 def test_three_levels_of_which_one_is_a_plugins():
-    """Where each of them decides; the middle level of three stands against the last of two."""
+    """Cases where each of them decides; the middle level of three is tested against the last of two."""
     world = disc_world()
     a, b = nested(world, (0, 0)), nested(world, (9, 9))
     two = world.create_entity(Transform((-9, 9)), RigidBody(), AABBCollider((1, 1)), SphereCollider(1.5))
@@ -205,13 +205,13 @@ def test_shapes_of_others_are_checked_by_the_boxes_around_them():
         nested(world, (0, 0), **sizes)
         with pytest.raises(ValueError, match=out):
             world.step()
-    world = disc_world(cost=1.0)  # as cheap as a sphere, and first by its name
+    world = disc_world(cost=1.0)  # as cheap as a sphere, and first by name
     world.create_entity(Transform((0, 0)), DiscCollider(1.0), SphereCollider(1.1))
     with pytest.raises(ValueError, match=r"DiscCollider is the cheaper level .* SphereCollider, .* out by 0\.1:"):
         world.step()
 
 
-def test_a_collider_that_nobody_has_registered_is_named():
+def test_an_unregistered_collider_is_named():
     world = make_world()
     world.create_entity(Transform((0, 0)), DiscCollider(1.0))
     with pytest.raises(UnhandledPairError, match="DiscCollider is a collider that no plugin"):

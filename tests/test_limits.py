@@ -1,4 +1,4 @@
-"""``carom limits``: every axis finds the places that are known, and the command shows them."""
+"""``carom limits``: every axis finds the known limits, and the command shows them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PLAIN = Method("plain", ("discrete",))
 
 @click.group(cls=Commands)
 def carom():
-    """The command as it hangs below ``carom``."""
+    """The command as a subcommand of ``carom``."""
 
 
 carom.add_command(limits_command)
@@ -113,7 +113,7 @@ def test_mistakes_in_a_measurement_are_not_hidden():
         measured(artificial(measure), PLAIN, 1.0)
 
 
-# -- known places --------------------------------------------------------------------------------
+# -- known limits --------------------------------------------------------------------------------
 
 
 def test_discrete_tunnels_at_its_own_size_and_the_others_never():
@@ -174,7 +174,7 @@ def test_jumps():
 
 
 def test_the_step_of_a_spring_breaks_at_its_limit():
-    """One swing a second: dt = 2 / (2 pi) s; fine down to a nanosecond."""
+    """One oscillation a second: dt = 2 / (2 pi) s; fine down to a nanosecond."""
     line = line_of("dt-spring", "velocity_verlet")
     assert 1 / math.pi / 1.1 <= line.edge(BREAKS).value <= 1.15 / math.pi
     assert line.edge("1 %", DOWN).value is None
@@ -182,7 +182,7 @@ def test_the_step_of_a_spring_breaks_at_its_limit():
 
 @pytest.mark.parametrize("method", ["discrete", "continuous", "event_driven"])
 def test_far_away_nothing_moves(method):
-    """C6: with 1/60 m in a step, half of what the numbers beyond 2^48 m are apart is more. Exact to 1e9."""
+    """C6: 1/60 m per step is less than half the spacing of the numbers beyond 2^48 m. Exact to 1e9."""
     line = line_of("distance", method)
     edge = line.edge(BREAKS)
     assert edge.last <= 2.0**48 <= edge.value <= 1.2 * 2.0**48
@@ -202,7 +202,8 @@ def test_ratios_of_sizes_and_masses(method):
 
 
 def test_loads():
-    """B19: on a single box any ratio stands; on three the discrete solver gives way, 32 substeps ten times later."""
+    """B19: on a single box any ratio is stable; on three the discrete solver yields, with 32 substeps ten times
+    later."""
     assert max(sample.error for sample in line_of("load", "discrete", (1.0, 100.0, 1e12)).samples) < 0.01
     values = (1.0, 100.0, 1e4)
     plain, fine = (line_of("load-on-three", m, values).edge("1 %") for m in ("discrete", "discrete with 32 substeps"))
@@ -211,20 +212,21 @@ def test_loads():
 
 
 def test_towers_sink():
-    """The sum of what n (n + 1) / 2 loads give way at 7.1e-5 of a box each: 1 % at 12 boxes (docs/limitations.md)."""
+    """The sum of the overlaps under n (n + 1) / 2 loads at 7.1e-5 of a box each: 1 % at 12 boxes
+    (docs/limitations.md)."""
     edge = line_of("stack", "discrete", (5.0, 20.0)).edge("1 %")
     assert 10 <= edge.last < edge.value <= 13
 
 
 def test_crowds_are_refused_and_two_part():
-    """C1, C3: two part; 5,000 at one point are refused, and the answer says how many pairs that would be."""
+    """C1, C3: two separate; 5,000 at one point are refused, and the error states the number of pairs."""
     line = line_of("crowd", "discrete", (2.0, 5000.0))
     assert line.samples[0].error < 0.01
     assert "candidate pairs exceed the limit" in line.edge(BREAKS).why
 
 
 def test_long_runs():
-    """B2, B12: no drift in a thousand steps but for what a window cuts off; event-driven bounces to rounding."""
+    """B2, B12: no drift in a thousand steps up to the effect of the window; event-driven bounces to rounding."""
     for method in ("semi_implicit_euler", "rk4"):
         assert line_of("duration", method).samples[0].error < 1e-3
     assert line_of("bounces", "event_driven").samples[0].error < 1e-12
@@ -347,7 +349,7 @@ def test_the_command_tells_the_limits_of_a_scene(tmp_path, monkeypatch):
 
 
 def test_the_command_watches_a_scene_of_the_library():
-    """Billiards: the cue ball is fast from the start; two balls of 0.05715 m overlap on twice that."""
+    """Billiards: the cue ball is fast from the start; two balls of 0.05715 m overlap over twice that."""
     result = invoke("billiards", "--seconds", "0.1")
     assert result.exit_code == 0, result.output
     assert "overlap on a way of 0.1143 m" in result.stdout
@@ -373,7 +375,7 @@ def build(settings, seed=0):
 
 
 def test_the_command_tells_what_broke_while_it_watched(tmp_path):
-    """A world whose numbers are gone is not one whose step nothing limits."""
+    """A world with non-finite numbers must not be reported as one without limits."""
     file = tmp_path / "broken.py"
     file.write_text(BROKEN_ON_THE_WAY)
     result = invoke(str(file), "--seconds", "2")

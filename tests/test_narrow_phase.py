@@ -1,4 +1,4 @@
-"""The narrow phase against the plain oracle: every pair of shapes in 2D and 3D, wherever they stand."""
+"""The narrow phase against the plain oracle: every pair of shapes in 2D and 3D, at any position."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def components(body):
 
 
 def in_world(body):
-    """Where the oracle says the shape is: the offset turns with the body, a box stretches."""
+    """The shape as placed by the oracle: the offset turns with the body, a box is enlarged."""
     shape, position, offset, rotation, size = body
     centre = position + narrow_naive.rotation_matrix(rotation, len(position)) @ offset
     return centre, size if shape == "sphere" else narrow_naive.stretched(size, rotation)
@@ -72,7 +72,7 @@ def contacts_of(bodies):
 @given(data=st.data())
 def test_any_pair_equals_the_oracle(d, first, second, data):
     """hit, depth, unit normal from the smaller entity id to the larger, point. Tolerance: 100 eps of the sizes (< 20);
-    within it of touching, either answer."""
+    within it of a touch, hit and miss are both right."""
     a, b = data.draw(bodies(d, first)), data.draw(bodies(d, second))
     depth, normal, point = expected(a, b)
     found = contacts_of([a, b])
@@ -91,7 +91,8 @@ def test_any_pair_equals_the_oracle(d, first, second, data):
 
 
 def radius_of(a, b):
-    """Of the sphere in a pair with a box: at that depth its centre is on the surface and the direction ill defined."""
+    """Radius of the sphere in a pair with a box: at that depth its centre is on the surface and the normal ill
+    defined."""
     return next(body[4] for body in (a, b) if body[0] == "sphere")
 
 
@@ -115,7 +116,7 @@ def test_both_orders_give_the_same_contact(d, data):
 
 @both_dimensions
 def test_crowd_equals_the_oracle_pair_by_pair(d):
-    """All pairs of 120 mixed bodies; the static ones never with each other."""
+    """All pairs of 120 mixed bodies; never two static ones."""
     rng = np.random.default_rng(4)
     world = make_world(d)
     crowd = []
@@ -141,7 +142,7 @@ def test_crowd_equals_the_oracle_pair_by_pair(d):
     assert len(pairs) > 100
 
 
-# -- what the oracle leaves open -----------------------------------------------------------------
+# -- cases that the oracle leaves undefined ------------------------------------------------------
 
 
 @both_dimensions
@@ -149,7 +150,7 @@ def test_crowd_equals_the_oracle_pair_by_pair(d):
 @pytest.mark.parametrize("second", [ball, box])
 @pytest.mark.parametrize("scale", [1.0, 2.0**-40, 2.0**40])
 def test_touching_exactly_counts(d, first, second, scale):
-    """Half sizes are powers of two: at the exact distance a contact of depth 0, one ulp further none."""
+    """Half sizes are powers of two: at the exact distance a contact of depth 0, one ulp farther none."""
     for factor, hits in ((1.0, 1), (1 + EPS, 0), (1 - EPS / 2, 1)):
         world = make_world(d)
         sizes = [{"radius" if maker is ball else "half": 0.5 * scale} for maker in (first, second)]
@@ -215,8 +216,8 @@ def test_a_turned_box_stretches():
     assert len(world.contacts) == 1
 
 
-def test_rotation_is_read_anew_in_every_step():
-    """Turned between steps, a body's box and offset follow at once, and go back at once."""
+def test_rotation_is_read_again_in_every_step():
+    """Turned between steps, a body's box and offset follow at once, and return at once."""
     world = make_world()
     turning = box(world, 0.0, half=(1, 0.1), offset=(1, 0), kind="kinematic")
     right, up = ball(world, (1.9, 0.0), radius=0.05), ball(world, (0.0, 1.9), radius=0.05)
@@ -269,7 +270,7 @@ def test_layers_may_change_between_steps():
 
 @pytest.mark.parametrize("both", [False, True])
 def test_sensors_report_and_do_not_react(both):
-    """A ball flies through a sensor at its own speed; begin, stay and end are told, no impact, no impulse."""
+    """A ball flies through a sensor at constant speed; begin, stay and end are sent, no impact, no impulse."""
     world = make_world()
     sensor = box(world, 0.0, kind="static", sensor=True, restitution=1.0)
     flying = ball(world, -2.0, 3.0, radius=0.1, sensor=both, restitution=1.0)
@@ -296,7 +297,7 @@ def test_static_bodies_do_not_meet_each_other():
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_contacts_read_late_are_those_of_their_step(copied):
-    """Made when first read, whatever rows have moved and steps have begun since; also those of a snapshot."""
+    """Created when first read, although rows have moved and steps have begun since; also those of a snapshot."""
     world = make_world()
     gone = ball(world, (9.0, 0.0))
     a, b = ball(world, (0.0, 0.0)), ball(world, (0.9, 0.0))
@@ -314,7 +315,7 @@ def test_contacts_read_late_are_those_of_their_step(copied):
         _ = contacts.speed
 
 
-def test_contacts_nobody_has_read_outlast_the_start_of_a_step_that_fails():
+def test_unread_contacts_outlast_the_start_of_a_step_that_fails():
     class Failing(System):
         phase = Phase.NARROW
 

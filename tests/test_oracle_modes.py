@@ -1,9 +1,9 @@
-"""Worlds whose bodies are swept agree with the oracle, which looks at all pairs all the time: the same impacts in the
+"""Worlds with swept bodies agree with the oracle, which tests all pairs all the time: the same impacts in the
 same order, the same motion, the same contacts.
 
-In these scenes rounding seldom decides anything; where it did (``oracle.doubts``) a step may come out otherwise. Curved
-bodies that meet amplify rounding, tenfold and more with every impact: each step starts from the world's own state, and
-where it is lost within one step, the oracle too comes out otherwise when it is shaken by as much.
+In these scenes rounding seldom decides anything; where it did (``oracle.doubts``) a step may differ. Impacts of curved
+bodies amplify rounding, tenfold and more each: each step starts from the world's own state, and if accuracy is lost
+within one step, the oracle must also give another result when its start is perturbed by as much.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from carom.lab import testing as kit
 pytestmark = pytest.mark.slow  # its scenes compile for long
 
 DT = 1 / 60
-SHAKEN, GROWN = 1e-14, 1e-10  # of the scale: what tells a step that magnifies rounding beyond what is compared
+SHAKEN, GROWN = 1e-14, 1e-10  # of the scale: perturbation, and the growth beyond which a step is not compared
 
 
 def magnifies(oracle, other):
-    """Whether a step comes out otherwise where every body starts a rounding error or a few from where it did."""
+    """True if a step changes when every body starts from a position perturbed by some rounding errors."""
     rng = np.random.default_rng(0)
     scale = max(np.abs(body.position).max() for body in other.bodies)
     for body in other.bodies:
@@ -40,17 +40,17 @@ def magnifies(oracle, other):
 
 @dataclasses.dataclass
 class Told:
-    """What has happened in the steps that were compared."""
+    """Counts over the compared steps."""
 
     steps: int = 0
     impacts: int = 0
     rounds: int = 0
     capped: int = 0  # steps in which the cap was reached
-    crossed: int = 0  # sensors that were met on the way
-    differ: int = 0  # steps that came out otherwise where the oracle has its doubts, or rounding grows
+    crossed: int = 0  # sensors that were met during the step
+    differ: int = 0  # steps that differ where the oracle has doubts, or rounding grows
 
     def compare(self, world, steps=1):
-        """Each step from the world's own state."""
+        """Compare steps, each from the world's own state."""
         for _ in range(steps):
             oracle, other = kit.Oracle(world), kit.Oracle(world)
             before = dict(world.stats().counters)
@@ -73,10 +73,10 @@ class Told:
 
 
 def scattered(rng, mode, d, count, speed, *, shapes="mixed", gravity=0.0, plain=False, **chosen):
-    """``count`` bodies that do not overlap, sizes over most of a decade, flying so many of their sizes in a step.
+    """``count`` bodies without overlap, sizes over most of a decade, with that speed in sizes per step.
 
     All kinds, masses over six decades and e from 0 to 1.2, mostly inside a room with thin walls; ``plain``: only
-    dynamic bodies, masses alike, elastic. In discrete worlds the first body has ccd.
+    dynamic elastic bodies of equal mass. In discrete worlds the first body has ccd.
     """
     world = mode_world(mode, d, gravity, **chosen)
     width = 0.62 * count ** (1 / d)
@@ -157,7 +157,7 @@ def test_more_random_scenes(mode):
 @both_dimensions
 @each_mode
 def test_many_fast_bodies_in_several_rounds(mode, d):
-    """70 bodies in a room, a dozen impacts and more: the oracle knows no neighbourhoods, rooms or rounds."""
+    """70 bodies in a room, a dozen impacts and more: the oracle has no neighbourhoods, search bounds or rounds."""
     told = Told()
     for seed in range(2):
         rng = np.random.default_rng(seed)
@@ -190,7 +190,8 @@ def test_more_fast_bodies(mode, d):
 @both_dimensions
 @each_sweep
 def test_several_steps_together(mode, d):
-    """Without starting anew: a few elastic balls in a room, ten steps, until rounding has grown by some decades."""
+    """Without resetting the state: a few elastic balls in a room, ten steps, until rounding has grown by some
+    decades."""
     world = scattered(np.random.default_rng(7), mode, d, 4, 0.4, shapes="balls", gravity=9.81, plain=True)
     oracle = kit.Oracle(world)
     for _ in range(10):
@@ -202,7 +203,7 @@ def test_several_steps_together(mode, d):
 @each_sweep
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
 def test_damping_and_constant_forces(mode, integrator):
-    """They bend the paths, and slow down what blows have given: on straight ways, parabolas, flights."""
+    """They curve the paths, and damp the velocity changes of impacts: on straight paths, parabolas, flights."""
     told = Told()
     for seed in range(6):
         rng = np.random.default_rng(seed)
@@ -222,7 +223,7 @@ def test_damping_and_constant_forces(mode, integrator):
 @pytest.mark.parametrize("cap", [1, 2])
 @each_sweep
 def test_beyond_the_cap_what_loses_energy_sticks(mode, cap):
-    """Plastic balls fly into a corner one behind the other: clusters grow, meet each other, and the walls hold them."""
+    """Plastic balls fly into a corner in a row: clusters grow, meet each other, and the walls stop them."""
     told, sticks = Told(), 0
     for seed in range(4):
         rng = np.random.default_rng(seed)
@@ -236,7 +237,7 @@ def test_beyond_the_cap_what_loses_energy_sticks(mode, cap):
         oracle = kit.Oracle(world)
         oracle.step()
         sticks += sum(impact.kind == "stick" for impact in oracle.impacts)
-        told.compare(world)  # only one step: in the next, rounding says who of them touches still
+        told.compare(world)  # only one step: in the next, rounding decides which of them still touch
         world.close()
     assert sticks > 4
     assert told.differ == 0
@@ -244,7 +245,7 @@ def test_beyond_the_cap_what_loses_energy_sticks(mode, cap):
 
 @each_mode
 def test_fast_bodies_among_what_rests(mode):
-    """Boxes that lie on a floor, and bullets that strike them."""
+    """Boxes at rest on a floor, and bullets that hit them."""
     told = Told()
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -263,7 +264,7 @@ def test_fast_bodies_among_what_rests(mode):
 
 
 def test_a_kinematic_body_runs_into_one_that_the_cap_has_stopped():
-    """It has gone on stopping it for ever."""
+    """It once continued to stop it without end."""
     world = mode_world("continuous", max_impacts_per_step=1)
     kit.ball(world, 0.0, -200.0, radius=0.1, restitution=1.0)
     kit.box(world, (-1.5, 0.0), half=0.4, kind="static")
@@ -273,8 +274,8 @@ def test_a_kinematic_body_runs_into_one_that_the_cap_has_stopped():
     assert told.capped == 1
 
 
-def test_who_is_stopped_at_a_wall_is_not_pushed_through_it():
-    """A heavy plastic ball strikes it from behind, and would go on with it."""
+def test_a_body_stopped_at_a_wall_is_not_pushed_through_it():
+    """A heavy plastic ball hits it from behind, and would continue with it."""
     world = mode_world("continuous", max_impacts_per_step=1, restitution_mixing="min")
     ball = kit.ball(world, (0.0, 0.0), (200.0, 0.0), radius=0.1, restitution=1.0)
     for x in (-0.5, 1.0):
@@ -286,8 +287,8 @@ def test_who_is_stopped_at_a_wall_is_not_pushed_through_it():
     assert kit.position(world, ball)[0] > -0.4
 
 
-def test_contacts_tell_who_touches_a_body_that_the_cap_has_stopped():
-    """A slow box sinks into it by a tenth of the slop at the end of the step."""
+def test_contacts_include_what_touches_a_body_that_the_cap_has_stopped():
+    """A slow box overlaps it by a tenth of the slop at the end of the step."""
     world = mode_world("continuous", max_impacts_per_step=1)
     ball = kit.ball(world, (0.0, 0.0), (-200.0, 0.0), radius=0.1, restitution=1.0)
     kit.box(world, (-1.5, 0.0), half=0.4, kind="static")
@@ -299,8 +300,8 @@ def test_contacts_tell_who_touches_a_body_that_the_cap_has_stopped():
     kit.assert_touching(world, ball, box)
 
 
-def test_who_is_stopped_stays_there_whatever_carried_it():
-    """A box at rest on a floor is struck twice; it has been pushed into the floor, by what its support would have."""
+def test_a_stopped_body_stays_there_whatever_carried_it():
+    """A box at rest on a floor is hit twice; the resting prediction must not have pushed it into the floor."""
     world = mode_world("continuous", 2, 100.0, max_impacts_per_step=1)
     kit.floor(world)
     box = kit.box(world, (0.0, 0.5), restitution=1.0)
@@ -316,7 +317,7 @@ def test_who_is_stopped_stays_there_whatever_carried_it():
 
 
 def test_neighbours_in_a_discrete_world_do_not_lose_contacts_to_a_crowd_of_bullets():
-    """60 bullets make the step go in rounds; a ball without ccd meets a wall at its end all the same."""
+    """60 bullets make the step take several rounds; a ball without ccd still meets a wall at its end."""
     rng = np.random.default_rng(3)
     world = mode_world("ccd", 3)
     for _ in range(60):

@@ -61,7 +61,7 @@ def orbit(method, periods):
 
 
 def check_orbit(method, periods):
-    """What is bounded keeps its bound, what grows (RK4's energy, all phases) has its share of the thousand periods'."""
+    """Bounded errors keep their bound, growing ones (RK4's energy, all phases) are scaled to the number of periods."""
     energy, position, momentum = ORBIT[method]
     got = orbit(method, periods)
     share = periods / 1000

@@ -1,4 +1,4 @@
-"""The package as it is shipped: what is listed, what a wheel holds, and who imports whom."""
+"""The package as shipped: listed packages, contents of a wheel, and imports between packages."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def python_files(folder: str) -> list[Path]:
 
 
 def package_of(folder: Path) -> str:
-    """The package that a folder of sources is installed as: the nearest mapped folder above it decides."""
+    """The package of a source folder: the nearest mapped folder above it decides."""
     relative = folder.relative_to(ROOT)
     mapped = {Path(place): name for name, place in SETUPTOOLS["package-dir"].items()}
     for parent in (relative, *relative.parents):
@@ -58,7 +58,7 @@ def test_the_root_package_stays_bare():
 
 
 def imported_floors(path: Path) -> set[str]:
-    """The floors that a module imports from, however the import is written."""
+    """The floors that a module imports from, for any form of import."""
     package = package_of(path.parent).split(".")
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -81,7 +81,7 @@ def imported_floors(path: Path) -> set[str]:
 def test_each_floor_imports_only_from_the_floors_below(floor):
     allowed = set(FLOORS[: FLOORS.index(floor) + 1])
     for path in python_files(floor):
-        if path.name == "__main__.py":  # it alone reaches up, to the command line
+        if path.name == "__main__.py":  # the only one that imports upwards, from the command line
             continue
         above = imported_floors(path) - allowed
         assert not above, f"{path.relative_to(ROOT)} imports from {sorted(above)}"

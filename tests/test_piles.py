@@ -1,4 +1,4 @@
-"""Heaps: they come to rest and stay, nobody gets out, overlap is small; and bodies thrown into each other."""
+"""Heaps: they come to rest and stay, no body escapes, overlap is small; and bodies created in each other."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def fall(dimensions, n, e, seconds):
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
 def test_a_pile_of_a_thousand(e):
-    """At 15 s all stands but for what single discs may still do: mean overlap 0.2 %, greatest 2 % of a diameter."""
+    """At 15 s all is at rest except single discs: mean overlap 0.2 %, greatest 2 % of a diameter."""
     energy, overlap, escaped = fall(2, 1000, e, 15)
     assert energy < 1e-6
     assert overlap.mean() < 0.002
@@ -38,7 +38,7 @@ def test_a_pile_of_a_thousand(e):
 
 @pytest.mark.parametrize("e", [0.3, *(pytest.param(e, marks=pytest.mark.slow) for e in (0.0, 0.8))])
 def test_a_pile_of_a_thousand_spheres(e):
-    """Without friction layers of spheres go on slipping now and then; the demand on big piles holds at 20 s."""
+    """Without friction layers of spheres continue to slip now and then; the requirement on big piles holds at 20 s."""
     energy, overlap, escaped = fall(3, 1000, e, 20)
     assert energy < 1e-4
     assert overlap.mean() < 0.002
@@ -73,7 +73,7 @@ def test_published_lattice_666(shape, pitch, dt, published):
     assert world.kinetic_energy() < 1e-9
 
 
-# -- no room -------------------------------------------------------------------------------------
+# -- overlapping starts --------------------------------------------------------------------------
 
 
 def throw(count, dimensions, e=0.0, side=10.0):
@@ -104,7 +104,7 @@ def test_bodies_spawned_in_each_other(count, dimensions, e):
 @pytest.mark.parametrize("count", [100, 1000])
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_bodies_at_one_point(count, dimensions):
-    """C3: they part, slowly, and nothing is lost."""
+    """C3: they separate, slowly, and none is lost."""
     world = throw(count, dimensions, side=0.0)
     for _ in range(10):
         world.step()
@@ -116,7 +116,8 @@ def test_bodies_at_one_point(count, dimensions):
 
 @pytest.mark.parametrize("side", [0.0, 10.0])
 def test_more_pairs_than_memory_are_refused(side):
-    """C3, C19 with 1e5 bodies: 5e9 and 1.5e8 candidate pairs are not stored; the error says how many, nothing moves."""
+    """C3, C19 with 1e5 bodies: 5e9 and 1.5e8 candidate pairs are not stored; the error states the number, no body
+    moves."""
     world = throw(100_000, 3, side=side)
     before = world.bodies.position.copy()
     with pytest.raises(StepError, match="candidate pairs exceed the limit"):

@@ -1,4 +1,4 @@
-"""world.plan() against what happens: the columns that are allocated."""
+"""world.plan() against the columns that are actually allocated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .worlds import make_world
 
 
 def arrays_per_body(world):
-    """Sizes in bytes of all arrays with as many rows as there is room for bodies, reached from the world's physics."""
+    """Sizes in bytes of all arrays with as many rows as the body capacity, reached from the world's physics."""
     capacity, found, seen = world.physics.table.capacity, {}, set()
     todo = [world.physics, world.physics.table, *world.systems]
     while todo:
@@ -34,7 +34,7 @@ def arrays_per_body(world):
     return sum(array.nbytes for array in found.values())
 
 
-COUNT = 150  # bodies made at once, more than a new table has room for: exactly as many rows
+COUNT = 150  # bodies created at once, more than the capacity of a new table: exactly that many rows
 
 
 def many(world, *components):
@@ -45,7 +45,7 @@ def many(world, *components):
 
 
 def near(world, *components):
-    """The same, where two of them overlap."""
+    """The same with two overlapping bodies."""
     many(world, *components)
     world.bodies.position[1] = world.bodies.position[0] + 0.25
     return world
@@ -108,7 +108,7 @@ def test_the_columns_there_are_those_of_the_plan(name):
     world.close()
 
 
-def test_fields_at_their_defaults_are_told_from_those_in_use():
+def test_fields_at_their_defaults_are_distinguished_from_those_in_use():
     world = make_world()
     entity = world.create_entity(Transform((0.0, 0.0)), RigidBody())
     columns = {column.column: column.reason for column in world.plan().columns}

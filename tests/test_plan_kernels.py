@@ -1,4 +1,4 @@
-"""world.plan() against what happens: the kernels that are called and compiled; and how the plan reads."""
+"""world.plan() against the kernels that are called and compiled; and the text of the plan."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .worlds import ball, make_world
 
 
 def record_calls(world, steps):
-    """(system, kernel) of the calls in each step, those included that compile."""
+    """(system, kernel) of the calls in each step, including those that compile."""
     taken = []
     time_calls(lambda name, nanoseconds, compiled: taken[-1].add((world._pipeline.measurements.at or "", name)))
     try:
@@ -32,7 +32,7 @@ def record_calls(world, steps):
 
 
 def planned(plan, always=False):
-    """The same as the plan has it; ``always``: only what is called in every step."""
+    """The same from the plan; ``always``: only what is called in every step."""
     found = {(entry.system, k.kernel) for entry in plan.entries for k in entry.kernels if not (always and k.when)}
     return found | {("", k.kernel) for k in plan.around if not (always and k.when)}
 
@@ -125,7 +125,7 @@ def test_friction_is_swept_only_where_there_is_some():
 
 
 def test_forces_are_not_summed_where_none_acts():
-    """The column is zero all the same, and what is applied later counts; also what a system of the game has left."""
+    """The column is zero all the same, and forces applied later count; also those left by a user system."""
     world = make_world()
     entity = world.create_entity(Transform((0.0, 0.0)), RigidBody())
     body = world.component_for_entity(entity, RigidBody)
@@ -157,7 +157,7 @@ def test_forces_are_not_summed_where_none_acts():
 @pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4"])
 @pytest.mark.parametrize("damping", [0.0, 0.7])
 def test_drifting_gives_the_bits_of_the_integrator(integrator, damping):
-    """A system of the game that does nothing makes carom go the long way."""
+    """A user system that does nothing makes carom take the general path."""
     worlds = [drifting(damping=damping, integrator=integrator) for _ in range(2)]
     worlds[1].add_system(Nudge())
     for world in worlds:

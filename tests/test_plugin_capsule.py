@@ -1,4 +1,4 @@
-"""Capsules: pairs against an independent oracle, and what they do in worlds, in 2D and 3D."""
+"""Capsules: pairs against an independent oracle, and their behaviour in worlds, in 2D and 3D."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ spheres = capsule.plugin.pairs[CapsuleCollider, SphereCollider].function
 
 @kernel
 def meet_all(sizes, axes_a, axes_b, offsets, hits, depths, normals, points, like):
-    """sizes (n, 4): radius and half height of the one, of the other; a half height below 0 makes it a sphere."""
+    """sizes (n, 4): radius and half height of the first, of the second; a half height below 0 makes it a sphere."""
     for i in range(len(offsets)):
         one = Capsule(sizes[i, 0], sizes[i, 1], axes_at(axes_a, i, like))
         d = row(offsets, i, like)
@@ -75,7 +75,7 @@ def to_segment(points, ends):
 
 
 def overlap(a, b):
-    """Of the cores; in 3D two segments overlap in a point at most."""
+    """Overlap of the cores; in 3D two segments overlap in a point at most."""
     return convex_brute.meet(a, b)[0] if a.shape[2] == 2 else -convex_brute.separation(a, b)[0]
 
 
@@ -93,10 +93,10 @@ def test_ten_thousand_random_poses(d, other):
     expected = reach - to_segment(offsets, a) if other == "sphere" else reach + overlap(a, b)
     assert 0.2 < met.hit.mean() < 0.95
     np.testing.assert_allclose(met.depth, expected, rtol=0, atol=1e-12)
-    # moved by the depth along the normal they just touch
+    # after a translation by the depth along the normal they just touch
     moved = b + (met.depth[:, None] * met.normal)[:, None]
     gap = to_segment(moved[:, 0], a) if other == "sphere" else -overlap(a, moved)
-    np.testing.assert_allclose(gap, reach, rtol=0, atol=1e-7)  # nearly parallel normals: the oracle's, of 1e-15 squares
+    np.testing.assert_allclose(gap, reach, rtol=0, atol=1e-7)  # nearly parallel normals: limit of the oracle
     # the point is in the middle of the overlap, or of the gap; where segments cross, near there
     crossing = 0.5 * abs(sizes[:, 0] - sizes[:, 2]) * (met.depth > reach)
     for ends, radius in ((a, sizes[:, 0]), (b, sizes[:, 2])):
@@ -154,15 +154,15 @@ def test_cores_that_just_touch_part_by_their_radii(d):
     axes_a, axes_b = rotations(rng, n, d), rotations(rng, n, d)
     angle = 10.0 ** rng.uniform(-18, 0, n)[:, None]
     near = np.cos(angle) * axes_a[:, :, 1] + np.sin(angle) * axes_a[:, :, 0]
-    axes_b[: n // 2, :, 1] = near[: n // 2]  # only this one counts
+    axes_b[: n // 2, :, 1] = near[: n // 2]  # only this axis is used
     sizes = rng.choice((0.0, 1e-15, 0.5, 2.0), (n, 4))
     places = rng.choice((-1.0, 0.0, 0.3, 1.0), (n, 2))
     places *= sizes[:, [1, 3]]
     offsets = places[:, :1] * axes_a[:, :, 1] - places[:, 1:] * axes_b[:, :, 1]
     met = meet(sizes, axes_a, axes_b, offsets)
     reach = sizes[:, 0] + sizes[:, 2]
-    assert (met.depth >= reach - 5e-8).all()  # by angles below 1e-8, of which lines lie how is not known
-    # along the normal no point of the one core is then farther than the nearest of the other less the radii
+    assert (met.depth >= reach - 5e-8).all()  # angles below 1e-8 cannot be resolved
+    # along the normal every point of one core is then farther than the nearest of the other less the radii
     along_a, along_b = ((axes[:, :, 1] * met.normal).sum(1) for axes in (axes_a, axes_b))
     between = ((offsets + met.depth[:, None] * met.normal) * met.normal).sum(1)
     between -= abs(along_a) * sizes[:, 1] + abs(along_b) * sizes[:, 3]
@@ -190,7 +190,7 @@ def test_a_sphere_on_the_axis_leaves_sideways():
 
 
 def make_world(d, others=True, **settings):
-    """One with a floor, its top at 0, and a sphere far away: all three shapes, so that all tests share their code."""
+    """A world with a floor, its top at 0, and a distant sphere: all three shapes, so that all tests share code."""
     options = {"integrator": "velocity_verlet"} | settings
     world = World(Physics(dimensions=d, gravity=at(d, 0, -G)), capsule.plugin, settings=Settings(**options))
     if others:
@@ -204,7 +204,7 @@ def at(d, *place):
 
 
 def turn(d, angle):
-    """In the plane of x and y."""
+    """A rotation in the plane of x and y."""
     return angle if d == 2 else (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
@@ -241,7 +241,7 @@ def test_bounces_at_the_right_height_however_it_is_turned(d):
 
 @mostly_2d
 def test_rests_on_boxes_spheres_and_capsules(d):
-    """Each a slop, 0.005 of its size 0.5, into what is below it at most."""
+    """Each overlaps the body below by at most the slop, 0.005 of its size 0.5."""
     world = make_world(d)
     lying = math.pi / 2
     floor = drop(world, d, 0, 0.26, lying)
@@ -297,7 +297,7 @@ def test_is_carried_by_a_moving_platform(d):
 
 @both_dimensions
 def test_equal_capsules_exchange_their_speeds(d):
-    """In 3D with nothing else, which compiles in half the time."""
+    """In 3D with no other shapes, which compiles in half the time."""
     world = make_world(d, others=d == 2)
     one = drop(world, d, 0, 50, velocity=at(d, 3, 0), restitution=1.0)
     two = drop(world, d, 2, 50.7, velocity=at(d, -1, 0), restitution=1.0)
@@ -335,7 +335,7 @@ def test_queries_and_casts_find_it(d):
 
 
 def test_levels_a_sphere_around_a_capsule():
-    """What meets the sphere only passes."""
+    """A body that meets only the sphere passes."""
     world = make_world(2)
     statue = CapsuleCollider(0.25, 1.0, restitution=1.0)
     world.create_entity(Transform((0, 50)), statue, SphereCollider(1.3, restitution=1.0))

@@ -1,5 +1,5 @@
-"""What is wrong with a plugin is said when it is registered, with its name, the function and the cure; nothing else
-happens, and the worlds that run go on."""
+"""Defects of a plugin are reported at registration, with its name, the function and the cure; nothing is changed,
+and running worlds continue."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from carom.plugins import Physics
 
 
 def disc_class(**members):
-    """A round shape; members replace what it has, None takes it away."""
+    """A round shape; members replace its attributes, None removes one."""
 
     def bounds(shape, dimensions):
         return (shape.reach, shape.reach) if dimensions == 2 else (shape.reach, shape.reach, shape.reach)
@@ -221,7 +221,7 @@ class disc_like:  # noqa: N801
 
 
 def test_a_late_registration_that_clashes_changes_nothing():
-    """The world that has both plugins keeps what it has, and the one that is asked for more says why not."""
+    """The world that has both plugins is unchanged, and the registration that conflicts is refused with the reason."""
     plugin, disc = registered()
     plugin.pair(disc, disc)(disc_disc)
     other = Plugin("others")
@@ -237,7 +237,7 @@ def test_a_late_registration_that_clashes_changes_nothing():
 
 
 def test_what_cannot_be_compiled_is_named():
-    """Python can do more than compiled code; what only the compiler finds names plugin, shape and function too."""
+    """Python can do more than compiled code; errors found only by the compiler name plugin, shape and function too."""
     plugin, disc = registered(bounds=lambda shape, dimensions: (shape.reach,) * dimensions)
     plugin.pair(disc, disc)(disc_disc)
     world = World(Physics(), plugin)

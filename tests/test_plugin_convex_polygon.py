@@ -1,4 +1,4 @@
-"""Convex polygons: what is refused, 10,000 poses against brute force over features, and falling, sliding, queries."""
+"""Convex polygons: refused input, 10,000 poses against brute force over features, and falling, sliding, queries."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def meet(a, b, offsets):
 
 
 def in_world(polygons):
-    """Corners where they are, turned."""
+    """The turned corners at their positions."""
     vertices, _, angles = polygons
     turn = np.array(((np.cos(angles), -np.sin(angles)), (np.sin(angles), np.cos(angles))))
     return np.einsum("kjn,nvj->nvk", turn, vertices)
@@ -172,7 +172,7 @@ def test_a_triangle_is_no_shape_of_a_3d_world():
 
 
 def make_world(gravity=(0, -10), others=False):
-    """With polygons alone, or with spheres and boxes in each: few kinds of worlds, so that they share their code."""
+    """With polygons alone, or always with spheres and boxes: few kinds of worlds, so that they share compiled code."""
     world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)
     if others:
         world.create_entity(Transform((0, -500)), SphereCollider(1.0))
@@ -207,7 +207,7 @@ def test_it_bounces_at_the_right_height_and_rests(shape):
         world.step()
         heights.append(world.component_for_entity(bouncing, Transform).y)
     top = max(heights[40:])
-    # From 1.5 m above the floor to 0.64 of it; a step's sampling misses at most g dt^2 / 8 of the top.
+    # From 1.5 m above the floor to 0.64 of it; sampling at steps misses at most g dt^2 / 8 of the apex.
     assert top - 0.5 == pytest.approx(0.64 * 1.5, rel=0.01)
     place = world.component_for_entity(resting, Transform).position
     assert place[0] == 5.0
@@ -263,7 +263,7 @@ def test_rays_and_moving_shapes_meet_it():
 
 @pytest.mark.slow
 def test_as_a_second_level_it_decides():
-    """A body with a sphere around a triangle: who touches the sphere alone is not touched."""
+    """A body with a sphere around a triangle: a body that touches only the sphere has no contact."""
     world = make_world(gravity=(0, 0), others=True)
     triangle = ConvexPolygonCollider(((0, 1), (-0.8, -0.6), (0.8, -0.6)))
     world.create_entity(Transform((0, 0)), SphereCollider(1.0), triangle)

@@ -1,4 +1,4 @@
-"""Half-spaces: the pair against the definition, ground without end in small and large worlds, in 2D and 3D."""
+"""Half-spaces: the pair against the definition, unbounded ground in small and large worlds, in 2D and 3D."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def meet_all(normal, axes, half, radius, offsets, hits, depths, normals, points,
 
 
 def check(normal, axes, half, radius, offsets, tolerance=1e-14):
-    """Depth: how far the lowest of all corners is below the plane; the point: halfway between that and the plane."""
+    """Depth: that of the lowest corner below the plane; the point: halfway between that corner and the plane."""
     n, d = offsets.shape
     hits, depths, normals, points = np.zeros(n, bool), np.zeros(n), np.zeros((n, d)), np.zeros((n, d))
     meet_all(normal, axes, half, radius, offsets, hits, depths, normals, points, (0.0,) * d)
@@ -83,7 +83,7 @@ def test_extremes(d):
 
 @mostly_2d
 def test_the_point_is_in_the_middle_of_a_face_that_lies_on_it(d):
-    """Of a box on level ground and, whatever the order of rounding, nowhere else."""
+    """For a box on level ground, for any rounding."""
     up, half, place = np.eye(d)[[1]], np.full((1, d), 2.0), np.full((1, d), 1.9)
     _, points = check(up, np.eye(d)[None], half, np.zeros(1), place)
     assert points[0] == pytest.approx([1.9, -0.05, *[1.9] * (d - 2)])
@@ -107,12 +107,12 @@ def at(d, *place):
 
 
 def turn(d, angle):
-    """In the plane of x and y."""
+    """A rotation in the plane of x and y."""
     return angle if d == 2 else (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
 def make_world(d, ground=None, angle=0.0, body=(), **settings):
-    """Ground below y = 0, and a box and a ball far up, so that all tests share their code."""
+    """Ground below y = 0, and a box and a ball far up, so that all tests share compiled code."""
     options = {"integrator": "velocity_verlet"} | settings
     world = World(Physics(dimensions=d, gravity=at(d, 0, -G)), half_space.plugin, settings=Settings(**options))
     ground = HalfSpaceCollider(at(d, 0, 1), friction=1.0) if ground is None else ground
@@ -134,7 +134,7 @@ def velocity_of(world, entity):
 @both_dimensions
 @pytest.mark.parametrize("away", [0.0, 1e6])
 def test_bounces_at_the_right_height_wherever_it_is(d, away):
-    """From 2 m to e^2 2 m; verlet's flight is exact, impacts are at their time: 2e-3 is what sampling may miss."""
+    """From 2 m to e^2 2 m; verlet's flight is exact, impacts are at their time: sampling may miss 2e-3."""
     world, e = make_world(d), 0.5
     colliders = SphereCollider(0.5, restitution=e), AABBCollider(0.5, restitution=e), SphereCollider(0, restitution=e)
     entities = [
@@ -154,7 +154,7 @@ def test_bounces_at_the_right_height_wherever_it_is(d, away):
 
 @mostly_2d
 def test_bodies_rest_on_it_as_on_a_box(d):
-    """The same heights as on a box of any size, within a slop; a point has no size, so that its slop on a
+    """The same heights as on a box of any size, within a slop; a point has no size, so its slop on a
     box is that of the box."""
     colliders = SphereCollider(0.5), AABBCollider(0.5), SphereCollider(0), AABBCollider(at(d, 2, 0.25, 1))
     lows = np.array((0.5, 0.5, 0.0, 0.25))
@@ -195,7 +195,7 @@ def test_a_slope_made_by_the_transform(d):
 @pytest.mark.slow
 @both_dimensions
 def test_a_rising_one_lifts_what_is_on_it(d):
-    """In one tree with what moves, among few and among many; half-spaces do not meet each other."""
+    """In one tree with moving bodies, among few and among many; half-spaces do not meet each other."""
     for count in (3, 300):
         rises = RigidBody(kind="kinematic", linear_velocity=at(d, 0, 1))
         world = make_world(d, body=(rises,))
@@ -216,7 +216,7 @@ def test_a_rising_one_lifts_what_is_on_it(d):
 @mostly_2d
 @pytest.mark.parametrize("sizes", ["even", pytest.param("uneven", marks=pytest.mark.slow)])
 def test_two_thousand_bodies_fall_on_it(d, sizes):
-    """Grid and tree, whose boxes are finite, find all that reach the ground without end; nothing falls through."""
+    """Grid and tree, whose boxes are finite, find all bodies that reach the unbounded ground; none falls through."""
     rng, n = np.random.default_rng(0), 2000
     world = make_world(d)
     radii = np.full(n, 0.5) if sizes == "even" else 10 ** rng.uniform(-2, 0, n)

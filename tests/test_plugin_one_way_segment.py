@@ -1,4 +1,4 @@
-"""One-way segments: solid for what comes from the front, nothing for all else, and for how long."""
+"""One-way segments: solid for bodies from the front, not for others, and for how long."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ each_shape = pytest.mark.parametrize("shape", SHAPES)
 
 
 def make_world(*segments, with_capsules=False, **settings):
-    """One segment from x = -2 to 2 unless given; a box and a ball far away, so that all tests share their code."""
+    """One segment from x = -2 to 2 unless given; a distant box and ball, so that all tests share compiled code."""
     plugins = (capsule,) if with_capsules else ()
     world = World(
         Physics(dimensions=2, gravity=(0, -G)), one_way_segment.plugin, *plugins, settings=Settings(**settings))
@@ -61,7 +61,7 @@ def run(world, seconds, *entities):
 
 @each_shape
 def test_a_jump_passes_and_lands(shape):
-    """As high as without the platform, to the bit; then it stands on it, and has touched it once."""
+    """As high as without the platform, to the bit; then it stands on it, with a single begin."""
     free = World(Physics(dimensions=2, gravity=(0, -G)))
     alone = free.create_entity(Transform((0, -2)), RigidBody(linear_velocity=(0, 9)))
     world = make_world()
@@ -85,7 +85,7 @@ def test_a_jump_passes_and_lands(shape):
 @each_shape
 @pytest.mark.parametrize("apex", [-0.4, 0.0, 0.3, 0.47])
 def test_a_jump_that_ends_inside_falls_back(shape, apex):
-    """The centre's highest point over the platform; from 0.5 on it would stand. The fall is free."""
+    """Varies the apex of the centre over the platform; from 0.5 on it would stand. The fall is free."""
     world = make_world(integrator="velocity_verlet")
     speed = math.sqrt(2 * G * (apex + 2))
     jumper = throw(world, (0, -2), (0, speed), shape)
@@ -99,7 +99,7 @@ def test_a_jump_that_ends_inside_falls_back(shape, apex):
 @each_shape
 @pytest.mark.parametrize("speed", [0, 10, 30, 45])
 def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed):
-    """A body of size 1 at 45 m/s goes 0.75 in a step: its centre may come to be below the platform in between."""
+    """A body of size 1 at 45 m/s moves 0.75 per step: its centre may be below the platform in between."""
     for phase in (0.0, 0.1, 0.2, 0.35, 0.6):
         world = make_world()
         faller = throw(world, (0.3, 2 + phase), (1.0, -speed), shape)
@@ -111,7 +111,7 @@ def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed)
 
 @each_shape
 def test_bounces_at_the_right_height(shape):
-    """From 2 m to e^2 2 m; verlet's flight is exact, impacts are at their time: 2e-3 is what sampling may miss."""
+    """From 2 m to e^2 2 m; verlet's flight is exact, impacts are at their time: sampling may miss 2e-3."""
     world, e = make_world(integrator="velocity_verlet"), 0.5
     bouncer = throw(world, (0, 2.5), shape=shape, restitution=e)
     fall, rise = math.sqrt(2 * 2 / G), math.sqrt(2 * 2 * e**2 / G)
@@ -122,8 +122,8 @@ def test_bounces_at_the_right_height(shape):
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, -2.0])
 def test_ten_thousand_bodies_from_everywhere(angle):
-    """Balls that do not meet each other fly at the segment. Against their free flight, known from a world without it:
-    who never was wholly in front flies freely, to the bit; who came down on it from the front never gets behind it."""
+    """Balls that do not meet each other fly at the segment. Compared with their free flight in a world without it: a
+    ball that never was wholly in front flies freely, to the bit; one that came from the front never gets behind it."""
     rng, n, radius, size, seconds = np.random.default_rng(7), 10_000, 0.3, 4.0, 1.0
     places, speeds = rng.uniform(-5, 5, (n, 2)), rng.uniform(-8, 8, (n, 2))
     paths = []
@@ -155,7 +155,7 @@ def test_ten_thousand_bodies_from_everywhere(angle):
 
 
 def test_a_stack_stands_on_it_however_heavy():
-    """A light box under 400 times its mass sinks in by more than the slack; who was held is held."""
+    """A light box under 400 times its mass overlaps by more than the slack; a supported body stays supported."""
     world = make_world()
     light = throw(world, (0, 0.5))
     heavy = world.create_entity(Transform((0, 1.5)), RigidBody(mass=400.0), AABBCollider(0.5))
@@ -171,8 +171,8 @@ def test_a_stack_stands_on_it_however_heavy():
 
 
 @each_shape
-def test_who_comes_from_the_side_passes(shape):
-    """At any height of its middle below half its own: the end of a platform is no wall."""
+def test_a_body_from_the_side_passes(shape):
+    """At any height of its centre below half its own: the end of a platform is not a wall."""
     for height in (-0.45, 0.0, 0.4):
         world = make_world()
         walker = world.create_entity(
@@ -182,8 +182,8 @@ def test_who_comes_from_the_side_passes(shape):
         world.close()
 
 
-def test_who_falls_past_the_end_is_not_caught():
-    """A box that comes down beside the end, moving in under it: it meets the line when it is not over the segment."""
+def test_a_body_that_falls_past_the_end_is_not_caught():
+    """A box that falls beside the end and moves in under it: it meets the line where it is not over the segment."""
     world = make_world()
     faller = throw(world, (-2.7, 2.0), (1.5, -20.0))
     run(world, 0.2, faller)
@@ -197,7 +197,7 @@ def test_who_falls_past_the_end_is_not_caught():
 
 @each_shape
 def test_slides_off_the_end(shape):
-    """Never thrown: it leaves at the speed it had, and falls freely, past the end."""
+    """Never thrown: it leaves with its speed, and falls freely, past the end."""
     world = make_world()
     slider = throw(world, (0, 0.5), (2.0, 0.0), shape)
     heights = run(world, 2.2, slider)
@@ -258,7 +258,7 @@ def test_a_slope_to_slide_down():
 
 @each_shape
 def test_a_lift_carries_and_is_jumped_through(shape):
-    """It rises at 2 m/s; what jumps through it does so as the lift sees it, and rides on it."""
+    """It rises at 2 m/s; a body jumps through it by its velocity relative to the lift, and rides on it."""
     lift = RigidBody(kind="kinematic", linear_velocity=(0, 2))
     world = make_world((Transform((0, 0)), OneWaySegmentCollider((-5, 0), (5, 0)), lift))
     rider = throw(world, (-2, 0.5), shape=shape)
@@ -267,15 +267,15 @@ def test_a_lift_carries_and_is_jumped_through(shape):
     run(world, 3.0)
     top = place_of(world, 1)[1]
     assert top == pytest.approx(6.0)
-    for entity in (rider, jumper, still):  # what hangs in the air is picked up
+    for entity in (rider, jumper, still):  # bodies at rest in the air are picked up
         assert place_of(world, entity)[1] - top == pytest.approx(0.5, abs=0.01)
         assert velocity_of(world, entity)[1] == pytest.approx(2, abs=0.01)
     world.close()
 
 
 @each_shape
-def test_a_platform_that_sinks_over_somebody_passes(shape):
-    """From above with its back: whoever stands below is not pushed."""
+def test_a_platform_that_sinks_over_a_body_passes(shape):
+    """From above with its back: a body below is not pushed."""
     sinks = RigidBody(kind="kinematic", linear_velocity=(0, -2))
     world = make_world(
         (Transform((0, 3)), OneWaySegmentCollider((-5, 0), (5, 0)), sinks), (Transform((0, -1)), AABBCollider((9, 1))))
@@ -295,11 +295,11 @@ def test_a_ferry_takes_along_by_friction():
     world.close()
 
 
-# -- what else may happen ---------------------------------------------------------------------------
+# -- other cases ------------------------------------------------------------------------------------
 
 
 def test_dropping_through_by_the_mask():
-    """Without the platform's layer for a moment; once it passes it goes on passing."""
+    """Excluded from the platform's layer for a moment; once it passes it continues to pass."""
     world = make_world((Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0), layer=2)))
     player = throw(world, (0, 0.5))
     run(world, 0.5)
@@ -313,7 +313,7 @@ def test_dropping_through_by_the_mask():
     world.close()
 
 
-@pytest.mark.slow  # capsules: all kernels once more
+@pytest.mark.slow  # capsules: compiles all kernels again
 def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
     world = make_world(with_capsules=True)
     jumpers = [

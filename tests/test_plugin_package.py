@@ -1,4 +1,4 @@
-"""A plugin as somebody else ships it: a package built, installed, found, checked, used; and its kernels kept."""
+"""A third-party plugin: a package built, installed, found, checked, used; and its kernels cached."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def write_package(folder: Path, name: str, version: str, point: str, value: str,
 
 
 def install(source: Path, target: Path) -> None:
-    """Into a folder of its own, without a network."""
+    """Install into a separate folder, without a network."""
     options = ["--no-build-isolation", "--no-deps", "--no-index", "--quiet", "--disable-pip-version-check"]
     command = [sys.executable, "-m", "pip", "install", *options, "--target", str(target), str(source)]
     result = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""})
@@ -122,7 +122,7 @@ def install(source: Path, target: Path) -> None:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory) -> Path:
-    """Where a good plugin's package is installed, and a broken one's beside it."""
+    """A folder with a good plugin's package and a broken one's."""
     base = tmp_path_factory.mktemp("third-party")
     files = {"shapes.py": SHAPE, "geometry.py": GEOMETRY}
     good = write_package(
@@ -139,7 +139,7 @@ def site(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def python(site, tmp_path_factory):
-    """Runs Python with that folder on its path, in an empty one."""
+    """Runs Python with that folder on its path, in an empty working folder."""
     empty = tmp_path_factory.mktemp("empty")
 
     def run(*arguments: str, cache: Path | None = None, site: Path = site) -> subprocess.CompletedProcess[str]:
@@ -188,7 +188,7 @@ def test_a_ball_falls_on_its_shape_and_bounces(python):
 
 @pytest.fixture
 def look(python, site, tmp_path):
-    """Has a sensor look at a copy of the installed package's shape, edited before, with a kernel cache of its own."""
+    """Tests a sensor against a copy of the installed package's shape, edited before, with a separate kernel cache."""
     copy = tmp_path / "site"
     shutil.copytree(site, copy)
 
@@ -229,7 +229,7 @@ def test_its_kernels_are_kept_until_something_they_call_is_edited(look):
     assert smaller["compiled"]
     assert smaller["depth"] == pytest.approx([0.625 - side - 0.1 / 2**0.5])
 
-    # A helper that only the helper calls: the other normal where there is a choice, which is not here.
+    # A helper called only by the helper: another normal for ambiguous cases, which do not occur here.
     turned = look(("geometry.py", "return 1.0 if x >= 0.0 else -1.0", "return 1.0 if x > 0.0 else -1.0"))
     assert turned["compiled"]
     assert turned["normal"] == smaller["normal"]

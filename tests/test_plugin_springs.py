@@ -1,4 +1,4 @@
-"""The springs plugin: closed forms, energy, order, bodies that go, bad input."""
+"""The springs plugin: closed forms, energy, order, deleted bodies, bad input."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_two_masses_swing_as_the_closed_form_says(dimensions):
         expected = 4.5 + 0.5 * math.cos(w * world.time)
         assert np.linalg.norm(x(world, b) - x(world, a)) == pytest.approx(expected, abs=4e-5)
         worst = max(worst, abs(world.kinetic_energy() + world.potential_energy() - energy))
-    assert worst < energy * (w * 1e-3) ** 2  # Verlet's energy swings by (w h)^2 / 4 and does not drift
+    assert worst < energy * (w * 1e-3) ** 2  # Verlet's energy oscillates by (w h)^2 / 4 and does not drift
     np.testing.assert_allclose((x(world, a) + 3 * x(world, b)) / 4, centre, atol=1e-12)
     np.testing.assert_allclose(world.momentum(), 0.0, atol=1e-13)
 
@@ -93,7 +93,7 @@ def test_a_rope_only_pulls():
     world, springs = make(integrator="velocity_verlet", dt=1 / 1000)
     post, ball = body(world, 0.0, 0.0, kind="static"), body(world, 1.0, 0.0, velocity=(-1.0, 0.0))
     rope = springs.connect(post, ball, 2.0, stiffness=4000.0, only_pulls=True)
-    run(world, 2.5)  # through the post and on, slack all the way
+    run(world, 2.5)  # past the post, slack all the way
     assert rope.tension == 0.0
     assert x(world, ball)[0] == pytest.approx(-1.5, abs=1e-12)
     assert world.potential_energy() == 0.0
@@ -119,7 +119,7 @@ def test_a_pendulum_on_a_stiff_spring_keeps_its_length():
     for _ in range(480):
         world.step()
         lengths.append(rod.length)
-    # 3 m g at the bottom stretch it by 3e-3; twice that while it swings into it
+    # 3 m g at the bottom stretch it by 3e-3; twice that in the transient
     assert max(abs(length - 1.0) for length in lengths) < 6e-3
     assert world.faults == []
 
@@ -168,7 +168,7 @@ def test_the_order_of_creation_changes_no_bit():
 
 
 def test_order_of_rows_changes_no_bit():
-    """Bodies deleted and created in between move rows; the springs of the others do not notice."""
+    """Bodies deleted and created in between move rows; the springs of the others are not affected."""
 
     def hash_of(disturbed):
         world, springs = make()
@@ -214,7 +214,7 @@ def test_a_spring_goes_with_its_body_and_says_so():
     assert not lost.connected
     assert kept.connected
     assert list(springs) == [kept]
-    lost.remove()  # again, in vain
+    lost.remove()  # again, without effect
     with pytest.raises(CaromError, match="not connected any more"):
         _ = lost.length
     world.step()

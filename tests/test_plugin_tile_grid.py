@@ -1,4 +1,4 @@
-"""Tile grids: maps and what is refused, poses against brute force over single cells, queries."""
+"""Tile grids: maps and refused input, poses against brute force over single cells, queries."""
 
 from __future__ import annotations
 
@@ -126,13 +126,13 @@ def test_random_polygons_against_every_single_cell(size, tile):
     assert 30 < apart.sum() < count - 30
     assert abs(depths - single)[apart].max() < 1e-13 * scale  # the true distance
     assert depths[~apart].min() > -1e-13 * scale
-    # The point lies in the middle of gap or overlap with something: not farther from the body than half the depth.
+    # The point lies in the middle of a gap or overlap: not farther from the body than half the depth.
     to_body = np.einsum("nvk,nk->nv", vertices + offsets[:, None] - points[:, None], normals).min(1) - radii
     assert abs(to_body + depths / 2)[apart].max() < 1e-9 * scale
 
 
 def test_out_of_a_corner_it_goes_in_one_move():
-    """A body in floor and wall is as deep as the way to where it is out of both."""
+    """The depth of a body in floor and wall is its distance from the place where it is out of both."""
     cells = cells_of_text("""
         ...#
         ...#
@@ -146,7 +146,7 @@ def test_out_of_a_corner_it_goes_in_one_move():
 
 
 def test_where_tiles_border_on_each_other_are_no_faces():
-    """Seen from above a row of tiles has one face, wherever the body is, however little it is over the next column."""
+    """From above a row of tiles has one face, for any position of the body, even barely over the next column."""
     cells = cells_of_text("""
         ..........
         ##########
@@ -164,7 +164,7 @@ def test_where_tiles_border_on_each_other_are_no_faces():
 
 
 def test_moving_polygons_touch_when_the_first_cell_says_so():
-    """Against steps of a thousandth of the way: apart before, and in touch at the time given."""
+    """Against steps of a thousandth of the path: apart before, and touching at the time given."""
     rng = np.random.default_rng(5)
     cells = rng.random((9, 9)) < 0.25
     count = 500
@@ -218,7 +218,7 @@ def test_queries_find_the_tiles():
 
 @pytest.mark.slow
 def test_rays_and_shapes_pass_close_by_walls():
-    """A way along a wall, a hair from it, ends at the next one."""
+    """A ray along a wall, very close to it, ends at the next one."""
     cells = cells_of_text("#" * 40 + "\n" + "." * 39 + "#\n" + "#" * 40)
     world = make_world()
     world.create_entity(Transform((0, 0)), TileGridCollider(cells, 1.0, lower=(0, 0)))

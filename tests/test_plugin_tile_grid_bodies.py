@@ -1,5 +1,5 @@
-"""Bodies on maps of tiles: what slides feels no seams, what stands in a corner stands still, nothing gets in
-between tiles."""
+"""Bodies on tile maps: no seams while sliding, no motion at rest in a corner, no body between
+tiles."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def octagon(radius, **common):
-    """Flat below; that far from its middle on all sides."""
+    """Flat below; its half extent is the same on all sides."""
     angles = (np.arange(8) + 0.5) * math.pi / 4
     corners = np.stack((np.cos(angles), np.sin(angles)), 1) / math.cos(math.pi / 8)
     return ConvexPolygonCollider(radius * corners, **common)
 
 
 def capsule(radius, **common):
-    """As good as one, lying slantwise; its box is that far from its middle on all sides."""
+    """Nearly a capsule, tilted; its box has the same half extent on all sides."""
     ends = np.array(((-0.5, -0.5), (0.5, 0.5), (0.5, 0.5), (-0.5, -0.5)))
     ends += np.array(((1, -1), (1, -1), (-1, 1), (-1, 1))) * 1e-6
     return ConvexPolygonCollider(radius * ends / abs(ends).max() / 2, corner_radius=radius / 2, **common)
@@ -41,7 +41,7 @@ SHAPES = {
     "capsule": capsule,
 }
 
-# A channel, ragged outside: whatever slides along its inner sides passes ends of columns of all lengths.
+# A channel, ragged outside: bodies that slide along its inner sides pass ends of columns of all lengths.
 LENGTH = 60
 CHANNEL = np.zeros((14, LENGTH), bool)
 CHANNEL[[4, 9]] = True
@@ -65,7 +65,7 @@ QUICK_SLIDES = {("sphere", "floor", "all"), ("sphere", "left wall", "two entitie
     pytest.param(*slide, marks=() if slide in QUICK_SLIDES else pytest.mark.slow) for slide in SLIDES
 ])  # fmt: skip
 def test_sliding_bodies_feel_no_seams(shape, side, faces):
-    """The velocity along tiles of a body that is pressed onto them stays as it is."""
+    """The velocity along the tiles of a body that is pressed onto them does not change."""
     cells = CHANNEL if side in ("floor", "ceiling") else CHANNEL.T
     down = {"floor": (0, -1), "ceiling": (0, 1), "left wall": (-1, 0), "right wall": (1, 0)}[side]
     down = np.array(down, float)
@@ -81,7 +81,7 @@ def test_sliding_bodies_feel_no_seams(shape, side, faces):
     for size in SIZES:
         for speed in SPEEDS:
             for e in (0.0, 0.6):
-                # The channel is 4 m wide, its middle that of the map. It starts anywhere along it, at rest or falling.
+                # The channel is 4 m wide, centred on the map. The body starts anywhere along it, at rest or falling.
                 place = -20 * along + rng.uniform(0, 1) * along + down * (2 - size - rng.choice((0.0, 0.01)))
                 common = {"layer": 1, "mask": 2, "restitution": e}
                 body = world.create_entity(
@@ -117,7 +117,7 @@ def corner_world(faces, shape, size, friction, **body):
 @pytest.mark.parametrize("shape", ["sphere", *(pytest.param(s, marks=pytest.mark.slow) for s in ("box", "polygon"))])
 @pytest.mark.parametrize("size", [0.5, *(pytest.param(size, marks=pytest.mark.slow) for size in (0.1, 1.7))])
 def test_pushed_against_a_wall_it_stands_still_on_the_floor(shape, size):
-    """With floors and walls two entities: 10 s, pushed by its own weight or walking into the wall."""
+    """With floors and walls as two entities: 10 s, pushed by its own weight or walking into the wall."""
     for speed in (None, 5.0):
         world, entity = corner_world(
             "two entities", shape, size, 0.0, **({"constant_force": (10, 0)} if speed is None else {})
@@ -131,7 +131,7 @@ def test_pushed_against_a_wall_it_stands_still_on_the_floor(shape, size):
             places.append(transform.position - (8 - size, 1 + size))
         late = np.array(places[60:])
         assert np.ptp(late, axis=0).max() < 1e-6  # jitter and drift, m
-        # It is 0.07 mm deep in the floor, and 2 mm in the wall that it walks into with 5 m/s in each step.
+        # It overlaps the floor by 0.07 mm, and by 2 mm the wall that it walks into with 5 m/s in each step.
         assert late[:, 1].min() > -0.0001
         assert late[:, 0].max() < (0.0001 if speed is None else 0.003)
 
@@ -139,7 +139,7 @@ def test_pushed_against_a_wall_it_stands_still_on_the_floor(shape, size):
 @pytest.mark.parametrize("shape", ["sphere", pytest.param("box", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("size", [pytest.param(0.1, marks=pytest.mark.slow), 0.5])
 def test_in_a_corner_of_one_collider_it_stays(shape, size):
-    """One contact serves both sides: it gives way by millimetres, and nobody gets through."""
+    """One contact serves both sides: it yields by millimetres, and nothing gets through."""
     world, entity = corner_world("all", shape, size, 0.0, constant_force=(10, 0))
     transform, body = (world.component_for_entity(entity, kind) for kind in (Transform, RigidBody))
     places = []
@@ -152,14 +152,14 @@ def test_in_a_corner_of_one_collider_it_stays(shape, size):
     for _ in range(300):
         body.linear_velocity[0] = 5.0
         world.step()
-        assert transform.x < 8 - size + 0.1  # at most what it walks in a step, 83 mm, and a little
+        assert transform.x < 8 - size + 0.1  # at most its walk in a step, 83 mm, and a little
         assert transform.y > 1 + size - 0.05
     world, entity = corner_world("all", shape, size, 0.5, constant_force=(10, 0))
     places = []
     for _ in range(300):
         world.step()
         places.append(world.component_for_entity(entity, Transform).position.copy())
-    assert np.ptp(places[60:], axis=0).max() < 1e-5  # friction holds it still
+    assert np.ptp(places[60:], axis=0).max() < 1e-5  # friction stops it
 
 
 @pytest.mark.parametrize("others", [False, pytest.param(True, marks=pytest.mark.slow)])

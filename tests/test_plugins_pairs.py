@@ -1,4 +1,4 @@
-"""Pairs of plugins: those that are missing, those that come late, and those that go wrong at run time."""
+"""Pairs of plugins: missing pairs, late registration, and errors at run time."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def lonely_lonely(a, b, d):
 lonely_lonely_kernel = _helpers.kernel(lonely_lonely)
 
 
-def test_a_pair_that_nobody_handles_is_an_error_with_both_and_the_ways_out():
+def test_a_pair_without_handler_is_an_error_with_both_shapes_and_the_ways_out():
     plugin, lonely = lonely_plugin()
     world = World(Physics(), plugin)
     a = world.create_entity(Transform((0, 0)), lonely(1.0))
@@ -61,7 +61,7 @@ def test_a_pair_that_nobody_handles_is_an_error_with_both_and_the_ways_out():
         with pytest.raises(UnhandledPairError, match=message):
             world.step()
     assert world.step_count == 0
-    world.component_for_entity(a, lonely).mask = 2  # now nobody can meet it
+    world.component_for_entity(a, lonely).mask = 2  # now it meets no other body
     world.step()
     world.component_for_entity(a, lonely).mask = -1
     with pytest.raises(UnhandledPairError):
@@ -137,11 +137,11 @@ def test_a_flat_shape_is_not_for_3d():
     world.close()
 
 
-# -- what goes wrong at run time ------------------------------------------------------------------
+# -- errors at run time ---------------------------------------------------------------------------
 
 
 def fragile_plugin():
-    """Works on everything the checks try, and fails on sizes between."""
+    """Works for all inputs of the checks, and fails for sizes between."""
     plugin, fragile = lonely_plugin()
 
     @plugin.pair(fragile, fragile)
@@ -160,7 +160,7 @@ def fragile_plugin():
      (5.5, "entities 2 and 3 returned a contact that is not finite")],
 )  # fmt: skip
 def test_a_pair_that_fails_names_itself_and_the_step_is_undone(size, message):
-    """Columns and clock are what they were; without the culprit the world goes on."""
+    """Columns and clock are unchanged; without the culprit the world continues."""
     plugin, fragile = fragile_plugin()
     world = World(Physics(gravity=(0, -10)), plugin)
     bystander = world.create_entity(Transform((0, 50)), RigidBody(linear_velocity=(1, 0)), fragile(1.0))
@@ -182,7 +182,7 @@ def test_a_pair_that_fails_names_itself_and_the_step_is_undone(size, message):
 
 
 def test_a_sweep_that_fails_names_itself():
-    """It works on everything the checks try, but for one size its time is no part of the way."""
+    """It works for all inputs of the checks, but for one size its time is out of range."""
     plugin, fragile = lonely_plugin()
     plugin.pair(fragile, fragile)(lonely_lonely)
 
@@ -200,11 +200,11 @@ def test_a_sweep_that_fails_names_itself():
     world.close()
 
 
-# -- what goes wrong elsewhere at run time --------------------------------------------------------
+# -- other errors at run time ---------------------------------------------------------------------
 
 
 def odd_plugin(what):
-    """A round shape that is wrong at a size which the checks do not try."""
+    """A round shape that is wrong at a size which the checks do not test."""
     plugin = Plugin("odd")
 
     def bounds(shape, dimensions):

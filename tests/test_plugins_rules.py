@@ -1,4 +1,4 @@
-"""What else plugins bring is at work in a world: rules, filters, broad phases, integrators, systems."""
+"""Other plugin functions at work in a world: rules, filters, broad phases, integrators, systems."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_a_mixing_rule_of_a_plugin():
         World(Physics(), plugin, settings=Settings(friction_mixing="third"))
 
 
-def test_a_filter_decides_who_may_meet():
+def test_a_filter_decides_which_bodies_may_meet():
     plugin = Plugin("teams")
     seen = []
 
@@ -98,7 +98,7 @@ def test_a_filter_answers_for_each_pair(answer):
 
 
 class AllPairs:
-    """Every pair whose boxes overlap, the plain way."""
+    """Every pair of overlapping boxes, by brute force."""
 
     def pairs(self, lower, upper, moving):
         touching = (lower[:, None] <= upper).all(axis=2) & (lower <= upper[:, None]).all(axis=2)

@@ -1,4 +1,4 @@
-"""Shapes of plugins are at work in a world: one that turns with its body, and one whose field is an array."""
+"""Plugin shapes at work in a world: one that turns with its body, and one with an array field."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def make_plugin():
 @pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("sphere_first", [True, False])
 def test_a_shape_of_a_plugin_bounces_at_the_right_height(d, sphere_first):
-    """Dropped from h with restitution e a ball comes back to e^2 h; here e = 1, over a rod that lies flat."""
+    """Dropped from h with restitution e a ball returns to e^2 h; here e = 1, over a horizontal rod."""
     up, here = np.eye(d)[1], np.zeros(d)
     turned = math.pi / 2 if d == 2 else (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
     settings = Settings(integrator="velocity_verlet")
@@ -108,7 +108,7 @@ def test_a_rod_turns_with_its_body():
 
 
 class CloudCollider(Collider):
-    """Points around the centre: as far as anybody is concerned, a sphere around the farthest."""
+    """Points around the centre: for contacts, a sphere through the farthest one."""
 
     dimensions = (2,)
     points = array_column(2, rows=(1, 100), check=lambda p: "must be near" if np.abs(p).max() > 1e12 else None)
@@ -143,7 +143,7 @@ def cloud_plugin():
 
 
 def test_a_field_may_be_an_array():
-    """Each body has its own number of rows; what is assigned is seen by the next step; equal arrays are one."""
+    """Each body has its own number of rows; assigned values count from the next step; equal arrays are shared."""
     world = World(Physics(), cloud_plugin())
     one = world.create_entity(Transform((0, 0)), CloudCollider([(3.0, 0.0), (0.0, 1.0), (0.0, 2.0)]))
     world.create_entity(Transform((20, 0)), CloudCollider([(1.0, 0.0)]))

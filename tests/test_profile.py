@@ -1,4 +1,4 @@
-"""Where the time goes: by system always, by kernel inside a profile; what is counted and what is divided by what."""
+"""Times of a step: by system always, by kernel inside a profile; the counts and the divisors."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_kernels_called_between_steps_stand_apart():
         world.query_sphere((0, 0), 3.0)
     outside = [row for row in world.stats().kernels if row.system == ""]
     assert outside
-    assert all(not row.nanoseconds for row in outside)  # a query has no bodies to divide by
+    assert all(not row.nanoseconds for row in outside)  # a query has no body count to divide by
     assert world.stats().kernels[-len(outside) :] == tuple(outside)
 
 
@@ -86,7 +86,7 @@ def test_means_are_over_the_steps_inside_profiles():
     assert world.stats().profiled.steps == 5
 
 
-def test_resetting_inside_a_profile_begins_anew():
+def test_resetting_inside_a_profile_starts_again():
     world = bouncing()
     run(world, 1)
     with world.profile():
@@ -202,7 +202,7 @@ def test_kernels_made_inside_a_profile_are_timed_too():
 
         thing(1.0)
         thing(1.0)
-        assert thing._reduce_class() is Kernel  # what a cached kernel remembers of those it holds
+        assert thing._reduce_class() is Kernel  # held by a cached kernel
     assert type(thing) is Kernel
     assert [row.kernel for row in world.stats().kernels] == ["thing"]
 

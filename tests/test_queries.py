@@ -1,4 +1,4 @@
-"""What touches, what is nearest, who is near: against brute force over all bodies; and what all questions share."""
+"""Overlap, nearest and neighbour queries against brute force over all bodies; and the common rules of all queries."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_nearest_of_many_bodies(d, n, sizes):
         assert hits.distance[i] == pytest.approx(distance[nearest], abs=tolerance)
         assert distance[bodies.entity == hits.entity[i]][0] == pytest.approx(distance[nearest], abs=2 * tolerance)
         assert (single.entity, single.distance) == (hits.entity[i], hits.distance[i])
-        # the point lies on the surface, and the normal leads from it to where the question was asked
+        # the point lies on the surface, and the normal points from it to the query point
         np.testing.assert_allclose(single.point + single.distance * single.normal, points[i], atol=10 * tolerance)
         on_surface = bodies.depth_of_point(single.point)[bodies.entity == single.entity][0]
         assert abs(on_surface) < 10 * tolerance
@@ -65,8 +65,8 @@ def test_touching_many_bodies(d, n):
 
 
 @both_dimensions
-def test_many_questions_to_few_bodies(d):
-    """More tests than are worth while go through a tree; the answers are those to single questions."""
+def test_many_queries_of_few_bodies(d):
+    """Many tests go through a tree; the results are those of single queries."""
     world, _, side = scene(d, 180, seed=2, kinds=("dynamic",))
     centres = np.random.default_rng(2).random((1000, d)) * side
     spheres, nearest = world.query_spheres(centres, 1.0), world.query_nearests(centres)
@@ -104,7 +104,7 @@ def test_neighbours_of_many_bodies(d, n):
     world.close()
 
 
-# -- what all questions share ---------------------------------------------------------------------
+# -- common rules of all queries -----------------------------------------------------------------
 
 
 @both_dimensions
@@ -122,7 +122,7 @@ def test_ties_go_to_the_smaller_id(d):
 
 @both_dimensions
 def test_the_order_of_rows_does_not_matter(d):
-    """The kinds of bodies decide on rows and trees; ids and places are the same, and so are the bits."""
+    """The kinds of bodies decide on rows and trees; ids and positions are the same, and so are the bits."""
     answers = []
     for kinds in (("dynamic",), ("static",), ("static", "dynamic", "kinematic")):
         world, _, side = scene(d, 400, seed=11, kinds=kinds)
@@ -144,7 +144,7 @@ def test_masks_and_exclusion(d):
     world = make_world(d)
     first = ball(world, 3, layer=1, sensor=True)
     second = ball(world, 6, layer=2, kind="static")
-    third = ball(world, 9, layer=4, mask=0)  # who it meets does not matter to questions
+    third = ball(world, 9, layer=4, mask=0)  # its own mask does not matter for queries
     origin, way = np.zeros(d), np.eye(d)[0]
 
     def along(**arguments):
@@ -196,7 +196,7 @@ def test_what_is_deleted_and_what_is_written(d):
 
 
 def test_systems_see_bodies_where_they_are():
-    """In every phase of a step, whatever has been asked before in it."""
+    """In every phase of a step, after any earlier query in it."""
     world = make_world(restitution_threshold=0.0)
     mover = ball(world, (0, 0), (60.0, 0.0), restitution=1.0)
     ball(world, (1.5, 0), kind="static", restitution=1.0)

@@ -1,4 +1,4 @@
-"""What the contacts at rest remember from step to step: snapshots, errors, other steps, other units."""
+"""State of contacts at rest between steps: snapshots, errors, changed steps, other units."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def bits(world):
 
 
 def test_a_snapshot_in_the_midst_of_a_pile_holds_the_impulses():
-    """Restored, also into a world that has gone on: the same bits as without."""
+    """Restored, also into a world that has continued: the same bits as without."""
     world = heap()
     run(world, 90)
     snapshot = world.snapshot()
@@ -56,7 +56,7 @@ class Fails(System):
 
 
 def test_a_step_that_fails_leaves_no_trace_in_the_impulses():
-    """An error after the response takes the impulses back too: what follows has the bits of a world without."""
+    """An error after the response undoes the impulses too: the following steps have the bits of a world without it."""
     calm, hurt = heap(), heap()
     saboteur = Fails()
     hurt.add_system(saboteur)
@@ -71,10 +71,10 @@ def test_a_step_that_fails_leaves_no_trace_in_the_impulses():
 
 
 @pytest.mark.parametrize("change", [{"dt": 1 / 120}, {"dt": 1 / 30}, {"substeps": 8}, {"substeps": 2}])
-def test_another_step_in_mid_run_makes_nobody_jump(change):
-    """The impulses in store are those of the old step; they are rescaled. The overlap goes to that of the new springs.
+def test_another_step_in_mid_run_makes_no_body_jump(change):
+    """The stored impulses are those of the old step; they are rescaled. The overlap changes to that of the new springs.
 
-    Impulses of another step would send them off at 0.03 to 0.05 m/s; the springs' own change of length makes 0.014.
+    Impulses of another step would accelerate them to 0.03 to 0.05 m/s; the springs' own change of length makes 0.014.
     """
     world = make_world(gravity=G)
     floor(world)
@@ -121,7 +121,7 @@ def test_slop_and_threshold_are_relative_to_size():
 
 
 def test_a_slop_of_ones_own_reaches_the_contacts():
-    """With 0.05 m bodies are held from further away: two boxes 0.04 above each other are a contact at once."""
+    """With 0.05 m contacts at rest begin farther apart: two boxes with a gap of 0.04 are a contact at once."""
     found = []
     for slop in (None, 0.05):
         world = make_world(slop=slop)

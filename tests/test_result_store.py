@@ -1,4 +1,4 @@
-"""Results that are kept as they come: whatever ends the process, what was added is there, once."""
+"""Stored results: however the process ends, each added record is there, once."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def content(store: Store) -> dict[str, dict | None]:
     return {key: store.get(key) for key in RECORDS if key in store}
 
 
-# -- what is kept -----------------------------------------------------------------------------------------------
+# -- contents of the store --------------------------------------------------------------------------------------
 
 
 def test_records_are_there_when_the_work_is_resumed(kept):
@@ -77,7 +77,7 @@ json_values = st.recursive(
 def test_every_value_comes_back_as_it_was(path, key, value):
     with Store.open(path) as store:
         store.add(key, {"value": value})
-        assert repr(store.get(key)) == repr({"value": value})  # in which nan is nan
+        assert repr(store.get(key)) == repr({"value": value})  # repr, so that nan equals nan
     with Store.open(path, resume=True) as store:
         assert repr(store.get(key)) == repr({"value": value})
 
@@ -193,7 +193,7 @@ def test_without_resume_the_results_of_before_are_put_aside(kept):
     aside = kept.with_name("results.jsonl.before")
     before = kept.read_bytes()
     aside.write_text("older")
-    for _ in range(2):  # the second time there is nothing that would be worth it
+    for _ in range(2):  # the second time there is nothing to keep
         with Store.open(kept) as store:
             assert len(store) == 0
         assert kept.read_bytes() == b""
@@ -228,7 +228,7 @@ def test_a_file_in_use_is_refused(path):
 
 
 def test_what_a_killed_process_added_is_there_and_its_lock_is_taken_over(path):
-    """It ends within add, when the record is on its way: after ten whole ones."""
+    """It is killed within add, while a record is being written: after ten whole ones."""
     script = (
         "import os, sys; from carom.lab.jobs.result_store import Store\n"
         "store = Store.open(sys.argv[1])\n"
@@ -248,7 +248,7 @@ def test_what_a_killed_process_added_is_there_and_its_lock_is_taken_over(path):
 @pytest.mark.parametrize(
     "owner", ["1 another-machine", "", "nonsense", f"0 {platform.node()}", f"-1 {platform.node()}"]
 )
-def test_a_lock_of_which_nobody_knows_whether_it_is_abandoned_is_kept(path, owner):
+def test_a_lock_that_may_not_be_abandoned_is_kept(path, owner):
     lock = path.with_name("results.jsonl.lock")
     lock.write_text(owner)
     with pytest.raises(Problem, match="being written by"):
@@ -257,9 +257,9 @@ def test_a_lock_of_which_nobody_knows_whether_it_is_abandoned_is_kept(path, owne
 
 
 def test_of_two_that_take_an_abandoned_lock_one_gets_it(path, monkeypatch):
-    """The other one removed the lock that the first had just made, and made its own."""
+    """The second one has removed the lock that the first had just made, and made its own."""
     lock = path.with_name("results.jsonl.lock")
-    lock.write_text(f"{2**22 + 1} {platform.node()}\n")  # above what Linux numbers processes with
+    lock.write_text(f"{2**22 + 1} {platform.node()}\n")  # above Linux's largest process id
     monkeypatch.setattr("carom.lab.jobs.result_store.time.sleep", lambda _: lock.write_text("1 faster\n"))
     with pytest.raises(Problem, match="process 1 on faster"):
         Store.open(path)
@@ -271,7 +271,7 @@ def test_of_two_that_take_an_abandoned_lock_one_gets_it(path, monkeypatch):
 
 @pytest.mark.parametrize(("done", "left"), [(0, "0:07:40"), (900, "0:00:10")])
 def test_the_time_left_counts_what_was_resumed_as_done_and_not_as_fast(done, left):
-    """After 80 of 1000 in 40 s; 900 that were there before take no time and say nothing of the others."""
+    """After 80 of 1000 in 40 s; 900 resumed ones take no time and do not count for the rate."""
     now = 0.0
     shown = io.StringIO()
     console = Console(file=shown, force_terminal=True, width=80, get_time=lambda: now)

@@ -1,4 +1,4 @@
-"""What the scenes are there to show: what stands stands, what is carried comes along, what counts counts right."""
+"""Physics of the scenes: stacks stand, loads are carried, counts are right."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from carom.framework import Settings
 from carom.scenes import conveyor, cradle, galperin, lift, pile, platforms, pyramid, stack
 
 G = 9.81
-SLOP = 0.005  # of a size: what the solver leaves alone
+SLOP = 0.005  # of a size: overlap that the solver does not correct
 
 
 def steps(world, seconds):
@@ -21,7 +21,7 @@ def steps(world, seconds):
 
 
 def kinetic_energy_per_body(world):
-    """In units of m g d: how high, in diameters, the motion that is left could lift a body."""
+    """Kinetic energy per body in units of m g d: the height, in diameters, that it could lift a body."""
     dynamic = world.bodies.dynamic
     return 0.5 * (np.asarray(dynamic.linear_velocity) ** 2).sum(axis=1).mean() / G
 
@@ -36,9 +36,9 @@ def solid_depths(world):
 @pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
 def test_as_many_balls_fly_off_as_arrive(gap, dt):
-    """B16: equal masses and e = 1 exchange velocities, one impact at a time, at any gap: only 0 and 1 are left.
+    """B16: equal masses and e = 1 exchange velocities, one impact at a time, at any gap: only 0 and 1 remain.
 
-    Each line is alone with its five balls, so all four are judged at once. Rounding: 20 exchanges of 0 and 1.
+    Each line has only its five balls, so all four are tested at once. Rounding: 20 exchanges of 0 and 1.
     """
     with cradle.build(Settings(dt=dt), gap=gap) as world:
         start = world.bodies.dynamic.position.reshape(4, 5, 2).copy()
@@ -60,7 +60,7 @@ def test_as_many_balls_fly_off_as_arrive(gap, dt):
     [(0, Settings(), 5.0), (1, Settings(), 5.0), (1, Settings(dt=1 / 1000), 5.0), (2, None, 9.0)],
 )
 def test_the_blocks_count_the_digits_of_pi(digits, settings, seconds):
-    """B17: a step with many impacts takes them all, in order, so even 60 Hz counts right while nothing tunnels."""
+    """B17: all impacts of a step are handled in order, so even 60 Hz counts right while nothing tunnels."""
     with galperin.build(settings, digits=digits) as world:
         counter = next(system for system in world.systems if isinstance(system, galperin.ImpactCounter))
         energy = world.kinetic_energy()
@@ -76,7 +76,7 @@ def test_the_blocks_count_the_digits_of_pi(digits, settings, seconds):
 
 @pytest.mark.parametrize(("name", "n", "dimensions", "seconds"), [("pile2d", 400, 2, 10.0), ("pile3d", 343, 3, 20.0)])
 def test_a_pile_comes_to_rest(name, n, dimensions, seconds):
-    """The demands on piles of 10,000, on small ones: less than 1e-4 m g d a body, mean overlap below 2 %.
+    """The requirements on piles of 10,000, on small ones: less than 1e-4 m g d per body, mean overlap below 2 %.
 
     Spheres without friction slip past each other longer than discs.
     """
@@ -89,7 +89,7 @@ def test_a_pile_comes_to_rest(name, n, dimensions, seconds):
         assert kinetic_energy_per_body(world) < 1e-4
         assert solid_depths(world).mean() < 0.02
         touching = np.concatenate([world.contacts.entity_a, world.contacts.entity_b])
-        assert np.isin(world.bodies.dynamic.entity, touching).mean() > 0.99  # nobody hangs in the air
+        assert np.isin(world.bodies.dynamic.entity, touching).mean() > 0.99  # no body floats in the air
 
 
 @pytest.mark.parametrize("balls", [False, True])
@@ -106,7 +106,7 @@ def test_a_stack_stays_as_it_is(balls):
 
 
 def test_a_heavy_box_on_a_light_one():
-    """B19: a ratio of 100 may not sink in by more than 1.5 % at four substeps, at any time."""
+    """B19: a ratio of 100 may not overlap by more than 1.5 % at four substeps, at any time."""
     with stack.build(n=2, top_mass=100.0) as world:
         deepest = 0.0
         for _ in range(300):
@@ -136,7 +136,7 @@ def test_crates_come_to_rest_on_the_platforms():
         assert solid_depths(world).mean() < 0.02
         assert ((position[:, 0] > 0) & (position[:, 0] < platforms.WIDTH) & (position[:, 1] > 0)).all()
         x, y = position.T
-        for start, end, height in platforms.PLATFORMS:  # no centre inside of one, and somebody on each
+        for start, end, height in platforms.PLATFORMS:  # no centre inside one, and a crate on each
             assert not ((x > start) & (x < end) & (y > height - platforms.THICKNESS) & (y < height)).any()
             assert ((x > start) & (x < end) & (y > height) & (y < height + 2)).any()
 
@@ -145,9 +145,9 @@ def test_crates_come_to_rest_on_the_platforms():
 
 
 def test_the_lift_and_the_ferry_take_their_crates_along():
-    """One round and a half: each crate keeps its place on what carries it to a twentieth of its size.
+    """One period and a half: each crate keeps its place on its carrier to a twentieth of its size.
 
-    The load changes between 0.75 and 1.25 of the weight: the solver's give of a stack of three is below that.
+    The load changes between 0.75 and 1.25 of the weight: the compliance of a stack of three is below that.
     """
     with lift.build() as world:
         steps(world, 0.5)

@@ -1,6 +1,6 @@
-"""The scenes whose answers are known in closed form: spring, orbit, bouncing, oblique, thermal_gas and drops.
+"""The scenes with results in closed form: spring, orbit, bouncing, oblique, thermal_gas and drops.
 
-Rounding: 1e-12 of what is measured unless a test says otherwise; anything coarser follows from the method's order.
+Rounding: relative 1e-12 unless a test says otherwise; any larger tolerance follows from the method's order.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def energy(world):
 
 
 def run(world, seconds):
-    """The world after the whole number of steps nearest to that many seconds."""
+    """The world after the number of steps nearest to that many seconds."""
     for _ in range(round(seconds / world.settings.dt)):
         world.step()
     return world
@@ -61,14 +61,14 @@ def test_spring_has_the_energy_of_its_amplitude():
     with spring.build(Settings(dt=1 / 1000, integrator="rk4")) as world:
         assert world.potential_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-15)
         assert energy(run(world, 0.25)) == pytest.approx(OMEGA**2 / 2, rel=1e-9)
-        assert world.kinetic_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-9)  # a quarter of a swing: in the middle
+        assert world.kinetic_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-9)  # a quarter period: at the centre
 
 
 # -- orbit -----------------------------------------------------------------------------------------
 
 
 def return_error(method, steps, eccentricity):
-    """How far from its start the planet is after one turn."""
+    """Distance of the planet from its start after one orbit."""
     with orbit.build(Settings(dt=orbit.PERIOD / steps, integrator=method), eccentricity=eccentricity) as world:
         start = world.bodies.position.copy()
         for _ in range(steps):
@@ -84,8 +84,8 @@ def test_orbit_closes_with_the_order_of_the_method(method, order):
 
 @pytest.mark.parametrize("eccentricity", [0.0, 0.3, 0.6])
 def test_orbit_closes(eccentricity):
-    """RK4, 4,000 steps: the angle in a step at the perihelion is at most 5 dt = 0.008, its fourth power 4e-9, which
-    many steps there multiply."""
+    """RK4, 4,000 steps: the angle per step at the perihelion is at most 5 dt = 0.008, its fourth power 4e-9, multiplied
+    by the number of steps there."""
     assert return_error("rk4", 4000, eccentricity) < 1e-7
 
 
@@ -98,7 +98,7 @@ def test_orbit_has_the_energy_and_momentum_of_its_ellipse(eccentricity):
 
 
 def test_orbit_keeps_its_energy_with_its_own_settings():
-    """Ten turns; Verlet's error returns to what it was with every turn, and is of order (5 dt)^2 = 1e-3 at most.
+    """Ten orbits; Verlet's error returns to its value with every orbit, and is of order (5 dt)^2 = 1e-3 at most.
     Angular momentum: to the rounding of 10,000 steps."""
     with orbit.build() as world:
         worst = 0.0
@@ -172,7 +172,7 @@ def test_oblique_with_another_mass_and_restitution():
 
 @pytest.mark.parametrize(("n", "eta", "seed"), [(400, 0.3, 0), (400, 0.3, 7), (4, 0.01, 0), (100, 0.78, 1)])
 def test_thermal_gas_starts_warm_at_rest_as_a_whole_and_apart(n, eta, seed):
-    """kT = <v^2> / 2 = 1, momentum 0, no overlap, and the share of the box that was asked for."""
+    """kT = <v^2> / 2 = 1, momentum 0, no overlap, and the requested fraction of the box."""
     with thermal_gas.build(seed=seed, n=n, eta=eta) as world:
         moving, length = world.bodies.dynamic, thermal_gas.side(n, eta)
         assert len(moving) == n
@@ -245,8 +245,8 @@ def test_drops_have_the_published_times():
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_drops_come_to_rest(restitution):
-    """All is over after T (1 + e) / (1 - e) <= 3 s; then it lies on the floor, no deeper than the slop and a quarter:
-    0.005 of its diameter of 0.2 m."""
+    """The bounces end after T (1 + e) / (1 - e) <= 3 s; then it rests on the floor, no deeper than the slop and a
+    quarter: 0.005 of its diameter of 0.2 m."""
     with drops.build(restitution=restitution) as world:
         run(world, 5.0)
         body = world.bodies.dynamic

@@ -1,4 +1,4 @@
-"""The scene ``shots``: what the kinds of collision see of fast balls, against where the balls must be."""
+"""The scene ``shots``: fast balls in each collision mode, against their exact positions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from carom.scenes import shots
 
 STEPS = 6
 STEP = shots.SPEED / 60  # metres
-FLOWN = shots.START + STEP * STEPS  # what nothing stops
+FLOWN = shots.START + STEP * STEPS  # free flight
 FREE = shots.APART - 2 * shots.RADIUS  # between the plates
 ROUNDING = 1e-12 * shots.END
 
@@ -27,7 +27,7 @@ def after_six_steps(**settings):
 
 
 def to_and_fro(way):
-    """The height of the ball between the plates after ``way`` metres down and up."""
+    """The height of the ball between the plates after a path of ``way`` metres down and up."""
     phase = (way + FREE / 2) % (2 * FREE)
     return shots.PLATES + FREE / 2 - min(phase, 2 * FREE - phase)
 
@@ -35,8 +35,8 @@ def to_and_fro(way):
 @pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "rk4"])
 def test_what_sweeps_finds_every_ball_where_it_must_be(mode, integrator):
-    """Reflections at planes; two that exchange are points that pass through each other, diameters apart; one normal
-    of (7, 24) / 25, by which (1, 0) becomes (527, 336) / 625."""
+    """Reflections at planes; two balls that exchange velocities are points that pass through each other, plus
+    diameters; one normal of (7, 24) / 25, by which (1, 0) becomes (527, 336) / 625."""
     lanes, world = after_six_steps(collision=mode, integrator=integrator)
     post = np.array((shots.POST, shots.GRAZE - shots.OFF_CENTRE))
     touch = post + (shots.POST_RADIUS + shots.RADIUS) * np.array((-7, 24)) / 25
@@ -58,7 +58,8 @@ def test_what_sweeps_finds_every_ball_where_it_must_be(mode, integrator):
 
 
 def test_discrete_passes_through_thin_things_and_meets_a_ghost():
-    """All fly on straight but for the ball that is found inside the target: that gets its velocity, past the shield."""
+    """All fly on straight except the ball that is found inside the target, which takes its velocity, past the
+    shield."""
     lanes, world = after_six_steps(collision="discrete")
     met = shots.TARGET - shots.TARGET_RADIUS - shots.RADIUS
     expected = {

@@ -1,4 +1,4 @@
-"""The library of scenes: the protocol, the published generator, and what each scene is there to show."""
+"""The scene library: the protocol, the published generator, and the behaviour of each scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WITHOUT_CHANCE = {  # any seed gives the same world
 
 
 def published_generator(count: int, seed: int = 12345) -> list[float]:
-    """One number after the other, as the definition reads."""
+    """One number after the other, by definition."""
     x, numbers = seed, []
     for _ in range(count):
         x = (1664525 * x + 1013904223) % 2**32
@@ -118,7 +118,7 @@ class TestEveryScene:
         scene = scenes.get(name)
         world = scene.build()
         lower, upper = np.array(scene.view)
-        for _ in range({"fastgas": 1, "shots": 6}.get(name, 20)):  # that bodies leave the box is what fastgas shows
+        for _ in range({"fastgas": 1, "shots": 6}.get(name, 20)):  # bodies leave the box in fastgas
             positions = world.bodies.dynamic.position
             assert np.all((positions > lower) & (positions < upper))
             world.step()
@@ -169,7 +169,7 @@ def test_the_hero_lands_six_tiles_further_on_the_ground():
     [("asteroids", 300), ("gas2d", 120), ("gas3d", 30), ("mixed2d", 120), ("maze", 120), ("static_world", 120)],
 )
 def test_elastic_scenes_keep_their_energy(name, steps):
-    """In gas3d a wall is struck more often in a step than a body may be: walls have no limit."""
+    """In gas3d a wall has more impacts in a step than the cap of a body: walls have no cap."""
     world = scenes.get(name).build()
     before, impacts = world.kinetic_energy(), 0
     for _ in range(steps):

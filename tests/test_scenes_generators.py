@@ -1,4 +1,4 @@
-"""The benchmark scenes are what their definition says: every number again by a plain loop, body by body."""
+"""The benchmark scenes against their definition: every number from a plain loop, body by body."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ SMALL = {name: {"n": 400} for name in (*GENERATORS, "maze", "platforms")} | {"py
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", sorted(set(scenes.names()) - {"freefall", "spring", "orbit", "conveyor", "player"}))
 def test_nothing_overlaps_at_the_start(name, seed):
-    """What stands on something touches it: a gap of 0, to rounding."""
+    """A body that stands on another touches it: a gap of 0, to rounding."""
     with make(name, seed=seed, **SMALL.get(name, {})) as world:
         assert min(gaps(world).values()) > -1e-12
 

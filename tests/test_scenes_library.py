@@ -1,4 +1,4 @@
-"""What the game-like scenes promise before any contact is solved: mazes, belts, lifts, repeatability."""
+"""Game-like scenes before any contact is solved: mazes, belts, lifts, repeatability."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from carom.scenes import conveyor, galperin, lift, maze, platforms
 
 
 def reached(right, above):
-    """The cells that can be reached from (0, 0), by walking."""
+    """The cells that can be reached from (0, 0)."""
     side = len(right)
     seen, todo = set(), [(0, 0)]
     while todo:
@@ -35,7 +35,7 @@ def reached(right, above):
 
 @pytest.mark.parametrize(("side", "seed"), [(1, 0), (2, 0), (7, 3), (32, 0)])
 def test_the_maze_has_one_way_to_every_cell(side, seed):
-    """All cells are reached, by one passage less than there are cells: a tree. The rim is closed."""
+    """All cells are reached, with one passage less than there are cells: a tree. The outer wall is closed."""
     right, above = maze.cut(side, np.random.default_rng(seed))
     assert len(reached(right, above)) == side**2
     assert (~right).sum() + (~above).sum() == side**2 - 1
@@ -71,7 +71,7 @@ def test_each_mover_starts_in_a_cell_of_its_own(n):
 
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 37, 1 / 200])
 def test_the_belt_never_tears_and_the_chute_keeps_its_time(dt):
-    """Slats stay a slat apart and cover the belt; crate k drops in the step that holds k EVERY."""
+    """Slats keep their spacing and cover the belt; crate k drops in the step that contains k EVERY."""
     with conveyor.build(Settings(dt=dt), n=4) as world:
         for step in range(round(4.0 / dt)):
             dropped = min(4, int(world.time / conveyor.EVERY + 1e-9) + 1)
@@ -86,7 +86,7 @@ def test_the_belt_never_tears_and_the_chute_keeps_its_time(dt):
 
 
 def test_lift_and_ferry_are_where_their_schedule_says():
-    """At every step's end, to rounding, however long it has been going: no drift from adding velocities."""
+    """At the end of every step, to rounding, after any time: no drift from summed velocities."""
     with lift.build() as world:
         for _ in range(600):
             world.step()
@@ -138,7 +138,7 @@ def test_pi_in_counts():
     ],
 )
 def test_the_same_seed_gives_the_same_bits(name, options):
-    """After 90 steps, with everything that systems add on the way."""
+    """After 90 steps, with everything that systems create meanwhile."""
     build = importlib.import_module(f"carom.scenes.{name}").build
     hashes = []
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""What each field of Settings costs and buys: every field is there, and the figures are those that theory gives."""
+"""The settings study: it has every field, and its figures agree with theory."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ STUDIED = [("dt", "jump"), ("slop", "tiles"), ("debug", "jump"), ("friction_mixi
 
 
 def errors(field, scene, *values):
-    """What the study measures for these values, one after the other; without the clock."""
+    """The study's errors for these values, without timing."""
     varied = EVERY[field, scene]
     return [varied.measure(partial(varied.world, value), varied.seconds) for value in values or varied.values]
 
 
 def works(field, scene):
-    """The work of each value of a field, by value; counted, so always the same."""
+    """The work of each value of a field, by value; counted, so reproducible."""
     varied = EVERY[field, scene]
     taken = next(costs([partial(varied.world, value) for value in varied.values], varied.timed, 1, varied.play))
     return dict(zip(varied.values, (cost.work for cost in taken), strict=True))
@@ -62,7 +62,7 @@ def works(field, scene):
 
 @pytest.fixture(scope="module", autouse=True)
 def short_timing():
-    """One span under the clock is enough where only counts are looked at."""
+    """One timed span is enough where only counts are checked."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(settings_clock, "ENOUGH", 1e-4)
         yield
@@ -90,7 +90,7 @@ def test_each_field_is_varied_alone(varied):
                 assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
-# -- what theory says ----------------------------------------------------------------------------
+# -- comparison with theory ----------------------------------------------------------------------
 
 
 def test_the_first_order_of_the_default_in_the_apex():
@@ -102,13 +102,13 @@ def test_the_first_order_of_the_default_in_the_apex():
 def test_twice_the_steps_are_twice_the_work():
     work = works("dt", "jump")
     for dt in (1 / 30, 1 / 60, 1 / 120):
-        assert work[dt / 2] == pytest.approx(2 * work[dt], rel=1e-3)  # but for what the first steps test
+        assert work[dt / 2] == pytest.approx(2 * work[dt], rel=1e-3)  # up to the tests of the first steps
     assert works("dt", "jump") == work
 
 
 @pytest.mark.parametrize("field", ["dt", "substeps"])
 def test_a_tower_gives_way_with_the_square_of_the_substep(field):
-    """load |a| / (m w^2), w = 2 pi substeps / 4 dt: most between the lowest two, under nine boxes, m = 1/2."""
+    """load |a| / (m w^2), w = 2 pi substeps / 4 dt: largest between the lowest two, under nine boxes, m = 1/2."""
     varied = EVERY[field, "stack of 10"]
     for value, found in zip(varied.values, errors(field, "stack of 10"), strict=True):
         settings = varied.base.replace(**{field: value})
@@ -119,7 +119,7 @@ def test_a_tower_gives_way_with_the_square_of_the_substep(field):
 
 def test_substeps_are_work_where_something_rests():
     work = works("substeps", "pyramid of 210")
-    loops = [work[count] - work[1] for count in (2, 4, 8)]  # in proportion to the substeps beyond the first
+    loops = [work[count] - work[1] for count in (2, 4, 8)]  # proportional to the substeps beyond the first
     assert loops[1] / loops[0] == pytest.approx(3, rel=0.02)
     assert loops[2] / loops[0] == pytest.approx(7, rel=0.02)
 
@@ -133,14 +133,14 @@ def test_the_integrators_on_an_orbit():
     for name in ("rk4", "yoshida4"):
         assert found[name]["energy"] < 0.01 * found["velocity_verlet"]["energy"]
     assert found["rk4"]["growth"] < 0  # it loses
-    assert abs(found["yoshida4"]["growth"]) < 0.01 * found["yoshida4"]["energy"]  # symplectic: it comes back
+    assert abs(found["yoshida4"]["growth"]) < 0.01 * found["yoshida4"]["energy"]  # symplectic: it returns
     work = works("integrator", "orbit")
     assert work["semi_implicit_euler"] == work["explicit_euler"] < work["velocity_verlet"] < work["rk4"]
     assert work["rk4"] == work["yoshida4"]
 
 
 def test_the_integrators_on_the_jump():
-    """Both Euler methods miss by the same on either side, the others by what lies between two steps: g dt^2 / 8."""
+    """Both Euler methods are off by the same amount in opposite directions, the others by the sampling: g dt^2 / 8."""
     found = [error["apex"] for error in errors("integrator", "jump")]
     assert found[:2] == pytest.approx([2.0, 2.0])
     assert found[2:] == pytest.approx([jump.GRAVITY / 60**2 / 8] * 3)
@@ -172,7 +172,7 @@ def test_contacts_that_are_none(scene, share):
 
 
 def test_the_first_bounce_that_is_lost():
-    """A ball that hits the floor at the threshold v comes up by e^2 v^2 / 2g; the last bounce but one was higher."""
+    """A ball that hits the floor at the threshold v would rise to e^2 v^2 / 2g; the last bounce was higher."""
     varied = EVERY["restitution_threshold", "drops"]
     for threshold in (None, 0.5, 1.0, 2.0):
         speed = 2 * drops.GRAVITY * varied.base.dt if threshold is None else threshold
@@ -272,7 +272,7 @@ def test_the_six_kinds_of_games():
 
 
 def check_game(game):
-    """The choice keeps its target, is the cheapest that is shown, and its line gives settings."""
+    """The choice meets its target, is the cheapest shown, and its line gives settings."""
     tuned = game.tuned
     assert tuned is not None
     assert tuned.met
@@ -295,7 +295,7 @@ def test_the_shooter():
 
 
 def test_games_get_what_they_need():
-    """Those whose search takes seconds; the shooter has a test of its own."""
+    """Those with a short search; the shooter has its own test."""
     names = ["platformer", "puzzle stacks", "orbits"]
     found = games.games_study(names, repeats=1)
     assert [game.game for game in found.games] == [game.name for game in games.ALL if game.name in names]
@@ -348,7 +348,7 @@ def test_games_as_tables_and_as_json():
 
 @pytest.fixture
 def carom(monkeypatch, study):
-    """The command with studies that are done already; returns what to call with arguments."""
+    """The command with finished studies; returns a function to call with arguments."""
     cli = Commands("carom")
     cli.add_command(settings_command.settings_command)
     asked = []

@@ -1,9 +1,9 @@
-"""Every pair of convex shapes that carom brings, on ten thousand random poses and the extremes, against an oracle that
-knows the shapes only by how far they reach in a direction.
+"""Every pair of convex shapes that ships with carom, on ten thousand random poses and the extremes, against an oracle
+that uses only the extent of a shape in a direction.
 
-Two convex shapes are apart by the largest, over all unit directions n, of d.n - reach_a(n) - reach_b(-n); negative, it
-is how far they overlap. So a depth is right if the normal that comes with it attains it, and if no direction at all
-gives more. The second is tried for many directions, those near the normal among them.
+The distance of two convex shapes is the largest value, over all unit directions n, of d.n - reach_a(n) - reach_b(-n);
+a negative value is minus the overlap. So a depth is right if its normal attains it, and if no other direction gives
+more. The second condition is tested for many directions, including some near the normal.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from carom.plugins.one_way_segment import OneWaySegmentCollider
 SHAPES = (
     AABBCollider, CapsuleCollider, ConvexPolygonCollider, HalfSpaceCollider, OneWaySegmentCollider, SphereCollider
 )  # fmt: skip
-DIRECTIONS = 24  # of each pose: half of them anywhere, half near the normal
+DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
 ROUNDING = 1e-9  # of distance and sizes
 
 
@@ -47,12 +47,12 @@ PAIRS = [
 
 
 def turned(rows: Rows, vectors: np.ndarray) -> np.ndarray:
-    """The bodies' own vectors (n, d) in the world."""
+    """The bodies' own vectors (n, d) in world axes."""
     return np.einsum("pij,pj->pi", rows.axes, vectors)
 
 
 def reach(rows: Rows, n: np.ndarray) -> np.ndarray:
-    """(poses, directions): how far each shape reaches from its centre along n (poses, directions, d)."""
+    """(poses, directions): extent of each shape from its centre along n (poses, directions, d)."""
     arrays = rows.arrays
     component = rows.shape.component
     if component is SphereCollider:
@@ -75,7 +75,7 @@ def reach(rows: Rows, n: np.ndarray) -> np.ndarray:
 
 
 def gap(cases: Poses, n: np.ndarray) -> np.ndarray:
-    """(poses, directions): how far apart the two are along n."""
+    """(poses, directions): gap of the two along n."""
     return np.einsum("pkd,pd->pk", n, cases.d) - reach(cases.a, n) - reach(cases.b, -n)
 
 
@@ -94,7 +94,7 @@ def test_depth_and_normal_of(first, second, d):
     allowed = ROUNDING * cases.scale()
     np.testing.assert_allclose(np.linalg.norm(found.normal, axis=1), 1.0, rtol=0, atol=1e-12)
     assert (found.hit == (found.depth >= 0.0)).all()
-    if HalfSpaceCollider in (first, second):  # only one direction counts, its own
+    if HalfSpaceCollider in (first, second):  # only its own direction counts
         plane, other, sign = (cases.a, cases.b, 1.0) if first is HalfSpaceCollider else (cases.b, cases.a, -1.0)
         normal = unit(turned(plane, plane.arrays["normal"]))
         height = np.einsum("pd,pd->p", sign * cases.d, normal) - reach(other, -normal[:, None])[:, 0]

@@ -1,4 +1,4 @@
-"""Snapshots go on with the same bits and events, and the hash of the state notices any change."""
+"""Restored snapshots give the same bits and events, and the state hash detects any change."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_restored_snapshot_goes_on_with_the_same_bits_and_events():
 
     first = go_on()
     assert len({name for name, *_ in first[1]}) == 4
-    for _ in range(2):  # it can be restored as often as one likes
+    for _ in range(2):  # it can be restored repeatedly
         world.restore(snapshot)
         assert (world.state_hash(), world.time, world.step_count, state(world)) == at
         assert go_on() == first

@@ -18,7 +18,7 @@ from carom.systems.broad_phase.tree.tree import CandidateLimitError, SpatialTree
 
 
 def load_oracle(name):
-    """Import a file of tests/oracles whatever pytest's import mode is."""
+    """Import a file of tests/oracles in any pytest import mode."""
     path = Path(__file__).parent / "oracles" / f"{name}.py"
     spec = importlib.util.spec_from_file_location(f"carom_oracle_{name}", path)
     module = importlib.util.module_from_spec(spec)
@@ -40,7 +40,7 @@ def tree_of(lower, upper, start=0, stop=None):
 
 
 def unordered(first, second):
-    """The pairs as a set, after checking that none is there twice and none is of one object."""
+    """The pairs as a set, after checking that there are no duplicates and no self pairs."""
     pairs = {(min(i, j), max(i, j)) for i, j in zip(first.tolist(), second.tolist(), strict=True)}
     assert len(pairs) == len(first)
     assert all(i != j for i, j in pairs)
@@ -86,12 +86,12 @@ def scene(name, n, d, rng):
             return uniform[rng.integers(0, n // 4 + 1, n)], half
         case "split lines":  # centres and edges on multiples of powers of two
             return rng.integers(0, 17, (n, d)) * 4.0, 2.0 ** rng.integers(-3, 3, (n, 1))
-        case "far outside":  # most of the extent is empty, a quarter of the bodies in it
+        case "far outside":  # most of the extent is empty, with a quarter of the bodies
             far = rng.random((n, 1)) < 0.25
             return np.where(far, rng.standard_cauchy((n, d)) * 100 * side, uniform), half
         case "sizes 1e-9 to 1e9":
             return rng.standard_cauchy((n, d)), 10.0 ** rng.uniform(-9, 9, (n, 1))
-        case "galaxies":  # two dense places, 1e9 apart
+        case "galaxies":  # two dense regions, 1e9 apart
             return uniform + rng.integers(0, 2, (n, 1)) * 1e9, half
         case "line":
             return uniform * np.eye(d)[d - 1], np.full((n, 1), 0.002)
@@ -144,7 +144,7 @@ coordinate = st.one_of(
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_any_boxes_at_all(d, data):
-    """NaN, infinities, empty boxes, one ulp apart: what brute force says, no more and no less."""
+    """NaN, infinities, empty boxes, one ulp apart: exactly the result of brute force."""
     n = data.draw(st.integers(0, 70))
     values = data.draw(st.lists(coordinate, min_size=8, max_size=40))
     rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
@@ -170,7 +170,7 @@ def test_any_scale_and_any_spread(d, seed, exponent, n):
 @pytest.mark.parametrize("spacing", [1.0, 0.25, 2.0**-30, 2.0**40])
 def test_lattice_of_touching_discs(n, spacing):
     """Touching counts: the boxes of n x n discs at spacing 2 R touch 2 n (n - 1) times along the axes, and
-    2 (n - 1)^2 times at corners. One ulp less of size and none do."""
+    2 (n - 1)^2 times at corners. At one ulp less of size none touch."""
     centre = np.stack(np.meshgrid(np.arange(n), np.arange(n)), axis=-1).reshape(-1, 2) * spacing
     lower, upper = centre - spacing / 2, centre + spacing / 2
     first, second = tree_of(lower, upper).pairs_within()
@@ -191,7 +191,7 @@ def test_lattice_of_touching_balls(n):
 @both_dimensions
 @pytest.mark.parametrize("offset", [0.0, 1.0, 1e6, 1e15])
 def test_one_ulp_decides(d, offset):
-    """Neighbours in a chain that share an edge overlap; one ulp between them and they do not."""
+    """Neighbours in a chain that share an edge overlap; with a gap of one ulp they do not."""
     edges = offset + np.arange(0, 401, dtype=float)
     lower = np.full((400, d), offset)
     upper = np.full((400, d), offset + 1.0)
@@ -249,7 +249,7 @@ def test_many_bodies_at_one_point_are_counted_not_stored(d):
 
 @both_dimensions
 def test_walls_and_a_static_world(d):
-    """Four huge walls against small movers, either way round; then a crowd of static boxes against few movers."""
+    """Four huge walls against small movers, in either order; then many static boxes against few movers."""
     rng = np.random.default_rng(5)
     centre, half = scene("uniform", 4000, d, rng)
     lower, upper = centre - half, centre + half

@@ -36,7 +36,7 @@ ROWS = [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1), (1.0, 1.0), (1.0, 2.0)]  # (stiffnes
 
 
 def at_share_of_limit(method, share):
-    """(stiffness, drag) in steps of 1 s that lie at that share of each limit above zero."""
+    """(stiffness, drag) for steps of 1 s, at that fraction of each limit above zero."""
     limits = [naive.stability_limit(method, *row) for row in ROWS]
     return np.array(
         [(k * (share * h) ** 2, c * share * h) for (k, c), h in zip(ROWS, limits, strict=True) if h > 1e-3]
@@ -94,13 +94,13 @@ def test_bounded_just_below_the_limit(method):
 @pytest.mark.slow
 @all_methods
 def test_bounded_just_below_the_limit_for_long(method):
-    """B6, C16: 30,000 steps; the eigenvalues say the rest."""
+    """B6, C16: 30,000 steps; the eigenvalues cover longer runs."""
     check_stable_run(method, 30_000)
 
 
 @all_methods
 def test_growth_just_above_the_limit(method):
-    """B6, C16: at 1.01 the run grows as its matrix power says (1e-6: double eigenvalues of critical damping magnify
+    """B6, C16: at 1.01 the run grows like its matrix power (1e-6: double eigenvalues of critical damping amplify
     rounding by n^2); explicit Euler grows at any z without damping."""
     stiffness, drag = at_share_of_limit(method, 1.01).T
     if method == "explicit_euler":
@@ -122,7 +122,7 @@ def test_double_root_of_semi_implicit_euler():
 
 def test_what_explodes_is_reported():
     """B6, B7: explicit Euler with drag at dt = 2.5 tau grows by 1.5 per step; once not finite, a fault names the body
-    and the other bodies are as they would be without it."""
+    and the other bodies are as without it."""
     world = oscillators("explicit_euler", 1.0, 0.0, [2.5, 0.5], v0=1.0)
     alone = oscillators("explicit_euler", 1.0, 0.0, 0.5, v0=1.0)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -162,7 +162,7 @@ def test_drag_force_of_every_method_is_the_textbooks(method):
     factor = naive.oscillator_matrix(method, 0.0, 1 / TAU, dt)[1, 1]
     expected = V_T * (1 - factor ** np.arange(steps + 1))
     np.testing.assert_allclose(velocities[:, 0, 0], expected, rtol=0, atol=1e-13 * V_T)
-    if method in ("velocity_verlet", "rk4"):  # and near the true speed, as the order says
+    if method in ("velocity_verlet", "rk4"):  # and near the true speed, to the method's order
         true = -V_T * np.expm1(-dt * np.arange(steps + 1) / TAU)
         np.testing.assert_allclose(velocities[:, 0, 0], true, rtol=0, atol=V_T * (dt / TAU) ** ORDERS[method])
 
@@ -172,7 +172,7 @@ def test_drag_force_of_every_method_is_the_textbooks(method):
 def test_terminal_speed_is_a_fixed_point(method, dt):
     """B7: a body at terminal speed stays there, 1e-14, with drag as a force and as linear_damping.
 
-    Where steps are short, half ulps gather until they are pulled back: tau / dt of them.
+    With short steps, half ulps accumulate until drag removes them: tau / dt of them.
     """
     world = oscillators(method, dt, 0.0, 1 / TAU, x0=0.0, v0=V_T, gravity=(G, 0.0))
     damped = world.create_entity(Transform((0, 0)), RigidBody(1.0, (V_T, 0.0), linear_damping=1 / TAU))
@@ -182,7 +182,7 @@ def test_terminal_speed_is_a_fixed_point(method, dt):
 
 
 class Nothing(ForceSystem):
-    """Its presence alone makes the integrators evaluate every stage."""
+    """Its presence makes the integrators evaluate every stage."""
 
     def add_forces(self, bodies, time):
         pass
@@ -257,7 +257,7 @@ def test_linear_damping_has_the_methods_order_with_a_spring(method):
 def test_heavily_damped_bodies_creep(method):
     """c = 600 / s at 60 Hz on a spring of 600 N/m: x = e^(-t) to the first order, (k / c) dt = 1/60.
 
-    A body without damping beside it does not notice.
+    An undamped body beside it is not affected.
     """
     world = make_world(dt=1 / 60, integrator=method)
     world.create_entity(Transform((1, 0)), RigidBody(linear_damping=600.0), Oscillator(600.0))
@@ -290,7 +290,7 @@ class Network(ForceSystem):
 
 
 def return_error(method, steps=1000):
-    """Forward, velocities turned round, back: how far from the start, relative to the largest coordinate."""
+    """Forward, velocities reversed, back: distance from the start, relative to the largest coordinate."""
     rng = np.random.default_rng(8)
     n = 100
     springs = np.triu(rng.random((n, n)) < 0.05, 1) * rng.uniform(1.0, 5.0, (n, n))
@@ -308,9 +308,9 @@ def return_error(method, steps=1000):
 
 @all_methods
 def test_time_reversal(method):
-    """B8: 100 bodies, springs, no collisions. VV and YO4 are their own adjoints and come back; the others do not."""
+    """B8: 100 bodies, springs, no collisions. VV and YO4 are their own adjoints and return; the others do not."""
     error = return_error(method)
     if method in ("velocity_verlet", "yoshida4"):
         assert error < 1e-12
     else:
-        assert error > 1e-9  # else the test would not tell
+        assert error > 1e-9  # otherwise the test could not distinguish them

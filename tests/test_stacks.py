@@ -1,6 +1,6 @@
-"""What stands on each other stays: towers, heavy bodies on light ones, pyramids, in 2D and 3D.
+"""Stacks stay in place: towers, heavy bodies on light ones, pyramids, in 2D and 3D.
 
-Overlap at rest is known: each contact gives way like its spring does under the load, see ``soft_overlap``.
+Overlap at rest is known: each contact is compressed like its spring under the load, see ``soft_overlap``.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ COUNTS = (2, 5, 10, 20, 40)
 def test_towers_stand(d, maker):
     """B18, default settings: no drift, penetration up to the slop + 25 % for ten, speed below 1e-6 after 5 s.
 
-    Each contact carries g dt times the mass above it, and gives way as its spring does: both to the 1e-9 to which the
-    solver has converged. While it settles a tower of 40 gives 1.3 times as much, one of ten or less no more than that.
+    Each contact carries g dt times the mass above it, and is compressed like its spring: both to the 1e-9 of the
+    solver's convergence. While settling, a tower of 40 overlaps 1.3 times as much, one of ten or less no more than
+    that.
     """
     world = make_world(d, gravity=G)
     ground = floor(world)
@@ -73,7 +74,7 @@ def test_more_substeps_give_stiffer_contacts(substeps):
 @pytest.mark.parametrize(("e", "deepest"), [(0.0, 0.07), (0.5, 0.016), (0.9, 0.015)])
 @both_dimensions
 def test_fifteen_boxes_fall_on_each_other(d, e, deepest):
-    """0.1 apart at the start: no energy out of nothing, overlaps within the measured, all at rest after 5 s."""
+    """0.1 apart at the start: energy does not grow, overlaps within the measured ones, all at rest after 5 s."""
     world = make_world(d, gravity=G)
     floor(world)
     ids = tower(world, 15, bottom=0.55, pitch=1.1, restitution=e)
@@ -89,8 +90,8 @@ def test_fifteen_boxes_fall_on_each_other(d, e, deepest):
 def test_published_stacks_near_and_far(origin):
     """A8, VerticalStack: 15 unit boxes at y = 0.55 + 1.1 i, x = +-0.01; CircleStack: 10 circles r = 1 at y = 4 + 3 i.
 
-    They must stand, without a sideways move, also far from the origin: heights as near it up to ten roundings of the
-    place a substep, 600 steps.
+    They must stand, without sideways motion, also far from the origin: heights equal to those near it up to ten
+    roundings of the position per substep, 600 steps.
     """
     x, y = origin
     world = make_world(gravity=10.0)
@@ -112,7 +113,7 @@ def test_published_stacks_near_and_far(origin):
 
 @both_dimensions
 def test_a_wide_ground_is_as_good_as_a_narrow_one(d):
-    """A10: three unit boxes stand coherent whatever the half-width of what they stand on, up to 1e6: the same bits."""
+    """A10: three unit boxes stand for any half-width of the ground, up to 1e6: the same bits."""
     answers = []
     for half in (1.0, 1e2, 1e4, 1e6):
         world = make_world(d, gravity=G)
@@ -146,9 +147,9 @@ def test_heavy_on_light(d, substeps):
 
 @pytest.mark.parametrize(("substeps", "limits"), [(4, (0.018, 0.22)), (32, (2.4e-4, 0.0034))])
 def test_heavy_on_several_light_ones(substeps, limits):
-    """Three boxes below one of 100 or 1000 times their mass: a documented limit, for the block of two does not apply.
+    """Three boxes below one of 100 or 1000 times their mass: a documented limit, because the 2x2 block does not apply.
 
-    At a ratio of 100 the contact at rest gives way as its spring does; before, it gives a quarter more.
+    At a ratio of 100 the contact at rest is compressed like its spring; in the transient a quarter more.
     """
     world = make_world(gravity=G, substeps=substeps)
     floor(world)
@@ -166,7 +167,8 @@ def test_heavy_on_several_light_ones(substeps, limits):
 def test_a_heavy_box_on_top_of_a_pyramid(density):
     """A8, HighMassRatio1: ten rows of boxes of side 2, the top one 100 to 300 times as dense. They stand, for 10 s.
 
-    Two boxes carry the top one: at 300 their contacts give way by soft_overlap(600, 4 300 / 301) = 0.6 % of a box.
+    Two boxes carry the top one: at 300 their contacts are compressed by soft_overlap(600, 4 300 / 301) = 0.6 % of a
+    box.
     """
     world = make_world(gravity=10.0)
     floor(world, friction=0.6)
@@ -184,10 +186,10 @@ def test_a_heavy_box_on_top_of_a_pyramid(density):
 
 
 @both_dimensions
-def test_taking_the_load_off_shoots_nobody_up(d):
-    """A8, WarmStartEnergy: three circles, densities 1, 1, 100; the top one goes after 120 steps.
+def test_removing_the_load_shoots_no_body_up(d):
+    """A8, WarmStartEnergy: three circles, densities 1, 1, 100; the top one is removed after 120 steps.
 
-    The impulses that carried it are in store; the others must stay: upward speed up to 0.02.
+    The impulses that carried it are stored; the others must stay: upward speed up to 0.02.
     """
     world = make_world(d, gravity=10.0)
     floor(world)
@@ -205,7 +207,7 @@ def test_taking_the_load_off_shoots_nobody_up(d):
 
 @pytest.mark.parametrize("friction", [None, 0.6])
 def test_boxes_in_each_other_part_gently(friction):
-    """A8, OverlapRecovery: a pyramid of four rows at 75 % spacing: nobody faster than 1 m/s, no overlap left."""
+    """A8, OverlapRecovery: a pyramid of four rows at 75 % spacing: no box faster than 1 m/s, no overlap left."""
     world = make_world(gravity=10.0)
     floor(world, friction=friction)
     for x, y in pyramid.initial_positions(4) * 0.75:
@@ -215,12 +217,12 @@ def test_boxes_in_each_other_part_gently(friction):
         assert speed(world) < 1.0
     assert depths(world).max() < SLOP
     if friction:
-        assert speed(world) < 1e-9  # without, the rows slide on, apart
+        assert speed(world) < 1e-9  # without friction the rows continue to slide apart
 
 
 @pytest.mark.parametrize("friction", [0.6, 0.0])
 def test_a_pyramid_of_fifty_rows_stands_without_drift(friction):
-    """10 s. The boxes of a row touch with nothing between them: no push to the side, so no friction is needed."""
+    """10 s. The boxes of a row touch without force between them: no sideways push, so no friction is needed."""
     with pyramid.build(friction=friction) as world:
         start = pyramid.initial_positions(50)
         run(world, 300)

@@ -1,4 +1,4 @@
-"""Grids of what does not move against brute force, alone and in the broad phase of whole worlds."""
+"""The static grid against brute force, alone and in the broad phase of whole worlds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from carom.systems.broad_phase.tree import tree as spatial_tree
 
 
 def check(lower, upper, start, stop):
-    """The grid of rows start..stop-1, after comparing what all other rows find in it with brute force."""
+    """The grid of rows start..stop-1, after comparing the pairs of all other rows with brute force."""
     grid = StillGrid(lower, upper, start, stop)
     if not grid.suits:
         return grid
@@ -36,8 +36,8 @@ def check(lower, upper, start, stop):
 @both_dimensions
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-def test_any_boxes_look_into_even_ones(d, data):
-    """Boxes of all sizes, touching, infinite and without shape; the largest of what does not move stay outside."""
+def test_any_boxes_against_even_ones(d, data):
+    """Boxes of all sizes, touching, infinite and without shape; the largest static ones stay outside."""
     rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
     count, large = data.draw(st.integers(OUTSIDE + 1, 300)), data.draw(st.integers(0, OUTSIDE))
     unit = 10.0 ** data.draw(st.integers(-100, 100))
@@ -65,7 +65,7 @@ def test_walls_stay_outside(d):
 
 @both_dimensions
 def test_what_does_not_suit(d):
-    """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
+    """More large boxes than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
     rng = np.random.default_rng(2)
     centre, half = rng.random((1000, d)) * 40, np.full((1000, 1), 0.01)
     half[: OUTSIDE + 1] = 15.0
@@ -94,7 +94,7 @@ def test_output_grows_up_to_the_limit(d, monkeypatch):
 
 
 def test_too_many_pairs_are_left_to_the_tree(monkeypatch):
-    """One place per box, and each of 40 others covers all of them: what the limit does not allow, no grid finds."""
+    """One place per box, and each of 40 others covers all of them: the grid must not exceed the limit."""
     centre = np.random.default_rng(4).random((1040, 2)) * 60
     lower, upper = centre - 0.1, centre + 0.1
     lower[1000:], upper[1000:] = -1.0, 1e3
@@ -150,7 +150,7 @@ def touching(world):
 @both_dimensions
 @pytest.mark.parametrize("movers", [1, 60, 400])
 def test_a_level_is_seen_as_it_is(d, movers):
-    """All that overlaps is in contact; also after static boxes were moved by their handles or in the columns."""
+    """All overlaps are contacts; also after static boxes were moved by their handles or in the columns."""
     with level(d, movers, speed=0.0) as world:
         sphere = int(world.bodies.entity[0])
         for turn in range(4):

@@ -1,4 +1,4 @@
-"""suggest_dt and step_limits: speed against thin things, nothing and nonsense; the world is left alone."""
+"""suggest_dt and step_limits: speed against thin shapes, no limits and invalid input; the world is not changed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.half_space import plugin as half_space
 from carom.plugins.springs import Springs
 
-# -- nothing, and nonsense -----------------------------------------------------------------------
+# -- no limits, and invalid input ----------------------------------------------------------------
 
 
 def test_worlds_in_which_nothing_limits():
@@ -83,12 +83,12 @@ def test_not_inside_a_step():
         world.step()
 
 
-# -- the world is left alone ---------------------------------------------------------------------
+# -- the world is not changed --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("collision", ["discrete", "continuous", "event_driven"])
 def test_asking_changes_no_bit_of_what_follows(collision):
-    """Bouncing and resting bodies on springs, asked before every step, beside their like that is never asked."""
+    """Bouncing and resting bodies on springs, with a call before every step, against an equal world without calls."""
     hashes = []
     for asked in (False, True):
         springs = Springs()
@@ -111,7 +111,7 @@ def test_asking_changes_no_bit_of_what_follows(collision):
     assert hashes[0] == hashes[1]
 
 
-# -- speed against thin things -------------------------------------------------------------------
+# -- speed against thin shapes -------------------------------------------------------------------
 
 
 def shot(collision="discrete", speed=30.0, thickness=0.1, radius=0.25, **body):
@@ -184,7 +184,7 @@ def test_the_first_passage_against_all_pairs(seed):
 
 
 def test_scenes_of_the_library():
-    """Each has an answer, none is changed by the question."""
+    """Each has a result, and none is changed by the call."""
     for name in ("stack", "billiards", "gas2d", "jump", "conveyor", "cradle"):
         with scenes.get(name).build() as world:
             run(world, 3)

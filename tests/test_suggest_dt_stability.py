@@ -1,4 +1,4 @@
-"""suggest_dt and step_limits: known limits of stability, and which oscillation it is that limits the step."""
+"""suggest_dt and step_limits: known limits of stability, and the oscillation that limits the step."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_the_limit_is_that_of_the_table(method, column):
 
 @all_methods
 def test_limits_are_those_of_the_textbooks_step(method):
-    """For damping ratios between those of the table, and Yoshida's method, which it has not."""
+    """For damping ratios between those of the table, and Yoshida's method, which is not in it."""
     drags = (0.0, 0.02, 0.3, 0.7, 1.5, 3.0, 10.0)
     limits = stability_limits(STANDARD_INTEGRATORS[method](), np.ones(len(drags)), drags)
     for drag, limit in zip(drags, limits, strict=True):
@@ -97,7 +97,7 @@ def test_explicit_euler_has_no_step_for_a_spring_without_damping():
 
 
 def test_event_driven_worlds_have_the_limits_of_their_flight():
-    """Second order, like velocity Verlet, whatever the integrator: 2 and 1.91 (B6)."""
+    """Second order, like velocity Verlet, for any integrator: 2 and 1.91 (B6)."""
     for (stiffness, drag), limit in zip(COLUMNS, TABLE["velocity_verlet"], strict=True):
         found = step_limits(oscillators("explicit_euler", 1 / 60, stiffness, drag, collision="event_driven"))
         assert found.stability == pytest.approx(limit, abs=DIGITS)
@@ -150,7 +150,7 @@ def test_chains_of_springs(n, dimensions):
 
 @pytest.mark.parametrize("n", [200, 1200])
 def test_long_chains(n):
-    """Only the extreme modes are sought: within a thousandth, and never stiffer than the stiffest."""
+    """Only the extreme modes are computed: within a thousandth, and never above the stiffest."""
     world, highest = chain(n)
     limits = step_limits(world)
     assert 2 / highest * (1 - NOISE) <= limits.stability <= 2 / highest * 1.001
@@ -190,7 +190,7 @@ def coupled(stiffness, drag, dt=1 / 60, **settings):
 
 @pytest.mark.parametrize("method", METHODS[1:4])
 def test_bodies_whose_springs_and_drag_do_not_share_their_modes(method):
-    """A spring between two bodies of which one alone is braked: the run stays bounded just below the limit."""
+    """A spring between two bodies of which only one has drag: the run stays bounded just below the limit."""
     stiffness, drag = [[50, -50], [-50, 50]], [[12, 0], [0, 0]]
     limit = step_limits(coupled(stiffness, drag, integrator=method)).stability
     for share, stable in ((0.99, True), (1.02, False)):
@@ -204,7 +204,7 @@ def test_bodies_whose_springs_and_drag_do_not_share_their_modes(method):
 @pytest.mark.parametrize("seed", range(4))
 def test_coupled_bodies_against_the_matrix_of_the_whole_step(method, seed):
     """Random springs, dampers and linear damping of two to four bodies: the first step at which an eigenvalue leaves
-    the unit circle, looked for in steps of 1 %."""
+    the unit circle, searched in steps of 1 %."""
     random = np.random.default_rng(seed)
     n = int(random.integers(2, 5))
     springs, dampers = (random.normal(size=(n, n)) * s for s in (10.0, 2.0))
@@ -219,7 +219,7 @@ def test_coupled_bodies_against_the_matrix_of_the_whole_step(method, seed):
 
 
 def test_free_motion_of_what_hangs_together_has_no_limit():
-    """Two bodies with a damped spring between them: their centre flies freely, which explicit Euler does well."""
+    """Two bodies with a damped spring between them: their centre moves freely, which explicit Euler integrates well."""
     springs = Springs()
     world = World(Physics(), springs, settings=Settings(integrator="explicit_euler"))
     a, b = (world.create_entity(Transform((x, 0)), RigidBody()) for x in (0, 1))
@@ -266,7 +266,7 @@ def test_a_rope_at_its_full_length_counts_as_taut():
 
 
 def test_what_grows_by_itself_limits_no_step():
-    """A body on top of a hill: no step could prevent it."""
+    """A body on top of a hill: no step could prevent the growth."""
     world = oscillators("velocity_verlet", 1 / 60, [-4.0, 1.0])
     assert step_limits(world).stability == pytest.approx(2.0, rel=NOISE)
     assert suggest_dt(oscillators("velocity_verlet", 1 / 60, -4.0)) == math.inf
@@ -301,7 +301,7 @@ def test_an_integrator_of_a_plugin():
 
 
 def test_far_from_the_origin():
-    """A spring to a place 10,000 km away from the origin, of 2 rad/s."""
+    """A spring of 2 rad/s to a point 10,000 km from the origin."""
 
     class Pull(ForceSystem):
         def add_forces(self, bodies, time):

@@ -1,5 +1,5 @@
-"""The small kernels beneath sweeps against brute force: roots, the heap, joined pairs, rooms, touches on curved ways,
-flight."""
+"""The small kernels of sweeps against brute force: roots, the heap, merged pairs, search bounds, touches on curved
+paths, flight."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ numbers = st.floats(-10, 10).map(lambda x: round(x, 3))
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(st.floats(0, 10), numbers, numbers, numbers, st.floats(0.01, 2))
 def test_first_root_against_numpy(gap, c1, c2, c3, span):
-    """Exact of a parabola; never late of a cubic. Tolerance: double roots are lost to the root of rounding."""
+    """Exact for a parabola; never late for a cubic. Tolerance: double roots lose half of the digits."""
     exact, cubic = first_root(gap, c1, c2, 0.0, span), first_root(gap, c1, c2, c3, span)
     for root, third in ((exact, 0.0), (cubic, c3)):
         polynomial = np.polynomial.Polynomial([gap, c1, c2, third])
@@ -64,7 +64,7 @@ def test_the_heap_against_sorted(orders, seed):
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9))
 def test_merged_pairs_against_sets(seed, n):
-    """Who crossed, struck or hits stays, with all that is known; of the others those stay that are candidates anew."""
+    """Pairs that crossed, had impacts or hit are kept with their data; of the others the new candidates are kept."""
     rng = np.random.default_rng(seed)
     rank = rng.permutation(n)
     every = sorted(((a, b) for a in range(n) for b in range(n) if rank[a] < rank[b]), key=lambda p: tuple(rank[[*p]]))
@@ -113,9 +113,9 @@ def test_merged_pairs_against_sets(seed, n):
 @both_dimensions
 @pytest.mark.parametrize("mode", [CONTINUOUS, EVENT_DRIVEN, DISCRETE])
 @pytest.mark.parametrize("degree", [1, 2])
-def test_nobody_leaves_its_space_before_the_time_said(mode, degree, d):
-    """100 bodies in a crowd, from slow to 50 sizes a step; each is sent another way at some time of the step, and its
-    new path sampled. Who is not swept is not asked. Tolerance: rounding of positions."""
+def test_no_body_leaves_its_search_bounds_before_the_stated_time(mode, degree, d):
+    """100 bodies close together, from slow to 50 sizes per step; each is deflected at some time of the step, and its
+    new path sampled. Bodies that are not swept are left out. Tolerance: rounding of positions."""
     rng, like = np.random.default_rng(10 * mode + degree), (0.0,) * d
     n = 100
     size = 10 ** rng.uniform(-2, 0, n)
@@ -159,8 +159,8 @@ def test_nobody_leaves_its_space_before_the_time_said(mode, degree, d):
 @both_dimensions
 @pytest.mark.parametrize("off", [0.0, 1e-10, 0.3])
 def test_bodies_in_a_row_have_room_however_little_they_are_off_it(off, d):
-    """40 balls 2 m apart that fall 0.2 m in the step: each is alone in its room, 0.4 m wide, so no round is needed. A
-    volume that is next to nothing must not make them a crowd."""
+    """40 balls 2 m apart that fall 0.2 m in the step: each is alone in its search bounds, 0.4 m wide, so no round is
+    needed. A volume of nearly zero must not count as a dense crowd."""
     n, like = 40, (0.0,) * d
     origin = np.zeros((n, d))
     origin[:, 0] = 2.0 * np.arange(n)
@@ -192,9 +192,9 @@ def plain_box(_, a, __, b, d, shapes, like):
 @both_dimensions
 @pytest.mark.parametrize("shape", [plain_sphere, plain_box])
 def test_first_touch_on_parabolas_against_sampling(shape, d):
-    """Touches on curved ways, spheres and boxes of half extents, found at 4000 moments and by halving between two.
+    """Touches on curved paths, spheres and boxes of half extents, found at 4000 moments and by bisection between two.
 
-    Without a graze, which may go either way, times agree to rounding over the slope.
+    Except for grazes, which are ambiguous, times agree to rounding over the slope.
     """
 
     def corner(*_):
@@ -242,7 +242,7 @@ def test_first_touch_on_parabolas_against_sampling(shape, d):
 @given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.booleans())
 def test_flight_against_closed_forms(d, seed, damped):
     """A parabola under the forces of the start, between two half kicks of damping; then the mean of the forces at both
-    ends. Forces that are the same at the end change nothing. Tolerance: a few roundings."""
+    ends. Equal forces at the end change nothing. Tolerance: a few roundings."""
     rng, h = np.random.default_rng(seed), 0.1
     n = 5
     position, velocity = rng.normal(size=(2, n, d))

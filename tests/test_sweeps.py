@@ -1,5 +1,5 @@
-"""Sweeps in closed form: rational cases (B10, B13, B14, C4, C15), and ten thousand random ways against the depth that
-the pairs find, which has an oracle of its own in test_shipped_pairs.
+"""Sweeps in closed form: rational cases (B10, B13, B14, C4, C15), and ten thousand random motions against the depth of
+the pair functions, which test_shipped_pairs tests against an oracle.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ NOWHERE = 1e-300  # keeps tolerances above zero
 
 
 def exact_time(d, v, reach):
-    """When |d + t v| first is reach, of the floats as they are, to 60 digits; infinite for never."""
+    """When |d + t v| is first reach, for these exact floats, to 60 digits; infinite for never."""
     with localcontext() as context:
         context.prec = 60
         d, v, reach = [Decimal(x) for x in d], [Decimal(x) for x in v], Decimal(reach)
@@ -47,7 +47,7 @@ def exact_time(d, v, reach):
 
 
 def test_b10_oblique_spheres():
-    """The second comes to the first: d is minus the flier's place, v its velocity turned round; 4 s are the way."""
+    """The second moves: d is minus the first's position, v its reversed velocity; v covers 4 s."""
     hit, time = sphere_sphere_sweep(Sphere(0.25), Sphere(0.75), (-3.0, 0.6), (4.0, 0.0))
     assert hit
     assert 4 * time == pytest.approx(2.2, rel=1e-15)
@@ -111,7 +111,7 @@ def test_b13_radius_zero_is_a_ray():
 
 @pytest.mark.parametrize("size", [0.1, 0.3, 1 / 3, 0.7])
 def test_nothing_slips_through_the_seams_of_a_row_of_boxes(size):
-    """Neither a ray nor a box that is a point, on its way to where the seam between two boxes ends."""
+    """Neither a ray nor a point box, on its way to the end of the seam between two boxes."""
     half, point = Box((0.5 * size, 0.5 * size)), Box((0.0, 0.0))
     for seam, high in itertools.product(range(40), (0.7, 3.0, 17.1)):
         way = (-2 * seam * size, -2 * high * size)
@@ -123,7 +123,7 @@ def test_nothing_slips_through_the_seams_of_a_row_of_boxes(size):
 @pytest.mark.parametrize("gap", [1e-15, 1e-12, 1e-6])
 @pytest.mark.parametrize("v", [1.0, 3.0, 1e-150, 1e150])
 def test_b14_nearly_touching(gap, v):
-    """Along an axis the rounded start is all that is lost; aslant, roundings of the distance."""
+    """Along an axis only the rounding of the start is lost; obliquely, roundings of the distance."""
     start, way = 2.0 + gap, v * max(gap * 2, 1e-3)
     ratio = (start - 2.0) / way
     for shapes in ((Sphere(0.5), Sphere(1.5)), (Sphere(0.5), Box((1.5, 1.5))), (Box((0.5, 0.1)), Box((1.5, 0.2)))):
@@ -146,7 +146,7 @@ def test_b14_nearly_touching(gap, v):
 @pytest.mark.parametrize("offset", [0.0, 0.3, 0.9, 1 - 1e-6])
 @pytest.mark.parametrize("speed", [1e-150, 1e-9, 1.0, 1e9, 1e145])
 def test_b14_far_starts_and_scales(offset, speed):
-    """At 1e7 radii, lengths from 1e-150 to 1e150: what is left of the coordinates, over the slope of the meeting."""
+    """At 1e7 radii, lengths from 1e-150 to 1e150: the remaining digits of the coordinates, over the closing slope."""
     for d, v in (((1e7, offset), (-2e7, 0.0)), ((1e7, offset, 0.0), (-1.9e7, 0.0, 0.0)), ((6e6, 8e6), (-9e6, -1.2e7))):
         d, v, reach = [x * speed for x in d], [x * speed for x in v], speed
         expected = exact_time(d, v, reach)
@@ -157,7 +157,7 @@ def test_b14_far_starts_and_scales(offset, speed):
 
 @pytest.mark.parametrize("scale", [1e-154, 1e-150, 1e150, 1e153])
 def test_extreme_ways(scale):
-    """A way too short to matter, or one that is over at once; and sizes as extreme."""
+    """A negligible motion, or one that ends at once; and equally extreme sizes."""
     one, two = Sphere(1.0), Box((1.0, 1.0))
     for sweep, a, b in ((sphere_sphere_sweep, one, one), (sphere_box_sweep, one, two), (box_box_sweep, two, two)):
         hit, time = sweep(a, b, (3.0, 0.5), (-scale, 0.0))
@@ -252,7 +252,7 @@ def test_finite_numbers_of_any_size_give_a_time():
             assert hit or time == 0.0
 
 
-# -- ten thousand random ways ---------------------------------------------------------------------
+# -- ten thousand random motions ------------------------------------------------------------------
 
 
 def registry():
@@ -273,8 +273,8 @@ every_pair = pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: "-".join(ea
 
 @cache
 def ways(pair, d):
-    """(compiled pair, poses, ways, hit, time): from each pose a way, to near the other or anywhere, a fifth slanted
-    along axes, some of no length."""
+    """(compiled pair, poses, displacements, hit, time): for each pose a displacement, towards the other or anywhere, a
+    fifth along slanted axes, some of zero length."""
     found = REGISTRY.pair(*pair)
     assert found is not None
     assert found.sweep is not None
@@ -319,7 +319,7 @@ def test_they_touch_then_and_not_before(pair, d):
 @both_dimensions
 @every_pair
 def test_what_is_missed_is_missed_by_something(pair, d):
-    """The least gap on the way, by a ternary search: the gap of convex shapes is a convex function of the way."""
+    """The least gap during the motion, by a ternary search: the gap of convex shapes is a convex function of time."""
     code, cases, v, hit, _ = ways(pair, d)
     missed = np.flatnonzero(~hit)
     cases, v = cases.take(missed), v[missed]
@@ -337,7 +337,7 @@ def test_what_is_missed_is_missed_by_something(pair, d):
 @both_dimensions
 @every_pair
 def test_a_way_four_times_as_long_changes_no_digit(pair, d):
-    """Casts rely on it: their ways are as long as the next power of two."""
+    """Casts rely on it: their displacements have the next power of two as length."""
     code, cases, v, hit, time = ways(pair, d)
     hit_far, time_far = code.sweep(cases.a, cases.b, cases.d, 4.0 * v)
     np.testing.assert_array_equal(time_far[hit] * 4.0, time[hit])
@@ -348,7 +348,7 @@ def test_a_way_four_times_as_long_changes_no_digit(pair, d):
 @both_dimensions
 @pytest.mark.parametrize("pair", PAIRS[:3], ids=["spheres", "sphere-box", "boxes"])
 def test_c22_mirrored_and_swapped_the_digits_stay(pair, d):
-    """Mirrored along one axis; x and y exchanged in 2D; seen from the other of two alike."""
+    """Mirrored along one axis; x and y exchanged in 2D; with exchanged roles for equal shapes."""
     code, cases, v, hit, time = ways(pair, d)
     mirror = np.ones(d)
     mirror[d - 1] = -1.0
@@ -385,7 +385,7 @@ def test_plain_python_gives_the_same_digits(d):
 
 @both_dimensions
 def test_a_cast_that_slides_along_a_face_says_where_it_came_from(d):
-    """At its touch, two directions are as near; before it there is one."""
+    """At the touch, two directions are equally near; before it there is one."""
     world = make_world(d)
     box(world, (5.0, 0.0, 0.0)[:d], half=1.0, kind="static")
     for place, axis, face in (((5.0, -9.0), 1, -1.0), ((7.0, -9.0), 1, -1.0), ((0.0, 2.0), 0, 4.0)):
@@ -399,7 +399,7 @@ def test_a_cast_that_slides_along_a_face_says_where_it_came_from(d):
 
 @both_dimensions
 def test_casts_at_half_spaces(d):
-    """Of rays and shapes, near, far away and without limit."""
+    """Casts of rays and shapes, near, far away and without limit."""
     world = World(Physics(dimensions=d), half_space.plugin)
     ground = world.create_entity(Transform(np.zeros(d)), HalfSpaceCollider((0.0, 1.0, 0.0)[:d]))
     up = np.eye(d)[1]

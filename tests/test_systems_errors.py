@@ -1,4 +1,4 @@
-"""Systems that fail: which one is named, what is undone, and how the world goes on."""
+"""Failing systems: the error names the system, the step is undone, and the world can continue."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Health:
 
 
 class Failing:
-    """Does damage everywhere, then raises."""
+    """Changes everything, then raises."""
 
     def act(self, world):
         bodies = world.bodies
@@ -52,7 +52,7 @@ class FailingProcessor(esper.Processor, Failing):
 
 
 def damaged_world(integrator="semi_implicit_euler"):
-    """Something of everything, a few steps in."""
+    """A world with all kinds of state, after a few steps."""
     world = make_world(gravity=9.81, integrator=integrator)
     for x in range(4):
         e = ball(world, (0.95 * x, 0.5), (x, 0.0), restitution=0.5)
@@ -86,7 +86,7 @@ def failing(world, kind):
 
 
 def same_columns(now, before):
-    derived = {"force", "inverse_mass"}  # computed anew from the others in every step
+    derived = {"force", "inverse_mass"}  # recomputed in every step
     for name in before.keys() - derived:
         np.testing.assert_array_equal(now[name], before[name], err_msg=name)
     return True
@@ -115,7 +115,7 @@ def test_an_error_leads_back_to_the_start_of_the_step(kind, how):
     assert same_columns(columns(world), before)
     assert (world.time, world.step_count) == clock
     assert [(c.entity_a, c.entity_b, c.normal_impulse) for c in world.contacts] == touching
-    assert all(health.points < 100 for _, health in world.get_component(Health))  # theirs stay as they were left
+    assert all(health.points < 100 for _, health in world.get_component(Health))  # user data is not restored
     if bad is None:
         return
     world.remove_system(bad)

@@ -1,4 +1,4 @@
-"""Systems: once per step and once per frame, what is added and removed, also in the middle of a step."""
+"""Systems: calls per step and per frame, addition and removal, also in the middle of a step."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_what_is_added_or_removed_inside_a_step_joins_or_leaves_at_its_end(plain
                 self.world.add_processor(plain)
                 self.world.remove_system(leaving)
                 self.world.remove_system(kept)
-                self.world.add_system(kept)  # thought better of it
+                self.world.add_system(kept)  # added again
                 with pytest.raises(ValueError, match="already"):
                     self.world.add_system(late)
                 with pytest.raises(KeyError):

@@ -142,7 +142,7 @@ def test_cycles_and_unknown_neighbours_are_errors_and_leave_nothing_behind():
         world.add_system(b, before=A, after=A)
     with pytest.raises(ScheduleError, match="before C, which is not in this world"):
         world.add_system(b, before=C)
-    world.add_system(b, before=A)  # what failed has left no trace in it
+    world.add_system(b, before=A)  # the failure has left no trace in it
     world.step()
     assert log == ["b", "a"]
 

@@ -1,4 +1,4 @@
-"""The kit for users' tests: each assertion passes on a right world and says what is wrong with a wrong one; the oracle
+"""The kit for users' tests: each assertion passes for a correct world and reports the error of a wrong one; the oracle
 and the compiled step agree."""
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class SpeedsUp(System):
 
 
 class Disables(System):
-    """Takes every contact away."""
+    """Disables every contact."""
 
     phase = Phase.NARROW
 
@@ -67,7 +67,7 @@ def test_flight_is_predicted_for_every_method(method):
 
 
 def test_falls_bounces_and_impacts_are_predicted():
-    """A fall of 2 m is seen within a step of its time; heights within the semi-implicit lag, g dt t / 2 = 5 %."""
+    """A fall of 2 m is detected within a step of its time; heights within the semi-implicit lag, g dt t / 2 = 5 %."""
     world = kit.make_world(gravity=G, integrator="velocity_verlet", dt=1 / 240)
     floor, entity = kit.floor(world), kit.ball(world, (0, 2.5), restitution=0.8)
     log = kit.ContactLog(world)
@@ -98,7 +98,7 @@ def test_collisions_are_predicted(e):
 
 
 def test_sliding_is_predicted():
-    """Within a step of speed: the friction of the first step counts from its start."""
+    """Within one step's change of speed: the friction of the first step counts from its start."""
     world = kit.make_world(gravity=G)
     kit.floor(world)
     entity = kit.box(world, (0, 0.5), 4.0, friction=0.5)
@@ -141,7 +141,8 @@ def test_springs_orbits_and_damping_are_predicted():
 
 @both_dimensions
 def test_what_is_conserved(d):
-    """Elastic balls in free space keep both; friction and e < 1 lose energy, and a system that adds some is seen."""
+    """Elastic balls in free space conserve both; friction and e < 1 lose energy, and a system that adds some is
+    detected."""
     world = kit.make_world(d)
     for x in range(5):
         kit.ball(world, 1.5 * x, (-1.0) ** x, restitution=1.0)
@@ -258,7 +259,7 @@ def together(world, steps):
 
 
 def step_by_step(world, steps):
-    """Each step from the world's own state; returns in how many the two differ where the oracle has its doubts."""
+    """Each step from the world's own state; returns the number of steps that differ where the oracle has doubts."""
     different = 0
     for _ in range(steps):
         oracle = kit.Oracle(world)
@@ -332,8 +333,8 @@ def test_oracle_of_a_platform_that_carries(d):
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.integers(2, 8))
 def test_oracle_of_small_heaps(d, seed, count):
-    """Each step from the world's own state, for heaps are chaotic. A step in which a number of rounding's size decides
-    what happens, such as the gap of two bodies that exactly touch, may come out otherwise; such steps are few."""
+    """Each step from the world's own state, because heaps are chaotic. A step decided by a number of the size of
+    rounding, such as the gap of two bodies that exactly touch, may differ; such steps are few."""
     rng = np.random.default_rng(seed)
     world = kit.make_world(d, G)
     kit.floor(world, friction=0.4)
@@ -387,4 +388,4 @@ def test_oracle_of_sensors_layers_offsets_turned_boxes_damping_and_settings(d):
     kit.ball(world, v(d, 0.3, 1.9), layer=2, mask=1, restitution=0.4)
     damped = RigidBody(3.0, constant_force=(1.0, 0.0, 0.0)[:d], linear_damping=0.8, gravity_scale=0.5)
     world.create_entity(Transform(v(d, -1.5, 1.2)), damped, SphereCollider(0.4))
-    assert step_by_step(world, 40) <= 1  # three impacts between touching bodies at one moment
+    assert step_by_step(world, 40) <= 1  # three impacts between touching bodies at one time

@@ -1,6 +1,6 @@
-"""`trade()` measures what is known: orders, apexes, published energies, and whatever a file of one's own shows.
+"""`trade()` measures known figures: orders, apexes, published energies, and those of user files.
 
-The tolerance of each figure is that of its law, and was there before the run.
+The tolerance of each figure follows from its law, and was set before the run.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ def test_the_orders_of_all_methods_on_the_spring(spring):
 
 
 def test_errors_of_the_spring_are_those_of_the_recurrence():
-    """Semi-implicit Euler in whole steps, iterated here; 2: from 1 to -1 is the longest way."""
+    """Semi-implicit Euler in whole steps, iterated here; 2: from 1 to -1 is the longest displacement."""
     case = case_of("spring", seconds=1.3, repeats=1, steps=(1 / 120,), only=Only(integrators=("semi_implicit_euler",)))
-    omega, x, v = 2 * math.pi, 1.0, 0.0  # a swing a second
+    omega, x, v = 2 * math.pi, 1.0, 0.0  # one oscillation a second
     for _ in range(156):
         v -= omega**2 * x / 120
         x += v / 120
@@ -135,7 +135,7 @@ def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(orbit, me
 
 @pytest.mark.parametrize(("turns", "order"), [(10, 2.0), (0.75, 1.0)])
 def test_semi_implicit_euler_gains_an_order_after_whole_turns(turns, order):
-    """It is velocity Verlet seen half a step aside; from the perihelion that shift is undone after whole turns."""
+    """It is velocity Verlet shifted by half a step; from the perihelion the shift vanishes after whole orbits."""
     seconds = turns * 2 * math.pi
     steps = tuple(seconds / (turns * count) for count in (400, 800, 1600))
     found = case_of(
@@ -159,7 +159,8 @@ def bouncing() -> CaseTrade:
 @pytest.mark.parametrize("dt", [0.1, 0.01])
 def test_the_energy_of_elastic_balls(bouncing, dt):
     """Semi-implicit Euler lags by half a step, M g dt/2: a mean square of 18511 (dt / 0.01)^2 J^2 for 49 balls, and up
-    to 7.5 times that with the two-cycle of the apex. Velocity Verlet with impacts at their times keeps all of it."""
+    to 7.5 times that with the two-cycle of the apex. Velocity Verlet with impacts at their times conserves the
+    energy."""
     found = errors(bouncing, "energy_square")
     assert 0 < found["semi implicit euler", dt] <= 7.5 * 18511 * (dt / 0.01) ** 2
     assert found["velocity verlet", dt] < 1e-16
@@ -198,7 +199,7 @@ def test_a_file_gets_its_reference_from_two_methods_that_agree(tmp_path):
 
 
 def test_errors_against_an_own_reference_are_the_true_ones(tmp_path):
-    """A spring in a file, whose solution only the test knows: cos(w t), way 2."""
+    """A spring in a file, whose solution only the test knows: cos(w t), displacement 2."""
     case = case_of(scene_file(tmp_path, SPRING.format(stiffness=15.0)), repeats=1, steps=(1 / 60,))
     assert case.kind == SMOOTH
     x, v = np.array([1.0]), np.array([0.0])
@@ -223,7 +224,7 @@ def test_a_chaotic_file_is_recognised_and_its_places_are_not_measured(tmp_path):
 
 @pytest.mark.slow  # 80 runs make its reference
 def test_a_chaotic_file_is_measured_by_statistics(tmp_path):
-    """Elastic discs on which nothing acts keep their kinetic energy whatever the step."""
+    """Elastic discs without forces conserve their kinetic energy with any step."""
     case = case_of(scene_file(tmp_path, CROWD), steps=(1 / 60,), repeats=5, workers=None)
     assert (case.kind, case.repeated, case.norm) == (CHAOTIC, "seeds", "pressure")
     assert set(case.reference.spread) >= {"pressure", "rate"}
@@ -249,7 +250,7 @@ def test_a_bullet_through_a_wall_is_kept_as_a_failure(tmp_path):
         assert point.repeats == 8
         assert set(point.failures) <= ({TUNNELLED, ESCAPED} if coarse else set())
         assert not coarse or sum(point.failures.values()) >= 4
-        assert point.counts["steps"] > 0  # failing costs too
+        assert point.counts["steps"] > 0  # failed runs have a cost too
         assert not coarse or not point.meets(case.norm, math.inf)
 
 

@@ -1,4 +1,4 @@
-"""Work-precision charts: what is drawn where, asked of matplotlib; and that nothing is left out."""
+"""Work-precision charts: positions of the drawn marks, read from matplotlib; and that no point is left out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`carom trade`: what it writes and prints, and what it says of input that cannot be."""
+"""`carom trade`: its output, and its errors for invalid input."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ def trade_in(folder: Path) -> Trade:
     return Trade.from_dict(json.loads((folder / "trade.json").read_text()))
 
 
-# -- what it makes --------------------------------------------------------------------------------
+# -- output ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """(folder, result) of a bullet that discrete collisions miss, beside pymunk; timed, with pictures."""
+    """(folder, result) for a bullet that discrete collisions miss, with pymunk; timed, with pictures."""
     folder = tmp_path_factory.mktemp("made")
     mine = scene_file(folder, BULLET, first_line="A bullet & <a wall>.")
     words = [mine, "--dt", "1/15,1/60", "--repeats", "4", "--workers", "1", "--against", "pymunk"]
@@ -111,7 +111,7 @@ def test_what_it_prints(made):
         "reference: own runs", "carom: Settings(",
     ):  # fmt: skip
         assert words in result.stdout, words
-    assert "solver loops" not in result.stdout  # a terminal is not so wide
+    assert "solver loops" not in result.stdout  # a terminal is too narrow
 
 
 def test_json_alone_goes_to_stdout_and_resume_takes_all_over(carom, monkeypatch):
@@ -121,7 +121,7 @@ def test_json_alone_goes_to_stdout_and_resume_takes_all_over(carom, monkeypatch)
     before = trade_in(folder)
     assert before.command == f"carom trade jump {' '.join(SHORT)} --no-pictures"
     kept = (folder / "results.jsonl").read_bytes()
-    monkeypatch.setattr(trade_runs, "perform", None)  # nothing runs
+    monkeypatch.setattr(trade_runs, "perform", None)  # no task runs
     again = carom("jump", *SHORT, "--no-pictures", "--resume")
     assert again.exit_code == 0, again.output
     assert re.search(r"carom: \d+ results in out/trade/results\.jsonl: those that fit are taken over", again.stderr)
@@ -244,7 +244,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
     (("spring", "--no-timign"), "--no-timing"),
 ])  # fmt: skip
 def test_wrong_input_is_refused_at_once_in_one_line(carom, monkeypatch, arguments, words):
-    monkeypatch.setattr(trade_runs, "perform", None)  # nothing runs before
+    monkeypatch.setattr(trade_runs, "perform", None)  # no task runs before
     result = carom(*arguments)
     assert result.exit_code == 2
     assert words in result.stderr.splitlines()[-1]

@@ -1,4 +1,4 @@
-"""The page of a trade: valid, self-contained, light, and with everything in it."""
+"""The page of a trade: valid, self-contained, small, and complete."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PICTURE = base64.b64decode(
 
 
 class Reader(HTMLParser):
-    """Notes what a page consists of, and refuses tags that do not match."""
+    """Records the contents of a page, and rejects tags that do not match."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -130,7 +130,7 @@ def test_it_says_what_was_done_and_what_to_choose(text):
 
 
 def test_every_point_has_its_row(reader):
-    # headings of five tables, all points, what others published, and four targets for two engines and for one
+    # headings of five tables, all points, published results, and four targets for two engines and for one
     assert reader.seen.count("tr") == 5 + (42 + 9) + 20 + (8 + 4)
 
 

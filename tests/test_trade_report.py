@@ -1,4 +1,4 @@
-"""A trade as tables, sentences, files and lines of Python: made of points whose figures are known before."""
+"""A trade as tables, sentences, files and lines of Python: made of points with known figures."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_failures_in_words():
     rows = trade_report.points_table(made.smooth(), "position")
     failed = [text for text in column(rows, "failed") if text]
     assert failed == ["tunnelled", "2 of 64 escaped", "3 of 64 tunnelled"]
-    assert rows.rows[0][3:5] == ("-", "-")  # none of 64 got to the end: no error
+    assert rows.rows[0][3:5] == ("-", "-")  # none of 64 reached the end: no error
     assert trade_report.failure_lines(made.smooth())[1] == "explicit euler, step 1/30 s: 2 of 64 escaped"
 
 

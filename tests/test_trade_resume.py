@@ -1,4 +1,4 @@
-"""What `trade()` has measured stays measured: over interruptions, killed workers, and any number of workers."""
+"""Results of `trade()` are kept: over interruptions, killed workers, and any number of workers."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def measured(target, folder=None, resume=False, workers=1, **options) -> Trade:
 
 @pytest.fixture(autouse=True)
 def however_few(monkeypatch):
-    """Workers are used even for work that takes less time than they need to start."""
+    """Workers are used even for small amounts of work."""
     monkeypatch.setattr(trade_runs, "FEW_STEPS", 0)
 
 
 @pytest.fixture
 def performed(monkeypatch):
-    """The keys of what ran, in this process."""
+    """The keys of the tasks that ran, in this process."""
     ran: list[str] = []
 
     def counted(task):
@@ -59,7 +59,7 @@ def ball(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def whole(ball) -> Trade:
-    """Measured in one go, in one process, with nothing kept."""
+    """Measured in one call, in one process, without a store."""
     return measured(ball)
 
 
@@ -73,7 +73,7 @@ def test_nothing_is_performed_twice_when_it_goes_on(ball, whole, performed, tmp_
     assert len(performed) == len(set(performed)) == RUNS
     assert sorted(keys(path)) == sorted(performed)
     lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"".join(lines[:4]) + lines[4][:30])  # as a process leaves it that is killed while it writes
+    path.write_bytes(b"".join(lines[:4]) + lines[4][:30])  # as left by a process killed while writing
     performed.clear()
     assert measured(ball, tmp_path, resume=True) == whole
     assert len(performed) == len(set(performed)) == RUNS - 4
@@ -122,7 +122,7 @@ def test_two_workers_give_the_same_bits_as_one(ball, whole, tmp_path):
 
 @needs_signals
 def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(tmp_path):
-    """The first process of two that builds the scene dies at once; its run is done again by another."""
+    """The first process of two that builds the scene dies at once; another one repeats its run."""
     mine = scene_file(tmp_path, DEADLY.format(times=1))
     found = measured(mine, tmp_path, workers=2)
     assert len(list((tmp_path / "mine.marks").iterdir())) >= 1  # it happened
@@ -133,7 +133,7 @@ def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(tmp_path):
 
 @needs_signals
 def test_a_run_that_always_kills_its_worker_is_a_failed_run(ball, whole, tmp_path, monkeypatch):
-    """Its process ended twice; the other runs are what they are."""
+    """Its process ended twice; the other runs are not affected."""
     path = tmp_path / "results.jsonl"
     measured(ball, tmp_path)
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))  # only the last run is missing

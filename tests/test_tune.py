@@ -1,6 +1,6 @@
-"""`carom tune` and `tune()`: the cheapest settings that keep an error, or why there are none.
+"""`carom tune` and `tune()`: the cheapest settings that keep an error limit, or why there are none.
 
-Each right answer is known from a closed form or from the words of the interface.
+Each expected result is known from a closed form or from the text of the interface.
 """
 
 from __future__ import annotations
@@ -68,14 +68,14 @@ def test_all_repeats_have_to_keep_the_target(jump):
     assert at_largest[1].error * 64 == pytest.approx(GRAVITY / 15**2 / 8, rel=0.01)
 
 
-def test_nothing_dearer_than_needed_is_run(jump):
+def test_nothing_more_expensive_than_needed_is_run(jump):
     assert jump.choice is not None
     assert len(jump.trials) < 3 * 8 / 2  # the whole grid: three methods, eight steps, all of them 64 times
     assert max(trial.work for trial in jump.trials) < 4 * jump.choice.work
 
 
 def test_the_choice_on_the_spring(spring):
-    """Runge-Kutta 4 lags by (w dt)^4 / 120 of the angle w t: at 1/15 s by 8e-3 of 32.7, which is 3e-3 of the way."""
+    """Runge-Kutta 4 lags by (w dt)^4 / 120 of the angle w t: at 1/15 s by 8e-3 of 32.7, which is a relative 3e-3."""
     lag = (2 * math.pi / 15) ** 4 / 120 * 2 * math.pi * 5.2 / 2
     assert lag < 1e-2
     assert spring.settings == Settings(dt=1 / 15, integrator="rk4")
@@ -93,7 +93,7 @@ def test_the_line_to_paste_gives_the_settings(jump, spring):
 
 def test_dials_that_are_not_searched_stay_in_the_line():
     def falling(settings, seed=0):
-        """A ball falls past nothing; its world wants a slop of its own."""
+        """A ball falls without contacts; its world sets a slop."""
         settings = settings or Settings(dt=1 / 50, slop=0.02, max_steps_per_advance=3)
         world = World(Physics(dimensions=2, gravity=(0.0, -10.0)), settings=settings)
         world.create_entity(Transform((0.0, 5.0)), RigidBody(), SphereCollider(0.5))
@@ -107,7 +107,7 @@ def test_dials_that_are_not_searched_stay_in_the_line():
 
 
 def test_no_step_is_larger_than_the_largest_that_was_allowed():
-    """An error that any step keeps: the largest step, and not a larger one."""
+    """An error that any step meets: the largest step, and not a larger one."""
     found = search("spring", 5.0, steps=TWO_STEPS, seconds=1.0, repeats=1, workers=1)
     assert found.settings.dt == 1 / 30
     assert all(trial.cell.dt <= 1 / 30 for trial in found.trials)
@@ -181,7 +181,7 @@ def test_a_target_below_what_the_references_know_is_refused(tmp_path):
 
 
 def test_a_statistic_that_is_too_noisy_for_the_target_is_refused():
-    """16 discs for 10 s: a single run's pressure is known to some 5 %, 80 of them to half a per cent."""
+    """16 discs for 10 s: a single run's pressure is known to some 5 %, that of 80 runs to half a per cent."""
     options = {"n": 16}
     with pytest.raises(Problem, match=r"thermal_gas.*pressure.*(larger error|longer runs)"):
         search("thermal_gas", 1e-4, seconds=10.0, options=options, workers=1)
@@ -220,11 +220,11 @@ def test_the_names_of_the_laboratory():
     assert carom.lab.check is check
 
 
-# -- elsewhere ----------------------------------------------------------------------------------------------------
+# -- other scenes -------------------------------------------------------------------------------------------------
 
 
 def hero_with(speed: float, gravity: float):
-    """A build of one's own."""
+    """A user's build function."""
 
     def build(settings, seed=0):
         world = World(Physics(dimensions=2, gravity=(0.0, -gravity)), settings=settings)
@@ -235,10 +235,10 @@ def hero_with(speed: float, gravity: float):
 
 
 def test_the_error_on_another_jump_is_that_of_the_closed_form(jump):
-    """g dt^2 / 8 over v^2 / 2g, at the worst of 16 start phases; the promise of 0.1 px is a part of 64 px, or 0.1."""
+    """g dt^2 / 8 over v^2 / 2g, at the worst of 16 start phases; the promise of 0.1 px is relative to 64 px, or 0.1."""
     speed, gravity, dt = 12.0, 30.0, jump.settings.dt
     found = check(jump, hero_with(speed, gravity))
-    assert found.scale == pytest.approx(speed**2 / (2 * gravity), rel=1e-4)  # its own reference sees it at steps too
+    assert found.scale == pytest.approx(speed**2 / (2 * gravity), rel=1e-4)  # its reference samples it at steps too
     assert (found.promise, found.seconds) == (jump.target, jump.seconds)
     worst = (gravity * dt / speed) ** 2 / 4
     assert found.error == pytest.approx(worst, rel=0.2)

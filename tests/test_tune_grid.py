@@ -1,8 +1,8 @@
-"""What a search promises is kept: verified by runs that share nothing with the laboratory, against the whole grid, and
+"""The promises of a search are kept: verified by runs that share nothing with the lab, against the whole grid, and
 on scenes that were not tuned on.
 
 The targets, the scenes held out and the tolerances (1.3 times the work of the grid's cheapest, twice the promise) were
-there before the first run.
+set before the first run.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from carom.scenes import billiards, get, jump, orbit, spring, stack, thermal_gas
 
 pytestmark = pytest.mark.slow
 
-DEARER = 1.3  # times the cheapest of the grid is what the choice may cost
-BROKEN = 2.0  # times the promise is what the error may be elsewhere
+DEARER = 1.3  # limit of the choice's cost over that of the grid's cheapest
+BROKEN = 2.0  # limit of the error on other scenes over the promise
 PERIODS = 10
-LEAST_STEP = WEIGHTS["steps"] + WEIGHTS["force_evaluations"]  # the work of a step in which nothing else happens
+LEAST_STEP = WEIGHTS["steps"] + WEIGHTS["force_evaluations"]  # the work of an otherwise empty step
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """One target of the issue; verify(settings): the error in a run of the test's own, in parts of the target."""
+    """One target of the issue; verify(settings): the error in the test's own runs, relative to the target."""
 
     max_error: float
     norm: str
@@ -48,14 +48,14 @@ WANTED = {
     "orbit": Wanted(1e-4, "energy", {"seconds": PERIODS * orbit.PERIOD}),
     "thermal_gas": Wanted(0.01, "pressure", {"seconds": 40.0}),
     "stack": Wanted(1e-3, "overlap"),
-    # The break itself, to 2 mm where balls have moved by 2 m: 1 s takes in the rack's impacts and the first cushions,
-    # and two starts as near as numbers can be stay near, so there is a right answer. 32 phases keep the test short.
+    # The break itself, to 2 mm where balls have moved by 2 m: 1 s includes the rack's impacts and the first cushions,
+    # and nearby starts stay near, so there is a right result. 32 phases keep the test short.
     "billiards": Wanted(1e-3, "position", {"seconds": 1.0, "repeats": 32}),
 }
 
 
 class Laboratory:
-    """Searches each scene once, and keeps the runs."""
+    """Searches each scene once, and keeps the results."""
 
     def __init__(self, store: Store) -> None:
         self.store = store
@@ -74,11 +74,11 @@ def laboratory(tmp_path_factory):
         yield Laboratory(store)
 
 
-# -- the target, in runs that the laboratory has no part in -------------------------------------------------------
+# -- the target, in runs independent of the lab --------------------------------------------------------------------
 
 
 def hero(settings: Settings | None, seed: int = 0, *, speed: float, gravity: float, start: float = 0.0) -> World:
-    """A jump of its own with ``speed`` at height 0 (m/s or pixels/s), first seen ``start`` s after that."""
+    """The test's own jump with ``speed`` at height 0 (m/s or pixels/s), first sampled ``start`` s after that."""
     world = World(Physics(dimensions=2, gravity=(0.0, -gravity)), settings=settings or Settings())
     height = speed * start - gravity * start**2 / 2
     world.create_entity(
@@ -90,7 +90,7 @@ def hero(settings: Settings | None, seed: int = 0, *, speed: float, gravity: flo
 
 
 def apex_error(settings: Settings) -> float:
-    """Pixels, at worst, of 64 jumps that leave the ground at another moment within a step."""
+    """Pixels, the worst of 64 jumps that leave the ground at different times within a step."""
     missed = []
     for phase in range(64):
         world = hero(settings, speed=jump.JUMP_SPEED, gravity=jump.GRAVITY, start=phase / 64 * settings.dt)
@@ -103,7 +103,7 @@ def apex_error(settings: Settings) -> float:
 
 
 def spring_error(settings: Settings) -> float:
-    """Parts of the longest way, 2: at worst in the last swing that is over by 5.2 s."""
+    """Relative to the largest displacement, 2: the worst in the last oscillation that ends by 5.2 s."""
     world, omega = spring.build(settings), math.sqrt(spring.STIFFNESS / spring.MASS)
     worst = 0.0
     while world.time + settings.dt <= 5.2:
@@ -115,7 +115,7 @@ def spring_error(settings: Settings) -> float:
 
 
 def orbit_error(settings: Settings) -> float:
-    """|E - E0| / |E0| at worst in ten periods."""
+    """|E - E0| / |E0|, the worst in ten periods."""
     world = orbit.build(settings)
 
     def energy() -> float:
@@ -131,7 +131,7 @@ def orbit_error(settings: Settings) -> float:
 
 
 def mean_pressure(settings: Settings, seeds: range, seconds: float = 60.0, discard: float = 12.0) -> float:
-    """Momentum that the walls take per second, from runs with other seeds than any of the laboratory's."""
+    """Momentum that the walls take per second, from runs with other seeds than the lab's."""
     found = []
     for seed in seeds:
         world = thermal_gas.build(settings, seed)
@@ -146,7 +146,7 @@ def mean_pressure(settings: Settings, seeds: range, seconds: float = 60.0, disca
 
 
 def gas_error(settings: Settings) -> float:
-    """Of the pressure, against event-driven runs with a step of a thirtieth of a second."""
+    """Error of the pressure, against event-driven runs with a step of a thirtieth of a second."""
     exact = Settings(dt=1 / 30, integrator="velocity_verlet", collision="event_driven")
     return abs(mean_pressure(settings, range(8000, 8005)) / mean_pressure(exact, range(7000, 7005)) - 1)
 
@@ -163,7 +163,7 @@ def stack_error(settings: Settings) -> float:
 
 
 def billiards_error(settings: Settings) -> float:
-    """Parts of the way of the ball that comes farthest: after 1 s, against a sweep in steps of 1/16 000 s."""
+    """Relative to the largest displacement of a ball: after 1 s, against a sweep in steps of 1/16 000 s."""
     exact = Settings(dt=1 / 16_000, integrator="rk4", collision="continuous")
     start = billiards.build(settings).bodies.dynamic.position.copy()
     places, reach = [], 0.0
@@ -197,7 +197,7 @@ def test_the_choice_meets_its_target_in_runs_of_the_test(laboratory, name):
 
 @pytest.mark.parametrize("name", WANTED)
 def test_the_choice_costs_little_more_than_the_cheapest_of_the_grid(laboratory, name):
-    """Of the same ladder of steps; those whose mere number costs more than the choice cannot be cheaper."""
+    """Over the same ladder of steps; cells whose number of steps alone costs more than the choice are skipped."""
     tuning = laboratory.tuned(name)
     assert tuning.choice is not None
     ladder = tuning.case.steps
@@ -237,7 +237,7 @@ Pair = tuple[float, float]
 def swinging(
     settings: Settings | None, seed: int = 0, *, start: Pair, velocity: Pair, faster: float = 1.0
 ) -> World:
-    """1 kg on a spring of omega = 2 pi faster, anywhere on its way."""
+    """1 kg on a spring of omega = 2 pi faster, started anywhere in its period."""
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings or Settings())
     world.create_entity(Transform(start), RigidBody(mass=1.0, linear_velocity=velocity))
     world.add_system(Pull((2 * math.pi * faster) ** 2))
@@ -245,7 +245,7 @@ def swinging(
 
 
 def other_break(settings: Settings | None, seed: int = 0, *, speed: float, aside: float) -> World:
-    """The cue ball at another speed, ``aside`` m beside the middle."""
+    """The cue ball at another speed, ``aside`` m off the centre line."""
     world = billiards.build(settings, seed)
     bodies = world.bodies.dynamic
     cue = int(np.argmax(np.abs(bodies.linear_velocity[:, 0])))

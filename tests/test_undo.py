@@ -1,4 +1,4 @@
-"""Going back to the start of a step that only carom's own systems have worked on: they keep what they overwrite."""
+"""Undoing a step in which only carom's own systems have run: they save what they overwrite."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KEPT = ("position", "previous_position", "linear_velocity", "step_force", "appli
 
 
 def fail_after(patch, world, kind):
-    """From now on that built-in system raises when its work is done."""
+    """From now on that built-in system raises at the end of its work."""
     world.run(Phase.START)  # the processors are guarded from here on
     system = next(s for s in world.systems if isinstance(s, kind))
     guard = vars(system)["process"]
@@ -31,9 +31,9 @@ def busy_world(colliders):
     world = make_world(gravity=9.81)
     if colliders:
         floor(world, restitution=0.5)
-        ball(world, (0.0, 0.6), (0.3, -2.0), restitution=0.7)  # about to strike
+        ball(world, (0.0, 0.6), (0.3, -2.0), restitution=0.7)  # about to have an impact
         ball(world, (0.2, 4.0), (-0.1, 0.0), restitution=0.2)
-    world.create_entity(Transform((5, 5)), RigidBody(2.0, (1, 0), max_linear_speed=0.5))  # too fast as it is
+    world.create_entity(Transform((5, 5)), RigidBody(2.0, (1, 0), max_linear_speed=0.5))  # beyond its limit
     world.create_entity(Transform((-5, 5)), RigidBody(kind="kinematic", linear_velocity=(0.1, 0.2)))
     pushed = world.create_entity(Transform((9, 5)), RigidBody(2.0, (1, 0)))
     world.component_for_entity(pushed, RigidBody).apply_force((3.0, 0.0))
@@ -55,7 +55,7 @@ def test_a_step_of_built_in_systems_that_fails_leaves_no_trace(monkeypatch, syst
             if not limited:
                 body.max_linear_speed = None
             body.linear_velocity = 4.0 * body.linear_velocity  # beyond the limit, where there is one
-            body.step_force = (1.0, 2.0)  # as a system of the game may have left it
+            body.step_force = (1.0, 2.0)  # as left by a user system
             body.apply_force((0.5, 0.25))
         before, steps, hashed = columns(world), world.step_count, world.state_hash()
         twin = world.snapshot()
@@ -89,7 +89,7 @@ def test_a_phase_alone_that_fails_leaves_no_trace(monkeypatch, system):
 
 
 def test_without_the_built_in_integration_all_is_kept(monkeypatch):
-    """Who else would: the response overwrites the positions of bodies that stand where they overlap."""
+    """Everything must be saved: the response overwrites the positions of overlapping bodies."""
     with make_world(gravity=9.81) as world:
         floor(world)
         ball(world, (0.0, 0.45), (0.0, -1.0))
@@ -128,7 +128,7 @@ def test_forces_applied_late_do_not_outlive_the_window():
 
 @pytest.mark.parametrize("steps", [1, 3])
 def test_forces_written_into_the_columns_act_for_one_window(steps):
-    """A force of 6 N on 2 kg for so many steps of dt: v = 3 n dt; then no more."""
+    """A force of 6 N on 2 kg for that many steps of dt: v = 3 n dt; then no more."""
     with make_world() as world:
         world.create_entity(Transform((0, 0)), RigidBody(2.0))
         world.bodies.applied_force[:] = (6.0, 0.0)

@@ -1,4 +1,4 @@
-"""Compiling ahead: what ``world.prepare`` promises, and what ``carom warm-up`` says and leaves behind."""
+"""Compiling in advance: the guarantees of ``world.prepare``, and the output and effects of ``carom warm-up``."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from carom.lab.commands import warm_up
 
 from .worlds import ball, floor, make_world, run
 
-# A whole game, in a process of its own: kernels that were there before would hide what prepare has missed.
+# A whole game in a separate process: kernels already loaded would hide what prepare has missed.
 GAME = '''
 import logging
 import sys
@@ -143,13 +143,13 @@ for integrator in ("semi_implicit_euler", "yoshida4", "rk4", "velocity_verlet", 
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_after_prepare_nothing_compiles_and_nothing_loads(d):
-    """Every integrator; few bodies and hundreds, impacts and rest, levels, sensors, platforms, all queries, a game's
-    own force system; the last body of a shape goes, too."""
+    """Every integrator; few bodies and hundreds, impacts and rest, levels, sensors, platforms, all queries, a user
+    force system; also deleting the last body of a shape."""
     result = subprocess.run([sys.executable, "-c", GAME, str(d)], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr[-3000:]
 
 
-# -- what else prepare must keep --------------------------------------------------------------------------------------
+# -- other guarantees of prepare ---------------------------------------------------------------------------------------
 
 
 def test_prepare_changes_nothing_that_can_be_seen():
@@ -182,7 +182,7 @@ def test_one_may_prepare_more_and_more():
     assert {shape.component for shape in world.physics.code.shapes} == {SphereCollider, AABBCollider}
 
 
-def test_force_systems_are_asked_about_the_bodies_there_are():
+def test_force_systems_are_called_for_the_present_bodies():
     seen = []
 
     class Watch(ForceSystem):
@@ -195,7 +195,7 @@ def test_force_systems_are_asked_about_the_bodies_there_are():
     world = make_world()
     world.add_system(Watch())
     world.prepare()
-    assert seen == []  # no bodies, nothing to ask about
+    assert seen == []  # no bodies, no calls
     ball(world, 0)
     world.create_entity(Transform((9, 9)), RigidBody())
     world.prepare()
@@ -243,7 +243,7 @@ def build(settings=None, seed=0):
 
 @pytest.fixture
 def carom(tmp_path):
-    """The command, in processes of its own and with an empty cache of its own."""
+    """The command, in separate processes with a separate, initially empty cache."""
     (tmp_path / "falling.py").write_text(FALLING)
     environment = {**os.environ, "CAROM_CACHE_DIR": str(tmp_path / "kernels")}
 
@@ -286,7 +286,7 @@ def test_the_second_time_everything_is_there_already(carom, tmp_path):
 
 
 def names_of_work(monkeypatch, *arguments):
-    """What the command would do, and the order."""
+    """The command's pieces of work, in order."""
     done = []
     monkeypatch.setattr(warm_up, "prepare_built_in", lambda d: done.append(d))
     monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: done.append(loaded.name))

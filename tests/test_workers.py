@@ -1,4 +1,4 @@
-"""Tasks in worker processes: every one is finished once, whatever becomes of the workers."""
+"""Tasks in worker processes: every one is finished once, whatever happens to the workers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_large_tasks_and_results_get_through():
     tasks = [bytes([number]) * 3_000_000 + b"!" for number in range(3)]
     results = list(in_parallel(helpers_workers.turned, tasks, workers=2))
     assert all(result == task[::-1] for task, result in results)
-    assert {id(task) for task, _ in results} == set(map(id, tasks))  # not copies that went there and back
+    assert {id(task) for task, _ in results} == set(map(id, tasks))  # the original objects, not pickled copies
 
 
 def test_nothing_to_do_starts_nothing(monkeypatch):
@@ -98,7 +98,7 @@ def test_a_task_that_always_ends_its_worker_is_lost_and_no_other(tmp_path):
 
 
 def test_a_single_task_has_a_process_of_its_own_too(tmp_path):
-    """Else one that was lost would take everything along when the work is resumed."""
+    """Otherwise a lost task would end the whole command again when it is resumed."""
     [(_, result)] = in_parallel(perform, tasks_of(tmp_path, "exits"), workers=2)
     assert isinstance(result, Lost)
     assert "exit code 0" in result.reason
@@ -146,7 +146,7 @@ def test_closing_early_ends_the_workers(tmp_path):
 
 
 def started(folder: Path, script: str, **more) -> subprocess.Popen[str]:
-    """A script as a user writes one, without a guard, in a session of its own; what it prints, and its errors."""
+    """A user script without a guard, in a separate session; its output and errors."""
     (folder / "script.py").write_text(script)
     return subprocess.Popen(
         [sys.executable, str(folder / "script.py")], cwd=folder, start_new_session=True, text=True,
@@ -178,7 +178,7 @@ def test_an_interruption_of_the_terminal_ends_all_without_a_word_from_the_worker
         _, errors = script.communicate(timeout=helpers_workers.DEADLINE)
         assert errors.count("Traceback") == 1  # the script's own
         assert errors.rstrip().endswith("KeyboardInterrupt")
-        until(lambda: not alive(-script.pid))  # nor any other process of its session
+        until(lambda: not alive(-script.pid))  # no other process of its session either
 
 
 @needs_signals
@@ -192,7 +192,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
         until(lambda: not any(map(alive, pids)))
 
 
-# -- what runs here, and what workers know ----------------------------------------------------------------------
+# -- tasks that run here, and the imports of workers --------------------------------------------------------------
 
 
 def test_one_worker_is_this_process(tmp_path):
@@ -219,7 +219,7 @@ def test_a_worker_has_no_workers():
         assert len({pid for _, pid in inner} - {os.getpid()}) == 1
 
 
-def test_kernels_that_workers_compile_are_told_to_those_who_listen_here(monkeypatch):
+def test_kernels_that_workers_compile_are_reported_to_listeners_here(monkeypatch):
     heard: list[str] = []
     monkeypatch.setattr(log, "listeners", [heard.append])
     assert len(list(in_parallel(helpers_workers.compiles, ["one", "two", "three"], workers=2))) == 3

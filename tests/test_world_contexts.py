@@ -97,7 +97,7 @@ def test_closing_gives_the_context_back_and_ends_the_world():
     world.close()
     assert world.closed
     assert world.name not in esper.list_worlds()
-    np.testing.assert_array_equal(transform.position, place)  # the game may still look at what it had
+    np.testing.assert_array_equal(transform.position, place)  # handles stay readable
     for use in (
         world.step,
         lambda: world.advance(1.0),
@@ -152,7 +152,7 @@ def test_several_worlds_side_by_side_do_not_disturb_each_other():
     expected = [alone(1.0), alone(2.0)]
     worlds = [make_world(gravity=9.81) for _ in range(2)]
     for world, velocity in zip(worlds, (1.0, 2.0), strict=True):
-        assert ball(world, (0.0, 1.0), velocity) == 1  # each counts its own entities
+        assert ball(world, (0.0, 1.0), velocity) == 1  # each world counts its own entities
     for _ in range(20):
         for world in worlds:
             world.step()

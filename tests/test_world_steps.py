@@ -40,7 +40,7 @@ def test_what_needs_physics_says_so(use):
     with pytest.raises(NoPhysicsError) as caught:
         use(World())
     assert str(caught.value) == NO_PHYSICS
-    assert isinstance(caught.value, AttributeError)  # hasattr(world, "bodies") is a fair question
+    assert isinstance(caught.value, AttributeError)  # so that hasattr(world, "bodies") works
 
 
 def test_a_world_without_physics_still_steps_its_processors():

@@ -1,4 +1,4 @@
-"""The verbs of a world, which mean what esper's mean, and the traps of esper that are not there."""
+"""The verbs of a world, equal to esper's, and the traps of esper that it avoids."""
 
 from __future__ import annotations
 
