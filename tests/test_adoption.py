@@ -19,7 +19,7 @@ class Health:
     """A component that is not carom's."""
 
 
-# -- components added, removed, replaced -------------------------------------------------------
+# -- components added, removed, replaced ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("plain", [False, True], ids=["facade", "plain esper"])

@@ -26,7 +26,7 @@ from carom.lab.bench.benchmarks import (
     startup as bench_startup,
 )
 from carom.lab.bench.benchmarks.against_pymunk import bench
-from carom.lab.bench.benchmarks.queries import QUESTIONS
+from carom.lab.bench.benchmarks.queries import QUERIES
 from carom.lab.bench.suite import LARGE, SUITE, Subject, Window, subjects
 from carom.lab.commands.usage_errors import Problem
 from carom.lab.engines import pymunk_space as peer_pymunk
@@ -123,7 +123,7 @@ def test_carom_alone(no_pymunk):
 def test_queries_find_the_same_in_both_engines():
     """But for boxes: pymunk tests the bounding boxes of the discs, and finds a few more."""
     rows = bench(subjects(["player_query"]), (300,), repeats=1).rows
-    assert [row.window for row in rows] == [question.name for question in QUESTIONS]
+    assert [row.window for row in rows] == [query.name for query in QUERIES]
     for row in rows:
         (own,), (other,) = (figures.values() for figures in row.quality.values())
         if row.window.startswith("box"):

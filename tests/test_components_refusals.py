@@ -157,7 +157,7 @@ def test_forces_and_impulses_are_checked(call, value):
     assert world.state_hash() == before
 
 
-# -- mistakes that would otherwise be silent ------------------------------------------------------
+# -- mistakes that would otherwise be silent -----------------------------------------------------
 
 
 def test_classes_and_lists_are_no_components():

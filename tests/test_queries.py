@@ -104,7 +104,7 @@ def test_neighbours_of_many_bodies(d, n):
     world.close()
 
 
-# -- common rules of all queries -----------------------------------------------------------------
+# -- common rules of all queries ------------------------------------------------------------------
 
 
 @both_dimensions

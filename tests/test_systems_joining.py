@@ -163,7 +163,7 @@ def test_plain_esper_calls_add_and_remove_systems_as_well():
         esper.remove_processor(type(early))
         esper.process(world.settings.dt)
     assert log == ["early", "plain", "plain"]
-    world.add_system(Note(log, "new"))  # arranging them anew does not bring it back
+    world.add_system(Note(log, "new"))  # sorting them again does not bring it back
     world.step()
     assert log[3:] == ["new", "plain"]
 

@@ -179,7 +179,7 @@ def test_theory_stands_beside_each_curve(bouncing):
     assert shown["pymunk, 10 iterations"].endswith("(2)")
 
 
-# -- scenes of one's own --------------------------------------------------------------------------
+# -- user scenes ----------------------------------------------------------------------------------
 
 
 def test_a_file_gets_its_reference_from_two_methods_that_agree(tmp_path):
@@ -279,7 +279,7 @@ def test_a_function_that_no_other_process_can_import_is_measured_here():
     assert found["velocity verlet", 1 / 10] < 1e-12
 
 
-# -- what is said of wrong arguments --------------------------------------------------------------
+# -- errors for wrong arguments -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("options", "words"), [

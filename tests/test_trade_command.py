@@ -212,7 +212,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
     assert again.exit_code == 0
 
 
-# -- what it refuses ------------------------------------------------------------------------------
+# -- refused input --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

@@ -104,7 +104,7 @@ def test_compact_numbers(value, text):
     assert trade_report.compact(value) == text
 
 
-# -- what is said about them ------------------------------------------------------------------------------------
+# -- remarks ----------------------------------------------------------------------------------------------------
 
 
 def test_remarks_name_kind_reference_norm_and_command():

@@ -74,7 +74,7 @@ def laboratory(tmp_path_factory):
         yield Laboratory(store)
 
 
-# -- the target, in runs independent of the lab --------------------------------------------------------------------
+# -- the target, in runs independent of the lab -------------------------------------------------------------------
 
 
 def hero(settings: Settings | None, seed: int = 0, *, speed: float, gravity: float, start: float = 0.0) -> World:

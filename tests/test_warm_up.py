@@ -149,7 +149,7 @@ def test_after_prepare_nothing_compiles_and_nothing_loads(d):
     assert result.returncode == 0, result.stderr[-3000:]
 
 
-# -- other guarantees of prepare ---------------------------------------------------------------------------------------
+# -- other guarantees of prepare --------------------------------------------------------------------------------------
 
 
 def test_prepare_changes_nothing_that_can_be_seen():

@@ -192,7 +192,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
         until(lambda: not any(map(alive, pids)))
 
 
-# -- tasks that run here, and the imports of workers --------------------------------------------------------------
+# -- tasks that run here, and the imports of workers ------------------------------------------------------------
 
 
 def test_one_worker_is_this_process(tmp_path):

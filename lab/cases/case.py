@@ -99,7 +99,7 @@ class Case:
         return "seeds" if self.kind == CHAOTIC else "start phases"
 
     @property
-    def repeats_told(self) -> str:
+    def repeats_text(self) -> str:
         """For messages: 1 start phase, 64 start phases, 5 seeds."""
         return f"{self.repeats} {self.repeated if self.repeats > 1 else self.repeated[:-1]}"
 
@@ -234,7 +234,7 @@ def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[st
     world = subject.world(None)
     seen = form.function(world, seconds)
     world.close()
-    return (form.text, seen) if all(NORMS[name].tells(seen) for name in norms) else ("", None)
+    return (form.text, seen) if all(NORMS[name].is_usable_with(seen) for name in norms) else ("", None)
 
 
 def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:

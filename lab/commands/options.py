@@ -220,7 +220,7 @@ only_options = together(
     ),
 )  # fmt: skip
 
-# -- execution of runs -------------------------------------------------------------------------------------------
+# -- execution of runs ------------------------------------------------------------------------------------------
 
 runs_options = together(
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),

@@ -87,7 +87,7 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
     if case.kind == CHAOTIC:
         return _with_statistics(case, seens, half)
     first, *others = seens
-    case = _told(case, first)
+    case = _with_usable_norms(case, first)
     apart = [errors_of(other, first, NORMS) for other in others]
     agreement = {name: max(abs(errors[name]) for errors in apart) for name in NORMS}
     if conserves(first):
@@ -124,7 +124,7 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
     """The case with two ensembles as reference: if both are right, their means differ only by noise."""
     means = mean_of(seens[:half]), mean_of(seens[half:])
     both = mean_of(seens)
-    case = _told(case, both)
+    case = _with_usable_norms(case, both)
     agreement, spread = {}, {}
     for name in case.norms:
         values = [NORMS[name].measure(seen, both) for seen in seens]
@@ -141,16 +141,16 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
     return case.replace(reference=both), Reference(text, agreement, spread)
 
 
-def _told(case: Case, reference: Seen) -> Case:
+def _with_usable_norms(case: Case, reference: Seen) -> Case:
     """The case with the norms that can be computed from the reference; Problem if there are none."""
-    told = tuple(name for name in case.norms if NORMS[name].tells(reference))
-    if not told:
-        others = ", ".join(name for name in OF_KIND[case.kind] if NORMS[name].tells(reference))
+    usable = tuple(name for name in case.norms if NORMS[name].is_usable_with(reference))
+    if not usable:
+        others = ", ".join(name for name in OF_KIND[case.kind] if NORMS[name].is_usable_with(reference))
         raise Problem(
             f"{case.subject.name}: {' and '.join(case.norms)} {'are' if len(case.norms) > 1 else 'is'} 0 throughout, "
             f"nothing can be relative to that; what can be measured here: {others}"
         )
-    return case.replace(norms=told)
+    return case.replace(norms=usable)
 
 
 def _words(cell: Cell) -> str:

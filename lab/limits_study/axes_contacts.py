@@ -47,7 +47,7 @@ def speed(method: Method, ratio: float) -> float:
 
 
 def exchange(method: Method, ratio: float) -> float:
-    """Elastic impact of a light ball and one ``ratio`` times heavier, against the closed form of both velocities."""
+    """Elastic impact of a light ball and one ``ratio`` times heavier, against the closed form: velocities, momentum."""
     with closing(new_world(method)) as world:
         for side, mass in ((-1, 1.0), (1, ratio)):
             world.create_entity(

@@ -38,7 +38,7 @@ class Norm:
     absolute: bool = False
     relative_to: str = ""
 
-    def tells(self, reference: Seen) -> bool:
+    def is_usable_with(self, reference: Seen) -> bool:
         """True if runs can be compared by it: the scale must not be 0."""
         return not self.relative_to or getattr(reference, self.relative_to) != 0
 

@@ -16,7 +16,7 @@ from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..commands.usage_errors import one_line
 from .findings import Finding, Report, Subject, row_shown
-from .kernels import RaisedError, SupportCode, compiler_said
+from .kernels import RaisedError, SupportCode, compiler_message
 from .pair_checks import TOLERANCE, PairChecks
 from .samples import ORDINARY, Rows, directions, poses, rows
 
@@ -76,7 +76,7 @@ def _attempt(subject: Subject, progress: Callable[[str], None], check: Callable[
         check(subject)
     except NumbaError as error:
         subject.findings.append(
-            Finding(f"it does not compile: {compiler_said(error)}", "every input",
+            Finding(f"it does not compile: {compiler_message(error)}", "every input",
                     "use what numba compiles: numbers and tuples, math, carom.framework.vectors, helpers marked "
                     "@plugin.kernel; return the same types on every way")
         )  # fmt: skip

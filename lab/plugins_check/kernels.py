@@ -95,7 +95,7 @@ class SupportCode:
         return points, beyond
 
 
-def compiler_said(error: BaseException) -> str:
+def compiler_message(error: BaseException) -> str:
     """The essence of numba's message: what it could not compile, and the line of the plugin's file."""
     lines = [line.strip() for line in str(error).splitlines()]
     gist = next((line for line in lines if line and not line.startswith(NOISE)), type(error).__name__)

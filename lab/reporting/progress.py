@@ -20,7 +20,7 @@ class Compiling:
 
     def __init__(self) -> None:
         self._before = (len(log.compiled), log.seconds)
-        self._told = False
+        self._shown = False
 
     def words(self, kernel: str) -> str:
         """The text for ``kernel``, named as in the log."""
@@ -28,11 +28,11 @@ class Compiling:
         so_far = f" ({count} so far, {seconds:.1f} s)" if count else ""
         return f"compiling {kernel.rpartition('.')[2]}{so_far} ..."
 
-    def tell_where(self, console: Console) -> None:
+    def show_cache_folder(self, console: Console) -> None:
         """Print where the kernels are kept; at the first call only."""
-        if self._told:
+        if self._shown:
             return
-        self._told = True
+        self._shown = True
         folder = cache_folder()
         text = f"kept in {folder} for next time"
         if folder is None:
@@ -95,7 +95,7 @@ class StepProgress:
 
     def _compiles(self, kernel: str) -> None:
         self._compiling = True
-        self._words.tell_where(self._console)
+        self._words.show_cache_folder(self._console)
         self._bar.update(self._task, description=f"{self._name}: {self._words.words(kernel)}", rate="")
         self._bar.refresh()
 
@@ -126,7 +126,7 @@ class CompileStatus:
         self._status.update(what)
 
     def _compiles(self, kernel: str) -> None:
-        self._words.tell_where(self._console)
+        self._words.show_cache_folder(self._console)
         self._status.update(f"{self._what}: {self._words.words(kernel)}")
 
 

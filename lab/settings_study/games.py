@@ -77,7 +77,7 @@ class Game:
         return _tuned(self, repeats, progress)
 
 
-LEFT = {"speed": ("mm/s", 1000.0)}  # of a body of 1 m
+RESIDUAL = {"speed": ("mm/s", 1000.0)}  # of a body of 1 m
 
 GAMES: tuple[Game, ...] = (
     Game(
@@ -98,11 +98,11 @@ GAMES: tuple[Game, ...] = (
     ),
     Game(
         "puzzle stacks", "stack", "tower of 10", "boxes sink by a thousandth into each other at most, and stand still",
-        "overlap", 1e-3, "%", 100.0, 5.0, 1.0, repeats=1, also=LEFT,
+        "overlap", 1e-3, "%", 100.0, 5.0, 1.0, repeats=1, also=RESIDUAL,
     ),
     Game(
         "puzzle stacks", "pyramid", "pyramid of 210", "as above, with twenty rows", "overlap", 1e-3, "%", 100.0, 3.0,
-        0.5, repeats=1, options={"rows": 20}, also=LEFT,
+        0.5, repeats=1, options={"rows": 20}, also=RESIDUAL,
     ),
     Game(
         "orbits", "orbit", "ten turns, e = 0.6", "the energy stays within a hundredth of a percent for ten turns",

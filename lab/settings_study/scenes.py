@@ -265,7 +265,7 @@ def slowed(make: Make, seconds: float) -> Errors:
     return {"shown": shown, "off": abs(shown - rule(FIRST, SECOND))}
 
 
-# -- settings that must change nothing ---------------------------------------------------------------------------
+# -- settings that must change nothing --------------------------------------------------------------------------
 
 EVERY_PAIR = "every pair"
 every_pair = Plugin("every pair of boxes")

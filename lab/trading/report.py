@@ -189,8 +189,8 @@ def choices(
                 for point in curve.points
                 if point.cell.engine == engine and point.meets(chosen, target)
             ]
-            told = meeting and case.reference.trusts(chosen, target)
-            made.append((target, engine, min(meeting, key=lambda found: found[1].work) if told else None))
+            usable = meeting and case.reference.trusts(chosen, target)
+            made.append((target, engine, min(meeting, key=lambda found: found[1].work) if usable else None))
     return made
 
 

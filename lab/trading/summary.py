@@ -18,13 +18,13 @@ def summaries(trade: Trade, norm: str | None = None) -> list[TextTable]:
 def summary(case: CaseTrade, norm: str, targets: Sequence[float] = TARGETS) -> TextTable:
     """By method: the observed order of each norm with the theoretical one; for each target the largest step that meets
     it in all repeats, with its work per simulated second; the best error of ``norm``; and the failures."""
-    told = [target for target in targets if case.reference.trusts(norm, target)]
-    headings = ["method", *(f"{name}, order" for name in case.norms), *(target_text(t, norm) for t in told), "best"]
+    trusted = [target for target in targets if case.reference.trusts(norm, target)]
+    headings = ["method", *(f"{name}, order" for name in case.norms), *(target_text(t, norm) for t in trusted), "best"]
     failing = any(point.failed for curve in case.curves for point in curve.points)
     rows = []
     for curve in case.curves:
         row = [curve.label, *(order(curve, name) for name in case.norms)]
-        row += [_step(curve, norm, target) for target in told]
+        row += [_step(curve, norm, target) for target in trusted]
         row += [_best(curve, norm), *[_failed(curve)] * failing]
         rows.append(tuple(row))
     title = (

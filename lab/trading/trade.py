@@ -125,7 +125,7 @@ def measure(case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Ru
         case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
     )
     cells = grids.grid((*curves, *peers), case.steps)
-    records = runs.all(run_tasks(case, cells), f"{name}: {len(cells)} settings, {case.repeats_told}")
+    records = runs.all(run_tasks(case, cells), f"{name}: {len(cells)} settings, {case.repeats_text}")
     outcomes: dict[Cell, list[Outcome]] = {}
     for record in records:
         outcome = Outcome.from_dict(record)

@@ -100,7 +100,7 @@ def check(
 def measured_with(case: Case, settings: Settings, runs: Runs) -> Point:
     """The point of these settings over all repeats of a case; fields that no cell has keep the scene's values."""
     cell = cell_of(settings)
-    records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats_told}")
+    records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats_text}")
     return point_of([Outcome.from_dict(record) for record in records])
 
 

@@ -306,7 +306,7 @@ def exact_enough(
     case: Case, norm: str, max_error: float, absolute: bool, runs: Runs
 ) -> tuple[Case, Reference]:
     """The case with a reference accurate enough for the target; Problem if own runs cannot be made to agree so well."""
-    def told(known: Case, reference: Reference) -> float:
+    def margin_of(known: Case, reference: Reference) -> float:
         """The target over the accuracy of the reference."""
         seen = known.reference
         assert seen is not None
@@ -319,14 +319,14 @@ def exact_enough(
         return target / max(reference.agreement.get(norm, 0.0), 1e-300)
 
     wanted = NOISE if NORMS[norm].signed else TRUSTED
-    known, reference, enough = refined_reference(case, runs, lambda case, found: told(case, found) >= wanted)
+    known, reference, enough = refined_reference(case, runs, lambda case, found: margin_of(case, found) >= wanted)
     if norm not in known.norms:
         others = " or ".join(f"--norm {name}" for name in known.norms)
         raise Problem(f"{case.subject.name}: its {norm} is 0 throughout, nothing can be relative to it: take {others}")
     if enough:
         return known, reference
     agreement = reference.agreement[norm]
-    target = told(known, reference) * agreement
+    target = margin_of(known, reference) * agreement
     raise Problem(
         f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
         f"{reference.text} agree to {agreement:.2g} only. Take a larger error"
