@@ -92,7 +92,7 @@ class Crowd:
 
     @classmethod
     def random(cls, thing: Object, turned: bool, count: int, room: float, seed: tuple[int, ...]) -> Self:
-        """Uniformly in a square of that area per object; the positions depend only on the seed and the count."""
+        """Uniformly in a square of that area per object; equal seeds give equal positions for all kinds of objects."""
         rng = np.random.default_rng(seed)
         positions = rng.uniform(0.0, math.sqrt(count * room), (count, 2))
         rotations = rng.uniform(-math.pi, math.pi, count) if turned else np.zeros(count)
