@@ -18,6 +18,10 @@ FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
 IMPULSE = Column(item="vector", owner="RigidBody", name="apply_impulse")
 
 
+def _force_applied(table: Any, row: int) -> None:
+    table.frames_applied = True
+
+
 def _kind_written(table: Any, row: int) -> None:
     table.kind_changed = True
 
@@ -56,7 +60,7 @@ class RigidBody(Component, flat=True):
     max_linear_speed = column(None, optional=True, minimum=0.0)
     ccd = column(False, dtype=bool)
     applied_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # until the frame ends
-    applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False)  # frame of applied_force
+    applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False, on_write=_force_applied)
     step_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # for one step
 
     def __init__(
@@ -102,7 +106,7 @@ class RigidBody(Component, flat=True):
         if self.kind != "dynamic":
             return
         if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
-            if hasattr(store, "in_step") and store.forces_summed:
+            if hasattr(store, "in_step") and store.forces_are_summed():
                 store.arrays["force"][store.find(self._entity)] += force
             else:
                 self.step_force = self.step_force + force

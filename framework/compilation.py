@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import time
 import weakref
 from collections.abc import Callable
@@ -47,6 +48,8 @@ class CompilationLog:
 
 log = CompilationLog()
 
+CHECKED = os.environ.get("CAROM_CHECK", "") not in ("", "0")  # a build that checks every index into a record
+
 # A wrapper for C callers costs compile time and serves none of our kernels.
 _OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
@@ -58,7 +61,7 @@ def kernel(function: Function) -> Function:
     cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
     passed in tuples. Use :func:`allocating_kernel` for those that must.
     """
-    return _kept(numba.njit(**_OPTIONS, _nrt=False)(function))
+    return _kept(numba.njit(**_OPTIONS, _nrt=CHECKED)(function))
 
 
 def allocating_kernel(function: Function) -> Function:
@@ -68,18 +71,24 @@ def allocating_kernel(function: Function) -> Function:
 
 def part(function: Function) -> Function:
     """For functions that only kernels call: nothing on disk of their own; called from Python they stay Python."""
-    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=False)(function))
+    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=CHECKED)(function))
 
 
 def inlined(function: Function) -> Function:
     """Like :func:`part`, for small helpers that must disappear into the kernels which call them."""
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True, "_nrt": False}
+    options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True, "_nrt": CHECKED}
     return _as_part(numba.njit(**options)(function))
 
 
 def pasted(function: Function) -> Function:
     """Like :func:`inlined`, but before types are known: branches on arguments that are constants at the call vanish."""
-    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, inline="always", _nrt=False)(function))
+    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, inline="always", _nrt=CHECKED)(function))
+
+
+def linked_dispatcher(function: Any, allocates: bool) -> Any:
+    """For functions that are called through their address alone, see :mod:`~carom.framework.jit.linking`."""
+    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": allocates or CHECKED}
+    return _kept(numba.njit(**options)(getattr(function, "py_func", function)))
 
 
 class Wait:

@@ -20,6 +20,7 @@ from .commands.group import Commands
 from .commands.loading import Loaded, load, stdout_kept_clean
 from .commands.options import plugin_option, seed_number, seed_option, set_option, settings_option
 from .commands.plan import plan_command
+from .commands.stages import stages_command
 from .commands.usage_errors import Problem
 from .commands.warm_up import warm_up_command
 from .geometry.command import geometry_command
@@ -134,6 +135,7 @@ def scenes_command() -> None:
 
 
 cli.add_command(plan_command)
+cli.add_command(stages_command)
 cli.add_command(plugins_command)
 cli.add_command(bench_command)
 cli.add_command(trade_command)

@@ -5,16 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..framework.plugins.plugin import Plugin
-from ..systems import (
-    BroadPhase,
-    ContactEvents,
-    ForceAccumulation,
-    Integration,
-    NarrowPhase,
-    Response,
-)
 from ..systems.integration.integrators import STANDARD_INTEGRATORS
-from ..systems.state import PhysicsState
+from ..systems.simulation import Simulation
 from .standard_shapes import standard_shapes
 
 if TYPE_CHECKING:
@@ -44,18 +36,8 @@ class Physics(Plugin):
         """Give the world its table and its systems; ValueError if it has physics already."""
         if world.physics is not None:
             raise ValueError("a world takes one Physics")
-        state = PhysicsState(world, self.dimensions, self.gravity)
-        world.physics = state
-        state.forces = ForceAccumulation(state)
-        state.broad_phase = BroadPhase(state)
-        state.narrow_phase = NarrowPhase(state)
-        state.contact_events = ContactEvents(state)
-        for system in (
-            state.forces,
-            Integration(state),
-            state.broad_phase,
-            state.narrow_phase,
-            Response(state),
-            state.contact_events,
-        ):
+        simulation = Simulation(world, self.dimensions, self.gravity)
+        simulation.check_settings(world.settings)  # the systems read them
+        world.physics = simulation
+        for system in simulation.systems:
             world.add_system(system)

@@ -1,7 +1,7 @@
-"""Compiling ahead: a small world of the same plugins and settings goes through all that a step and the queries do.
+"""Compiling ahead: what bodies of some component types will need, and the queries.
 
-Kernels compile when they are called first, and which ones a world calls depends on what happens in it. So things
-happen here: bodies strike and rest, move fast and slowly, alone and by the hundreds, and are asked about.
+The stages of a step are linked before it, so that only shapes and plugins can bring anything new. What queries and
+force systems call compiles when it is called first: a small world of the same plugins and settings calls it here.
 """
 
 from __future__ import annotations
@@ -15,39 +15,40 @@ from ..framework.data.bodies import SelectedBodies
 from ..framework.data.component import Component
 from ..framework.schedule.phases import ForceSystem
 from ..framework.world.world import World
-from .broad_phase.brute_force import FEW
+from .broad_phase.brute_force import BRUTE_FORCE_MAX
 from .shapes.geometry_levels import in_order
 
 if TYPE_CHECKING:
-    from .state import PhysicsState
+    from .simulation import Simulation
 
 STEPS = 3  # contacts begin, stay and end
-MANY = 4 * FEW  # static bodies, more than move
+MANY = 4 * BRUTE_FORCE_MAX  # static bodies, more than move
 LANE = 8.0  # m between things that are not to meet; samples of shapes are about one metre wide
 
 
-def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
+def prepare(simulation: Simulation, world: World, components: tuple[type[Any], ...]) -> None:
     """Compile what bodies of these types will need beside those there are; TypeError for what is no component type.
 
-    The world keeps to the kernels for all these shapes from now on, whether bodies of each exist or not.
+    The world keeps to the functions of all these shapes from now on, whether bodies of each exist or not.
     """
     for component in components:
         if not (isinstance(component, type) and issubclass(component, Component)):
             raise TypeError(f"prepare takes component types, got {component!r}")
-    table, registry = state.table, state.world.registry
+    table, registry, prepared = simulation.table, world.registry, simulation.scene.prepared
     wanted = {c for c in components if issubclass(c, Collider)}
     wanted.update(c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[: table.count].any())
     in_order(registry, wanted)
     for component in sorted(wanted, key=lambda c: c.__name__):
         table.check_component_type(component)
         table.add_component_type(component)
-    state.keep_ready(wanted)
-    colliders = sorted(state.prepared, key=lambda c: c.__name__)
+    prepared |= wanted
+    simulation.scene.forget()
+    colliders = sorted(prepared, key=lambda c: c.__name__)
     fine = [c for c in colliders if c is not SphereCollider and in_order(registry, (c, SphereCollider))[1] is c]
     ccd = bool(table.arrays["ccd"][: table.stops[1]].any())
     with_levels = SphereCollider in colliders and bool(fine)
-    for crowd, layered in ((0, False), (FEW + 8, False), (0, True))[: 3 if with_levels else 2]:
-        small = World(*state.world.plugins, settings=state.world.settings)
+    for crowd, layered in ((0, False), (BRUTE_FORCE_MAX + 8, False), (0, True))[: 3 if with_levels else 2]:
+        small = World(*world.plugins, settings=world.settings)
         small.physics.preparing = True  # type: ignore[union-attr]
         try:
             if crowd:
@@ -56,7 +57,8 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
             if colliders:
                 _crowd(small, colliders[0], crowd)
             for collider in fine if layered else ():
-                small.create_entity(Transform(np.zeros(state.dimensions)), SphereCollider(LANE), collider.sample())
+                place = Transform(np.zeros(simulation.dimensions))
+                small.create_entity(place, SphereCollider(LANE), collider.sample())
             for _ in range(STEPS):
                 small.step()
             small.gravity = 0
@@ -65,7 +67,7 @@ def prepare(state: PhysicsState, components: tuple[type[Any], ...]) -> None:
             _ask(small, colliders)
         finally:
             small.close()
-    _evaluate_forces(state)
+    _evaluate_forces(simulation, world)
 
 
 class _NoForce(ForceSystem):
@@ -143,21 +145,21 @@ def _ask(world: World, colliders: list[type[Collider]]) -> None:
         world.shape_casts(shape, points, ways)
 
 
-def _evaluate_forces(state: PhysicsState) -> None:
-    """Force systems of the game are pure: asked about the bodies there are, they compile what they call.
+def _evaluate_forces(simulation: Simulation, world: World) -> None:
+    """Force systems of the game are pure: called for the bodies there are, they compile what they call.
 
     They get columns in place if all bodies have what they require, else copies that cannot be written: to numba two
     types.
     """
-    dynamic, force = state.bodies.dynamic, state.table.arrays["force"].copy()
+    dynamic, force = simulation.bodies.dynamic, simulation.table.arrays["force"].copy()
     try:
-        for system in state.world.force_systems:
+        for system in world.force_systems:
             has = np.ones(len(dynamic), bool)
             for component in system.requires:
                 has &= dynamic.has(component)
             if has.any() and has.all():
-                system.add_forces(dynamic, state.world.time)
+                system.add_forces(dynamic, world.time)
             if has.any():
-                system.add_forces(SelectedBodies(state.table, np.flatnonzero(has)), state.world.time)
+                system.add_forces(SelectedBodies(simulation.table, np.flatnonzero(has)), world.time)
     finally:
-        state.table.arrays["force"][...] = force
+        simulation.table.arrays["force"][...] = force

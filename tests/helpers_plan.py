@@ -1,4 +1,4 @@
-"""Worlds that run different kernels, and the expected kernels of each."""
+"""Worlds that run different stages, and the expected stages of each, with the kernels that are called from Python."""
 
 from __future__ import annotations
 
@@ -9,19 +9,26 @@ from carom.framework.compilation import kernel
 from carom.framework.schedule.plan import PlannedKernel
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
-from carom.systems.broad_phase.brute_force import FEW
+from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
 
 from .worlds import ball, box, floor, make_world
 
 STEPS = 40
 
-AROUND = {"invert_masses", "all_finite"}
-REST = {"gather", "linearise", "recall", "squeeze", "solve_contacts", "put_back", "remember", "predict_support"}
-REST |= {"drop_support"}
-CONTACTS = {"find_resting", "find_touching", "collect_contacts", "compare_pairs"} | REST
-SHAPES = {"any_turned", "box_motion", "sort_pairs", "find_contacts"}
-FALL = {"sum_constant_forces", "euler"}
-TREE = {"choose_frame", "assign_cells", "place", "ranges_within_levels", "ranges_between", "overlapping"}
+OUTSIDE = {"keep_state", "read_bodies", "check_finite"}  # of no system
+AROUND = OUTSIDE | {"keep_start", "end_flight"}  # in every step
+FORCES = {"limit_velocities", "sum_forces"}
+DRIFT = AROUND | FORCES | {"drift"}
+FALL = DRIFT | {"semi_implicit_euler"}
+BOXES = {"box_statics", "box_motions", "choose_search", "test_few"}
+GRIDS = {"place_statics", "search_uniform_grid", "search_static_grid"}
+CANDIDATES = {"order_candidates", "select_pairs", "collect_contacts"}
+REST = {"gather", "linearise", "match_warm_start", "find_blocks", "solve_contacts", "put_back", "store_warm_start"}
+RESPONSE = {"begin_response", "predict_rest", "begin_impacts", "resolve_impacts", "find_resting"} | REST
+CONTACTS = {"find_touching", "publish_contacts", "compare_contacts"}
+COLLISIONS = {"note_path"} | BOXES | CANDIDATES | RESPONSE | CONTACTS
+TREE = {"run_tree_pass"}
+COPIES = {"copy_blocks"}  # where code of the game runs in a step
 
 
 @kernel
@@ -146,53 +153,46 @@ def crowd(count, still=0, radii=(0.5,)):
     return world
 
 
-# Expected kernels: all that can be called in the scene, and no others.
-FALLS = AROUND | FALL
-HITS = FALLS | SHAPES | CONTACTS | {"test_all"}
-CROWD = AROUND | {"any_force", "drift"} | SHAPES | CONTACTS
+# Expected: all that can run in the scene, and nothing else.
+HITS = FALL | COLLISIONS | {"evaluate_pairs"}
+CROWD = HITS | GRIDS
 LADDER = {
     "nothing": (lambda: make_world(), AROUND),
     "a static body": (lambda: _with(RigidBody(kind="static")), AROUND),
     "a kinematic body": (lambda: _with(RigidBody(kind="kinematic", linear_velocity=(1.0, 0.0))), AROUND),
-    "drifting": (drifting, AROUND | {"any_force", "drift"}),
-    "drifting, 3D": (lambda: drifting(3), AROUND | {"any_force", "drift"}),
-    "drifting, rk4": (lambda: drifting(integrator="rk4"), AROUND | {"any_force", "drift"}),
-    "damping": (lambda: drifting(damping=0.5), AROUND | {"any_force", "drift", "euler"}),
-    "a limit of speed": (lambda: drifting(limit=1.0), AROUND | {"any_force", "drift", "limit_distance"}),
-    "a system of the game": (with_system, AROUND | {"any_force", "euler"}),
-    "constant force": (with_constant_force, AROUND | {"any_force", "sum_constant_forces", "euler"}),
-    "force system": (pushed, FALLS | {"push"}),
+    "drifting": (drifting, FALL),
+    "drifting, 3D": (lambda: drifting(3), FALL),
+    "drifting, rk4": (lambda: drifting(integrator="rk4"), DRIFT | {"verlet_drift"}),
+    "damping": (lambda: drifting(damping=0.5), FALL),
+    "a limit of speed": (lambda: drifting(limit=1.0), FALL),
+    "a system of the game": (with_system, FALL | COPIES),
+    "constant force": (with_constant_force, FALL),
+    "force system": (pushed, FALL | COPIES | {"push"}),
     "force system, Verlet": (
-        lambda: pushed(integrator="velocity_verlet"),
-        AROUND | {"sum_constant_forces", "push", "verlet_drift", "verlet_kick"},
+        lambda: pushed(integrator="velocity_verlet"), DRIFT | COPIES | {"push", "verlet_drift", "verlet_kick"}
     ),
-    "force system, rk4": (
-        lambda: pushed(integrator="rk4"), AROUND | {"sum_constant_forces", "push", "runge_kutta_stage"}
-    ),
+    "force system, rk4": (lambda: pushed(integrator="rk4"), DRIFT | COPIES | {"push", "runge_kutta_stage"}),
     "force system, Yoshida": (
-        lambda: pushed(integrator="yoshida4"),
-        AROUND | {"sum_constant_forces", "push", "verlet_drift", "verlet_kick"},
+        lambda: pushed(integrator="yoshida4"), DRIFT | COPIES | {"push", "verlet_drift", "verlet_kick"}
     ),
-    "gravity": (falling, FALLS),
-    "gravity, explicit Euler": (lambda: falling(integrator="explicit_euler"), FALLS),
-    "gravity, Verlet": (
-        lambda: falling(integrator="velocity_verlet"), AROUND | {"sum_constant_forces", "verlet_drift"}
-    ),
-    "gravity, 3D": (lambda: falling(3), FALLS),
+    "gravity": (falling, FALL),
+    "gravity, explicit Euler": (lambda: falling(integrator="explicit_euler"), DRIFT | {"explicit_euler"}),
+    "gravity, Verlet": (lambda: falling(integrator="velocity_verlet"), DRIFT | {"verlet_drift"}),
+    "gravity, 3D": (lambda: falling(3), FALL),
     "spheres": (on_each_other, HITS),
     "a sphere and boxes": (resting, HITS),
     "boxes": (lambda: resting(shape=box), HITS),
     "boxes, turned": (lambda: resting(shape=box, rotation=0.1), HITS),
     "spheres, 3D": (lambda: resting(3), HITS),
     "friction": (lambda: resting(friction=0.5), HITS),
-    "restitution": (lambda: resting(restitution=0.5), HITS | {"resolve_impacts"}),
-    "a handler": (lambda: resting(handler=True), HITS),
-    "levels": (with_levels, HITS),
+    "restitution": (lambda: resting(restitution=0.5), HITS),
+    "a handler": (lambda: resting(handler=True), HITS | COPIES),
+    "levels": (with_levels, FALL | COLLISIONS | {"evaluate_levels"}),
     "a plugin's shape": (with_plugin, HITS),
-    "a uniform grid": (lambda: crowd(FEW + 8), CROWD | {"even_pairs"}),
-    "a grid of what stands still": (lambda: crowd(20, still=FEW + 8), CROWD | {"lay_out", "pairs_inside", "test_all"}),
-    "two grids": (lambda: crowd(FEW + 8, still=FEW + 50), CROWD | {"lay_out", "pairs_inside", "even_pairs"}),
-    "a tree": (lambda: crowd(FEW + 8, radii=(0.5, 0.02, 20.0)), CROWD | {"even_pairs"} | TREE),
+    "a uniform grid": (lambda: crowd(BRUTE_FORCE_MAX + 8), CROWD),
+    "a grid of what stands still": (lambda: crowd(20, still=BRUTE_FORCE_MAX + 8), CROWD),
+    "two grids": (lambda: crowd(BRUTE_FORCE_MAX + 8, still=BRUTE_FORCE_MAX + 50), CROWD),
+    "a tree": (lambda: crowd(BRUTE_FORCE_MAX + 8, radii=(0.5, 0.02, 20.0)), CROWD | TREE),
 }  # fmt: skip
 
 

@@ -82,7 +82,7 @@ MISTAKES = {  # mistakes that pass registration, and the expected finding
         ("the compiled function raised ValueError: too big", "return a contact for every input"),
     ),
     "does not compile": (
-        (SPHERE, SPHERE + "    depth = {'depth': depth}.get('depth')\n"),
+        (SPHERE, SPHERE + "    depth = max([depth], key=abs)\n"),
         ("it does not compile", "use what numba compiles"),
     ),
     "point from the wrong centre": (

@@ -1,41 +1,24 @@
-"""The uniform grid against brute force: the same exact sets as the tree, or None where it is not suitable."""
+"""The uniform grid against brute force: the same exact sets as the tree, or no answer where it does not suit."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers_boxes import UNIFORM_GRID_ALONE, Boxes, overlapping, pair_set
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.systems.broad_phase.uniform_grid import FRAME_SIZE, HIGHEST, LARGEST, LOWEST, EvenGrid
-
-
-def frame_of(lower, upper):
-    frame, d = np.zeros(FRAME_SIZE), lower.shape[1]
-    frame[LOWEST : LOWEST + d] = np.nanmin(lower, axis=0)
-    frame[HIGHEST : HIGHEST + d] = np.nanmax(upper, axis=0)
-    frame[LARGEST] = np.nanmax(upper - lower)
-    return frame
-
-
-def brute_force(lower, upper, inside):
-    meet = ((lower[:, None] <= upper) & (lower <= upper[:, None])).all(axis=2)
-    first, second = np.nonzero(np.triu(meet, 1))
-    return {(i, j) for i, j in zip(first.tolist(), second.tolist(), strict=True) if i < inside}
-
 
 def check(lower, upper, inside, grid=None):
-    """None if the grid is not suitable, else the number of pairs, after comparing them with brute force."""
-    grid = grid or EvenGrid(lower.shape[1])
-    others = np.arange(inside, len(lower), dtype=np.int32)
-    found = grid.pairs(lower, upper, frame_of(lower[:inside], upper[:inside]), inside, others)
-    if found is None:
+    """None if the grid does not suit, else the number of pairs, after comparing them with brute force."""
+    grid = grid or Boxes(lower.shape[1], functions=UNIFORM_GRID_ALONE)
+    grid.set(lower, upper, inside)
+    found = grid.find()
+    if not grid.state.grid.suits:
         return None
-    pairs = [(min(p), max(p)) for p in zip(found[0].tolist(), found[1].tolist(), strict=True)]
-    assert len(set(pairs)) == len(pairs)
-    assert set(pairs) == brute_force(lower, upper, inside)
-    return len(pairs)
+    assert pair_set(*found) == overlapping(lower, upper, inside)
+    return len(found[0])
 
 
 @both_dimensions
@@ -52,7 +35,7 @@ def test_even_boxes_and_some_of_any_size(d, filling, offset):
     lower[810:820, 0], upper[815:825] = -np.inf, np.inf
     lower[830:835], upper[830:835] = np.inf, np.inf
     assert check(lower, upper, 800) > 0
-    grid = EvenGrid(d)
+    grid = Boxes(d, functions=UNIFORM_GRID_ALONE)
     for inside in (800, 300, 700):  # buffers are reused
         assert check(lower[:inside], upper[:inside], inside, grid) is not None
 
@@ -74,7 +57,7 @@ def test_lattices_lines_and_touching(d, data):
 
 @both_dimensions
 def test_full_cells(d):
-    """More objects in a row of cells than are processed together, up to the limit of a cell, and None beyond it."""
+    """More objects in a row of cells than are looked at together, up to the limit of a cell, and beyond it none."""
     rng = np.random.default_rng(2)
     spread = rng.random((2000, d)) * 2000 ** (1 / d) * 2
     for crowd in (12, 30, 60):
@@ -98,14 +81,13 @@ def test_what_does_not_suit(d):
     assert check(centre, centre, 1000) is None
     half[0] = np.inf
     assert check(centre - half, centre + half, 1000) is None
-    nothing, frame = np.full((10, d), np.nan), np.zeros(FRAME_SIZE)
-    frame[LOWEST : LOWEST + d], frame[HIGHEST : HIGHEST + d] = np.inf, -np.inf
-    assert EvenGrid(d).pairs(nothing, nothing, frame, 10, np.arange(0, dtype=np.int32)) is None
+    nothing = np.full((10, d), np.nan)
+    assert check(nothing, nothing, 10) is None
 
 
 @both_dimensions
 def test_output_grows(d):
-    """Each of 1,000 boxes meets 40 that are not in the grid: ten times the initial capacity."""
+    """Each of 1,000 boxes meets 40 that are not in the grid: ten times the room there is at first."""
     centre = np.random.default_rng(4).random((1040, d)) * 2 * 1000 ** (1 / d)
     lower, upper = centre - 0.1, centre + 0.1
     lower[1000:], upper[1000:] = -1.0, 1e3

@@ -1,4 +1,4 @@
-"""Times of a step: by system always, by kernel inside a profile; the counts and the divisors."""
+"""Times of a step: by system always, by stage and kernel inside a profile; the counts and the divisors."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from carom.components import RigidBody, Transform
 from carom.framework import CaromError, ForceSystem, Phase, System
 from carom.framework.compilation import Kernel, TimedKernel, kernel, log
 from carom.framework.schedule.profile_report import Stats, Totals
+from carom.framework.schedule.stages import run_stages
 from carom.lab.cli import cli
-from carom.systems.integration import integrators
 
 from .worlds import ball, floor, make_world, run
 
@@ -45,7 +45,7 @@ def kernel_calls(world):
     return {(row.system, row.kernel): row.calls for row in world.stats().kernels}
 
 
-def test_a_profile_counts_the_calls_of_each_kernel_by_system():
+def test_a_profile_counts_the_calls_of_each_stage_and_kernel_by_system():
     world = bouncing(integrator="rk4")
     world.add_system(Pull())
     run(world, 1)  # compiled; calls that compile are not counted
@@ -53,12 +53,12 @@ def test_a_profile_counts_the_calls_of_each_kernel_by_system():
         run(world, STEPS)
     calls = kernel_calls(world)
     assert calls["Integration", "runge_kutta_stage"] == 4
-    assert calls["ForceAccumulation", "sum_constant_forces"] == 1  # the state at the start of the step
-    assert calls["Integration", "sum_constant_forces"] == 3  # and those of the other stages
+    assert calls["ForceAccumulation", "sum_forces"] == 1 + 3  # at the start of the step, and where rk4 evaluates again
+    assert calls["ForceAccumulation", "pull"] == 1
     assert calls["Integration", "pull"] == 3
-    assert calls["NarrowPhase", "find_contacts"] == 1
-    assert calls["BroadPhase", "box_motion"] == 1
-    assert "euler" not in {name for _, name in calls}
+    assert calls["NarrowPhase", "evaluate_pairs"] == 1
+    assert calls["BroadPhase", "box_motions"] == 1
+    assert "semi_implicit_euler" not in {name for _, name in calls}
 
 
 def test_kernels_called_between_steps_stand_apart():
@@ -81,7 +81,7 @@ def test_means_are_over_the_steps_inside_profiles():
         with world.profile():
             run(world, steps)
         run(world, 7)
-    assert kernel_calls(world)["Integration", "euler"] == 1
+    assert kernel_calls(world)["Integration", "semi_implicit_euler"] == 1
     assert world.stats().steps == 3 + 2 + 7 + 3 + 7
     assert world.stats().profiled.steps == 5
 
@@ -95,7 +95,7 @@ def test_resetting_inside_a_profile_starts_again():
         assert world.stats().kernels == ()
         run(world, 2)
         assert world.stats().profiled.steps == 2
-        assert kernel_calls(world)["Integration", "euler"] == 1
+        assert kernel_calls(world)["Integration", "semi_implicit_euler"] == 1
     assert world.stats().profiled.steps == 2
     world.reset_stats()
     assert world.stats().kernels == ()
@@ -121,7 +121,7 @@ def test_time_is_divided_by_what_the_counters_counted():
     for name, counter in {"body": "bodies", "candidate": "candidates"}.items():
         whole = stats.nanoseconds["NarrowPhase"][name] * stats.counters[counter]
         assert whole == pytest.approx(1e6 * stats.milliseconds["NarrowPhase"] * STEPS)
-    (row,) = [row for row in stats.kernels if row.kernel == "find_contacts"]
+    (row,) = [row for row in stats.kernels if row.kernel == "evaluate_pairs"]
     assert row.nanoseconds["candidate"] * stats.counters["candidates"] == pytest.approx(1e6 * row.milliseconds * STEPS)
     assert sum(stats.milliseconds.values()) == pytest.approx(stats.total)
 
@@ -180,14 +180,14 @@ def test_compiling_is_kept_apart(monkeypatch, tmp_path):
 def test_a_profile_leaves_everything_as_it_was():
     plain, profiled = bouncing(), bouncing()
     run(plain, 20)
-    assert type(integrators.euler) is Kernel
+    assert type(run_stages) is Kernel
     with profiled.profile():
         run(profiled, 10)
-        assert type(integrators.euler) is TimedKernel
-    assert type(integrators.euler) is Kernel
+        assert type(run_stages) is TimedKernel
+    assert type(run_stages) is Kernel
     with pytest.raises(ValueError, match="the game's own"), profiled.profile():
         raise ValueError("the game's own")
-    assert type(integrators.euler) is Kernel
+    assert type(run_stages) is Kernel
     run(profiled, 10)
     assert plain.state_hash() == profiled.state_hash()
 
@@ -216,7 +216,7 @@ def test_one_profile_at_a_time():
         run(first, 1)
     with second.profile():
         run(second, 2)
-    assert kernel_calls(second)["Integration", "euler"] == 1
+    assert kernel_calls(second)["Integration", "semi_implicit_euler"] == 1
 
 
 def test_the_stats_print_as_a_table():
@@ -229,7 +229,7 @@ def test_the_stats_print_as_a_table():
         "system", "ms per step", "ns per body", "ns per candidate", "ns per pair", "ns per contact",
     ]  # fmt: skip
     names = [line.split()[0] for line in lines[1:]]
-    assert names.index("Integration") + 1 == names.index("euler")
+    assert names.index("Integration") + 1 == names.index("keep_start")
     assert lines[-1].startswith(f"all, {STEPS + 1} steps")
     assert "nan" not in str(Stats(Totals()))
 
@@ -246,11 +246,11 @@ def carom(tmp_path, monkeypatch):
 def test_the_command_shows_systems_and_their_kernels(carom):
     result = carom("--steps", "40", "--profile")
     assert result.exit_code == 0, result.stderr
-    for words in ("calls", "candidate", "ForceAccumulation", "  find_contacts", "Python and numpy"):
+    for words in ("calls", "candidate", "ForceAccumulation", "  evaluate_pairs", "Python and numpy"):
         assert words in result.stdout
     assert "for the steps that compiled or loaded kernels" in result.stdout
     assert max(map(len, result.stdout.splitlines())) <= 80
-    assert "find_contacts" not in carom("--steps", "2").stdout
+    assert "evaluate_pairs" not in carom("--steps", "2").stdout
 
 
 def test_the_command_s_json_adds_up(carom):
@@ -266,7 +266,8 @@ def test_the_command_s_json_adds_up(carom):
         assert system["milliseconds"] == pytest.approx(report["system_milliseconds"][system["system"]])
         whole += system["milliseconds"]
     assert whole == pytest.approx(report["step_milliseconds_mean"])
-    (euler,) = [row for system in profile["systems"] for row in system["kernels"] if row["kernel"] == "euler"]
+    rows = [row for system in profile["systems"] for row in system["kernels"]]
+    (euler,) = [row for row in rows if row["kernel"] == "semi_implicit_euler"]
     assert euler["calls"] == 1
     assert set(euler) == {"kernel", "calls", "milliseconds", "share", "nanoseconds_per"}
     assert json.loads(carom("--steps", "2", "--json").stdout)["profile"] is None

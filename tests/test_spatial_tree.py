@@ -32,9 +32,11 @@ brute_force = load_oracle("brute_force")
 PointerQuadtree = load_oracle("pointer_quadtree").PointerQuadtree
 
 
+ONE_CELL_MAX = 24  # so that small trees have levels too; one cell is tested as well
 
-def tree_of(lower, upper, start=0, stop=None):
-    tree = SpatialTree(lower.shape[1])
+
+def tree_of(lower, upper, start=0, stop=None, one_cell_max=ONE_CELL_MAX):
+    tree = SpatialTree(lower.shape[1], one_cell_max)
     tree.build(lower, upper, start, len(lower) if stop is None else stop)
     return tree
 
@@ -51,6 +53,9 @@ def check_everything(lower, upper, rng):
     """Pairs within, pairs between two halves, queries of many and of one: all equal to brute force."""
     n = len(lower)
     expected = brute_force.all_pairs(lower, upper)
+    one_cell = tree_of(lower, upper, one_cell_max=n)
+    assert one_cell.record.levels == 0
+    assert unordered(*one_cell.pairs_within()) == expected
     tree = tree_of(lower, upper)
     assert unordered(*tree.pairs_within()) == expected
 
@@ -68,6 +73,7 @@ def check_everything(lower, upper, rng):
         want = np.flatnonzero(brute_force.overlaps(lower, upper, lower[i], upper[i]))
         np.testing.assert_array_equal(rows[offsets[k] : offsets[k + 1]], want)
         np.testing.assert_array_equal(tree.query_one(lower[i], upper[i]), want)
+        np.testing.assert_array_equal(one_cell.query_one(lower[i], upper[i]), want)
 
 
 def scene(name, n, d, rng):
@@ -282,7 +288,7 @@ def test_walls_and_a_static_world(d):
 def test_one_tree_for_many_scenes(d):
     """Buffers are reused: a large scene, a small one and a large one again, rows from the middle of the arrays."""
     rng = np.random.default_rng(11)
-    tree = SpatialTree(d)
+    tree = SpatialTree(d, ONE_CELL_MAX)
     for n, start, stop in ((900, 0, 900), (60, 20, 50), (900, 100, 800), (10, 5, 5)):
         centre, half = scene("power law", n, d, rng)
         lower, upper = centre - half, centre + half

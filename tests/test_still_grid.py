@@ -1,9 +1,10 @@
-"""The static grid against brute force, alone and in the broad phase of whole worlds."""
+"""Grids of what does not move against brute force, alone and in the broad phase of whole worlds."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers_boxes import STATIC_GRID_ALONE, Boxes, overlapping, pair_set
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
@@ -11,35 +12,43 @@ from worlds import both_dimensions
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
-from carom.systems.broad_phase import static_grid as still_grid
-from carom.systems.broad_phase import uniform_grid as even_grid
-from carom.systems.broad_phase.static_grid import OUTSIDE, StillGrid
-from carom.systems.broad_phase.tree import tree as spatial_tree
+from carom.systems.broad_phase.stages import CANDIDATE_LIMIT
+from carom.systems.broad_phase.static_grid import OUTSIDE_MAX
+from carom.systems.broad_phase.tree.tree import CandidateLimitError
 
 
-def check(lower, upper, start, stop):
-    """The grid of rows start..stop-1, after comparing the pairs of all other rows with brute force."""
-    grid = StillGrid(lower, upper, start, stop)
-    if not grid.suits:
-        return grid
-    inside = np.setdiff1d(np.arange(start, stop), grid.outside)
-    others = np.setdiff1d(np.arange(len(lower)), np.arange(start, stop)).astype(np.int32)
-    found, askers = grid.pairs(others)
-    pairs = list(zip(found.tolist(), askers.tolist(), strict=True))
-    meet = (lower[inside][:, None] <= upper[others]) & (lower[others] <= upper[inside][:, None])
-    expected = {(int(inside[i]), int(others[j])) for i, j in zip(*np.nonzero(meet.all(axis=2)), strict=True)}
-    assert len(set(pairs)) == len(pairs)
-    assert set(pairs) == expected
-    return grid
+def grid_of(lower, upper, moving):
+    """A grid of all but the first rows, into which these look."""
+    boxes = Boxes(lower.shape[1], functions=STATIC_GRID_ALONE)
+    boxes.set(lower, upper, moving)
+    return boxes
+
+
+def outside(boxes):
+    """The rows that are not in the grid."""
+    grid = boxes.state.static_grid
+    return grid.outside[: grid.outside_count]
+
+
+def check(lower, upper, moving):
+    """The number of pairs, after comparing what the first rows find in the grid with brute force; None without one."""
+    boxes = grid_of(lower, upper, moving)
+    found = boxes.find()
+    if not boxes.state.static_grid.suits:
+        return None
+    left_out = set(outside(boxes).tolist())
+    expected = {(i, j) for i, j in overlapping(lower, upper, moving) if j >= moving and j not in left_out}
+    assert pair_set(*found) == expected
+    return len(expected)
 
 
 @both_dimensions
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-def test_any_boxes_against_even_ones(d, data):
-    """Boxes of all sizes, touching, infinite and without shape; the largest static ones stay outside."""
+def test_any_boxes_look_into_even_ones(d, data):
+    """Boxes of all sizes, touching, infinite and without shape; the largest of what does not move stay outside."""
     rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
-    count, large = data.draw(st.integers(OUTSIDE + 1, 300)), data.draw(st.integers(0, OUTSIDE))
+    count, large = data.draw(st.integers(OUTSIDE_MAX + 1, 300)), data.draw(st.integers(0, OUTSIDE_MAX))
     unit = 10.0 ** data.draw(st.integers(-100, 100))
     centre = rng.integers(0, data.draw(st.integers(2, 40)), (count + 100, d)) * 0.5 + data.draw(
         st.sampled_from([0.0, 0.25, 1e6])
@@ -50,7 +59,7 @@ def test_any_boxes_against_even_ones(d, data):
     lower, upper = (centre - half) * unit, (centre + half) * unit
     lower[3], upper[4, 0], lower[5:9, d - 1], lower[9], upper[9] = np.nan, np.inf, -np.inf, -np.inf, np.inf
     lower[-1] = np.nan
-    check(lower, upper, 100, len(lower))
+    check(lower, upper, 100)
 
 
 @both_dimensions
@@ -58,52 +67,56 @@ def test_walls_stay_outside(d):
     centre = np.random.default_rng(1).random((2000, d)) * 2000 ** (1 / d)
     half = np.full((2000, 1), 0.4)
     half[500:504] = 1e3
-    grid = check(centre - half, centre + half, 500, 2000)
-    assert grid.suits
-    assert grid.outside.tolist() == [500, 501, 502, 503]
+    boxes = grid_of(centre - half, centre + half, 500)
+    boxes.find()
+    assert boxes.state.static_grid.suits
+    assert outside(boxes).tolist() == [500, 501, 502, 503]
+    assert check(centre - half, centre + half, 500) > 100
 
 
 @both_dimensions
 def test_what_does_not_suit(d):
-    """More large boxes than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
+    """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
     rng = np.random.default_rng(2)
     centre, half = rng.random((1000, d)) * 40, np.full((1000, 1), 0.01)
-    half[: OUTSIDE + 1] = 15.0
+    half[: OUTSIDE_MAX + 1] = 15.0
     nothing = np.full((1000, d), np.nan)
-    for lower, upper, stop in (
-        (centre - half, centre + half, 1000),
-        (0 * centre - 0.5, 0 * centre + 0.5, 1000),
-        (centre, centre, 1000),
-        (nothing, nothing, 1000),
-        (centre, centre + 1.0, 0),
-        (centre, centre + 1.0, OUTSIDE),
+    for lower, upper in (
+        (centre - half, centre + half),
+        (0 * centre - 0.5, 0 * centre + 0.5),
+        (centre, centre),
+        (nothing, nothing),
+        (centre[:0], centre[:0]),
+        (centre[:OUTSIDE_MAX], centre[:OUTSIDE_MAX] + 1.0),
     ):
-        assert not StillGrid(lower, upper, 0, stop).suits
+        assert check(lower, upper, 0) is None
 
 
 @both_dimensions
-def test_output_grows_up_to_the_limit(d, monkeypatch):
+def test_output_grows(d):
     """Each of 40 boxes meets all 1,000 in the grid."""
     centre = np.random.default_rng(3).random((1040, d)) * 2 * 1000 ** (1 / d)
     lower, upper = centre - 0.1, centre + 0.1
     lower[:40], upper[:40] = -1.0, 1e3
-    grid, rows = StillGrid(lower, upper, 40, 1040), np.arange(40, dtype=np.int32)
-    assert len(grid.pairs(rows)[0]) == 40 * (1000 - len(grid.outside))
-    monkeypatch.setattr(still_grid, "CANDIDATE_LIMIT", 10_000)
-    assert StillGrid(lower, upper, 40, 1040).pairs(rows) is None
+    assert check(lower, upper, 40) == 40 * (1000 - len(outside_after(grid_of(lower, upper, 40))))
 
 
-def test_too_many_pairs_are_left_to_the_tree(monkeypatch):
-    """One place per box, and each of 40 others covers all of them: the grid must not exceed the limit."""
-    centre = np.random.default_rng(4).random((1040, 2)) * 60
+def outside_after(boxes):
+    """The rows that are not in the grid, once it is built."""
+    boxes.find()
+    return outside(boxes)
+
+
+def test_too_many_pairs_are_left_to_the_tree():
+    """Each of 8,500 boxes meets all 1,000 in the grid: what the limit does not allow, no grid finds."""
+    centre = np.random.default_rng(4).random((9500, 2)) * 60
     lower, upper = centre - 0.1, centre + 0.1
-    lower[1000:], upper[1000:] = -1.0, 1e3
-    frame = np.array((lower[:1000, 0].min(), lower[:1000, 1].min(), 0, 61.0, 61.0, 0, 0.2))
-    others = np.arange(1000, 1040, dtype=np.int32)
-    assert even_grid.EvenGrid(2).pairs(lower, upper, frame, 1000, others) is not None
-    monkeypatch.setattr(even_grid, "CANDIDATE_LIMIT", 10_000)
-    assert even_grid.EvenGrid(2).pairs(lower, upper, frame, 1000, others) is None
-    assert spatial_tree.CANDIDATE_LIMIT > 10_000
+    lower[:8500], upper[:8500] = -1.0, 1e3
+    boxes = grid_of(lower, upper, 8500)
+    with pytest.raises(CandidateLimitError):
+        boxes.find()
+    assert boxes.state.static_grid.suits
+    assert len(boxes.state.candidates.first) == CANDIDATE_LIMIT
 
 
 def level(d, movers, speed=1.0):
@@ -150,7 +163,7 @@ def touching(world):
 @both_dimensions
 @pytest.mark.parametrize("movers", [1, 60, 400])
 def test_a_level_is_seen_as_it_is(d, movers):
-    """All overlaps are contacts; also after static boxes were moved by their handles or in the columns."""
+    """All that overlaps is in contact; also after static boxes were moved by their handles or in the columns."""
     with level(d, movers, speed=0.0) as world:
         sphere = int(world.bodies.entity[0])
         for turn in range(4):

@@ -172,7 +172,7 @@ def test_the_plan_shows_the_order_and_the_reasons():
     assert [entry.priority for entry in plan.entries] == [system.priority for system in world.systems]
     text = str(plan)
     assert "gravity" in text
-    assert "nobody listens" in text
+    assert "no event has a handler" in text
     with world:
         esper.set_handler("contact_begin", _handler)
     assert "handlers of contact_begin" in str(world.plan())

@@ -45,7 +45,7 @@ class Adoption:
 
     def settled(self) -> bool:
         """Whether nothing has changed since the last synchronize; needs no switch of contexts to find out."""
-        return self._log is not None and not self._log and not self._pending and not self.table.kind_changed
+        return not (self._log is None or self._log.dirty or self._pending or self.table.kind_changed)
 
     def synchronize(self) -> bool:
         """Bring the table up to date; True if anything has changed.
@@ -54,7 +54,7 @@ class Adoption:
         is looked at again the next time.
         """
         log = self._log = esper_bridge.changes()
-        if not log and not self._pending and not self.table.kind_changed:
+        if not log.dirty and not self._pending and not self.table.kind_changed:
             return False
         self._gather(*log.take())
         touched = self._pending

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import operator
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -60,18 +59,11 @@ class ChangeLog:
     def __init__(self, base: type[Any]) -> None:
         self.base = base  # only types derived from it are watched
         self.cleared = False  # by esper.clear_database(): everything before it has gone
+        self.dirty = False  # something has been logged since the last time
         self._touched: dict[type[Any], _Touched] = {}
 
-    def __bool__(self) -> bool:
-        if self.cleared:
-            return True
-        for touched in self._touched.values():  # noqa: SIM110 asked in every step: any() takes twice the time
-            if touched.entities:
-                return True
-        return False
-
     def of(self, component: type[Any]) -> _Touched:
-        return self._touched.setdefault(component, _Touched())
+        return self._touched.setdefault(component, _Touched(self))
 
     def take(self) -> tuple[dict[type[Any], set[int]], bool]:
         """What has been logged since the last time."""
@@ -79,16 +71,18 @@ class ChangeLog:
         for component in touched:
             self._touched[component].entities = set()
         cleared, self.cleared = self.cleared, False
+        self.dirty = False
         return touched, cleared
 
 
 class _Touched:
     """Where the sets of one component type log into; the set inside is exchanged when the log is read."""
 
-    __slots__ = ("entities",)
+    __slots__ = ("entities", "log")
 
-    def __init__(self) -> None:
+    def __init__(self, log: ChangeLog) -> None:
         self.entities: set[int] = set()
+        self.log = log
 
 
 class _Members(set[int]):
@@ -99,17 +93,21 @@ class _Members(set[int]):
     def __init__(self, entities: Iterable[int], touched: _Touched) -> None:
         super().__init__(entities)
         self._touched = touched
+        touched.log.dirty = True
         touched.entities.update(self)
 
     def add(self, entity: int) -> None:
+        self._touched.log.dirty = True
         self._touched.entities.add(entity)
         super().add(entity)
 
     def discard(self, entity: int) -> None:
+        self._touched.log.dirty = True
         self._touched.entities.add(entity)
         super().discard(entity)
 
     def update(self, *entities: Iterable[int]) -> None:
+        self._touched.log.dirty = True
         self._touched.entities.update(*entities)
         super().update(*entities)
 
@@ -129,7 +127,7 @@ class _WatchedComponents(dict[type[Any], set[int]]):
         super().__setitem__(component, entities)
 
     def clear(self) -> None:
-        self.log.cleared = True
+        self.log.cleared = self.log.dirty = True
         super().clear()
 
 
@@ -239,24 +237,59 @@ def forget_unknown_dead() -> None:
 # -- processors and events -----------------------------------------------------------------------
 
 
-def processors() -> list[esper.Processor]:
-    return list(esper._processors)
+class Processors(list[esper.Processor]):
+    """esper's list of the processors of one world, which the first of them runs by itself.
+
+    esper's ``process()`` walks through the list; once the first processor has run the whole step (``step_done``), the
+    walk ends. So the world decides how each is called, and no processor has to be changed for it.
+    """
+
+    def __init__(self, content: Iterable[esper.Processor]) -> None:
+        super().__init__(content)
+        self.changed = True  # since the world has looked last
+        self.step_done = False
+
+    def __iter__(self) -> Iterator[esper.Processor]:
+        for processor in super().__iter__():
+            yield processor
+            if self.step_done:
+                self.step_done = False
+                return
+
+    def append(self, processor: esper.Processor) -> None:
+        self.changed = True
+        super().append(processor)
+
+    def remove(self, processor: esper.Processor) -> None:
+        self.changed = True
+        super().remove(processor)
+
+    def clear(self) -> None:
+        self.changed = True
+        super().clear()
 
 
-def same_processors(known: list[esper.Processor]) -> bool:
-    """Whether the current context still has these very processors, in this order."""
-    now = esper._processors
-    return len(now) == len(known) and all(map(operator.is_, now, known))
+def take_over_processors() -> Processors:
+    """Put our list in place of esper's in the current context."""
+    esper._processors = Processors(esper._processors)
+    return esper._processors  # type: ignore[return-value]
 
 
-def renew_processors() -> None:
-    """A process() that is running goes on with the processors as they are now, whatever is added or removed next."""
-    esper._processors = list(esper._processors)
+def give_back_processors() -> None:
+    """Put a plain list back."""
+    esper._processors = [*esper._processors]
+
+
+def dead_entities() -> set[int]:
+    """esper's own set of the entities of the current context whose deletion is pending."""
+    return esper._dead_entities
 
 
 def remove_processor_instance(processor: esper.Processor) -> None:
     """Remove that very processor; esper's own removal is by type and loses sight of a second instance."""
     esper._processors[:] = [p for p in esper._processors if p is not processor]
+    if isinstance(esper._processors, Processors):
+        esper._processors.changed = True
     kind = type(processor)
     rest = [p for p in esper._processors if type(p) is kind]
     if rest:
@@ -273,9 +306,9 @@ def event_handlers(name: str) -> Iterator[Any]:
             yield handler
 
 
-def has_event_handlers(name: str | None = None) -> bool:
-    """Whether plain esper has handlers for that event, or for any."""
-    return bool(esper.event_registry if name is None else esper.event_registry.get(name))
+def event_registry() -> dict[str, Any]:
+    """esper's own dict of the handlers of the current context: do not change it."""
+    return esper.event_registry
 
 
 # -- steps ---------------------------------------------------------------------------------------

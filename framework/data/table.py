@@ -6,6 +6,7 @@ leads to the same rows, the same order of every sum, the same bits.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,8 @@ class Table:
         self.frame = 0  # counts the calls of step() and advance()
         self.kind_changed = False
         self.arrays: dict[str, np.ndarray] = {}
-        self.undo: dict[str, np.ndarray] = {}  # what a step has overwritten so far, see open_undo
-        self.everything_kept = False  # at the start of the step: code that keeps nothing may write any column in it
-        self._buffers: dict[str, np.ndarray] = {}  # behind undo; fresh memory costs ten times the copying
-        self._everything: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # copy and column, see open_undo
-        self._everything_of = (0, 0)  # what version and how many arrays they are of
+        self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
+        self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
         self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
@@ -242,51 +240,3 @@ class Table:
     def copy_columns(self) -> dict[str, np.ndarray]:
         """Copies of the rows in use, of all columns."""
         return {key: self.column(key).copy() for key in self.arrays}
-
-    def open_undo(self, everything: bool) -> dict[str, np.ndarray]:
-        """A step begins: what it overwrites is kept from now on, in the dict that this returns.
-
-        everything: all columns at once; else each when a system says so with :meth:`keep`. Which bodies there are, and
-        which components they have, no step changes.
-        """
-        self.undo = {}
-        self.everything_kept = everything
-        if everything:
-            if self._everything_of != (self.version, len(self.arrays)):
-                keys = [key for key in self.arrays if key != "entity" and not key.startswith("has:")]
-                self._everything = {key: (self._buffer(key), self.column(key)) for key in keys}
-                self._everything_of = (self.version, len(self.arrays))
-            for key, (copy, column) in self._everything.items():
-                np.copyto(copy, column)
-                self.undo[key] = copy
-        return self.undo
-
-    def keep(self, key: str, copy: np.ndarray | None = None) -> None:
-        """To be called before a column is overwritten for the first time in a step.
-
-        copy: of its first rows, where there is one anyway; nobody may change it before the step ends. It may be a
-        column that was kept before this one, because the last is put back first.
-        """
-        if key in self.undo:
-            return
-        if copy is None:
-            copy = self._buffer(key)
-            np.copyto(copy, self.column(key))
-        self.undo[key] = copy
-
-    def _buffer(self, key: str) -> np.ndarray:
-        """Room for a copy of that column's rows in use."""
-        array, buffer = self.arrays[key], self._buffers.get(key)
-        if buffer is None or buffer.shape != array.shape:
-            buffer = self._buffers[key] = np.empty_like(array)
-        return buffer[: self.count]
-
-    def undo_buffers(self) -> list[tuple[str, np.ndarray]]:
-        """By column, the room for its copies that there is."""
-        return list(self._buffers.items())
-
-    def restore_columns(self, columns: dict[str, np.ndarray]) -> None:
-        """Put back what was kept, the last first: a copy may itself be a column that was kept before."""
-        for key, array in reversed(columns.items()):
-            self.arrays[key][: len(array)] = array
-        self.static_version += 1

@@ -36,8 +36,7 @@ class Phase(IntEnum):
         return 1000 * (len(Phase) - self)
 
 
-FIRST_PRIORITY = 1_000_000  # the step's own opening: synchronize, keep the start state
-LAST_PRIORITY = -1_000_000  # and its closing: the clock
+FIRST_PRIORITY = 1_000_000  # the processor that runs the step
 
 
 class System(esper.Processor):
@@ -64,6 +63,10 @@ class System(esper.Processor):
     def process(self, dt: float) -> None:  # type: ignore[override]
         """Called exactly once per fixed step of ``dt`` seconds."""
         raise NotImplementedError(f"{self.name} has no process(dt)")
+
+    def parts(self) -> list[Any] | None:
+        """What a step runs for a system that consists of stages; None: its ``process``."""
+        return None
 
 
 class ForceSystem:
@@ -139,8 +142,8 @@ def _topological(members: list[System], edges: dict[int, set[int]]) -> list[int]
     return ordered
 
 
-def _built_in(system: System) -> bool:
-    return type(system).__module__.startswith("carom.systems.")
+def _consists_of_stages(system: System) -> bool:
+    return system.parts() is not None
 
 
 def _check_writers(members: list[System], edges: dict[int, set[int]]) -> None:
@@ -158,7 +161,8 @@ def _check_writers(members: list[System], edges: dict[int, set[int]]) -> None:
     for j, second in enumerate(members):
         for i, first in enumerate(members[:j]):
             shared = sorted(set(first.writes) & set(second.writes))
-            if _built_in(first) is _built_in(second) and shared and i not in before(j) and j not in before(i):
+            alike = _consists_of_stages(first) is _consists_of_stages(second)
+            if alike and shared and i not in before(j) and j not in before(i):
                 raise ScheduleError(
                     f"{first.name} and {second.name} both write {', '.join(shared)} in phase "
                     f"{first.phase.name} without an order: give one of them before= or after= the other"

@@ -1,43 +1,49 @@
-"""What a world's pipeline measures while it runs; :mod:`profile_report` makes means of it."""
+"""What a world measures while it runs; :mod:`profile_report` makes means of it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from .. import compilation
 from ..errors import CaromError
+from ..jit.tick_counter import ticks_now
 from .profile_report import OUTSIDE, Stats, Totals, units_of
+from .stages import run_stages
 
 if TYPE_CHECKING:
     from .step import Pipeline
 
 
-class Measurements:
-    """Time by system, always; calls and time by kernel inside :meth:`profile`."""
+OWN = (run_stages.__name__, ticks_now.__name__)  # stages are counted one by one
+
+
+class Profiler:
+    """Time by system, always; calls and time by stage and by kernel called from Python inside :meth:`profile`."""
 
     def __init__(self, pipeline: Pipeline) -> None:
-        self.at: str | None = None  # the processor at work
         self._pipeline = pipeline
-        self._sums = Totals()  # but for the counters, which others keep
-        self.seconds = self._sums.seconds
+        self.steps = 0
+        self._sums = Totals()  # of what is Python
+        self._before: Any = 0  # what the stages had taken when measuring began
         self._profiled = Totals()  # inside profiles that have ended
         self._profile_start: Totals | None = None
 
-    def wait(self, seconds: float) -> None:
-        """A system has waited for kernels to be compiled or loaded."""
-        self._sums.waited += seconds
+    def add(self, system: str, seconds: float, waited: float) -> None:
+        """A Python system has run; waited: seconds that kernels were compiled or loaded in it."""
+        self._sums.seconds[system] = self._sums.seconds.get(system, 0.0) + seconds
+        self._sums.waited += waited
 
-    def step_taken(self) -> None:
-        self._sums.steps += 1
-        physics = self._pipeline.world.physics
-        if physics is not None:
-            self._sums.counters["bodies"] = self._sums.counters.get("bodies", 0) + physics.table.stops[1]
+    def wait(self, seconds: float) -> None:
+        """Stages were compiled or loaded."""
+        self._sums.waited += seconds
 
     @contextmanager
     def profile(self) -> Iterator[None]:
-        """Time each call of a kernel; CaromError if that is going on already, in this world or another."""
+        """Count calls and time of stages and kernels; CaromError if that is going on already, in any world."""
         if compilation.timing():
             raise CaromError("a profile is on already: kernels can be timed for one world at a time")
         self._profile_start = self.totals()
@@ -50,17 +56,40 @@ class Measurements:
             self._profile_start = None
 
     def _record(self, kernel: str, nanoseconds: int, compiled: bool) -> None:
-        if compiled:
+        if compiled or kernel in OWN:
             return
-        key, sums = (self.at or OUTSIDE, kernel), self._sums
+        key, sums = (self._pipeline.at or OUTSIDE, kernel), self._sums
         sums.calls[key] = sums.calls.get(key, 0) + 1
         sums.kernel_seconds[key] = sums.kernel_seconds.get(key, 0.0) + 1e-9 * nanoseconds
+
+    def _counts(self) -> np.ndarray:
+        """Calls and ticks of all stages since the world began."""
+        physics = self._pipeline.world.physics
+        return np.zeros((2, 0), np.int64) if physics is None else physics.program.counts()
+
+    def _stages(self) -> Totals:
+        """What all stages have taken since measuring began."""
+        physics, totals = self._pipeline.world.physics, Totals()
+        if physics is None:
+            return totals
+        program = physics.program
+        calls, ticks = program.counts() - self._before
+        seconds = (ticks * program.seconds_per_tick).tolist()
+        for k, (stage, count) in enumerate(zip(program.stages, calls.tolist(), strict=True)):
+            if count:
+                system = physics.system_of_stage(k)
+                totals.calls[system, stage.name] = count
+                totals.kernel_seconds[system, stage.name] = seconds[k]
+                if system != OUTSIDE:
+                    totals.seconds[system] = totals.seconds.get(system, 0.0) + seconds[k]
+        return totals
 
     def totals(self) -> Totals:
         """The sums so far."""
         physics = self._pipeline.world.physics
         counters = physics.counters() if physics is not None else {}
-        return self._sums + Totals(counters={**counters, "dropped_steps": self._pipeline.clock.dropped_steps})
+        kept = Totals(self.steps, counters={**counters, "dropped_steps": self._pipeline.clock.dropped_steps})
+        return self._sums + self._stages() + kept
 
     def profiled(self) -> Totals:
         """The part of them that profiles have seen."""
@@ -70,12 +99,11 @@ class Measurements:
 
     def stats(self) -> Stats:
         """Means of it all."""
-        units = {s.name: units_of(s.phase) for s in self._pipeline.lineup.systems}
+        units = {s.name: units_of(s.phase) for s in self._pipeline.order.systems}
         return Stats(self.totals(), self.profiled(), units)
 
     def reset(self) -> None:
-        self._sums = Totals()
-        self.seconds = self._sums.seconds
+        self.steps, self._sums, self._before = 0, Totals(), self._counts()
         self._profiled = Totals()
         if self._pipeline.world.physics is not None:
             self._pipeline.world.physics.reset_counters()

@@ -2,60 +2,58 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 import esper
 
+from ..compilation import log
 from ..data import esper_bridge
 from ..errors import CaromError, StepError
-from ..world import snapshots
 from .clock import Clock
-from .phases import FIRST_PRIORITY, LAST_PRIORITY, Phase
-from .profiler import Measurements
-from .system_order import Lineup
+from .phases import FIRST_PRIORITY, Phase, System
+from .profiler import Profiler
+from .stages import PythonPart, Segment, merged
+from .system_order import SystemOrder
 
 if TYPE_CHECKING:
     from ..world.world import World
 
 
-class _Opening(esper.Processor):
-    """First of all processors."""
+class StepRunner(esper.Processor):
+    """The first of a world's processors: it runs the whole step, the other processors included."""
 
     def __init__(self, pipeline: Pipeline) -> None:
         self._pipeline = pipeline
 
     def process(self, *args: Any, **kwargs: Any) -> None:
-        self._pipeline.open_step(*args, *kwargs.values())
-
-
-class _Closing(esper.Processor):
-    """Last of all processors."""
-
-    def __init__(self, pipeline: Pipeline) -> None:
-        self._pipeline = pipeline
-
-    def process(self, *args: Any, **kwargs: Any) -> None:
-        self._pipeline.close_step()
+        self._pipeline.process(*args, *kwargs.values())
 
 
 class Pipeline:
-    """Owns a world's line-up and clock; esper calls it back at the start and the end of every process()."""
+    """Owns the order of a world's systems and its clock, and takes its steps."""
 
-    OWN = (_Opening, _Closing)
+    RUNNER = StepRunner
 
     def __init__(self, world: World) -> None:
         self.world = world
         self.clock = Clock(world.settings.dt)
-        self.lineup = Lineup(self)
+        self.order = SystemOrder(self)
         self.in_step = False
-        self.measurements = Measurements(self)
+        self.profiler = Profiler(self)
         self.faults: list[str] = []
         self._in_window = False
-        self._unfinished: snapshots.StepState | None = None
+        self._parts: list[Any] = []  # what a step runs, in order
+        self._parts_order = self._parts_physics = -1  # versions that the parts were made of
+        self._at = ""  # the system at work
+        self.processors: esper_bridge.Processors
+        self._dead: set[int]
 
     def attach(self) -> None:
-        esper.add_processor(_Opening(self), FIRST_PRIORITY)
-        esper.add_processor(_Closing(self), LAST_PRIORITY)
+        """Become the first processor of the world's context; called in it."""
+        self.processors = esper_bridge.take_over_processors()
+        self._dead = esper_bridge.dead_entities()
+        esper.add_processor(StepRunner(self), FIRST_PRIORITY)
 
     def must_be_between_steps(self, what: str) -> None:
         if self.in_step:
@@ -64,7 +62,8 @@ class Pipeline:
     # -- stepping ---------------------------------------------------------------------------------
 
     def step(self) -> None:
-        self.must_be_between_steps("a step can be taken")
+        if self.in_step:
+            self.must_be_between_steps("a step can be taken")
         self._take(1)
 
     def advance(self, seconds: float) -> int:
@@ -76,7 +75,7 @@ class Pipeline:
         except BaseException:  # the time of the steps that were not taken is still there
             self.clock.gathered += (steps - (self.clock.step_count - before)) * self.clock.dt
             raise
-        for system in tuple(self.lineup.frame_systems):
+        for system in tuple(self.order.frame_systems):
             with esper_bridge.context(self.world.name):
                 system.process(seconds)
         return steps
@@ -84,82 +83,148 @@ class Pipeline:
     def _take(self, steps: int) -> None:
         """Some steps whose events are gathered together."""
         self._open_window()
-        if not steps:  # new bodies are taken in all the same, so that they know which frame it is
+        if not steps:  # new bodies are adopted all the same, so that they know which frame it is
             self.synchronize()
             return
         self._in_window = True
         try:
-            with esper_bridge.context(self.world.name):
-                for _ in range(steps):
-                    esper_bridge.forget_unknown_dead()
-                    esper.process(self.world.settings.dt)
+            for _ in range(steps):
+                others_write = self.others_write()
+                if others_write or self._dead or self.processors.changed:  # code of the game needs its context
+                    with esper_bridge.context(self.world.name):
+                        esper_bridge.forget_unknown_dead()
+                        esper.process(self.clock.dt)
+                else:
+                    self._run(self.clock.dt, False)
         finally:
             self._in_window = False
-            if self.in_step:  # a processor without a guard raised: added to esper itself while the step was running
-                self.roll_back()
         self._close_window()
 
-    def open_step(self, *args: Any) -> None:
-        if self.in_step and self.measurements.at is not None:
+    def process(self, *args: Any) -> None:
+        """One step, called by esper's ``process()`` in the world's context."""
+        if self.in_step:
             raise CaromError("a step cannot be taken inside a step")
-        self.roll_back()  # what a step has left behind that broke off under plain esper without anybody noticing
         dt = self.world.settings.dt
         if len(args) != 1 or args[0] != dt:
             raise ValueError(
                 f"esper.process({', '.join(map(repr, args))}): this world's step is fixed, settings.dt = {dt!r}; "
                 f"for frames of any length use world.advance(seconds)"
             )
-        if not self._in_window:
+        alone = not self._in_window
+        if alone:
             self._open_window()
-        self.lineup.reconcile()
-        self.synchronize()
-        self._begin(self._others_write())
+        if self.processors.changed:
+            self.order.reconcile()
+        self._run(dt, self.others_write())
+        self.processors.step_done = True
+        if alone:
+            self._close_window()
 
-    def _others_write(self) -> bool:
+    def _run(self, dt: float, others_write: bool) -> None:
+        """Open the step, run its parts, close it."""
+        physics = self.world.physics
+        if physics is not None and not physics.adoption.settled():
+            self.synchronize()
+        self._begin(others_write)
+        order = self.order
+        if self._parts_order != order.version or (physics is not None and self._parts_physics != physics.parts_version):
+            self._make_parts()
+        self._run_parts(self._parts, dt)
+        if physics is not None:
+            physics.table.in_step = False
+            physics.end_step()
+        self.in_step = False
+        esper_bridge.running.discard(self.world.name)
+        self.clock.step_count += 1
+        self.profiler.steps += 1
+        if order.changed:
+            with esper_bridge.context(self.world.name):
+                order.apply()
+
+    def _run_parts(self, parts: list[Any], dt: float) -> None:
+        try:
+            for part in parts:
+                kind = type(part)
+                if kind is Segment:
+                    part.program.run(part.start, part.stop, dt)
+                elif kind is PythonPart:
+                    self._run_python(part, dt)
+                elif part.words[part.index]:
+                    self._run_python(part.part, dt)
+        except BaseException as error:
+            at, self._at = self._at or self._system_at(), ""
+            self.fail(at, error)
+            raise
+
+    def _run_python(self, part: PythonPart, dt: float) -> None:
+        """A system in Python: its time is taken, less what it has waited for the compiler."""
+        self._at = part.name
+        waited, started = log.waited, time.perf_counter()
+        part.function(dt)
+        self.profiler.add(part.name, time.perf_counter() - started - (log.waited - waited), log.waited - waited)
+        self._at = ""
+
+    @property
+    def at(self) -> str:
+        """The Python system at work, or the one for whose stage Python does something; "" if there is none."""
+        return self._at or (self._system_at() if self.in_step else "")
+
+    def _system_at(self) -> str:
+        """The system whose stage ran last."""
+        physics = self.world.physics
+        return "" if physics is None else physics.system_of_stage(physics.program.state.stage)
+
+    # -- what a step runs -------------------------------------------------------------------------
+
+    def others_write(self) -> bool:
         """Whether code that is not carom's runs in a step."""
-        return self.lineup.foreign or self.world.events.any_handlers()
+        return self.order.foreign or self.world.events.any_handlers()
+
+    def _make_parts(self) -> None:
+        """The parts of all processors in esper's order, between those that open and close a step."""
+        physics, debug = self.world.physics, self.world.settings.debug
+        parts: list[Any] = [] if physics is None else [*physics.opening()]
+        for processor in self.order.in_esper_order():
+            parts += parts_of(processor)
+            if debug and physics is not None:
+                name = name_of(processor)
+                parts.append(PythonPart(name, lambda dt, name=name: physics.report_faults(f"after {name}: ")))
+        if physics is not None:
+            parts += physics.closing()
+        self._parts = merged(parts)
+        self._parts_order, self._parts_physics = self.order.version, 0 if physics is None else physics.parts_version
 
     def look_ahead(self) -> None:
         """Between two steps: know what the next one will do."""
         self.synchronize()
         if self.world.physics is not None and not self.in_step:
-            self.world.physics.look_ahead(self._others_write())
+            self.world.physics.look_ahead(self.others_write())
 
-    def _begin(self, everything_kept: bool) -> None:
+    # -- opening and closing ----------------------------------------------------------------------
+
+    def _begin(self, others_write: bool) -> None:
         physics = self.world.physics
-        self._set_in_step(True)
+        self.in_step = True
+        esper_bridge.running.add(self.world.name)
         if physics is None:
             return
-        self._unfinished = snapshots.capture(physics, self.clock, everything_kept)
         physics.table.in_step = True
+        waited = log.waited
         try:
-            physics.begin_step()
-        except BaseException:
+            physics.begin_step(others_write)
+        except BaseException as error:
+            if hasattr(error, "__notes__"):  # it comes from a plugin's function
+                self.fail("Physics", error)
             self.roll_back()
             raise
-
-    def close_step(self) -> None:
-        physics = self.world.physics
-        if physics is not None:
-            physics.table.in_step = False
-            physics.end_step()
-        self._set_in_step(False)
-        self._unfinished = None
-        self.clock.step_count += 1
-        self.measurements.step_taken()
-        if not self._in_window:
-            self._close_window()
-        if self.lineup.changed:
-            self.lineup.apply_after_step()
-
-    def _set_in_step(self, running: bool) -> None:
-        self.in_step = running
-        (esper_bridge.running.add if running else esper_bridge.running.discard)(self.world.name)
+        if log.waited != waited:
+            self.profiler.wait(log.waited - waited)
 
     def _open_window(self) -> None:
-        if self.world.physics is not None:
-            self.world.physics.contacts.open_window()
-            self.world.physics.table.frame += 1
+        physics = self.world.physics
+        if physics is not None:
+            physics.contacts.open_window(self.clock.step_count)
+            physics.table.frame += 1
 
     def _close_window(self) -> None:
         if self.world.physics is not None:
@@ -176,22 +241,28 @@ class Pipeline:
     def run(self, phase: Phase) -> None:
         """One phase alone; the clock stands still. If it raises, all is as it was before."""
         self.must_be_between_steps("a phase can be run")
+        physics = self.world.physics
         with esper_bridge.context(self.world.name):
-            self.lineup.reconcile()
+            if self.processors.changed:
+                self.order.reconcile()
             self.synchronize()
             self._begin(True)
-            for system in [s for s in self.lineup.systems if s.phase == phase]:
-                system.process(self.world.settings.dt)
-        self._unfinished = None
-        self._set_in_step(False)
-        if self.world.physics is not None:
-            self.world.physics.table.in_step = False
-        self.lineup.apply()
+            parts = [] if physics is None else [*physics.opening()]
+            for system in [s for s in self.order.systems if s.phase == phase]:
+                parts += parts_of(system)
+            self._run_parts(merged(parts), self.world.settings.dt)
+            if physics is not None:
+                physics.contacts.columns_now()  # rows may move before they are read
+            self.in_step = False
+            esper_bridge.running.discard(self.world.name)
+            if physics is not None:
+                physics.table.in_step = False
+            self.order.apply()
 
     # -- when something raises --------------------------------------------------------------------
 
     def fail(self, name: str, error: BaseException) -> None:
-        """A processor has raised: back to the start of the step, and an error that names it."""
+        """A system has raised: back to the start of the step, and an error that names it."""
         step = self.clock.step_count
         undone = self.roll_back()
         if isinstance(error, StepError) or not isinstance(error, Exception):
@@ -206,12 +277,26 @@ class Pipeline:
         """Back to the start of an unfinished step, if there is one."""
         if not self.in_step:
             return False
-        self._set_in_step(False)
-        state, self._unfinished = self._unfinished, None
+        self.in_step = False
+        esper_bridge.running.discard(self.world.name)
         physics = self.world.physics
-        if state is not None and physics is not None:
-            snapshots.put_back(state, physics, self.clock)
+        if physics is not None:
             physics.abandon_step()
             physics.table.in_step = False
-        self.lineup.apply()
+        with esper_bridge.context(self.world.name):
+            self.order.apply()
         return True
+
+
+def name_of(processor: esper.Processor) -> str:
+    """What a processor is called in messages and in ``stats()``."""
+    return processor.name if isinstance(processor, System) else type(processor).__name__
+
+
+def parts_of(processor: esper.Processor) -> list[Any]:
+    """What a step runs for a processor: its stages, if it is a built-in system, else its ``process``."""
+    if isinstance(processor, System):
+        parts = processor.parts()
+        if parts is not None:
+            return parts
+    return [PythonPart(name_of(processor), lambda dt: processor.process(dt))]

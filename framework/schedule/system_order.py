@@ -1,14 +1,12 @@
-"""The line-up of a world: its systems and processors, in which order they run, and who catches what they raise."""
+"""The order of a world's systems and processors."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import esper
 
-from ..compilation import log
 from ..data import esper_bridge
 from ..errors import NoPhysicsError, ScheduleError
 from .phases import ForceSystem, Phase, System, in_order, means
@@ -19,52 +17,18 @@ if TYPE_CHECKING:
 PLACED = ("before", "after", "phase")  # attributes of a system that being added may set
 
 
-class Guard:
-    """A processor's ``process`` with its time taken and its errors named; set on the instance, where esper finds it."""
-
-    def __init__(self, processor: esper.Processor) -> None:
-        self.replaced = vars(processor).get("process")  # what somebody else had put there
-        self._process = processor.process
-        self.name = processor.name if isinstance(processor, System) else type(processor).__name__
-        self.pipelines: dict[str, Pipeline] = {}  # by context: a plain processor may serve several worlds
-
-    def __call__(self, *args: Any, **kwargs: Any) -> None:
-        pipeline = self.pipelines.get(esper.current_world)
-        if pipeline is None:
-            self._process(*args, **kwargs)
-            return
-        measurements = pipeline.measurements
-        outer, measurements.at = measurements.at, self.name
-        waited, started = log.waited, time.perf_counter()
-        try:
-            self._process(*args, **kwargs)
-            if pipeline.world.settings.debug and pipeline.world.physics is not None:
-                pipeline.world.physics.report_faults(f"after {self.name}: ")
-        except BaseException as error:
-            pipeline.fail(self.name, error)
-            raise
-        finally:
-            measurements.at = outer
-        taken = time.perf_counter() - started
-        if log.waited != waited:  # kernels were compiled or loaded
-            measurements.wait(log.waited - waited)
-            taken -= log.waited - waited
-        seconds = measurements.seconds
-        seconds[self.name] = seconds.get(self.name, 0.0) + taken
-
-
-class Lineup:
-    """Who runs in a step. What is added or removed while one runs joins or leaves at its end."""
+class SystemOrder:
+    """What runs in a step. A system added or removed while one runs joins or leaves at its end."""
 
     def __init__(self, pipeline: Pipeline) -> None:
         self.systems: list[System] = []
         self.force_systems: list[ForceSystem] = []
         self.frame_systems: list[Any] = []
         self._pipeline = pipeline
+        self.version = 0  # changes with every change of what runs
         self._wanted: list[System] = []  # in order of addition, as they will be after the step
         self._wanted_forces: list[ForceSystem] = []
         self._later: list[Callable[[], None]] = []  # what is to happen to plain processors after the step
-        self._known: list[esper.Processor] = []  # esper's processors when they were looked at last
         self.changed = False  # whether something has been asked for that is not so yet
         self.foreign = True  # whether code that is not carom's runs in the step and may write any column
         self._given: dict[int, dict[str, Any]] = {}  # what PLACED attributes a system had before it was added
@@ -189,19 +153,19 @@ class Lineup:
     def remove_processor(self, processor: Any) -> None:
         """By instance, or the last one added of a type; KeyError if there is none."""
         with esper_bridge.context(self.world.name):
-            self.reconcile()
+            if self._pipeline.processors.changed:
+                self.reconcile()
             hits = [s for s in self._wanted if s is processor or type(s) is processor]
             if hits:
                 self.remove(hits[-1])
                 return
-            plain = [p for p in esper_bridge.processors() if p is processor or type(p) is processor]
-        if not plain or isinstance(plain[-1], (System, *self._pipeline.OWN)):
+            plain = [p for p in self.in_esper_order() if p is processor or type(p) is processor]
+        if not plain or isinstance(plain[-1], System):
             raise KeyError(f"no such processor in this world: {processor!r}")
 
         def action() -> None:
             with esper_bridge.context(self.world.name):
                 esper_bridge.remove_processor_instance(plain[-1])
-            self._unguard(plain[-1])
 
         self._soon(action)
 
@@ -215,89 +179,69 @@ class Lineup:
         if not self._pipeline.in_step:
             self.apply()
 
-    def apply_after_step(self) -> None:
-        """The same while esper's loop over the processors is at its last."""
-        with esper_bridge.context(self.world.name):
-            esper_bridge.renew_processors()
-        self.apply()
+    def in_esper_order(self) -> list[esper.Processor]:
+        """All processors but the one that runs the step, by priority."""
+        processors = self._pipeline.processors
+        return [processors[k] for k in range(len(processors)) if not isinstance(processors[k], self._pipeline.RUNNER)]
 
     def apply(self) -> None:
-        """Make the line-up what was asked for."""
+        """Make the order what was asked for."""
         later, self._later = self._later, []
         for action in later:
             action()
         self.force_systems = list(self._wanted_forces)
         if not _same(self._wanted, self.systems):
-            self._line_up()
+            self._place_systems()
         self.changed = False
-        self.foreign = self._has_foreign()
+        self._note_change()
 
-    def _line_up(self) -> None:
+    def _place_systems(self) -> None:
         """Each phase has a band of esper priorities; its systems take the places below the top."""
         with esper_bridge.context(self.world.name):
             for system in self.systems:
                 esper_bridge.remove_processor_instance(system)
             for system in self.systems:
                 if not any(system is other for other in self._wanted):
-                    self._unguard(system)
                     _set_placed(system, self._given.pop(id(system), {}))
             self.systems = in_order(self._wanted)
             place = dict.fromkeys(Phase, 0)
             for system in self.systems:
                 place[system.phase] += 1
                 esper.add_processor(system, system.phase.priority - place[system.phase])
-                self._guard(system)
 
     def reconcile(self) -> None:
-        """Take in what plain esper calls have added and removed; called in the world's context, before a step."""
-        if self._pipeline.in_step or esper_bridge.same_processors(self._known):
+        """Take in what plain esper calls have added and removed, before a step."""
+        if self._pipeline.in_step:
             return
-        present = esper_bridge.processors()
+        present = self.in_esper_order()
         lost = [s for s in self.systems if not any(s is p for p in present)]
         self._wanted = [s for s in self._wanted if not any(s is other for other in lost)]
         for processor in present:
             if isinstance(processor, System) and not any(processor is s for s in self.systems):
-                esper_bridge.remove_processor_instance(processor)  # it gets a place in its phase instead
+                with esper_bridge.context(self.world.name):
+                    esper_bridge.remove_processor_instance(processor)  # it gets a place in its phase instead
                 self._add_system(processor, (), ())
         self.apply()
-        self._known = esper_bridge.processors()
-        for processor in self._known:
-            self._guard(processor)
-        self.foreign = self._has_foreign()
+        self._pipeline.processors.changed = False
 
     def detach(self) -> None:
         """Leave esper; called in the world's context when the world closes."""
-        for processor in esper_bridge.processors():
-            if isinstance(processor, System) or type(processor) in self._pipeline.OWN:
+        for processor in list(self._pipeline.processors):
+            if isinstance(processor, (System, self._pipeline.RUNNER)):
                 esper_bridge.remove_processor_instance(processor)
-            self._unguard(processor)
+        esper_bridge.give_back_processors()
+
+    def _note_change(self) -> None:
+        self.version += 1
+        self.foreign = self._has_foreign()
 
     def _has_foreign(self) -> bool:
-        """Also true without the built-in INTEGRATION, which keeps the state that others overwrite after it."""
-        if self.force_systems or len(self._known) > len(self.systems) + len(self._pipeline.OWN):
+        """Also true without a built-in system that integrates: it keeps the state that others overwrite after it."""
+        if self.force_systems or len(self.in_esper_order()) > len(self.systems):
             return True
         if all(system.phase != Phase.INTEGRATION for system in self.systems):
             return True
-        return any(not type(system).__module__.startswith("carom.systems") for system in self.systems)
-
-    # -- guards -----------------------------------------------------------------------------------
-
-    def _guard(self, processor: esper.Processor) -> None:
-        if type(processor) in self._pipeline.OWN:
-            return
-        guard = vars(processor).get("process")
-        if not isinstance(guard, Guard):
-            guard = vars(processor)["process"] = Guard(processor)
-        guard.pipelines[self.world.name] = self._pipeline
-
-    def _unguard(self, processor: esper.Processor) -> None:
-        guard = vars(processor).get("process")
-        if isinstance(guard, Guard):
-            guard.pipelines.pop(self.world.name, None)
-            if not guard.pipelines:
-                del vars(processor)["process"]
-                if guard.replaced is not None:
-                    vars(processor)["process"] = guard.replaced
+        return any(system.parts() is None for system in self.systems)
 
 
 def _names_phase(system: System) -> bool:

@@ -53,8 +53,12 @@ class ContactRows:
     """
 
     def __init__(self, columns: dict[str, np.ndarray], lookup: EntityLookup) -> None:
-        self._columns = columns
+        self._own_columns = columns
         self._lookup = lookup
+
+    @property
+    def _columns(self) -> dict[str, np.ndarray]:
+        return self._own_columns
 
     def __len__(self) -> int:
         return len(self._columns["entity_a"])
@@ -119,6 +123,35 @@ class EntityLookup:
         self.has = has
 
 
+class ContactSource:
+    """Where the contacts of a world come from; this one has none.
+
+    version
+        changes whenever :meth:`columns` has others to give
+    stay_step
+        the number of the step that :meth:`stay_columns` are of
+    """
+
+    @property
+    def version(self) -> int:
+        return 0
+
+    @property
+    def stay_step(self) -> int:
+        return -1
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The contacts as they are now, copies."""
+        raise NotImplementedError
+
+    def stay_columns(self) -> dict[str, np.ndarray]:
+        """Those that touched in the step before, too."""
+        raise NotImplementedError
+
+    def record_impacts(self) -> None:
+        """Add the impacts of the step that is running to the history, unless they are in it already."""
+
+
 class Contacts(ContactRows):
     """The last step's contacts, with ``enabled`` that systems between NARROW and RESPONSE may clear.
 
@@ -131,15 +164,30 @@ class Contacts(ContactRows):
     HISTORIES = ("begin", "end", "impacts")
 
     def __init__(
-        self, dimensions: int, lookup: EntityLookup, running_step: Callable[[], int | None] = lambda: None
+        self,
+        dimensions: int,
+        lookup: EntityLookup,
+        running_step: Callable[[], int | None] = lambda: None,
+        source: ContactSource | None = None,
     ) -> None:
         super().__init__(empty_columns(dimensions, enabled=True), lookup)
         self._running_step = running_step  # the number of the step that is running, None between steps
         self.dimensions = dimensions
+        self._source = source or ContactSource()
+        self._columns_of = self._source.version  # the version that the columns show
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
-        self._no_stay = self._stay = empty_columns(dimensions)
+        self._window = 0  # number of the step that the window was opened with
+        self._recorded = False  # something has happened since
 
     # -- what users read --------------------------------------------------------------------------
+
+    @property
+    def _columns(self) -> dict[str, np.ndarray]:
+        """Made when they are read; a later step does not change them."""
+        if self._columns_of != self._source.version:
+            self._own_columns = self._source.columns()
+            self._columns_of = self._source.version
+        return self._own_columns
 
     @property
     def begin(self) -> ContactRows:
@@ -154,38 +202,57 @@ class Contacts(ContactRows):
     @property
     def impacts(self) -> ContactRows:
         """One row per impact, with ``time_of_impact``; a pair may have several in a step."""
+        self._source.record_impacts()
         return self._history("impacts")
 
     @property
     def stay(self) -> ContactRows:
         """Pairs that touched in the last step and in the one before."""
-        return ContactRows(self._stay, self._lookup)
+        if self._source.stay_step < self._window:
+            return ContactRows(empty_columns(self.dimensions), self._lookup)
+        return ContactRows(self._source.stay_columns(), self._lookup)
 
     # -- what the systems write -------------------------------------------------------------------
 
-    def open_window(self) -> None:
-        """Forget what the last window held."""
-        for chunks in self._chunks.values():
-            chunks.clear()
-        self._stay = self._no_stay
+    def open_window(self, step: int) -> None:
+        """Forget what the last window held; ``step`` is the next one's number."""
+        self._window = step
+        if self._recorded:
+            self._recorded = False
+            for chunks in self._chunks.values():
+                chunks.clear()
 
-    def set_current(self, columns: dict[str, np.ndarray]) -> None:
-        self._columns = columns
-
-    def set_stay(self, columns: dict[str, np.ndarray]) -> None:
-        self._stay = columns
+    def enabled_now(self) -> np.ndarray | None:
+        """``enabled`` of the contacts as they are; None if nothing has read their columns, so that all are."""
+        return self._own_columns["enabled"] if self._columns_of == self._source.version else None
 
     def record(self, history: str, columns: dict[str, np.ndarray]) -> None:
         if len(columns["entity_a"]):
+            self._recorded = True
             self._chunks[history].append(columns)
 
+    def forget_step(self, step: int) -> None:
+        """Drop the events of a step that has failed."""
+        for name, chunks in self._chunks.items():
+            self._chunks[name] = [chunk for chunk in chunks if chunk["step"][0] != step]
+
+    def columns_now(self) -> dict[str, np.ndarray]:
+        """The columns of the contacts as they are."""
+        return self._columns
+
+    def show(self, columns: dict[str, np.ndarray]) -> None:
+        """Show these columns until the source has others."""
+        self._own_columns, self._columns_of = columns, self._source.version
+
     def state(self) -> Any:
-        """What a failed step has to put back."""
-        return self._columns, self._stay, {name: list(chunks) for name, chunks in self._chunks.items()}
+        """The contacts and the events of the window, for a snapshot."""
+        return self._columns, {name: list(chunks) for name, chunks in self._chunks.items()}
 
     def restore_state(self, state: Any) -> None:
-        self._columns, self._stay, chunks = state
-        self._chunks = {name: list(rows) for name, rows in chunks.items()}
+        columns, histories = state
+        self.show(columns)
+        self._chunks = {name: list(rows) for name, rows in histories.items()}
+        self._recorded, self._window = True, -1
 
     def _history(self, name: str) -> ContactRows:
         chunks, step = self._chunks[name], self._running_step()

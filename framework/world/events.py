@@ -15,6 +15,11 @@ class Events:
 
     def __init__(self) -> None:
         self._handlers: dict[str, list[Handler]] = {}
+        self._of_esper: dict[str, Any] = {}
+
+    def attach(self) -> None:
+        """Note esper's own handlers; called in the world's context."""
+        self._of_esper = esper_bridge.event_registry()
 
     def on(self, name: str, handler: Handler) -> Handler:
         """Call ``handler`` on every event of that name from now on; returns it, so it serves as a decorator's core."""
@@ -31,18 +36,23 @@ class Events:
         handlers.remove(handler)
 
     def wanted(self, name: str) -> bool:
-        """Whether anybody listens (then nothing need be made for nobody)."""
-        return bool(self._handlers.get(name)) or esper_bridge.has_event_handlers(name)
+        """True if the event has a handler; lets callers skip building the payload."""
+        return bool(self._handlers.get(name)) or bool(self._of_esper.get(name))
 
     def any_handlers(self) -> bool:
-        """Whether anybody listens to anything."""
-        return any(self._handlers.values()) or esper_bridge.has_event_handlers()
+        """True if any event has a handler."""
+        if self._of_esper:
+            return True
+        for handlers in self._handlers.values():  # noqa: SIM110  called in every step
+            if handlers:
+                return True
+        return False
 
     def dispatch_many(self, name: str, records: Iterable[Any]) -> None:
         """One event for each record; quick where a single handler listens, which is usual."""
         for record in records:
             handlers = self._handlers.get(name, ())
-            if len(handlers) == 1 and not esper_bridge.has_event_handlers(name):
+            if len(handlers) == 1 and not self._of_esper.get(name):
                 _call(name, handlers[0], (record,))
             else:
                 self.dispatch(name, record)

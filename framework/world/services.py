@@ -12,6 +12,7 @@ from ..data.adoption import Adoption
 from ..data.bodies import Bodies
 from ..data.table import Table
 from ..schedule.plan import PlannedColumn, PlannedKernel
+from ..schedule.stages import Program
 from .contacts import Contacts
 from .hits import CastHits, Hits, NearestHits, Neighbours
 
@@ -63,7 +64,13 @@ class QueryServices(ABC):
 
 
 class PhysicsServices(ABC):
-    """The state behind ``world.bodies``, ``world.contacts``, energies and queries."""
+    """The state behind ``world.bodies``, ``world.contacts``, energies and queries, and the stages of a step.
+
+    program
+        the stages of all built-in systems
+    parts_version
+        changes whenever a system consists of other parts
+    """
 
     dimensions: int
     table: Table
@@ -72,36 +79,61 @@ class PhysicsServices(ABC):
     contacts: Contacts
     gravity: np.ndarray
     queries: QueryServices
+    program: Program
+    parts_version: int
 
     @abstractmethod
     def set_gravity(self, gravity: Any) -> None: ...
-
-    @abstractmethod
-    def begin_step(self) -> None:
-        """The table is in step with esper; refresh what depends on its structure."""
-
-    @abstractmethod
-    def abandon_step(self) -> None:
-        """The step failed and the columns are back at its start."""
-
-    @abstractmethod
-    def end_step(self) -> None: ...
-
-    @abstractmethod
-    def report_faults(self, prefix: str) -> None:
-        """Add what is wrong with the bodies' state to the world's faults."""
-
-    @abstractmethod
-    def end_window(self) -> None:
-        """The last step of a ``step()`` or ``advance()`` is over: forces applied from outside have done their work."""
 
     @abstractmethod
     def check_settings(self, settings: Any) -> None:
         """ValueError if the settings name something that no plugin has."""
 
     @abstractmethod
+    def take_settings(self, settings: Any) -> None:
+        """Follow these settings from the next step on."""
+
+    # -- a step -----------------------------------------------------------------------------------
+
+    @abstractmethod
+    def begin_step(self, others_write: bool) -> None:
+        """The table is in step with esper; refresh what depends on its structure and keep what a failed step puts back.
+
+        others_write: whether code that is not carom's runs in the step, and may write any column.
+        """
+
+    @abstractmethod
+    def opening(self) -> list[Any]:
+        """The parts of a step before all systems."""
+
+    @abstractmethod
+    def closing(self) -> list[Any]:
+        """The parts of a step after all systems."""
+
+    @abstractmethod
+    def abandon_step(self) -> None:
+        """The step failed: put everything back to its start."""
+
+    @abstractmethod
+    def end_step(self) -> None: ...
+
+    @abstractmethod
+    def end_window(self) -> None:
+        """The last step of a ``step()`` or ``advance()`` is over: forces applied from outside have done their work."""
+
+    @abstractmethod
+    def report_faults(self, prefix: str) -> None:
+        """Add what is wrong with the bodies' state to the world's faults."""
+
+    # -- looking inside ---------------------------------------------------------------------------
+
+    @abstractmethod
+    def system_of_stage(self, stage: int) -> str:
+        """The name of the system that a stage belongs to; "" for those that open and close a step."""
+
+    @abstractmethod
     def look_ahead(self, others_write: bool) -> None:
-        """Before a plan is made, between two steps. others_write: whether code that is not carom's runs in a step."""
+        """Before a plan is made, between two steps."""
 
     @abstractmethod
     def planned_kernels(self) -> Iterable[PlannedKernel]:
@@ -124,15 +156,15 @@ class PhysicsServices(ABC):
     def counters(self) -> dict[str, int]: ...
 
     @abstractmethod
+    def reset_counters(self) -> None: ...
+
+    @abstractmethod
     def prepare(self, components: tuple[type[Any], ...]) -> None:
         """Compile what bodies of these component types need; of those there are, if none are given."""
 
     @abstractmethod
-    def reset_counters(self) -> None: ...
-
-    @abstractmethod
     def tracking_state(self) -> Any:
-        """Which pairs touched at the end of the last step: a copy."""
+        """Which pairs touched at the end of the last step, with their impulses: a copy."""
 
     @abstractmethod
     def restore_tracking(self, state: Any) -> None: ...

@@ -1,4 +1,4 @@
-"""Copies of a world's state: for going back to the start of a failed step, for snapshots, and a hash to compare by."""
+"""Copies of a world's state, and a hash to compare by."""
 
 from __future__ import annotations
 
@@ -12,15 +12,10 @@ import numpy as np
 from ..schedule.clock import Clock
 from .services import PhysicsServices
 
-NO_ENTITIES = np.empty(0, np.int64)  # rows do not move within a step
-
 
 @dataclass
 class StepState:
-    """A copy of what a step may change: columns, clock, contacts, which pairs touch.
-
-    entities: ids by row, for copies that outlast the step.
-    """
+    """A copy of what a step may change: columns, clock, contacts, which pairs touch; entities: ids by row."""
 
     entities: np.ndarray
     columns: dict[str, np.ndarray]
@@ -29,25 +24,8 @@ class StepState:
     tracking: Any
 
 
-def capture(physics: PhysicsServices, clock: Clock, everything: bool) -> StepState:
-    """What going back to this moment takes, while the step lasts.
-
-    everything: all columns; else those that carom's own systems overwrite, which they keep themselves when they do.
-    """
-    columns = physics.table.open_undo(everything)
-    return StepState(NO_ENTITIES, columns, clock.state(), physics.contacts.state(), physics.tracking_state())
-
-
-def put_back(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
-    """Undo what a step has done."""
-    physics.table.restore_columns(state.columns)
-    clock.restore(state.clock)
-    physics.contacts.restore_state(state.contacts)
-    physics.restore_tracking(state.tracking)
-
-
 def snapshot(physics: PhysicsServices, clock: Clock) -> StepState:
-    """A capture that shares nothing with the world."""
+    """A copy that shares nothing with the world."""
     columns = physics.table.copy_columns()
     contacts, tracking = copy.deepcopy((physics.contacts.state(), physics.tracking_state()))
     return StepState(columns.pop("entity"), columns, clock.state(), contacts, tracking)
@@ -72,11 +50,12 @@ def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
         table.arrays[key][rows] = column
     table.set_kinds(rows, state.columns["kind"])
     table.static_version += 1
+    table.frames_applied = True
     dt = clock.dt
     clock.restore(state.clock)
     clock.set_dt(dt)
-    physics.contacts.restore_state(copy.deepcopy(state.contacts))
     physics.restore_tracking(copy.deepcopy(state.tracking))
+    physics.contacts.restore_state(copy.deepcopy(state.contacts))
     physics.queries.forget()
 
 

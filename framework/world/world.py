@@ -76,11 +76,13 @@ class World(EntityVerbs, QueryVerbs):
                 raise ValueError(f"esper's context {name!r} is a World already")
             esper_bridge.watch(Component)
             self._pipeline.attach()
+            self._events.attach()
         try:
             for plugin in plugins:
                 plugin.install(self)
             if self.physics is not None:
                 self.physics.check_settings(self._settings)
+                self.physics.take_settings(self._settings)
             self.registry.world = self
         except BaseException:
             self._give_back()
@@ -114,7 +116,7 @@ class World(EntityVerbs, QueryVerbs):
     def _give_back(self) -> None:
         self.closed = True
         with esper_bridge.context(self.name):
-            self._pipeline.lineup.detach()
+            self._pipeline.order.detach()
             esper.clear_database()
             esper_bridge.unwatch()
         if self.name != "default":
@@ -168,6 +170,8 @@ class World(EntityVerbs, QueryVerbs):
             self.physics.check_settings(settings)
         self._pipeline.clock.set_dt(settings.dt)
         self._settings = settings
+        if self.physics is not None:
+            self.physics.take_settings(settings)
 
     @property
     def dimensions(self) -> int | None:
@@ -233,16 +237,16 @@ class World(EntityVerbs, QueryVerbs):
         frame's seconds.
         """
         self._open()
-        self._pipeline.lineup.add(system, before, after, frame)
+        self._pipeline.order.add(system, before, after, frame)
 
     def remove_system(self, system: System | ForceSystem | esper.Processor) -> None:
         """Remove that instance; during a step it leaves at its end. KeyError if it is not in this world."""
         self._open()
-        self._pipeline.lineup.remove(system)
+        self._pipeline.order.remove(system)
 
     def has_system(self, system: System | ForceSystem | esper.Processor) -> bool:
         """Whether that very system is in this world, or joins at the end of the step."""
-        return self._pipeline.lineup.has(system)
+        return self._pipeline.order.has(system)
 
     def add_processor(self, processor: esper.Processor, priority: float = 0) -> None:
         """esper's verb: any processor at any priority; Phase.X.priority are the bands of carom's own.
@@ -251,24 +255,24 @@ class World(EntityVerbs, QueryVerbs):
         """
         self._open()
         if isinstance(processor, System):
-            self._pipeline.lineup.add(processor, (), (), False)
+            self._pipeline.order.add(processor, (), (), False)
             return
-        self._pipeline.lineup.add_plain(processor, priority)
+        self._pipeline.order.add_plain(processor, priority)
 
     def remove_processor(self, processor: type[esper.Processor] | esper.Processor) -> None:
         """esper's verb: by type, the last one added of it; an instance is taken too."""
         self._open()
-        self._pipeline.lineup.remove_processor(processor)
+        self._pipeline.order.remove_processor(processor)
 
     @property
     def force_systems(self) -> list[ForceSystem]:
         """Those that this step calls, in order of addition."""
-        return self._pipeline.lineup.force_systems
+        return self._pipeline.order.force_systems
 
     @property
     def systems(self) -> list[System]:
         """carom's systems in the order in which they run."""
-        return list(self._pipeline.lineup.systems)
+        return list(self._pipeline.order.systems)
 
     # -- time -------------------------------------------------------------------------------------
 
@@ -344,18 +348,18 @@ class World(EntityVerbs, QueryVerbs):
 
     def stats(self) -> Stats:
         """Time per system and counters since the world began (or ``reset_stats``); ``print`` shows a table."""
-        return self._pipeline.measurements.stats()
+        return self._pipeline.profiler.stats()
 
     def reset_stats(self) -> None:
         """Begin to measure anew."""
-        self._pipeline.measurements.reset()
+        self._pipeline.profiler.reset()
 
     def profile(self) -> AbstractContextManager[None]:
         """``with world.profile():`` times each call of a kernel; ``stats().kernels`` has the result.
 
         Kernels are timed for one world at a time: CaromError inside another profile.
         """
-        return self._pipeline.measurements.profile()
+        return self._pipeline.profiler.profile()
 
     @property
     def faults(self) -> list[str]:
@@ -371,7 +375,8 @@ class World(EntityVerbs, QueryVerbs):
     def plan(self) -> Plan:
         """What a step of the bodies there are now runs, in order, with which kernels, on which columns, and why."""
         with self._context():
-            self._pipeline.lineup.reconcile()
+            if self._pipeline.processors.changed:
+                self._pipeline.order.reconcile()
             self._pipeline.look_ahead()
             return Plan.of(self)
 

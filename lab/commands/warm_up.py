@@ -24,7 +24,6 @@ from ..reporting.progress import CompileStatus
 from .loading import Loaded, load, stdout_kept_clean
 from .usage_errors import Problem
 
-SHAPE_SETS = ((SphereCollider,), (AABBCollider,), (SphereCollider, AABBCollider))  # each has its own kernels
 STEPS = 10  # of a scene, to compile what its own systems call
 
 Work = tuple[str, Callable[[], None]]
@@ -101,10 +100,9 @@ def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> I
 
 
 def prepare_built_in(dimensions: int) -> None:
-    """Build worlds of spheres, of boxes and of both, with every integrator of the standard physics."""
-    for shapes in SHAPE_SETS:
-        with closing(World(Physics(dimensions=dimensions))) as world:
-            world.prepare(*shapes)
+    """Build a world of spheres and boxes, and one for every integrator of the standard physics."""
+    with closing(World(Physics(dimensions=dimensions))) as world:
+        world.prepare(SphereCollider, AABBCollider)
     for name in sorted(Physics(dimensions=dimensions).integrators):
         with closing(World(Physics(dimensions=dimensions), settings=Settings(integrator=name))) as world:
             world.prepare()

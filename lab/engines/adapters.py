@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ...systems.forces.accumulation import ForceAccumulation
 from ..measure.body_shapes import Floats, sensor_entities, shapes_of
 from ..measure.escape import Enclosure
 from ..trading.records import PYMUNK
@@ -195,7 +194,9 @@ class PymunkEngine(Engine):
         self.space = PymunkSpace(world)
         self.space.space.iterations = iterations
         self._iterations = iterations
-        [self._sums] = [system for system in world.systems if isinstance(system, ForceAccumulation)]
+        physics: Any = world.physics
+        physics.refresh_for_queries()  # the forces are summed without a step of carom
+        self._sums = physics.forces
         self._time, self._steps, self._forces, self._pairs = 0.0, 0, 0, 0
         self._dt = 0.0
         self._impacts = 0

@@ -19,7 +19,6 @@ from ...components import AABBCollider, RigidBody, SphereCollider, Transform
 from ...framework import Phase, World
 from ...plugins import Physics, convex_polygon
 from ...plugins.convex_polygon import ConvexPolygonCollider
-from ...systems.narrow_phase.system import NarrowPhase
 from ..bench.results import machine
 from ..commands.usage_errors import Problem, did_you_mean
 from ..measure.timing import Spread, no_garbage_collection, now
@@ -145,8 +144,8 @@ class Finder:
     def __init__(self, world: World) -> None:
         self._world = world
         world.run(Phase.NARROW)  # gathers the bodies and compiles
-        state: Any = world.physics
-        self._broad, self._narrow = state.broad_phase, NarrowPhase(state)
+        physics: Any = world.physics
+        self._broad, self._narrow = physics.broad_phase, physics.narrow_phase
 
     def seconds(self, calls: int) -> np.ndarray:
         """(2,) seconds of this many calls of the broad and of the narrow phase."""

@@ -12,13 +12,19 @@ Differential Equations II, section IV.2).
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...framework.jit.record import make_record
+from ...framework.schedule.stages import Program
 from ...systems import Integrator
+from ...systems.integration.integrators import STANDARD_INTEGRATORS, Flight
 from ...systems.integration.motion import Motion
+from ...systems.integration.system import Integration
+from ...systems.records import STATE
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -39,10 +45,7 @@ def advanced(
 
     force(position, velocity) returns (n, 2).
     """
-    motion = Motion(
-        position.copy(), velocity.copy(), force(position, velocity), np.ones(len(position)), damping.copy(),
-        position.copy(), velocity.copy(), None,
-    )  # fmt: skip
+    motion = _motion(position, velocity, force(position, velocity), damping)
 
     def evaluate(_: float) -> None:
         motion.force[:] = force(motion.position, motion.velocity)
@@ -50,6 +53,33 @@ def advanced(
     motion.evaluator = evaluate
     integrator.advance(motion, 1.0)
     return motion.position, motion.velocity
+
+
+@cache
+def _program() -> Program:
+    """The stages of the built-in integrators, over a record that belongs to no world."""
+    state = make_record(STATE, 2)
+    state.force_changes = True
+    program = Program(state, (*Integration.STAGES, *Integration.ON_DEMAND), {}, 0)
+    program.alarm = state.word_of("unsound")
+    return program
+
+
+def _motion(position: Floats, velocity: Floats, force: Floats, damping: Floats) -> Motion:
+    """A step that begins, for bodies of 1 kg."""
+    program, count = _program(), len(position)
+    bodies = program.state.bodies
+    program.state.count = program.state.moving = program.state.dynamic = count
+    columns = {
+        "position": position.copy(), "linear_velocity": velocity.copy(), "force": force,
+        "inverse_mass": np.ones(count), "linear_damping": damping.copy(),
+        "previous_position": position.copy(), "start_velocity": velocity.copy(),
+    }  # fmt: skip
+    for name, column in columns.items():
+        setattr(bodies, name, column)
+    for integrator in (*STANDARD_INTEGRATORS.values(), Flight):
+        bodies.reserve(count, *integrator.COLUMNS)
+    return Motion(*columns.values(), None, program)  # pyright: ignore[reportCallIssue]
 
 
 def growth(

@@ -15,7 +15,7 @@ import numpy as np
 from ...framework import CaromError, NoPhysicsError, World
 from ...systems import Integrator
 from .stability import growth_of_system, stability_limits
-from .stiffness import Modes, modes_of
+from .stiffness import Modes, modes_of, unmeasured
 
 SAFETY = 0.9  # fraction of the limit that is suggested
 EXACT = 60  # degrees of freedom of coupled bodies, up to which the full step is analysed
@@ -169,11 +169,12 @@ def step_limits(world: World) -> StepLimits:
     if services.table.in_step:
         raise CaromError("the limits of a step can be asked for between steps only, not inside one")
     modes = modes_of(world)
-    integrator = type(services.integrator())()
+    integrator = type(services.integration.integrator)()
     settings = world.settings
     passage = first_passage(world) if settings.collision == "discrete" else None
+    oscillation = _first_to_grow(integrator, modes)
     return StepLimits(
-        settings.dt, services.integrator_name, settings.collision, _first_to_grow(integrator, modes), passage
+        settings.dt, services.integration.integrator_name, settings.collision, oscillation, passage
     )
 
 
@@ -271,17 +272,18 @@ def _sizes(services: Any) -> tuple[Any, Any, Any]:
     """Of every row: its smallest extent (m; inf if unbounded), whether it is solid, and (layer, mask)."""
     table = services.table
     count = table.count
-    services.refresh_structure()
+    services.refresh_for_queries()
     size, solid, group = np.zeros(count), np.zeros(count, bool), np.zeros((count, 2), np.int64)
-    if services.code is None:
+    if services.scene.linked is None:
         return size, solid, group
-    services.refresh_rotation()
-    services.broad_phase.trees_now()
+    services.scene.refresh_rotation()
+    with unmeasured(services.state):
+        services.search.partitions()  # makes the boxes
     services.queries.forget()
-    scratch, stacks, rows = services.scratch, table.stacks, np.arange(count)
-    material = scratch["material"][:count]
-    endless = np.isinf(scratch["upper"][:count] - scratch["lower"][:count]).all(axis=1)
-    size = np.where(endless, np.inf, scratch["size"][:count])
-    solid = (services.levels[0, :count] >= 0) & ~stacks["collider.sensor"][material, rows].astype(bool)
-    group = np.column_stack([stacks[f"collider.{name}"][material, rows] for name in ("layer", "mask")])
+    bodies, colliders, rows = services.state.bodies, services.state.colliders, np.arange(count)
+    slot = bodies.collider_slot[:count]
+    endless = np.isinf(bodies.upper[:count] - bodies.lower[:count]).all(axis=1)
+    size = np.where(endless, np.inf, bodies.min_extent[:count])
+    solid = (services.scene.levels[0, :count] >= 0) & ~colliders.sensor[slot, rows]
+    group = np.column_stack((colliders.layer[slot, rows], colliders.mask[slot, rows]))
     return size, solid, group

@@ -8,6 +8,7 @@ is left unchanged, bit for bit; force systems are evaluated several times, which
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Self, TypeAlias
@@ -15,6 +16,7 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 
 from ...framework import World
+from ...framework.jit.record import Record
 from .stability import Complexes, Floats
 
 EPS = float(np.finfo(float).eps)
@@ -26,6 +28,9 @@ DENSE = 2000  # degrees of freedom up to which every one is shifted alone
 BLOCK = 300  # degrees of freedom of coupled bodies up to which all modes are found
 KRYLOV = 60  # directions tried if only the stiffest and the most damped modes are computed
 SOUGHT = 20  # number of these modes
+
+# What summing forces changes in the state beside the columns.
+FORCE_STATE = ("stage", "force_evaluations", "pushed", "unforced", "forces_summed")
 
 Apply: TypeAlias = Callable[[Floats], Floats]
 
@@ -75,8 +80,9 @@ class Forces:
         }
 
     def __enter__(self) -> Self:
-        forces = self._services.forces
-        self._counted = forces.evaluations, self._services.pushed, self._services.unforced
+        self._services.refresh_for_queries()  # the stages see the bodies that there are
+        self._restoring = unmeasured(self._services.state)
+        self._restoring.__enter__()
         self._world.__enter__()
         try:
             self._rest = self._sum()
@@ -91,8 +97,7 @@ class Forces:
         self._world.__exit__(kind, error, traceback)
         for name, column in self._columns.items():
             column[:] = self._kept[name]
-        forces = self._services.forces
-        forces.evaluations, self._services.pushed, self._services.unforced = self._counted
+        self._restoring.__exit__(kind, error, traceback)
 
     def __len__(self) -> int:
         return len(self._root)
@@ -133,6 +138,20 @@ class Forces:
         if len(bad):
             raise ValueError(f"entity {self.entity[bad[0]]}: the forces on it are {force[bad[0]].tolist()}")
         return force.ravel() / self._root
+
+
+@contextmanager
+def unmeasured(state: Record) -> Iterator[None]:
+    """Leave no trace of the stages that run inside: neither in what the world measures nor in what it knows of its
+    forces."""
+    numbers = {name: getattr(state, name) for name in FORCE_STATE}
+    measured = state.ticks.copy(), state.calls.copy()
+    try:
+        yield
+    finally:
+        for name, value in numbers.items():
+            setattr(state, name, value)
+        state.ticks[:], state.calls[:] = measured
 
 
 def modes_of(world: World) -> Modes:

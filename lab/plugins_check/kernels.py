@@ -2,24 +2,51 @@
 
 from __future__ import annotations
 
-import collections
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...framework.compilation import inlined, kernel
-from ...framework.data.array_columns import array_at
+from ...framework.compilation import kernel
+from ...framework.jit.linking import Linked
+from ...framework.jit.record import Record, make_record
+from ...framework.jit.record_type import record_at, record_type
+from ...framework.jit.schema import Schema, flags, floats, vectors
 from ...framework.plugins.registry import Pair, Shape
-from ...framework.vectors import axes_at, row, store
-from ...systems.shapes.dispatch import pair_call, parameters_source, source_module
+from ...systems.records import STATE
+from ...systems.shapes.linked_pair import LinkedPair, linked_pair
+from ...systems.shapes.linked_shape import linked_shape
+from ...systems.shapes.linked_shapes import set_support
+from ...systems.shapes.parameters import HEADER
+from ...systems.shapes.signatures import (
+    call_evaluate,
+    call_rounding,
+    call_support,
+    call_sweep,
+    evaluate_signature,
+    named,
+    sweep_signature,
+)
 from .samples import Rows
 
 # Compiler messages: lines without information, and files outside the plugin.
 NOISE = ("Failed in nopython", "- Resolution failure", "During:", ">>>")
 FOREIGN = ("numba/", "numba\\", "carom_shapes_")
+
+# Inputs and results of n calls, a row for each.
+CALLS = Schema(
+    "CheckedCalls",
+    d=vectors(),  # from the first shape to the second, or the direction of a support
+    v=vectors(),
+    hit=flags(),
+    depth=floats(),  # or the rounding
+    normal=vectors(),
+    point=vectors(),  # of contact, or of the support
+    time=floats(),
+)
 
 
 class RaisedError(Exception):
@@ -47,52 +74,66 @@ class PairCode:
     """The function of a pair for two shapes, in the pair's own order, compiled for one dimension."""
 
     def __init__(self, pair: Pair, first: Shape, second: Shape, dimensions: int) -> None:
-        self.pair, self.like = pair, (0.0,) * dimensions
-        scope = _scope((first, second))
-        one, two = (parameters_source((first, second), index, "at") for index in (0, 1))
-        lines = ["def contact(at, d, shapes, like):", f"    return {pair_call(pair, 'pair', scope, one, two, 'd')}", ""]
-        if pair.sweep is not None:
-            sweep = pair_call(replace(pair, function=pair.sweep), "sweep", scope, one, two, "d, v")
-            lines += ["def swept(at, d, v, shapes, like):", f"    return {sweep}", ""]
-        title = f'"""{pair.names}, {dimensions}D, to be checked."""'
-        module = source_module("\n".join([title, "", *lines]) + "\n", scope)
-        self._contact = _contact_kernel(inlined(module.contact))
-        self._sweep = _sweep_kernel(inlined(module.swept)) if pair.sweep is not None else None
+        linked = linked_pair(first, second, pair, dimensions)
+        self._functions = UncheckedPair(linked.first, linked.second, linked.pair, dimensions)
 
     def __call__(self, a: Rows, b: Rows, d: np.ndarray) -> Results:
         """RaisedError if the function raises; numba's errors if it does not compile."""
-        n, dimensions = d.shape
-        made = Results(np.zeros(n, bool), np.zeros(n), np.zeros((n, dimensions)), np.zeros((n, dimensions)))
-        at = np.zeros(1, np.int64)
-        columns = (a.columns, b.columns)
-        _call(self._contact, at, columns, np.ascontiguousarray(d), at, made.hit, made.depth, made.normal, made.point,
-              self.like)  # fmt: skip
-        return made
+        calls = _run(0, d, self._functions.evaluate.address, *self._parameters(a, b))
+        return Results(calls.hit, calls.depth, calls.normal, calls.point)
 
     def sweep(self, a: Rows, b: Rows, d: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(hit, time) of the pair's sweep function."""
-        hit, time, at = np.zeros(len(d), bool), np.zeros(len(d)), np.zeros(1, np.int64)
-        _call(self._sweep, at, (a.columns, b.columns), np.ascontiguousarray(d), v, at, hit, time, self.like)
-        return hit, time
+        assert self._functions.sweep is not None
+        calls = _run(1, d, self._functions.sweep.address, *self._parameters(a, b), v=v)
+        return calls.hit, calls.time
+
+    def _parameters(self, a: Rows, b: Rows) -> tuple[Record, Record]:
+        one, two = a.parameters(), b.parameters()
+        for rows, record, shape in ((a, one, self._functions.first), (b, two, self._functions.second)):
+            if shape is None:  # the pair calls its support by address
+                set_support(record, linked_shape(rows.shape, record.dimensions))
+        return one, two
+
+
+class UncheckedPair(LinkedPair):
+    """The linked functions of a pair, which return what the plugin's functions return, valid or not."""
+
+    @cached_property
+    def evaluate(self) -> Linked:
+        contact, (at_a, at_b) = self._contact, self._records
+
+        def evaluate(state, pa, a, pb, b, d):
+            state.row_a = a
+            return contact(at_a(pa), a, at_b(pb), b, d)
+
+        return Linked(named(evaluate), evaluate_signature(self.dimensions))
+
+    @cached_property
+    def sweep(self) -> Linked | None:
+        if self.pair.sweep is None:
+            return None
+        swept, (at_a, at_b) = self._registered("swept", self.pair.sweep, "d, v"), self._records
+
+        def sweep(state, pa, a, pb, b, d, v):
+            state.row_a = a
+            return swept(at_a(pa), a, at_b(pb), b, d, v)
+
+        return Linked(named(sweep), sweep_signature(self.dimensions))
 
 
 class SupportCode:
     """The support function of a shape and its rounding, compiled for one dimension."""
 
     def __init__(self, shape: Shape, dimensions: int) -> None:
-        self.like = (0.0,) * dimensions
-        scope = {**_scope((shape,)), "support": shape.support, "rounding": shape.rounding}
-        one = parameters_source((shape,), 0, "at")
-        title = f'"""Support of {shape.component.__name__}, {dimensions}D, to be checked."""'
-        lines = [title, "", "def farthest(at, direction, shapes, like):"]
-        lines += [f"    return support({one}, direction), rounding({one})", ""]
-        self._farthest = _support_kernel(inlined(source_module("\n".join(lines) + "\n", scope).farthest))
+        self._functions = linked_shape(shape, dimensions)
 
     def __call__(self, rows: Rows, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(points (n, d), rounding (n,)) of the rows in one direction each."""
-        points, beyond, at = np.zeros(direction.shape), np.zeros(len(direction)), np.zeros(1, np.int64)
-        _call(self._farthest, at, (rows.columns,), np.ascontiguousarray(direction), at, points, beyond, self.like)
-        return points, beyond
+        record = rows.parameters()
+        set_support(record, self._functions)
+        calls = _run(2, direction, 0, record, record)
+        return calls.point, calls.depth
 
 
 def compiler_message(error: BaseException) -> str:
@@ -111,56 +152,49 @@ def compiler_message(error: BaseException) -> str:
     return f"{words}{f': {call[4:]}' if call else ''}{place}"
 
 
-def _scope(shapes: tuple[Shape, ...]) -> dict[str, Any]:
-    scope: dict[str, Any] = {"row": row, "array_at": array_at, "axes_at": axes_at}
-    for index, shape in enumerate(shapes):
-        scope[f"Shape{index}"] = collections.namedtuple(f"Shape{index}", shape.parameters)
-    return scope
-
-
-def _call(compiled: Any, at: np.ndarray, *arguments: Any) -> None:
-    at[0] = -1
+def _run(which: int, d: np.ndarray, function: int, one: Record, two: Record, v: np.ndarray | None = None) -> Record:
+    """Call the function at that address once per row of d; which: of :func:`_kernels`. Returns a record of CALLS."""
+    (n, dimensions), calls = d.shape, make_record(CALLS, d.shape[1])
+    calls.d, calls.v = np.ascontiguousarray(d), np.ascontiguousarray(d if v is None else v)
+    calls.hit, calls.depth, calls.time = np.zeros(n, bool), np.zeros(n), np.zeros(n)
+    calls.normal, calls.point = np.zeros((n, dimensions)), np.zeros((n, dimensions))
+    state = make_record(STATE, dimensions)
+    state.row_a = -1
     try:
-        compiled(*arguments)
-    except Exception as error:  # raised by the plugin; before the first row, by the compiler
-        if at[0] < 0:
+        _kernels(dimensions)[which](state.address, calls.address, function, one.address, two.address)
+    except Exception as error:  # any error of the plugin; before the first row it is the compiler's
+        if state.row_a < 0:
             raise
-        raise RaisedError(int(at[0]), error) from error
+        raise RaisedError(state.row_a, error) from error
+    return calls
 
 
-def _contact_kernel(contact: Any) -> Any:
+@lru_cache(maxsize=2)
+def _kernels(dimensions: int) -> tuple[Any, Any, Any]:
+    """Loops over contacts, sweeps and supports; they compile once, whatever the plugin."""
+    state_at, calls_at = record_at(record_type(STATE, dimensions)), record_at(record_type(CALLS, dimensions))
+    header_at = record_at(record_type(HEADER, dimensions))
+
     @kernel
-    def check_contacts(shapes, d, at, hit, depth, normal, point, like):
-        for i in range(len(d)):
-            at[0] = i
-            touches, deep, direction, where = contact(i, row(d, i, like), shapes, like)
-            hit[i] = touches
-            depth[i] = deep
-            store(normal, i, direction)
-            store(point, i, where)
+    def check_contacts(state_address, address, function, pa, pb):
+        state, calls = state_at(state_address), calls_at(address)
+        for i in range(len(calls.d)):
+            hit, depth, normal, point = call_evaluate(function, state, pa, i, pb, i, calls.d[i])
+            calls.hit[i], calls.depth[i], calls.normal[i], calls.point[i] = hit, depth, normal, point
 
-    return check_contacts
-
-
-def _sweep_kernel(swept: Any) -> Any:
     @kernel
-    def check_sweeps(shapes, d, v, at, hit, time, like):
-        for i in range(len(d)):
-            at[0] = i
-            touches, when = swept(i, row(d, i, like), row(v, i, like), shapes, like)
-            hit[i] = touches
-            time[i] = when
+    def check_sweeps(state_address, address, function, pa, pb):
+        state, calls = state_at(state_address), calls_at(address)
+        for i in range(len(calls.d)):
+            hit, time = call_sweep(function, state, pa, i, pb, i, calls.d[i], calls.v[i])
+            calls.hit[i], calls.time[i] = hit, time
 
-    return check_sweeps
-
-
-def _support_kernel(farthest: Any) -> Any:
     @kernel
-    def check_supports(shapes, directions, at, points, beyond, like):
-        for i in range(len(directions)):
-            at[0] = i
-            place, radius = farthest(i, row(directions, i, like), shapes, like)
-            store(points, i, place)
-            beyond[i] = radius
+    def check_supports(state_address, address, function, pa, pb):
+        state, calls, shape = state_at(state_address), calls_at(address), header_at(pa)
+        for i in range(len(calls.d)):
+            state.row_a = i
+            calls.point[i] = call_support(shape.support, pa, i, calls.d[i])
+            calls.depth[i] = call_rounding(shape.rounding, pa, i)
 
-    return check_supports
+    return check_contacts, check_sweeps, check_supports

@@ -11,8 +11,10 @@ import numpy as np
 from ...components import Collider
 from ...framework.data.array_columns import ArrayColumn
 from ...framework.data.columns import REQUIRED, Column
+from ...framework.jit.record import Record
 from ...framework.plugins.registry import Shape
-from ...systems.shapes.dispatch import half_extents_kernel, parameter_columns
+from ...systems.shapes.linked_shape import half_extents_of
+from ...systems.shapes.parameters import bind, make_parameter_record
 from ...systems.shapes.rotation import axes_of
 
 ORDINARY = 10_000  # poses of a pair
@@ -36,9 +38,11 @@ class Rows:
     axes: np.ndarray
     half: np.ndarray
 
-    @property
-    def columns(self) -> tuple[Any, ...]:
-        return parameter_columns(self.shape, self.arrays, self.axes)
+    def parameters(self) -> Record:
+        """The record through which linked functions see them."""
+        record = make_parameter_record(self.shape, self.axes.shape[-1])
+        bind(record, self.shape, self.arrays, self.axes)
+        return record
 
     def at(self, row: int) -> Any:
         """The parameters of one row, as passed to a plain Python function."""
@@ -106,10 +110,7 @@ def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, 
                 _keep_rules(column, value, arrays[name])
     axes = np.eye(dimensions) * np.ones((count, 1, 1)) if not shape.rotates else _axes(count, dimensions, rng)
     axes[upright] = np.eye(dimensions)
-    half = np.zeros((count, dimensions))
-    made = Rows(shape, arrays, axes, half)
-    half_extents_kernel(shape, dimensions)((made.columns,), half, (0.0,) * dimensions)
-    return made
+    return Rows(shape, arrays, axes, half_extents_of(shape, arrays, axes))
 
 
 def _numbers(

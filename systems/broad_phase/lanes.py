@@ -11,6 +11,8 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
+from ...framework.compilation import CHECKED
+from ...framework.jit.record_type import ColumnType, _check
 from ...framework.vectors import _emitted
 
 _BITS = ir.IntType(64)
@@ -27,8 +29,11 @@ def _compared(width: int) -> tuple[Any, Any]:
         return builder.shuffle_vector(first, ir.Constant(lanes, ir.Undefined), everywhere)
 
     def emit(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
-        codes = context.make_array(arguments[0])(context, builder, values[0])
-        place = cgutils.get_item_pointer(context, builder, arguments[0], codes, [values[1]])
+        codes = cgutils.create_struct_proxy(arguments[0])(context, builder, values[0])
+        if CHECKED:
+            last = builder.add(values[1], _BITS(width - 1))
+            _check(context, builder, arguments[0], last, codes.length)
+        place = builder.gep(codes.data, [values[1]], inbounds=True)
         members = builder.load(builder.bitcast(place, lanes.as_pointer()), align=8)
         guards = splat(builder, values[3])
         left = builder.and_(builder.sub(splat(builder, values[2]), members), guards)
@@ -36,7 +41,7 @@ def _compared(width: int) -> tuple[Any, Any]:
         return builder.zext(hits, _BITS)
 
     def signature(codes: Any, at: Any, code: Any, guards: Any) -> Any:
-        return types.int64(codes, types.intp, types.int64, types.int64)
+        return types.int64(codes, types.intp, types.int64, types.int64) if isinstance(codes, ColumnType) else None
 
     return emit, signature
 
@@ -44,13 +49,13 @@ def _compared(width: int) -> tuple[Any, Any]:
 @_emitted(*_compared(4))
 def four_at(codes, at, code, guards):
     """Bit k is set if all guard bits outlast ``code - codes[at + k]``, k below 4; there must be so many codes."""
-    return sum(1 << k for k in range(4) if (code - int(codes[at + k])) & guards == guards)
+    return sum(1 << k for k in range(4) if (int(code) - int(codes[at + k])) & guards == guards)
 
 
 @_emitted(*_compared(8))
 def eight_at(codes, at, code, guards):
     """The same for k below 8."""
-    return sum(1 << k for k in range(8) if (code - int(codes[at + k])) & guards == guards)
+    return sum(1 << k for k in range(8) if (int(code) - int(codes[at + k])) & guards == guards)
 
 
 def _emit_lowest(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
@@ -64,4 +69,4 @@ def _sign_lowest(bits: Any) -> Any:
 @_emitted(_emit_lowest, _sign_lowest)
 def lowest_bit(bits):
     """The place of the lowest bit that is set; there must be one."""
-    return (bits & -bits).bit_length() - 1
+    return (int(bits) & -int(bits)).bit_length() - 1

@@ -1,50 +1,29 @@
-"""Which kernels find candidate pairs, by how many bodies move and stand still: for ``world.plan()``."""
+"""What ``world.plan()`` says of the broad phase: how candidates are found, and the kernels of trees."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from ...framework.schedule.plan import PlannedKernel
-from .brute_force import FEW, TESTS_AT_MOST
-
-EVEN, STILL = "even", "still"  # grids: one of what moves, or that and one of what does not
-
-SIZES = "boxes differ much in size"
-CHANGES = "static bodies change"
+from .brute_force import BRUTE_FORCE_MAX
+from .stages import STATIC_GRID, TREE, UNIFORM_GRID, UNIFORM_GRID_MIN
 
 
-def planned_pairs(moving: int, still: int, grids: str) -> Iterator[PlannedKernel]:
-    """The kernels for so many boxes; grids: EVEN, STILL or, where no grid suits or there are few, nothing."""
-    tried = still > max(moving, FEW)
-    if tried:
-        yield PlannedKernel("lay_out", "grid of what stands still", CHANGES)
-    if grids == STILL:
-        yield PlannedKernel("pairs_inside", "what moves looks into the grid of what stands still")
-    if moving > FEW and (grids or not tried):
-        unsuited = "" if grids else ": does not suit them, the tree goes on"
-        yield PlannedKernel("even_pairs", f"grid of what moves{unsuited}")
-    if grids == EVEN:
-        return
-    if grids == STILL:
-        if moving <= FEW:
-            yield PlannedKernel("test_all", f"every pair of at most {FEW} that move, and of what is in no grid")
-        return
-    yield from _without_grids(moving, still)
+def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
+    """How the candidates of so many bodies are found; search: a value of ``state.pair_search``."""
+    tree = "quadtree" if dimensions == 2 else "octree"
+    if search == UNIFORM_GRID:
+        return f"uniform grid of {moving} moving bodies, and {static} static ones that look into it"
+    if search == STATIC_GRID:
+        among = "uniform grid" if moving >= UNIFORM_GRID_MIN else "every pair"
+        return f"{among} of {moving} moving bodies, which look into a uniform grid of {static} static ones"
+    if search == TREE:
+        beside = f" and against that of {static} static ones" if static else ""
+        return f"{tree} of {moving} moving bodies against itself{beside}"
+    return f"every pair of {moving} moving and {static} static bodies; a {tree} above {BRUTE_FORCE_MAX}"
 
 
-def _without_grids(moving: int, still: int) -> Iterator[PlannedKernel]:
-    """Every pair of few boxes; trees of many."""
-    trees_meet = (still > 0 and moving * still > TESTS_AT_MOST) or (moving > FEW and still > FEW)
-    few_meet = still > 0 and not trees_meet
-    if (1 < moving <= FEW) or few_meet:
-        yield PlannedKernel("test_all", f"every pair of at most {FEW} boxes")
-    if moving > FEW or still > FEW or trees_meet:
-        when = "" if moving > FEW else CHANGES
-        yield PlannedKernel("choose_frame", f"a tree of more than {FEW} boxes", when)
-        yield PlannedKernel("assign_cells", "its cells", when)
-        yield PlannedKernel("place", "its boxes in their order", when)
-    if moving > FEW:
-        yield PlannedKernel("ranges_within_levels", "neighbours of one size")
-    if moving > FEW or trees_meet:
-        yield PlannedKernel("ranges_between", "neighbours of two sizes, or in two trees", "" if trees_meet else SIZES)
-        yield PlannedKernel("overlapping", "tests them")
+def planned_passes(static: int) -> Iterator[PlannedKernel]:
+    """What runs the passes that build trees and find their pairs."""
+    beside = ", and of what does not move" if static else ""
+    yield PlannedKernel("run_tree_pass", f"builds the tree of what moves{beside}; neighbours in it; tests their boxes")

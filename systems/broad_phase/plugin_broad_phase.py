@@ -1,30 +1,28 @@
-"""Broad phases that plugins bring."""
+"""Broad phases of plugins: called with the boxes of a step, their answers checked."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...framework.errors import PluginError
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
+from ...framework.plugins.registry import Registry
 
 
-class ForeignBroadPhase:
-    """Asks the one that the settings name, an instance for this world, and looks at what it answers."""
+class PluginBroadPhase:
+    """Calls the broad phase that the settings name, an instance for this world, and checks what it returns."""
 
-    def __init__(self, state: PhysicsState) -> None:
-        self._state = state
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
         self._made: dict[str, tuple[type[Any], Any]] = {}  # by name: the class as it was registered, and its instance
 
-    def pairs(self, name: str, moving: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of overlapping boxes, at least one of each pair below ``moving``; PluginError if they are none."""
-        registered = self._state.world.registry.broad_phases[name]
+    def pairs(self, name: str, lower: np.ndarray, upper: np.ndarray, moving: int) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of overlapping boxes, (n, d) corners; PluginError if these are no pairs with one of the first rows."""
+        registered, count = self._registry.broad_phases[name], len(lower)
         if name not in self._made or self._made[name][0] is not registered:
             self._made[name] = registered, registered()
-        boxes = [self._state.scratch[key][:count].view() for key in ("lower", "upper")]
+        boxes = [lower.view(), upper.view()]
         for box in boxes:
             box.flags.writeable = False
         try:

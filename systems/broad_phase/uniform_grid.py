@@ -1,17 +1,17 @@
 """A uniform grid for boxes of about one size, spread about evenly: what most scenes consist of, and twice as fast there
-as the tree of :mod:`broad_phase.tree.tree`, which serves all others.
+as the tree of :mod:`.tree`, which serves all others.
 
 Cells are at least as large as the largest box, and a box is in the cell of its middle: it overlaps only boxes of its
-own cell and of those around. One counting sort brings the objects into the order of their cells, row by row, so that
-neighbour cells of one row are one range of objects. An object looks at the later ones of its own and the next cell, and
-at three cells of each row that comes later: one row in 2D, four in 3D.
+own cell and of those around. One counting sort brings the boxes into the order of their cells, row by row, so that
+neighbour cells of one row are one range of boxes. A box looks at the later ones of its own and the next cell, and at
+three cells of each row that comes later: one row in 2D, four in 3D.
 
-Each object has a code, its box in small integers, all in one number: 14 bits for each corner's coordinate in 2D, 9 in
-3D, and a free bit above each. Lower corners come first, then the largest integer minus the upper corners. Rounding down
-keeps order, so codes of boxes that overlap do too: one subtraction rules out most candidates, and four or eight are
-looked at together (:mod:`lanes`). Exact corners are compared only for the others.
+Each box has a code: its corners in small integers, all in one number, 14 bits for each coordinate in 2D, 9 in 3D, and a
+free bit above each. Lower corners come first, then the largest integer minus the upper corners. Rounding down keeps
+order, so codes of boxes that overlap do too: one subtraction rules out most candidates, and four or eight are looked at
+together (:mod:`.lanes`). Exact corners are compared only for the others.
 
-Nothing branches on what a single comparison finds: results are written always, and the counter moves on or not. A
+Nothing branches on the result of a single comparison: results are always written, and the counter moves on or not. A
 mispredicted branch costs more than the test it would avoid.
 """
 
@@ -20,84 +20,80 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.cpython.unsafe.tuple import tuple_setitem
-from numpy.typing import NDArray
 
-from ...framework.compilation import kernel, part
+from ...framework.compilation import part
+from ...framework.jit.record_type import zero_of
 from ...framework.vectors import item, replace
+from .boxes import HIGHEST, LARGEST, LOWEST
+from .brute_force import boxes_overlap
 from .lanes import eight_at, four_at, lowest_bit
-from .tree.tree import CANDIDATE_LIMIT
 
-CELLS_PER_OBJECT = 2.0  # at most; cells grow where there is more room than that
+CELLS_PER_BOX = 2.0  # at most; cells grow where there is more room than that
 SPARE_CELLS = 64
-CROWDED = 8.0  # mean number of objects in an object's cell from which the tree is faster
-LOOSE = 1.0 + 2.0**-16  # cells exceed the largest box by this, which covers all rounding
-SLACK = 2.0**-16  # the same for boxes from outside, in cells
-FARTHEST = 2.0**28  # in boxes, from the origin of coordinates: the limit for that
-FULLEST = 64  # most objects in one cell
+CROWDED = 8.0  # mean number of boxes in a box's cell from which the tree is faster
+LOOSE = 1.0 + 2.0**-16  # cells exceed the largest box by this factor, which covers all rounding
+SLACK = 2.0**-16  # the same for boxes that are not in the grid, in cells
+FARTHEST = 2.0**28  # distance from the origin, in boxes, up to which LOOSE and SLACK cover rounding
+FULLEST = 64  # most boxes in one cell
 CODE_BITS = 60
-CHUNK = 1024  # records tested at a time; they stay in the first-level cache
-LONGEST = 128  # records of one object: 2 and 4 * 3 cells, all of them full, by eights, with some to spare
+CHUNK = 1024  # notes tested at a time; they stay in the first-level cache
+LONGEST = 128  # notes of one box: 2 and 4 * 3 cells, all of them full, by eights, with some to spare
 LANES = 8  # codes that may be read past the last one
+NOTE = 12  # pairs that one note may stand for: 4 and 8 lanes
 
-# Places in ``frame``, apart by 3: one value per axis. The largest is the longest edge of any box.
-LOWEST, HIGHEST, LARGEST = 0, 3, 6
-FRAME_SIZE = 7
-
-UNEVEN, FULL = -1, -2  # what the kernel returns in place of a number of pairs
+FULL = -1  # in place of a number of pairs: there may not be room for all
 
 
 @part
-def count_cells(frame, count, like):
-    """(1 / cell, cells a row, cells a layer, cells), with one empty cell around; 1 / cell is 0 if no grid suits."""
-    largest = frame[LARGEST]
-    farthest = 0.0
-    for q in range(len(like)):
+def choose_cells(grid, count):
+    """Size and number of cells, with one empty cell around; returns whether a grid may suit so many boxes."""
+    frame, zero = grid.frame, zero_of(grid)
+    largest, farthest = frame[LARGEST], 0.0
+    for q in range(len(zero)):
         farthest = max(farthest, max(abs(frame[LOWEST + q]), abs(frame[HIGHEST + q])))
-    if not farthest < largest * FARTHEST:  # also if a box is infinite, or none has a size, or there is none
-        return 0.0, np.int64(0), np.int64(0), np.int64(0)
+    if not farthest < largest * FARTHEST:  # also if a box is infinite, if none has a size, or if there is none
+        return False
     inverse = 1.0 / (largest * LOOSE)
     while True:
-        inside = 1.0
-        row, layer, total = 1.0, 1.0, 1.0
-        for q in range(len(like)):
+        inside, row, layer, total = 1.0, 1.0, 1.0, 1.0
+        for q in range(len(zero)):
             cells = math.floor((frame[HIGHEST + q] - frame[LOWEST + q]) * inverse) + 1.0
             inside *= cells
             layer = total
             total *= cells + 2.0
             row = total if q == 0 else row
-        if total <= CELLS_PER_OBJECT * count + SPARE_CELLS:
+        if total <= CELLS_PER_BOX * count + SPARE_CELLS:
             break
         inverse *= 0.9
-    if count > CROWDED * inside:
-        inverse = 0.0
-    return inverse, np.int64(row), np.int64(layer), np.int64(total)
+    grid.inverse_cell, grid.row, grid.layer, grid.total = inverse, int(row), int(layer), int(total)
+    return count <= CROWDED * inside
 
 
 @part
-def find_cells(lower, upper, count, frame, inverse, row, layer, total, keys, directory, like):
-    """Each object's cell, those of invalid boxes behind the last; then directory[key + 1] is where cell key begins.
+def find_cells(grid, lower, upper, count):
+    """The cell of each box, invalid ones behind the last; afterwards directory[key + 1] is where cell ``key`` begins.
 
-    Returns whether the objects are spread evenly enough.
+    Returns whether the boxes are spread evenly enough.
     """
-    d = len(like)
+    inverse, row, layer, total = grid.inverse_cell, grid.row, grid.layer, grid.total
+    keys, directory, frame, origin = grid.keys, grid.directory, grid.frame, zero_of(grid)
     for k in range(total + 3):
         directory[k] = 0
-    origin = like
-    for q in range(d):
+    for q in range(len(origin)):
         origin = replace(origin, q, frame[LOWEST + q])
     for i in range(count):
-        key = np.int64(0)
-        valid = True
-        for q in range(d):
-            low, high = lower[i, q], upper[i, q]
-            valid &= low <= high
-            at = np.int64((0.5 * (low + high) - item(origin, q)) * inverse) + 1
+        key, valid = 0, True
+        low, high = lower[i], upper[i]
+        for q in range(len(origin)):
+            fits = item(low, q) <= item(high, q)
+            valid &= fits
+            middle = 0.5 * (item(low, q) + item(high, q)) if fits else item(origin, q)
+            at = np.int64((middle - item(origin, q)) * inverse) + 1
             key += at if q == 0 else at * (row if q == 1 else layer)
         key = key if valid else total
         keys[i] = key
-        directory[np.uint64(key) + np.uint64(2)] += 1
-    crowding, fullest, before = np.int64(0), np.int64(0), np.int64(0)
+        directory[key + 2] += 1
+    crowding, fullest, before = 0, 0, 0
     for k in range(2, total + 2):
         found = np.int64(directory[k])
         crowding += found * found
@@ -108,36 +104,49 @@ def find_cells(lower, upper, count, frame, inverse, row, layer, total, keys, dir
 
 
 @part
-def place_objects(lower, upper, count, frame, inverse, keys, directory, order, cells, codes, like):
+def place_boxes(grid, lower, upper, count):
     """The counting sort's last pass; afterwards directory[key] is where cell ``key`` begins."""
-    d = len(like)
+    frame, total, zero = grid.frame, grid.total, zero_of(grid)
+    keys, directory, order, cells, codes = grid.keys, grid.directory, grid.order, grid.cells, grid.codes
+    d = len(zero)
     field = CODE_BITS // (2 * d)
     largest = (1 << (field - 1)) - 1
-    scale, origin = like, like
+    scale, origin = zero, zero
     for q in range(d):
         origin = replace(origin, q, frame[LOWEST + q])
-        scale = replace(scale, q, largest / (frame[HIGHEST + q] - frame[LOWEST + q] + 1.0 / inverse))
+        scale = replace(scale, q, largest / (frame[HIGHEST + q] - frame[LOWEST + q] + 1.0 / grid.inverse_cell))
     for i in range(count):
-        key = np.uint64(keys[i])
-        place = np.uint64(directory[key + np.uint64(1)])
-        directory[key + np.uint64(1)] += 1
+        key = keys[i]
+        if key == total:  # invalid
+            continue
+        place = directory[key + 1]
+        directory[key + 1] += 1
         order[place] = i
         cells[place] = key
-        code = np.int64(0)
+        code, low, high = np.int64(0), lower[i], upper[i]
         for q in range(d):
-            code |= np.int64((lower[i, q] - item(origin, q)) * item(scale, q)) << (q * field)
-            code |= (largest - np.int64((upper[i, q] - item(origin, q)) * item(scale, q))) << ((d + q) * field)
+            code |= np.int64((item(low, q) - item(origin, q)) * item(scale, q)) << (q * field)
+            code |= (largest - np.int64((item(high, q) - item(origin, q)) * item(scale, q))) << ((d + q) * field)
         codes[place] = code
 
 
 @part
-def _look_around(start, count, row, layer, directory, order, cells, codes, work, like):
-    """Write records of what may overlap the objects from ``start`` on, until ``work`` may be full.
+def build_grid(grid, lower, upper, count):
+    """Sort rows 0..count-1 of these columns into the cells; ``grid.suits``: whether they are even enough for it."""
+    grid.suits = choose_cells(grid, count) and find_cells(grid, lower, upper, count)
+    if grid.suits:
+        place_boxes(grid, lower, upper, count)
 
-    A record: an object's row, two places in the order, and bits. Bit k below 4 stands for the object k places behind
-    the first, others for the one k places behind the second. Returns (records, object to go on with).
+
+@part
+def look_around(grid, start, count):
+    """Note what may overlap the boxes from ``start`` on, until ``notes`` may be full.
+
+    A note: a box's row, two places in the order, and bits. Bit k below 4 stands for the box k places behind the first,
+    others for the one k - 4 places behind the second. Returns (notes, box to go on with).
     """
-    d = len(like)
+    directory, order, cells, codes, notes = grid.directory, grid.order, grid.cells, grid.codes, grid.notes
+    row, layer, d = grid.row, grid.layer, len(zero_of(grid))
     field = CODE_BITS // (2 * d)
     half = np.int64(field * d)
     lower_half = (np.int64(1) << half) - 1
@@ -145,173 +154,99 @@ def _look_around(start, count, row, layer, directory, order, cells, codes, work,
     for _ in range(2 * d):
         guards = (guards << field) | (1 << (field - 1))
         full = (full << field) | ((1 << (field - 1)) - 1)
-    four, eight, one = np.int64(4), np.int64(8), np.int64(1)
-    held, room = np.uint64(0), np.uint64(len(work) - LONGEST)
-    i = start
+    one, held, room, i = np.int64(1), np.int64(0), len(notes) - LONGEST, start
     while i < count and held < room:
-        key = np.int64(cells[np.uint64(i)])
-        code = codes[np.uint64(i)]
+        key, code, here, after = cells[i], codes[i], order[i], i + 1
         code = (full - ((code >> half) | ((code & lower_half) << half))) | guards
-        here = order[np.uint64(i)]
-        after = i + 1
-        length = np.int64(directory[np.uint64(key + 2)]) - after
-        bits = four_at(codes, after, code, guards) & ((one << min(length, four)) - 1)
+        length = directory[key + 2] - after
+        bits = four_at(codes, after, code, guards) & ((one << min(length, 4)) - 1)
         longest = length + 4
         for k in range(1 if d == 2 else 4):
             at = key + (row if k == 0 else layer + (k - 2) * row)
-            begin = np.int64(directory[np.uint64(at - 1)])
-            length = np.int64(directory[np.uint64(at + 2)]) - begin
+            begin = directory[at - 1]
+            length = directory[at + 2] - begin
             longest = max(longest, length)
-            bits |= (eight_at(codes, begin, code, guards) & ((one << min(length, eight)) - 1)) << four
-            work[held, 0] = here
-            work[held, 1] = after
-            work[held, 2] = begin
-            work[held, 3] = bits
-            held += np.uint64(bits != 0)
+            bits |= (eight_at(codes, begin, code, guards) & ((one << min(length, 8)) - 1)) << 4
+            notes[held, 0] = here
+            notes[held, 1] = after
+            notes[held, 2] = begin
+            notes[held, 3] = bits
+            held += bits != 0
             bits = np.int64(0)
         if longest > 8:  # seldom: what is left of the ranges
             for k in range(-1, 1 if d == 2 else 4):
                 at = key + (row if k <= 0 else layer + (k - 2) * row)
-                begin = np.int64(directory[np.uint64(at - 1)]) + 8 if k >= 0 else after + 4
-                stop = np.int64(directory[np.uint64(at + 2 if k >= 0 else key + 2)])
+                begin = directory[at - 1] + 8 if k >= 0 else after + 4
+                stop = directory[at + 2] if k >= 0 else directory[key + 2]
                 while begin < stop:
-                    bits = eight_at(codes, begin, code, guards) & ((one << min(stop - begin, eight)) - 1)
-                    work[held, 0] = here
-                    work[held, 2] = begin
-                    work[held, 3] = bits << four
-                    held += np.uint64(bits != 0)
+                    bits = eight_at(codes, begin, code, guards) & ((one << min(stop - begin, 8)) - 1)
+                    notes[held, 0] = here
+                    notes[held, 2] = begin
+                    notes[held, 3] = bits << 4
+                    held += bits != 0
                     begin += 8
         i += 1
     return held, i
 
 
 @part
-def _test(held, work, lower, upper, order, first, second, found, like):
-    """Compare exact corners; returns the number of pairs, or FULL if there may not be room for all."""
+def test_notes(state, held, found):
+    """Compare exact corners; returns the number of pairs, or FULL."""
+    grid, lower, upper, room = state.grid, state.bodies.lower, state.bodies.upper, len(state.candidates.first)
+    order, notes, first, second = grid.order, grid.notes, state.candidates.first, state.candidates.second
     for r in range(held):
-        record = np.uint64(r)
-        here = np.uint64(work[record, 0])
-        bits = np.int64(work[record, 3])
-        if found + 12 > len(first):
-            return np.int64(FULL)
+        here, bits = notes[r, 0], np.int64(notes[r, 3])
+        low, high = lower[here], upper[here]
+        if found + NOTE > room:
+            return FULL
         while bits != 0:
             k = lowest_bit(bits)
             bits &= bits - 1
-            at = work[record, 1] + k if k < 4 else work[record, 2] + k - 4
-            there = np.uint64(order[np.uint64(at)])
-            hit = True
-            for q in range(len(like)):
-                hit &= (lower[here, q] <= upper[there, q]) & (lower[there, q] <= upper[here, q])
+            there = order[notes[r, 1] + k if k < 4 else notes[r, 2] + k - 4]
             first[found] = here
             second[found] = there
-            found += hit
+            found += boxes_overlap(low, high, lower[there], upper[there])
     return found
 
 
 @part
-def look_inside(
-    rows, lower, upper, frame, inverse, row, layer, directory, order, first, second, found, like
-):  # fmt: skip
-    """Pairs of objects in the grid with boxes of any size, of ``rows`` that are not in it; returns as ``_test``."""
-    d = len(like)
-    one = np.int64(1)
-    origin, last = like, like
-    for q in range(d):
-        origin = replace(origin, q, frame[LOWEST + q])
-        last = replace(last, q, math.floor((frame[HIGHEST + q] - frame[LOWEST + q]) * inverse))
-    for k in range(len(rows)):
-        i = np.uint64(rows[k])
-        begin, end = (one, one, one), (one, one, one)
-        for q in range(d):
-            low, high = lower[i, q], upper[i, q]
-            valid = low <= high
-            low = min(max((low - item(origin, q)) * inverse - 0.5 - SLACK, 0.0), item(last, q) + 1.0)
-            high = min(max((high - item(origin, q)) * inverse + 0.5 + SLACK, -1.0), item(last, q))
-            begin = tuple_setitem(begin, q, np.int64(low if valid else 0.0) + 1)
-            end = tuple_setitem(end, q, np.int64((high if valid else -1.0) + 1.0))
-        for z in range(begin[2], end[2] + 1):
-            for y in range(begin[1], end[1] + 1):
-                at = y * row + (z * layer if d == 3 else 0)
-                place = np.int64(directory[np.uint64(at + begin[0])])
-                behind = np.int64(directory[np.uint64(at + max(end[0] + 1, begin[0]))])
-                if found + (behind - place) > len(first):
-                    return np.int64(FULL)
-                while place < behind:
-                    there = np.uint64(order[np.uint64(place)])
-                    hit = True
-                    for q in range(d):
-                        hit &= (lower[i, q] <= upper[there, q]) & (lower[there, q] <= upper[i, q])
-                    first[np.uint64(found)] = there
-                    second[np.uint64(found)] = i
-                    found += hit
-                    place += 1
+def look_inside(state, grid, i, found):
+    """Pairs of body i, which is not in the grid and of any size, with what is in it; returns as ``test_notes``."""
+    bodies, candidates, frame, inverse = state.bodies, state.candidates, grid.frame, grid.inverse_cell
+    lower, upper, order, directory = bodies.lower, bodies.upper, grid.order, grid.directory
+    first, second, room = candidates.first, candidates.second, len(candidates.first)
+    low, high, begin, last = lower[i], upper[i], lower[i], upper[i]
+    for q in range(len(low)):
+        if not item(low, q) <= item(high, q):
+            return found
+        origin = frame[LOWEST + q]
+        end = math.floor((frame[HIGHEST + q] - origin) * inverse)
+        start = min(max((item(low, q) - origin) * inverse - 0.5 - SLACK, 0.0), end + 1.0)
+        stop = min(max((item(high, q) - origin) * inverse + 0.5 + SLACK, -1.0), end)
+        begin, last = replace(begin, q, math.floor(start) + 1.0), replace(last, q, math.floor(stop) + 1.0)
+    x, after = int(begin[0]), max(int(last[0]) + 1, int(begin[0]))
+    deep = len(low) - 1
+    for z in range(int(item(begin, deep)) if deep == 2 else 0, int(item(last, deep)) + 1 if deep == 2 else 1):
+        for y in range(int(begin[1]), int(last[1]) + 1):
+            at = y * grid.row + z * grid.layer
+            place, behind = directory[at + x], directory[at + after]
+            if found + (behind - place) > room:
+                return FULL
+            for k in range(place, behind):
+                there = order[k]
+                first[found] = there
+                second[found] = i
+                found += boxes_overlap(low, high, lower[there], upper[there])
     return found
 
 
-@kernel
-def even_pairs(
-    lower, upper, inside, others, frame, keys, directory, order, cells, codes, work, first, second, like
-):  # fmt: skip
-    """Write the overlapping pairs of rows 0..inside-1 with each other and with the rows ``others`` (k,).
-
-    Returns how many, UNEVEN if a grid does not suit the first rows, or FULL if the output is too short.
-    """
-    inverse, row, layer, total = count_cells(frame, inside, like)
-    if inverse == 0.0:
-        return np.int64(UNEVEN)
-    if not find_cells(lower, upper, inside, frame, inverse, row, layer, total, keys, directory, like):
-        return np.int64(UNEVEN)
-    place_objects(lower, upper, inside, frame, inverse, keys, directory, order, cells, codes, like)
-    count = np.int64(directory[total])  # without invalid boxes
-    at, found = np.int64(0), np.int64(0)
-    while at < count and found >= 0:
-        held, at = _look_around(at, count, row, layer, directory, order, cells, codes, work, like)
-        found = _test(held, work, lower, upper, order, first, second, found, like)
-    if found >= 0:
-        found = look_inside(
-            others, lower, upper, frame, inverse, row, layer, directory, order, first, second, found, like
-        )
-    return found
-
-
-class EvenGrid:
-    """Overlaps among the boxes of the first rows, and of these with some that follow; made anew each time."""
-
-    def __init__(self, dimensions: int) -> None:
-        self._like = (0.0,) * dimensions
-        self._work = np.empty((CHUNK + LONGEST, 4), np.int32)
-        self._first, self._second = np.empty(0, np.int32), np.empty(0, np.int32)
-        self._reserve(0)
-
-    def pairs(
-        self, lower: NDArray[np.float64], upper: NDArray[np.float64], frame: NDArray[np.float64], inside: int,
-        others: NDArray[np.int32],
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:  # fmt: skip
-        """Rows (first, second) of all overlapping pairs of rows 0..inside-1, and of these with rows ``others`` (k,).
-
-        frame (FRAME_SIZE,): the lowest and the highest coordinates of the boxes of rows 0..inside-1, and their longest
-        edge. None if a grid does not suit them, or if there are more pairs than allowed: the tree counts them. The
-        arrays are views that hold until the next call.
-        """
-        if inside > len(self._keys):
-            self._reserve(inside)
-        while True:
-            found = even_pairs(
-                lower, upper, inside, others, frame, self._keys, self._directory, self._order, self._cells,
-                self._codes, self._work, self._first, self._second, self._like,
-            )  # fmt: skip
-            if found == UNEVEN:
-                return None
-            if found != FULL:
-                return self._first[:found], self._second[:found]
-            if len(self._first) >= CANDIDATE_LIMIT:
-                return None
-            room = 2 * len(self._first)
-            self._first, self._second = np.empty(room, np.int32), np.empty(room, np.int32)
-
-    def _reserve(self, capacity: int) -> None:
-        self._keys, self._order, self._cells = (np.empty(capacity, np.int32) for _ in range(3))
-        self._codes = np.zeros(capacity + LANES, np.int64)
-        self._directory = np.empty(int(CELLS_PER_OBJECT * capacity) + SPARE_CELLS + 4, np.int32)
-        if len(self._first) < 4 * capacity + 64:
-            self._first, self._second = (np.empty(4 * capacity + 64, np.int32) for _ in range(2))
+def reserve_grid(grid, count):
+    """Room for so many boxes; True if there was not enough. Called from Python, by the owner of the record."""
+    if len(grid.keys) >= count:
+        return False
+    count = max(count, len(grid.keys) * 3 // 2)  # worlds that grow body by body allocate seldom
+    grid.reserve(CHUNK + LONGEST, "notes")
+    grid.reserve(count, "keys", "order", "cells")
+    grid.codes = np.zeros(count + LANES, np.int64)
+    grid.reserve(int(CELLS_PER_BOX * count) + SPARE_CELLS + 4, "directory")
+    return True

@@ -1,112 +1,90 @@
-"""A step in several rounds: when a blow sends a body farther than its neighbours are known, all are looked for again.
+"""When an impact sends a body out of its search bounds, the pairs for the rest of the step are searched again.
 
-The boxes of the broad phase hold each body's foreseen motion and some room for what blows make of it. The event loop
-stops when a body leaves its room. Then candidates are made for the rest of the step from the paths as they are now, and
-the loop goes on. In most scenes that never happens; where everything is fast, a step takes several rounds.
+The boxes of the broad phase hold each body's foreseen motion and a margin for what impacts make of it. The event loop
+stops when a body leaves its bounds. Then candidates are made for the rest of the step from the paths as they are now,
+and the loop goes on. In most scenes that never happens; where everything is fast, a step takes several searches.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
-
-from ...framework.compilation import kernel
-from ...framework.vectors import row, store
-from ..impacts.impulses import LOGGED, UNTIL
-from ..narrow_phase.filters import filtered
-from ..narrow_phase.order import sort_pairs
-
-if TYPE_CHECKING:
-    from ..impacts.queue import EventQueue
-    from ..state import PhysicsState
+from ...framework.compilation import part
+from ..codes import NEED_MERGED, OK
+from ..narrow_phase.stages import is_solid_pair, layers_meet
 
 
-@kernel
-def merge_pairs(
-    new_a, new_b, count, old, pairs, crossed, rank, material, layers, masks, sensors, inverse_mass, merged, now_crossed,
-    place, hits, disabled, log_pair, like,
-):  # fmt: skip
-    """Join two lists in canonical order: new candidates whose layers meet, and the pairs that something has come of.
+@part
+def mark_kept(state):
+    """place[c] = 0 for the pairs that something has come of in this step, -1 for the others."""
+    pairs = state.pairs
+    for c in range(pairs.count):
+        pairs.place[c] = 0 if pairs.crossed[c] or pairs.impulse[c] > 0.0 else -1
+    for h in range(pairs.found):
+        pairs.place[pairs.hits[h]] = 0
 
-    old, merged: the arrays of the pairs (pairs,) until now and from now on; crossed, now_crossed: see ``impacts``.
-    What names pairs by their place, hits, disabled and log_pair, gets the new ones; place (pairs,): room. Returns how
-    many there are.
-    """
-    old_a, old_b, responds, involved, depth, impulse, parts, normal, point = old
-    a, b, now_responds, now_involved, now_depth, now_impulse, now_parts, now_normal, now_point = merged
-    n, found, i, j = len(rank), 0, 0, 0
-    for c in range(pairs):
-        place[c] = 0 if crossed[c] or impulse[c] > 0.0 else -1
-    for h in range(len(hits)):
-        place[hits[h]] = 0
-    while i < count or j < pairs:
+
+@part
+def keep_pair(state, j, found):
+    """Pair j of the list until now becomes pair ``found`` of the new one."""
+    old, new = state.pairs, state.merged
+    old.place[j] = found
+    new.a[found], new.b[found] = old.a[j], old.b[j]
+    new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
+    new.crossed[found] = old.crossed[j]
+    new.depth[found], new.impulse[found], new.parting[found] = old.depth[j], old.impulse[j], old.parting[j]
+    new.normal[found], new.point[found] = old.normal[j], old.point[j]
+
+
+@part
+def add_pair(state, a, b, found):
+    """A new candidate becomes pair ``found``; how it stands at the end is not known yet."""
+    new = state.merged
+    new.a[found], new.b[found] = a, b
+    new.is_solid[found] = is_solid_pair(state, a, b)
+    new.near_contact[found], new.crossed[found] = True, False
+    new.depth[found], new.impulse[found] = 0.0, 0.0
+
+
+@part
+def renumber(state):
+    """What names pairs by their place gets the new ones."""
+    old, new, impacts = state.pairs, state.merged, state.impacts
+    for h in range(old.found):
+        new.hits[h] = old.place[old.hits[h]]
+    for k in range(old.disabled_count):
+        new.disabled[k] = old.place[old.disabled[k]]
+    for k in range(impacts.logged):
+        impacts.log_pair[k] = old.place[impacts.log_pair[k]]
+    new.found, new.disabled_count = old.found, old.disabled_count
+    new.resting_count = new.touching_count = 0
+
+
+def merge_pairs(state, dt):
+    """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of."""
+    candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
+    if old.count + candidates.count > len(new.a):
+        state.needed = old.count + candidates.count
+        return NEED_MERGED
+    mark_kept(state)
+    n, found, i, j = state.count, 0, 0, 0
+    while i < candidates.count or j < old.count:
         new_key, old_key = n * n, n * n
-        if i < count:
-            new_key = rank[new_a[i]] * n + rank[new_b[i]]
-        if j < pairs:
-            old_key = rank[old_a[j]] * n + rank[old_b[j]]
+        if i < candidates.count:
+            new_key = rank[candidates.sorted_a[i]] * n + rank[candidates.sorted_b[i]]
+        if j < old.count:
+            old_key = rank[old.a[j]] * n + rank[old.b[j]]
         if old_key <= new_key:
-            if place[j] >= 0:
-                a[found], b[found], place[j] = old_a[j], old_b[j], found
-                now_responds[found], now_involved[found], now_crossed[found] = responds[j], involved[j], crossed[j]
-                now_depth[found], now_impulse[found], now_parts[found] = depth[j], impulse[j], parts[j]
-                store(now_normal, found, row(normal, j, like))
-                store(now_point, found, row(point, j, like))
+            if old.place[j] >= 0:
+                keep_pair(state, j, found)
                 found += 1
                 i += 1 if old_key == new_key else 0
             j += 1
             continue
-        p, q = new_a[i], new_b[i]
+        a, b = candidates.sorted_a[i], candidates.sorted_b[i]
         i += 1
-        slot_p, slot_q = material[p], material[q]
-        if layers[slot_p, p] & masks[slot_q, q] != 0 and layers[slot_q, q] & masks[slot_p, p] != 0:
-            a[found], b[found] = p, q
-            passive = sensors[slot_p, p] or sensors[slot_q, q]
-            now_responds[found] = not passive and inverse_mass[p] + inverse_mass[q] > 0.0
-            now_involved[found], now_crossed[found] = True, False  # how they stand at the end is not known yet
-            now_depth[found], now_impulse[found] = 0.0, 0.0
+        if layers_meet(state, a, b):
+            add_pair(state, a, b, found)
             found += 1
-    for h in range(len(hits)):
-        hits[h] = place[hits[h]]
-    for h in range(len(disabled)):
-        disabled[h] = place[disabled[h]]
-    for h in range(len(log_pair)):
-        log_pair[h] = place[log_pair[h]]
-    return found
-
-
-class Rounds:
-    """Begins the rounds after the first."""
-
-    def __init__(self, state: PhysicsState) -> None:
-        self._state = state
-
-    def begin(self, dt: float, queue: EventQueue, disabled: np.ndarray, crossed: np.ndarray) -> np.ndarray:
-        """Make pairs for the rest of the step; ``disabled`` is changed, and who ``crossed`` is returned."""
-        state, table = self._state, self._state.table
-        now = float(queue.clock[UNTIL])
-        first, second = state.broad_phase.pairs_on_the_way(now, dt)
-        state.pair_counters["candidates"] += len(first)
-        state.pair_counters["rounds"] += 1
-        first, second = filtered(state, *self._sorted(first, second))
-        old, merged = state.other_pairs(state.pairs + len(first))
-        now_crossed = np.empty(state.pairs + len(first), bool)
-        stacks = table.stacks
-        count = merge_pairs(
-            first, second, len(first), old, state.pairs, crossed, state.rank, state.scratch["material"],
-            stacks["collider.layer"], stacks["collider.mask"], stacks["collider.sensor"], table.arrays["inverse_mass"],
-            merged, now_crossed, np.empty(state.pairs, np.int64), state.hits[: state.found], disabled,
-            queue.log_pair[: queue.counts[LOGGED]], state.like,
-        )  # fmt: skip
-        state.take_others(count)
-        queue.begin_round(now, state.known_until, count)
-        return now_crossed
-
-    def _sorted(self, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """In canonical order."""
-        rank, count = self._state.rank, len(first)
-        starts = np.empty(len(rank) + 1, np.int64)
-        half_a, half_b, sorted_a, sorted_b = (np.empty(count, np.int64) for _ in range(4))
-        sort_pairs(first, second, rank, starts, half_a, half_b, sorted_a, sorted_b)
-        return sorted_a, sorted_b
+    new.count = found
+    renumber(state)
+    state.refreshes_counted += 1
+    return OK

@@ -2,93 +2,107 @@
 
 from __future__ import annotations
 
-from ...framework.compilation import kernel
-from ...framework.vectors import add, row, scale, store, sub
-from .heavy_light_blocks import find_squeezed
+from ...framework.compilation import part
+from ...framework.jit.record_type import zero_of
+from ...framework.vectors import add, scale, sub
+from ..codes import NEED_SOLVER, OK
+from ..impacts.impulses import STOPPED
+from .resting_prediction import drop_support
 
 COLOURS = 62  # bits of a mask; contacts beyond share the last
 
 
-@kernel
-def gather(
-    dt, resting, pair_a, pair_b, inverse_masses, moving, start, origin, velocity, start_velocity, supported, change,
-    place, rows, used, colours, starts, slot, first, second, velocities, shifts, accelerations, inverse_mass, like,
-):  # fmt: skip
-    """Number the bodies of the contacts, sort the contacts by colour; returns how many bodies.
+@part
+def number_body(state, i):
+    """The place of a row among the bodies of the solver, a new one if it has none yet."""
+    solver, place = state.solver, state.bodies.place
+    if place[i] < 0:
+        place[i] = solver.bodies
+        solver.body_row[solver.bodies] = i
+        solver.used[solver.bodies] = 0
+        solver.bodies += 1
+    return place[i]
 
-    place (n,): -1 for every row, and is so again after :func:`put_back`. slot (m,): the place of each contact.
-    Neighbours of one colour share no body that moves.
-    """
-    count = 0
+
+@part
+def colour_contacts(state):
+    """Number the bodies of the contacts and colour these: contacts of one colour share no body that moves."""
+    solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
+    used, starts = solver.used, solver.starts
+    solver.bodies = 0
     for k in range(COLOURS + 2):
         starts[k] = 0
-    for r in range(len(resting)):
-        a, b = pair_a[resting[r]], pair_b[resting[r]]
-        taken = 0
-        for side in range(2):
-            i = a if side == 0 else b
-            if place[i] < 0:
-                place[i] = count
-                rows[count] = i
-                used[count] = 0
-                count += 1
-            if inverse_masses[i] > 0.0:
-                taken |= used[place[i]]
-        colour = 0
+    for r in range(solver.contacts):
+        c = pairs.resting[r]
+        a, b, taken, colour = pairs.a[c], pairs.b[c], 0, 0
+        p, q = number_body(state, a), number_body(state, b)
+        if inverse_mass[a] > 0.0:
+            taken |= used[p]
+        if inverse_mass[b] > 0.0:
+            taken |= used[q]
         while colour < COLOURS - 1 and (taken >> colour) & 1:
             colour += 1
-        for side in range(2):
-            i = a if side == 0 else b
-            if inverse_masses[i] > 0.0:
-                used[place[i]] |= 1 << colour
-        colours[r] = colour
+        if inverse_mass[a] > 0.0:
+            used[p] |= 1 << colour
+        if inverse_mass[b] > 0.0:
+            used[q] |= 1 << colour
+        solver.colour[r] = colour
         starts[colour + 1] += 1
     for k in range(1, COLOURS + 1):
         starts[k] += starts[k - 1]
-    for r in range(len(resting)):
-        k = starts[colours[r]]
-        starts[colours[r]] += 1
-        slot[r] = k
-        first[k], second[k] = place[pair_a[resting[r]]], place[pair_b[resting[r]]]
-    for q in range(count):
-        i = rows[q]
-        inverse_mass[q] = inverse_masses[i]
-        nothing = scale(like, 0.0)
+
+
+def gather(state, dt):
+    """The bodies of the contacts at rest, where the step starts; the contacts sorted by colour.
+
+    Neighbours of one colour share no body that moves, so that the processor can work on several at once.
+    """
+    solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    for i in range(state.count):
+        bodies.held[i] = False
+    if solver.contacts == 0:
+        return OK
+    if solver.contacts > len(solver.first) or state.count > len(solver.body_row):
+        state.needed = solver.contacts
+        return NEED_SOLVER
+    colour_contacts(state)
+    for r in range(solver.contacts):
+        c, k = pairs.resting[r], solver.starts[solver.colour[r]]
+        solver.starts[solver.colour[r]] += 1
+        solver.slot[r] = k
+        solver.first[k], solver.second[k] = bodies.place[pairs.a[c]], bodies.place[pairs.b[c]]
+    inverse_mass, nothing = bodies.inverse_mass, zero_of(state)
+    for q in range(solver.bodies):
+        i = solver.body_row[q]
+        solver.inverse_mass[q] = inverse_mass[i]
         v, x, a = nothing, nothing, nothing
-        if i < moving:
-            v = row(start_velocity, i, like)
-            if inverse_masses[i] > 0.0:
-                x = sub(row(origin, i, like), row(start, i, like))
-                a = sub(row(velocity, i, like), v)
-                if supported[i]:
-                    a = sub(a, row(change, i, like))
+        if i < state.moving:
+            v = bodies.start_velocity[i]
+            if inverse_mass[i] > 0.0:
+                x = sub(bodies.origin[i], bodies.previous_position[i])
+                a = sub(bodies.linear_velocity[i], v)
+                if bodies.supported[i]:
+                    a = sub(a, bodies.support_change[i])
                 a = scale(a, 1.0 / dt)
-        store(velocities, q, v)
-        store(shifts, q, x)
-        store(accelerations, q, a)
-    return count
+        solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
+    return OK
 
 
-@kernel
-def squeeze(first, second, normal, inverse_mass, light_of, last, before, in_block, blocks, like):
-    """See :func:`~carom.systems.contacts.heavy_light_blocks.find_squeezed`."""
-    return find_squeezed(first, second, normal, inverse_mass, light_of, last, before, in_block, blocks, like)
-
-
-@kernel
-def put_back(
-    resting, slot, first, second, total, worked, rows, bodies, place, held, start, position, velocity, velocities,
-    shifts, inverse_mass, pair_impulse, like,
-):  # fmt: skip
-    """Bodies that some contact pushed take what the solver says; ``held`` (n,) tells which they are."""
-    for r in range(len(resting)):
-        k = slot[r]
-        pair_impulse[resting[r]] += total[k]
-        if worked[k]:
-            held[rows[first[k]]] = held[rows[second[k]]] = True
-    for q in range(bodies):
-        i = rows[q]
-        place[i] = -1
-        if held[i] and inverse_mass[q] > 0.0:
-            store(position, i, add(row(start, i, like), row(shifts, q, like)))
-            store(velocity, i, row(velocities, q, like))
+def put_back(state, dt):
+    """Bodies that some contact pushed take what the solver says; without the predicted support they fly free."""
+    solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    for r in range(solver.contacts):
+        k = solver.slot[r]
+        pairs.impulse[pairs.resting[r]] += solver.total[k]
+        if solver.worked[k]:
+            bodies.held[solver.body_row[solver.first[k]]] = True
+            bodies.held[solver.body_row[solver.second[k]]] = True
+    for q in range(solver.bodies if solver.contacts > 0 else 0):
+        i = solver.body_row[q]
+        bodies.place[i] = -1
+        if bodies.held[i] and solver.inverse_mass[q] > 0.0:
+            bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
+            bodies.linear_velocity[i] = solver.velocity[q]
+    if state.any_support:
+        drop_support(state, dt, STOPPED)
+    return OK

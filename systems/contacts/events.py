@@ -1,49 +1,120 @@
-"""RESPONSE: what began to touch, what still does, what ceased; and telling those who listen."""
+"""RESPONSE: which contacts began, stayed and ended; and calling the handlers of these events."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ...framework.compilation import kernel
-from ...framework.schedule.phases import Phase, System
-from ...framework.schedule.plan import PlannedKernel
-from ...framework.world.contacts import ContactRows, empty_columns
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
+from ...framework.jit.record import Record
+from ...framework.schedule.phases import Phase
+from ...framework.schedule.stages import Check, Program, PythonPart, Stage
+from ...framework.settings import Settings
+from ...framework.world.contacts import ContactRows, Contacts, ContactSource, EntityLookup
+from ..staged import StagedSystem
+from .event_stages import compare_contacts
 
 Columns = dict[str, np.ndarray]
 EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact")
 
 
-@kernel
-def compare_pairs(a0, b0, a1, b1, ended, began, stayed):
-    """Rows of the pairs that stand in the first list only, and of those in the second only and in both.
+class RecordedContacts(ContactSource):
+    """The contacts in a world's records, as columns."""
 
-    Both in canonical order. Returns how many rows are written to each.
-    """
-    i, j, ends, begins, stays = 0, 0, 0, 0, 0
-    while i < len(a0) or j < len(a1):
-        if j == len(a1) or (i < len(a0) and (a0[i] < a1[j] or (a0[i] == a1[j] and b0[i] < b1[j]))):
-            ended[ends] = i
-            ends += 1
-            i += 1
-        elif i == len(a0) or a0[i] != a1[j] or b0[i] != b1[j]:
-            began[begins] = j
-            begins += 1
-            j += 1
-        else:
-            stayed[stays] = j
-            stays += 1
-            i += 1
-            j += 1
-    return ends, begins, stays
+    def __init__(self, state: Record) -> None:
+        self._state, self._touching, self._impacts = state, state.contacts, state.impacts
+        self.record: Callable[[str, Columns], None] = lambda history, columns: None
+
+    @property
+    def version(self) -> int:
+        return self._state.contacts_version
+
+    @property
+    def stay_step(self) -> int:
+        return int(self._touching.steps[self._touching.now])
+
+    def columns(self) -> Columns:
+        """After NARROW what overlaps where free flight leads, or is near; after RESPONSE what touches."""
+        state = self._state
+        if state.found_current:
+            return self._found()
+        contacts, now = self._touching, self._touching.now
+        count = int(contacts.counts[now])
+        return {**self._rows(now, slice(count)), "enabled": contacts.enabled[now, :count].copy()}
+
+    def stay_columns(self) -> Columns:
+        now = self._touching.now
+        return self._rows(now, self._touching.stayed[now, : self._touching.stays[now]])
+
+    def began(self) -> Columns:
+        """The contacts that are new in this step."""
+        contacts = self._touching
+        return self._rows(contacts.now, contacts.began[: contacts.begins])
+
+    def ended(self) -> Columns:
+        """The contacts of the step before that are no more; point and normal are the last known."""
+        contacts, count = self._touching, self._touching.ends
+        columns = self._rows(1 - contacts.now, contacts.ended[:count])
+        return {**columns, "step": _repeated(self._state.step_number, count), "normal_impulse": np.zeros(count)}
+
+    def impacts(self) -> Columns:
+        """The impacts of the step, in the order of their times."""
+        state, columns, pairs = self._state, self._impacts.columns(), self._state.pairs.columns()
+        count, entity = state.impacts.logged, state.bodies.entity
+        pair = columns["log_pair"][:count]
+        return {
+            "entity_a": entity[pairs["a"][pair]],
+            "entity_b": entity[pairs["b"][pair]],
+            "point": columns["log_point"][:count].copy(),
+            "normal": columns["log_normal"][:count].copy(),
+            "depth": np.zeros(count),
+            "normal_impulse": columns["log_impulse"][:count].copy(),
+            "step": _repeated(state.step_number, count),
+            "time_of_impact": columns["log_time"][:count].copy(),
+        }
+
+    def record_impacts(self) -> None:
+        if self._impacts.logged and not self._state.impacts_recorded:
+            self._state.impacts_recorded = True
+            self.record("impacts", self.impacts())
+
+    def _rows(self, slot: int, rows: Any) -> Columns:
+        """Copies of some contacts."""
+        columns = self._touching.columns()
+        entity_a = columns["entity_a"][slot][rows].copy()
+        return {
+            "entity_a": entity_a,
+            "entity_b": columns["entity_b"][slot][rows].copy(),
+            "point": columns["point"][slot][rows].copy(),
+            "normal": columns["normal"][slot][rows].copy(),
+            "depth": columns["depth"][slot][rows].copy(),
+            "normal_impulse": columns["impulse"][slot][rows].copy(),
+            "step": _repeated(columns["steps"][slot], len(entity_a)),
+        }
+
+    def _found(self) -> Columns:
+        state, pairs = self._state, self._state.pairs
+        hits, entity = pairs.hits[: pairs.found], state.bodies.entity
+        return {
+            "entity_a": entity[pairs.a[hits]],
+            "entity_b": entity[pairs.b[hits]],
+            "point": pairs.point[hits],
+            "normal": pairs.normal[hits],
+            "depth": pairs.depth[hits],
+            "normal_impulse": np.zeros(len(hits)),
+            "step": _repeated(state.step_number, len(hits)),
+            "enabled": np.ones(len(hits), bool),
+        }
 
 
-class ContactEvents(System):
+def _repeated(number: int, count: int) -> np.ndarray:
+    column = np.empty(count, np.int64)
+    column[:] = number
+    return column
+
+
+class ContactEvents(StagedSystem):
     """Compares the pairs that touch with those of the step before; an end is always delivered.
 
     Reads the contacts; writes ``contacts.begin``, ``stay``, ``end``; calls the handlers of contact_begin,
@@ -51,66 +122,65 @@ class ContactEvents(System):
     """
 
     phase = Phase.RESPONSE
+    STAGES = (
+        Stage(
+            compare_contacts, "contacts of this step and the last", ("contacts",), ("contacts",), "contacts",
+            "bodies touch, or did",
+        ),
+    )  # fmt: skip
 
-    def __init__(self, state: PhysicsState) -> None:
-        self._state = state
-        self._nothing = empty_columns(state.dimensions)
-        self.touching: Columns = self._nothing
-        self._generation = state.table.generation
+    def __init__(
+        self, program: Program, source: RecordedContacts, contacts: Contacts, lookup: EntityLookup,
+        settings: Callable[[], Settings],
+    ) -> None:  # fmt: skip
+        super().__init__(program)
+        self._state, self._source, self._contacts = program.state, source, contacts
+        self._touching, self._impacts = program.state.contacts, program.state.impacts
+        self._lookup, self._settings = lookup, settings
+        source.record = contacts.record
 
-    def process(self, dt: float) -> None:
-        self._state.queries.forget()  # the response has moved bodies
-        before, now = self.touching, self._touching_now()
-        olds, news = len(before["entity_a"]), len(now["entity_a"])
-        if not olds and not news:
-            return
-        known = olds if self._generation == self._state.table.generation else 0
-        ended, began, stayed = np.empty(olds, np.int64), np.empty(news, np.int64), np.empty(news, np.int64)
-        ends, begins, stays = compare_pairs(
-            before["entity_a"][:known], before["entity_b"][:known], now["entity_a"], now["entity_b"], ended, began,
-            stayed,
-        )  # fmt: skip
-        self._generation = self._state.table.generation
-        begin, stay = self._select(now, began[:begins]), self._select(now, stayed[:stays])
-        end = self._select(before, ended[:ends]) if known else before
-        ends = len(end["entity_a"])
-        if ends:
-            end = {**end, "step": np.full(ends, self.world.step_count), "normal_impulse": np.zeros(ends)}
-        self.touching = now
-        contacts = self._state.contacts
-        contacts.record("begin", begin)
-        contacts.record("end", end)
-        contacts.set_stay(stay)
-        for columns, event in zip((begin, stay, end, self._state.step_impacts), EVENTS, strict=True):
-            self._tell(columns, event)
+    def _parts(self) -> list[Any]:
+        state = self._state
+        news = state.word_of("news")
+        if not state.others_write:  # nor has any event a handler
+            return [self.segment(), Check(state.words, news, PythonPart(self.name, self._record))]
+        tell = Check(state.words, news, PythonPart(self.name, self._tell))
+        return [PythonPart(self.name, self._take_disabled), self.segment(), tell]
 
-    def _touching_now(self) -> Columns:
-        """The contacts that are enabled."""
-        columns = self._state.contact_columns
-        enabled = columns["enabled"]
-        if enabled.all():
-            return {key: column for key, column in columns.items() if key != "enabled"}
-        return {key: column[enabled] for key, column in columns.items() if key != "enabled"}
+    def _take_disabled(self, dt: float) -> None:
+        """Contacts that a system has disabled after RESPONSE count as not touching."""
+        enabled, contacts = self._contacts.enabled_now(), self._state.contacts
+        if enabled is not None and not self._state.found_current:
+            contacts.enabled[contacts.now, : len(enabled)] = enabled
 
-    def _select(self, columns: Columns, rows: np.ndarray) -> Columns:
-        """Those rows, ascending; columns of which all are taken are not copied."""
-        if not len(rows):
-            return self._nothing
-        if len(rows) == len(columns["entity_a"]):
-            return columns
-        return {key: column.take(rows, axis=0) for key, column in columns.items()}
+    def _record(self, dt: float) -> None:
+        """Note what has begun, ended and bounced."""
+        if self._impacts.capped:
+            self.world.report_fault(
+                f"step {self.world.step_count}: {self._impacts.capped} impacts beyond {self._settings().impact_cap} "
+                f"of a body in one step"
+            )
+        source = self._source
+        source.record_impacts()
+        if self._touching.begins:
+            self._contacts.record("begin", source.began())
+        if self._touching.ends:
+            self._contacts.record("end", source.ended())
 
-    def _tell(self, columns: Columns | None, event: str) -> None:
-        if columns is None or not len(columns["entity_a"]) or not self.world.events.wanted(event):
-            return
-        self.world.events.dispatch_many(event, ContactRows(columns, self._state.lookup))
-
-    def kernels(self) -> Iterator[PlannedKernel]:
-        if self._state.collides or len(self.touching["entity_a"]):
-            yield PlannedKernel("compare_pairs", "contacts of this step and the last", "bodies touch, or did")
+    def _tell(self, dt: float) -> None:
+        """Note it and call the handlers."""
+        self._record(dt)
+        source, events = self._source, self.world.events
+        begin = source.began() if events.wanted("contact_begin") else None
+        end = source.ended() if events.wanted("contact_end") else None
+        stay = source.stay_columns() if events.wanted("contact_stay") else None
+        impacts = source.impacts() if events.wanted("impact") else None
+        for columns, event in zip((begin, stay, end, impacts), EVENTS, strict=True):
+            if columns is not None and len(columns["entity_a"]) and events.wanted(event):
+                events.dispatch_many(event, ContactRows(columns, self._lookup))
 
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
         wanted = [event for event in EVENTS if self.world.events.wanted(event)]
-        return f"handlers of {', '.join(wanted)}" if wanted else "begin, stay, end; nobody listens to events"
+        return f"handlers of {', '.join(wanted)}" if wanted else "begin, stay, end; no event has a handler"

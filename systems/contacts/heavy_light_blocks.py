@@ -7,75 +7,75 @@ needs r passes. For two contacts the exact answer is a linear complementarity pr
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.vectors import add_scaled, dot, negative, row, store, sub
+from ...framework.vectors import add_scaled, dot, negative, sub
+from ..codes import OK
 
 RATIO = 10.0  # a body is light between two that have at least this many times its mass
 OPPOSED = -0.5  # cosine between the two contacts' directions, below which they squeeze
 
 
 @part
-def find_squeezed(first, second, normal, inverse_mass, light_of, last, before, in_block, blocks, like):
-    """Pairs of contacts that squeeze a light body, into blocks (b, 2); returns how many.
+def light_body_of(solver, k):
+    """The light body of contact k, or -1."""
+    a, b, inverse_mass = solver.first[k], solver.second[k], solver.inverse_mass
+    if inverse_mass[a] >= RATIO * inverse_mass[b] and inverse_mass[a] > 0.0:
+        return int(a)
+    if inverse_mass[b] >= RATIO * inverse_mass[a]:
+        return int(b)
+    return -1
 
-    last (n,), before (m,): room for one list of contacts per body. At most one block per body, in the order of the
-    contacts; ``light_of`` (m,) gets the light body of each contact, or -1.
-    """
-    for i in range(len(inverse_mass)):
-        last[i] = -1
+
+def find_blocks(state, dt):
+    """Pairs of contacts that squeeze a light body; at most one block per body, in the order of the contacts."""
+    solver, inverse_mass = state.solver, state.solver.inverse_mass
+    for q in range(solver.bodies if solver.contacts > 0 else 0):
+        solver.last[q] = -1
     count = 0
-    for k in range(len(first)):
-        a, b = first[k], second[k]
-        in_block[k] = False
-        light = -1
-        if inverse_mass[a] >= RATIO * inverse_mass[b] and inverse_mass[a] > 0.0:
-            light = a
-        elif inverse_mass[b] >= RATIO * inverse_mass[a]:
-            light = b
-        light_of[k] = light
+    for k in range(solver.contacts):
+        solver.in_block[k] = False
+        light = light_body_of(solver, k)
+        solver.light_of[k] = light
         if light < 0:
             continue
-        outwards = row(normal, k, like) if light == a else negative(row(normal, k, like))
-        heavy = b if light == a else a
-        other = last[light]
+        is_first = solver.first[k] == light
+        outwards = solver.normal[k] if is_first else negative(solver.normal[k])
+        heavy = solver.second[k] if is_first else solver.first[k]
+        other = solver.last[light]
         while other >= 0:
-            theirs = row(normal, other, like)
-            partner = second[other]
-            if first[other] != light:
-                theirs, partner = negative(theirs), first[other]
+            theirs, partner = solver.normal[other], solver.second[other]
+            if solver.first[other] != light:
+                theirs, partner = negative(theirs), solver.first[other]
             movable = inverse_mass[heavy] + inverse_mass[partner] > 0.0
-            if movable and not in_block[other] and not in_block[k] and dot(outwards, theirs) < OPPOSED:
-                blocks[count, 0], blocks[count, 1] = other, k
-                in_block[other] = in_block[k] = True
+            free = not solver.in_block[other] and not solver.in_block[k]
+            if movable and free and dot(outwards, theirs) < OPPOSED:
+                solver.block[count, 0], solver.block[count, 1] = other, k
+                solver.in_block[other] = solver.in_block[k] = True
                 count += 1
-            other = before[other]
-        before[k] = last[light]
-        last[light] = k
-    return count
+            other = solver.before[other]
+        solver.before[k] = solver.last[light]
+        solver.last[light] = k
+    solver.blocks = count
+    return OK
 
 
 @part
-def solve_squeezed(
-    chosen, active, blocks, first, second, normal, bias, impulse, velocity, inverse_mass, like
-):  # fmt: skip
-    """Solve the two contacts of each block exactly; bias (m,): what they ask, see ``solver.measure``.
-
-    chosen: only blocks of which a contact is ``active`` (m,).
-    """
-    for q in range(len(blocks)):
-        j, k = blocks[q, 0], blocks[q, 1]
-        if chosen and not (active[j] or active[k]):
+def solve_blocks(solver, bias, chosen):
+    """Solve the two contacts of each block exactly; bias: what they ask of the speed. chosen: only active ones."""
+    velocity, inverse_mass, impulse, normal = solver.velocity, solver.inverse_mass, solver.impulse, solver.normal
+    first, second = solver.first, solver.second
+    for q in range(solver.blocks):
+        j, k = solver.block[q, 0], solver.block[q, 1]
+        if chosen and not (solver.active[j] or solver.active[k]):
             continue
         light = first[j] if first[j] == first[k] or first[j] == second[k] else second[j]
-        one, two = row(normal, j, like), row(normal, k, like)  # from the light body to its partners
-        p, r = second[j], second[k]
+        one, two, p, r = normal[j], normal[k], second[j], second[k]  # normals from the light body to its partners
         if first[j] != light:
             one, p = negative(one), first[j]
         if first[k] != light:
             two, r = negative(two), first[k]
-        w, w_p, w_r = inverse_mass[light], inverse_mass[p], inverse_mass[r]
-        v = row(velocity, light, like)
-        wrong_j = dot(sub(row(velocity, p, like), v), one) + bias[j]
-        wrong_k = dot(sub(row(velocity, r, like), v), two) + bias[k]
+        w, w_p, w_r, v = inverse_mass[light], inverse_mass[p], inverse_mass[r], velocity[light]
+        wrong_j = dot(sub(velocity[p], v), one) + bias[j]
+        wrong_k = dot(sub(velocity[r], v), two) + bias[k]
         cosine = dot(one, two)
         # changes of the two impulses: both contacts held; then one of them, the other let go; then none
         determinant = (1.0 - cosine * cosine) * w * w + w * (w_p + w_r) + w_p * w_r
@@ -89,6 +89,6 @@ def solve_squeezed(
                 change_k = max(-impulse[k], -(wrong_k + cosine * w * change_j) / (w + w_r))
         impulse[j] += change_j
         impulse[k] += change_k
-        store(velocity, light, add_scaled(add_scaled(v, one, -change_j * w), two, -change_k * w))
-        store(velocity, p, add_scaled(row(velocity, p, like), one, change_j * w_p))
-        store(velocity, r, add_scaled(row(velocity, r, like), two, change_k * w_r))
+        velocity[light] = add_scaled(add_scaled(v, one, -change_j * w), two, -change_k * w)
+        velocity[p] = add_scaled(velocity[p], one, change_j * w_p)
+        velocity[r] = add_scaled(velocity[r], two, change_k * w_r)

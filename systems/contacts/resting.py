@@ -1,196 +1,221 @@
-"""Contacts at rest: which pairs they are, and their geometry at the start of the step."""
+"""Contacts at rest: which pairs they are, their geometry at the start of the step, and what touches in the end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
-from ...framework.compilation import inlined, kernel, part
-from ...framework.vectors import add, add_scaled, dot, row, store, sub
-from ..impacts.impulses import ASIDE
-from ..shapes.mixing import mix_friction
-from ..shapes.tolerances import reach, slop_of, smaller
+from ...framework.compilation import inlined, part
+from ...framework.jit.record_type import zero_of
+from ...framework.vectors import add, add_scaled, dot, sub
+from ..codes import OK
+from ..impacts.impulses import EXCLUDED_FROM_REST
+from ..shapes.dispatch import evaluate, is_corner_touch, mix, mix_friction
+from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 
 ENTRY_ITERATIONS = 24
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
-SAME_PLACE = 1e-9  # of the size: a gap of rounding errors is none
+SAME_PLACE = 1e-9  # of the extent: a gap of rounding errors is none
 
 
 @inlined
-def between(a, b, position, offset, like):
-    """From the centre of a's shape to that of b's."""
-    at_a, at_b = add(row(position, a, like), row(offset, a, like)), add(row(position, b, like), row(offset, b, like))
-    return sub(at_b, at_a)
+def between(bodies, a, b):
+    """From the centre of a's shape to that of b's, where they are now."""
+    position, offset = bodies.position, bodies.offset
+    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
 
 
-def make_resting_kernels(evaluate: Any, corner: Any, mix: Any) -> tuple[Callable[..., Any], Callable[..., None], Any]:
-    """The kernels over the shapes of a scene: (find the contacts at rest, linearise them, measure what touches)."""
+@inlined
+def between_at_start(bodies, a, b):
+    """The same where the step starts."""
+    position, offset = bodies.previous_position, bodies.offset
+    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
 
-    @inlined
-    def touch(a, b, d, shape_of, shapes, like):
-        """The pair function and its answer."""
-        return evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
 
-    @part
-    def touch_seldom(a, b, d, shape_of, shapes, like):
-        """The same where speed is nothing, and code to compile is."""
-        return evaluate(shape_of[a], a, shape_of[b], b, d, shapes, like)
+@part
+def meet(state, a, b, d):
+    """The answer of the pair's function: (hit, depth, normal, point)."""
+    shape = state.bodies.shape
+    return evaluate(state, shape[a], a, shape[b], b, d)
 
-    @part
-    def entry(a, b, d, travel, at_end, slop, shape_of, shapes, like):
-        """Gap at the start, normal and point where the pair first touches on its way from d to d + travel.
 
-        That is the end if it touches nowhere or that is asked for. A touch of corners is none.
-        """
-        low, high, t = 0.0, 1.0, 1.0
-        normal, point, depth, chosen = like, like, 0.0, 0.0
-        for look in range(ENTRY_ITERATIONS):
-            at = add_scaled(d, travel, t)
-            _, depth_now, n, p = touch_seldom(a, b, at, shape_of, shapes, like)
-            if corner(shape_of[a], a, shape_of[b], b, at, slop, shapes, like):
-                depth_now = min(depth_now, -slop)  # so that the search goes on
-            if look == 0 or depth_now >= 0.0:  # the end, or a time in touch
-                normal, point, depth, chosen = n, p, depth_now, t
-                if at_end or depth_now < 0.0:
-                    break
-                high = t
-            else:
-                low = t
-            if abs(depth_now) <= slop and look > 0:
+@part
+def meets_at_corner(state, a, b, d, slop):
+    """Whether the two touch at a corner only."""
+    shape = state.bodies.shape
+    return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
+
+
+@part
+def meet_without_support(state, dt, a, b):
+    """(depth, normal) where free flight alone would lead: the resting prediction may push too much."""
+    bodies, travelled = state.bodies, state.force_travels * dt
+    free = between(bodies, a, b)
+    if bodies.supported[a]:
+        free = add_scaled(free, bodies.support_change[a], travelled)
+    if bodies.supported[b]:
+        free = add_scaled(free, bodies.support_change[b], -travelled)
+    _, depth, normal, _ = meet(state, a, b, free)
+    return depth, normal
+
+
+@part
+def still_bounces(state, dt, c, depth, normal):
+    """Whether a pair that bounces is no contact at rest: it meets in the next step only, or is on its way out.
+
+    Notes in pairs.parting how it parts.
+    """
+    pairs, bodies, colliders = state.pairs, state.bodies, state.colliders
+    a, b, slot = pairs.a[c], pairs.b[c], bodies.collider_slot
+    restitution, velocity = colliders.restitution, bodies.linear_velocity
+    if not mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b]) > 0.0:
+        return False
+    slop, fixed = slop_of(state, a, b), state.restitution_threshold
+    threshold = fixed if fixed >= 0.0 else (contact_margin(state, dt, a, b) - slop) / dt
+    speed = dot(sub(velocity[b], velocity[a]), normal)
+    touches = depth > (SAME_PLACE * smaller_extent(bodies, a, b) if pairs.impulse[c] == 0.0 else 0.0)
+    if not touches and speed < -threshold:
+        return True  # the next step's impact
+    if speed > 0.0:
+        pairs.parting[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY
+    if pairs.impulse[c] > 0.0 and speed > threshold:
+        _, before, _, _ = meet(state, a, b, between_at_start(bodies, a, b))
+        return before < 0.0  # on its way out
+    return False
+
+
+@part
+def is_resting(state, dt, c):
+    """Whether a solid pair's gap is below the margin after the impacts and it is not bouncing.
+
+    pairs.depth is that of the free flight, and still holds for bodies neither hit nor supported.
+    """
+    pairs, bodies, count = state.pairs, state.bodies, state.bodies.impact_count
+    a, b = pairs.a[c], pairs.b[c]
+    if count[a] >= EXCLUDED_FROM_REST or count[b] >= EXCLUDED_FROM_REST:  # stopped, or deflected far
+        pairs.near_contact[c] = True  # they may touch where they are now
+        return False
+    hit, carried = count[a] > 0 or count[b] > 0, bodies.supported[a] or bodies.supported[b]
+    if not pairs.near_contact[c] and not hit and not carried:
+        return False
+    margin = contact_margin(state, dt, a, b)
+    near = pairs.depth[c] >= -margin and not hit
+    if not near and not hit and not carried:
+        return False
+    d = between(bodies, a, b)
+    _, depth, normal, _ = meet(state, a, b, d)
+    if depth < -margin:
+        if hit or not carried:
+            return False
+        depth, normal = meet_without_support(state, dt, a, b)
+        if depth < -margin:
+            return False
+    if depth >= 0.0:
+        pairs.near_contact[c] = True
+    pairs.parting[c] = STAYS
+    if still_bounces(state, dt, c, depth, normal):
+        return False
+    return not meets_at_corner(state, a, b, d, slop_of(state, a, b))
+
+
+def find_resting(state, dt):
+    """The pairs that are contacts at rest, in canonical order."""
+    pairs, count = state.pairs, 0
+    if not state.response_idle:
+        for c in range(pairs.count):
+            if pairs.is_solid[c] and is_resting(state, dt, c):
+                pairs.resting[count] = c
+                count += 1
+    pairs.resting_count = count
+    state.solver.contacts = count
+    state.resting_counted += count
+    return OK
+
+
+@part
+def entry(state, a, b, d, travel, at_end, slop):
+    """Gap at the start, normal and point where the pair first touches on its way from d to d + travel.
+
+    That is the end if it touches nowhere or if ``at_end``. A touch of corners is none.
+    """
+    low, high, t = 0.0, 1.0, 1.0
+    normal, point, depth, chosen = zero_of(state), zero_of(state), 0.0, 0.0
+    for look in range(ENTRY_ITERATIONS):
+        at = add_scaled(d, travel, t)
+        _, depth_now, n, p = meet(state, a, b, at)
+        if meets_at_corner(state, a, b, at, slop):
+            depth_now = min(depth_now, -slop)  # so that the search goes on
+        if look == 0 or depth_now >= 0.0:  # the end, or a time in touch
+            normal, point, depth, chosen = n, p, depth_now, t
+            if at_end or depth_now < 0.0:
                 break
-            t = chosen + depth / dot(travel, normal)  # where its plane says, if that is between the two
-            if not low < t < high or look % 4 == 3:
-                t = 0.5 * (low + high)
-        return -depth - chosen * dot(travel, normal), normal, point
+            high = t
+        else:
+            low = t
+        if abs(depth_now) <= slop and look > 0:
+            break
+        t = chosen + depth / dot(travel, normal)  # where its plane says, if that is between the two
+        if not low < t < high or look % 4 == 3:
+            t = 0.5 * (low + high)
+    return -depth - chosen * dot(travel, normal), normal, point
 
-    @kernel
-    def find_resting(
-        dt, pair_a, pair_b, pairs, responds, involved, pair_depth, shape_of, offset, shapes, position, velocity,
-        start, size, restitution, material, rule, fixed_threshold, fixed_slop, share, struck, supported, change,
-        travelled, pair_impulse, pair_parts, result, like,
-    ):  # fmt: skip
-        """Pairs whose gap is below the margin after the impacts and that are not bouncing; returns how many.
 
-        pair_depth (m,) is that of the free flight, and still holds for bodies neither struck nor supported; only who is
-        ``involved`` (m,) may be near then, and who overlaps now is so from now on. supported (n,), change (n, d): see
-        ``resting_prediction``; travelled: the displacement by the latter, over it.
-        """
-        count = 0
-        for c in range(pairs):
-            if not responds[c]:
-                continue
-            a, b = pair_a[c], pair_b[c]
-            if struck[a] >= ASIDE or struck[b] >= ASIDE:  # stopped, or thrown from afar
-                involved[c] = True  # they may touch where they are now
-                continue
-            hit = struck[a] > 0 or struck[b] > 0
-            carried = supported[a] or supported[b]
-            if not involved[c] and not hit and not carried:
-                continue
-            slop = slop_of(a, b, size, fixed_slop)
-            margin = reach(dt, a, b, share, size, fixed_slop)
-            near = pair_depth[c] >= -margin and not hit
-            if not near and not hit and not carried:
-                continue
-            d = between(a, b, position, offset, like)
-            _, depth, normal, _ = touch(a, b, d, shape_of, shapes, like)
-            if depth < -margin:
-                if hit or not carried:
-                    continue
-                # Supports may push too much in the prediction; who meets in free flight is a contact all the same.
-                free = between(a, b, position, offset, like)
-                if supported[a]:
-                    free = add_scaled(free, row(change, a, like), travelled)
-                if supported[b]:
-                    free = add_scaled(free, row(change, b, like), -travelled)
-                _, depth, normal, _ = touch_seldom(a, b, free, shape_of, shapes, like)
-                if depth < -margin:
-                    continue
-            involved[c] |= depth >= 0.0
-            pair_parts[c] = STAYS
-            e = mix(rule, restitution[material[a], a], restitution[material[b], b])
-            if e > 0.0:
-                threshold = fixed_threshold if fixed_threshold >= 0.0 else (margin - slop) / dt
-                speed = dot(sub(row(velocity, b, like), row(velocity, a, like)), normal)
-                touches = depth > (SAME_PLACE * smaller(a, b, size) if pair_impulse[c] == 0.0 else 0.0)
-                if not touches and speed < -threshold:
-                    continue  # the next step's impact
-                if speed > 0.0:
-                    pair_parts[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY
-                if pair_impulse[c] > 0.0 and speed > threshold:
-                    _, before, _, _ = touch_seldom(a, b, between(a, b, start, offset, like), shape_of, shapes, like)
-                    if before < 0.0:
-                        continue  # on its way out
-            if corner(shape_of[a], a, shape_of[b], b, d, slop, shapes, like):
-                continue
-            result[count] = c
-            count += 1
-        return count
+def linearise(state, dt):
+    """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
+    pairs, bodies, solver, inverse_mass = state.pairs, state.bodies, state.solver, state.bodies.inverse_mass
+    friction, slot_of_body, has_friction = state.colliders.friction, bodies.collider_slot, False
+    for r in range(solver.contacts):
+        c, k = pairs.resting[r], solver.slot[r]
+        a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
+        slop, d = slop_of(state, a, b), between_at_start(bodies, a, b)
+        _, depth, normal, point = meet(state, a, b, d)
+        gap = -depth
+        if depth < 0.0 or parting != STAYS or meets_at_corner(state, a, b, d, slop):
+            travel = sub(between(bodies, a, b), d)
+            gap, normal, point = entry(state, a, b, d, travel, parting != STAYS, slop)
+        if pairs.impulse[c] > 0.0 and dot(normal, pairs.normal[c]) <= 0.0:
+            normal = pairs.normal[c]  # coincident centres have parted: not back again
+        solver.normal[k], pairs.normal[c] = normal, normal
+        pairs.point[c] = add(point, add(bodies.previous_position[a], bodies.offset[a]))
+        solver.gap[k] = gap
+        solver.mass[k] = 1.0 / (inverse_mass[a] + inverse_mass[b])
+        # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
+        solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
+        solver.extent[k] = smaller_extent(bodies, a, b)
+        mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
+        solver.friction[k] = mu
+        has_friction |= mu != 0.0
+    solver.has_friction = has_friction
+    return OK
 
-    @kernel
-    def linearise(
-        resting, slot, pair_a, pair_b, shape_of, offset, shapes, position, start, size, friction, material, rule,
-        fixed_slop, inverse_mass, pair_impulse, pair_parts, pair_normal, pair_point, normals, gaps, masses, frictions,
-        extents, parting, like,
-    ):  # fmt: skip
-        """The contacts' columns: normal and gap where the step starts, and what the two bodies make of it together.
 
-        resting (m,): pairs; slot (m,): where each contact's columns are.
-        """
-        for r in range(len(resting)):
-            c, k = resting[r], slot[r]
-            a, b = pair_a[c], pair_b[c]
-            slop = slop_of(a, b, size, fixed_slop)
-            d = between(a, b, start, offset, like)
-            _, depth, normal, point = touch(a, b, d, shape_of, shapes, like)
-            gap = -depth
-            if depth < 0.0 or pair_parts[c] != STAYS or corner(shape_of[a], a, shape_of[b], b, d, slop, shapes, like):
-                travel = sub(between(a, b, position, offset, like), d)
-                gap, normal, point = entry(a, b, d, travel, pair_parts[c] != STAYS, slop, shape_of, shapes, like)
-            if pair_impulse[c] > 0.0 and dot(normal, row(pair_normal, c, like)) <= 0.0:
-                normal = row(pair_normal, c, like)  # coincident centres have parted: not back again
-            point = add(point, add(row(start, a, like), row(offset, a, like)))
-            store(normals, k, normal)
-            store(pair_normal, c, normal)
-            store(pair_point, c, point)
-            gaps[k] = gap
-            masses[k] = 1.0 / (inverse_mass[a] + inverse_mass[b])
-            # After a blow at time t the body seems to come from dv t behind: no overlap to be pushed out.
-            parting[k] = pair_parts[c] == PARTS or (pair_impulse[c] > 0.0 and gap > 0.0)
-            extents[k] = smaller(a, b, size)
-            frictions[k] = mix_friction(mix, rule, friction[material[a], a], friction[material[b], b])
+def find_touching(state, dt):
+    """Pairs that touch now that all is done, or pushed each other in the step or crossed.
 
-    @kernel
-    def find_touching(
-        pair_a, pair_b, pairs, responds, involved, resting, struck, shape_of, offset, shapes, position, size,
-        crossed, pair_impulse, pair_depth, pair_normal, pair_point, result, like,
-    ):  # fmt: skip
-        """Pairs that touch now that all is done, or pushed each other in the step or crossed; returns how many.
-
-        Those that may are the ``involved`` (m,), the resting and struck ones, and those that push nobody. crossed (m,),
-        or (0,) if nothing did.
-        """
-        for r in range(len(resting)):
-            involved[resting[r]] = True
-        for r in range(len(struck)):
-            involved[struck[r]] = True
-        count = 0
-        for c in range(pairs):
-            if responds[c] and not involved[c] and not (len(crossed) > 0 and crossed[c]):
-                continue
-            a, b = pair_a[c], pair_b[c]
-            hit, depth, normal, point = touch(a, b, between(a, b, position, offset, like), shape_of, shapes, like)
-            pushed = pair_impulse[c] > 0.0
-            if responds[c] and depth >= -SAME_PLACE * smaller(a, b, size):
-                hit = True
-            if not hit and not pushed and not (len(crossed) > 0 and crossed[c]):
-                continue
-            pair_depth[c] = max(0.0, depth)
-            if not pushed:
-                store(pair_normal, c, normal)
-            store(pair_point, c, add(point, add(row(position, a, like), row(offset, a, like))))
-            result[count] = c
-            count += 1
-        return count
-
-    return find_resting, linearise, find_touching
+    Those that may are near contact, rest or had an impact, or are not solid.
+    """
+    pairs, bodies, impacts, count = state.pairs, state.bodies, state.impacts, 0
+    if state.response_idle:
+        pairs.touching_count = 0
+        return OK
+    for r in range(pairs.resting_count):
+        pairs.near_contact[pairs.resting[r]] = True
+    for r in range(impacts.logged):
+        pairs.near_contact[impacts.log_pair[r]] = True
+    for c in range(pairs.count):
+        solid, crossed = pairs.is_solid[c], pairs.crossed[c]
+        if solid and not pairs.near_contact[c] and not crossed:
+            continue
+        a, b = pairs.a[c], pairs.b[c]
+        hit, depth, normal, point = meet(state, a, b, between(bodies, a, b))
+        pushed = pairs.impulse[c] > 0.0
+        if solid and depth >= -SAME_PLACE * smaller_extent(bodies, a, b):
+            hit = True
+        if not hit and not pushed and not crossed:
+            continue
+        pairs.depth[c] = max(0.0, depth)
+        if not pushed:
+            pairs.normal[c] = normal
+        pairs.point[c] = add(point, add(bodies.position[a], bodies.offset[a]))
+        pairs.touching[count] = c
+        count += 1
+    pairs.touching_count = count
+    state.contacts_counted += count
+    return OK

@@ -1,69 +1,113 @@
-"""What bodies at rest will do in this step, before anything is known about it: their supports still push.
+"""What bodies at rest will do in this step, before anything is known about it: the contacts that held them still push.
 
-Free flight lets a resting body fall by g dt. A ball that bounces on such a body would see its support give way. So the
+Free flight lets a resting body fall by g dt. For a ball that bounces on such a body the ground would give way. So the
 impulses of the last step act on the prediction once more; where they push bodies apart they are taken back, so that a
-shock is not played again, and they never pull.
+shock is not repeated, and they never pull.
 """
 
 from __future__ import annotations
 
-from ...framework.compilation import kernel
-from ...framework.vectors import add_scaled, dot, row, store, sub
+from ...framework.compilation import part
+from ...framework.vectors import add_scaled, dot, sub
+from ..codes import OK
+from .warm_start import find_rows, scale_to
 
 
-@kernel
-def predict_support(
-    dt, travels, first, second, count, normal, total, impulse, inverse_mass, moving, position, velocity, path,
-    path_second, curved, supported, change, like,
-):  # fmt: skip
-    """Correct velocity, position and path of the bodies that were held in the last step.
+@part
+def mark_disabled(state):
+    """work[m] = 0 for what is remembered of pairs whose contact a system has disabled, else 1. Both lists are in
+    canonical order."""
+    memory, pairs, entity = state.warm_start, state.pairs, state.bodies.entity
+    now, m = memory.now, 0
+    for k in range(memory.counts[now]):
+        memory.work[k] = 1.0
+    for q in range(pairs.disabled_count):
+        c = pairs.disabled[q]
+        a, b = entity[pairs.a[c]], entity[pairs.b[c]]
+        while m < memory.counts[now] and (
+            memory.entity_a[now, m] < a or (memory.entity_a[now, m] == a and memory.entity_b[now, m] < b)
+        ):
+            m += 1
+        if m < memory.counts[now] and memory.entity_a[now, m] == a and memory.entity_b[now, m] == b:
+            memory.work[m] = 0.0
 
-    first, second (count,): rows of the pairs, -1 for one that is gone; normal (count, d); total (count,): the impulses
-    of last step's contacts, canonical order; impulse (count,): room. They act like a force throughout the step, which
-    displaces by ``travels`` times dt times the change of velocity: what the integrator makes of a force. supported (n,)
-    is set, change (n, d) is that of the velocity.
-    """
-    for m in range(count):
-        a, b = first[m], second[m]
-        impulse[m] = 0.0
-        if a < 0 or b < 0 or total[m] <= 0.0:
+
+@part
+def apply_remembered(state):
+    """The impulses of the last step act on the velocities; work[m] is what acts of each."""
+    memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
+    velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
+    for m in range(memory.counts[now]):
+        a, b, total = memory.first[now, m], memory.second[now, m], memory.total[now, m]
+        if a < 0 or b < 0 or total <= 0.0 or impulse[m] == 0.0:
+            impulse[m] = 0.0
             continue
-        impulse[m] = total[m]
+        impulse[m] = total
         for side in range(2):
             i = a if side == 0 else b
-            if inverse_mass[i] > 0.0 and not supported[i]:
-                supported[i] = True
-                store(change, i, row(velocity, i, like))
-        n = row(normal, m, like)
-        store(velocity, a, add_scaled(row(velocity, a, like), n, -impulse[m] * inverse_mass[a]))
-        store(velocity, b, add_scaled(row(velocity, b, like), n, impulse[m] * inverse_mass[b]))
-    for m in range(count):
+            if inverse_mass[i] > 0.0 and not bodies.supported[i]:
+                bodies.supported[i] = True
+                bodies.support_change[i] = velocity[i]
+        n = memory.normal[now, m]
+        velocity[a] = add_scaled(velocity[a], n, -total * inverse_mass[a])
+        velocity[b] = add_scaled(velocity[b], n, total * inverse_mass[b])
+
+
+@part
+def relax_remembered(state):
+    """Take back what pushes two bodies apart, never more than has pushed."""
+    memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
+    velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
+    for m in range(memory.counts[now]):
         if impulse[m] > 0.0:
-            a, b = first[m], second[m]
-            n = row(normal, m, like)
-            parting = dot(sub(row(velocity, b, like), row(velocity, a, like)), n)
+            a, b, n = memory.first[now, m], memory.second[now, m], memory.normal[now, m]
+            parting = dot(sub(velocity[b], velocity[a]), n)
             if parting > 0.0:
                 back = min(impulse[m], parting / (inverse_mass[a] + inverse_mass[b]))
-                store(velocity, a, add_scaled(row(velocity, a, like), n, back * inverse_mass[a]))
-                store(velocity, b, add_scaled(row(velocity, b, like), n, -back * inverse_mass[b]))
-    for i in range(moving):
-        if supported[i]:
-            dv = sub(row(velocity, i, like), row(change, i, like))
-            store(change, i, dv)
-            store(position, i, add_scaled(row(position, i, like), dv, travels * dt))
-            if curved:
-                store(path_second, i, add_scaled(row(path_second, i, like), dv, travels / dt))
+                velocity[a] = add_scaled(velocity[a], n, back * inverse_mass[a])
+                velocity[b] = add_scaled(velocity[b], n, -back * inverse_mass[b])
+
+
+def predict_rest(state, dt):
+    """Correct velocity, position and path of the bodies that were held in the last step.
+
+    The impulses act like a force throughout the step, which displaces by ``force_travels`` times dt times the change of
+    velocity: what the integrator makes of a force.
+    """
+    bodies, memory = state.bodies, state.warm_start
+    state.any_support = False
+    for i in range(state.count):
+        bodies.supported[i] = False
+    if state.response_idle or memory.counts[memory.now] == 0:
+        return OK
+    scale_to(state, dt)
+    find_rows(state)
+    state.any_support = True
+    state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
+    mark_disabled(state)
+    apply_remembered(state)
+    relax_remembered(state)
+    travels = state.force_travels
+    for i in range(state.moving):
+        if bodies.supported[i]:
+            dv = sub(bodies.linear_velocity[i], bodies.support_change[i])
+            bodies.support_change[i] = dv
+            bodies.position[i] = add_scaled(bodies.position[i], dv, travels * dt)
+            if state.path_degree > 1:
+                bodies.path_second[i] = add_scaled(bodies.path_second[i], dv, travels / dt)
             else:
-                store(path, i, add_scaled(row(path, i, like), dv, travels))
+                bodies.path_velocity[i] = add_scaled(bodies.path_velocity[i], dv, travels)
+    return OK
 
 
-@kernel
-def drop_support(dt, travels, moving, supported, held, stopped, position, velocity, change, like):
-    """Bodies whose supports have not pushed after all (``held`` (n,) False) fly as the integrator said; those that are
-    ``stopped`` (n,) stay where they are."""
-    for i in range(moving):
-        if supported[i] and not held[i]:
-            dv = row(change, i, like)
-            if not stopped[i]:
-                store(position, i, add_scaled(row(position, i, like), dv, -travels * dt))
-            store(velocity, i, sub(row(velocity, i, like), dv))
+@part
+def drop_support(state, dt, stopped):
+    """Bodies that no contact has pushed after all fly as the integrator said; those that were ``stopped``, by so many
+    impacts, stay where they are."""
+    bodies, travels = state.bodies, state.force_travels
+    for i in range(state.moving):
+        if bodies.supported[i] and not bodies.held[i]:
+            dv = bodies.support_change[i]
+            if bodies.impact_count[i] < stopped:
+                bodies.position[i] = add_scaled(bodies.position[i], dv, -travels * dt)
+            bodies.linear_velocity[i] = sub(bodies.linear_velocity[i], dv)

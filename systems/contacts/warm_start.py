@@ -1,112 +1,128 @@
-"""What is known of last step's contacts at rest: the impulses that the solver starts with."""
+"""What is known of last step's contacts at rest: the impulses that the solver starts with.
+
+Pairs in canonical order with the impulse of the last substep, its friction (tangent), and the sum of the normal impulse
+over the step (total).
+"""
 
 from __future__ import annotations
 
-import copy
-from typing import Any
-
-import numpy as np
-
-from ...framework.compilation import kernel
-from ...framework.vectors import add_scaled, dot, row, store
+from ...framework.compilation import part
+from ...framework.jit.record_type import zero_of
+from ...framework.vectors import add_scaled, dot, scale
+from ..codes import NEED_WARM_START, OK
 
 TURNED = 0.5  # cosine between last step's normal and this one's, below which the impulses say nothing
 
 
-class ContactMemory:
-    """Pairs in canonical order, with their impulses; the columns only grow.
-
-    count; entity_a, entity_b (m,); normal (m, d); impulse (m,) of the last substep, total (m,) of the whole step;
-    tangent (m, d): the friction's impulse of the last substep. ``substep`` and ``step``: seconds these belong to.
-    """
-
-    COLUMNS = (("entity_a", np.int64, False), ("entity_b", np.int64, False), ("normal", float, True))
-    COLUMNS += (("impulse", float, False), ("total", float, False), ("tangent", float, True))
-
-    def __init__(self, dimensions: int) -> None:
-        self.dimensions = dimensions
-        self.count = 0
-        self.stamp = 0  # grows with every change
-        self.step = self.substep = 1.0
-        self.capacity = 0
-        self.entity_a = self.entity_b = self.normal = self.impulse = self.total = self.tangent = np.empty(0)
-        self.reserve(16)
-
-    def reserve(self, count: int) -> None:
-        """Room for that many; what is there is lost."""
-        if count > self.capacity:
-            self.capacity = max(count, 2 * self.capacity)
-            for name, dtype, vector in self.COLUMNS:
-                shape = (self.capacity, self.dimensions) if vector else self.capacity
-                setattr(self, name, np.zeros(shape, dtype))
-
-    def __deepcopy__(self, memo: Any) -> ContactMemory:
-        made = copy.copy(self)
-        for name, _, _ in self.COLUMNS:
-            setattr(made, name, getattr(self, name).copy())
-        return made
-
-    def scale_to(self, step: float, substep: float) -> None:
-        """The impulses that belong to other steps than these."""
-        if step != self.step:
-            self.total[: self.count] *= step / self.step
-        if substep != self.substep:
-            self.impulse[: self.count] *= substep / self.substep
-            self.tangent[: self.count] *= substep / self.substep
-        self.step, self.substep = step, substep
+@part
+def scale_to(state, dt):
+    """The impulses that belong to steps of other length than this one."""
+    memory, now = state.warm_start, state.warm_start.now
+    substep = dt / state.substeps
+    if dt != memory.step[now] or substep != memory.substep[now]:
+        by_step, by_substep = dt / memory.step[now], substep / memory.substep[now]
+        for m in range(memory.counts[now]):
+            if dt != memory.step[now]:
+                memory.total[now, m] *= by_step
+            if substep != memory.substep[now]:
+                memory.impulse[now, m] *= by_substep
+                memory.tangent[now, m] = scale(memory.tangent[now, m], by_substep)
+        memory.step[now], memory.substep[now] = dt, substep
 
 
-@kernel
-def recall(
-    a, b, slot, old_a, old_b, count, old_normal, old_impulse, old_tangent, old_first, old_second, place, normal,
-    impulse, tangent, loose, like,
-):  # fmt: skip
+@part
+def row_of(state, wanted):
+    """The row of an entity; -1 if it is no body. Entities ascend within the dynamic, kinematic and static rows."""
+    entity = state.bodies.entity
+    for kind in range(3):
+        low = 0 if kind == 0 else (state.dynamic if kind == 1 else state.moving)
+        high = state.dynamic if kind == 0 else (state.moving if kind == 1 else state.count)
+        stop = high
+        while low < high:
+            middle = (low + high) // 2
+            if entity[middle] < wanted:
+                low = middle + 1
+            else:
+                high = middle
+        if low < stop and entity[low] == wanted:
+            return low
+    return -1
+
+
+@part
+def find_rows(state):
+    """The rows of the remembered pairs; -1 for bodies that are gone. They hold until rows move."""
+    memory, now = state.warm_start, state.warm_start.now
+    if memory.rows_version[now] == state.version:
+        return
+    for m in range(memory.counts[now]):
+        memory.first[now, m] = row_of(state, memory.entity_a[now, m])
+        memory.second[now, m] = row_of(state, memory.entity_b[now, m])
+    memory.rows_version[now] = state.version
+
+
+def match_warm_start(state, dt):
     """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none.
 
-    a, b (m,) and old_a, old_b (count,): entities, canonical order; ``slot`` (m,): where the contact's columns are.
-    loose (n,) is set for bodies that a contact of the last step pushes no more: their other contacts push too much.
-    Returns whether there are any. old_first, old_second: rows of those pairs; place: of rows among the bodies.
+    Bodies that a contact of the last step pushes no more become unsettled: their other contacts push too much.
     """
-    for r in range(len(a)):
-        k = slot[r]
-        impulse[k] = 0.0
-        for axis in range(len(like)):
-            tangent[k, axis] = 0.0
-    any_loose = False
+    solver, memory, bodies, pairs = state.solver, state.warm_start, state.bodies, state.pairs
+    if solver.contacts == 0:
+        return OK
+    entity, now, zero = bodies.entity, memory.now, zero_of(state)
+    for k in range(solver.contacts):
+        solver.impulse[k], solver.tangent[k] = 0.0, zero
+    for q in range(solver.bodies):
+        solver.unsettled[q] = False
+    solver.any_unsettled = False
+    if memory.counts[now] > 0:
+        find_rows(state)
     r = 0
-    for j in range(count):
-        while r < len(a) and (a[r] < old_a[j] or (a[r] == old_a[j] and b[r] < old_b[j])):
+    for m in range(memory.counts[now]):
+        one, other = memory.entity_a[now, m], memory.entity_b[now, m]
+        while r < solver.contacts:
+            c = pairs.resting[r]
+            a, b = entity[pairs.a[c]], entity[pairs.b[c]]
+            if a > one or (a == one and b >= other):
+                break
             r += 1
-        if r < len(a) and a[r] == old_a[j] and b[r] == old_b[j]:
-            k = slot[r]
-            n = row(normal, k, like)
-            if dot(row(old_normal, j, like), n) > TURNED:
-                impulse[k] = old_impulse[j]
-                pull = row(old_tangent, j, like)
-                store(tangent, k, add_scaled(pull, n, -dot(pull, n)))
+        c = pairs.resting[r] if r < solver.contacts else 0
+        if r < solver.contacts and entity[pairs.a[c]] == one and entity[pairs.b[c]] == other:
+            k = solver.slot[r]
+            n = solver.normal[k]
+            if dot(memory.normal[now, m], n) > TURNED:
+                pull = memory.tangent[now, m]
+                solver.impulse[k] = memory.impulse[now, m]
+                solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
                 continue
         for side in range(2):
-            i = old_first[j] if side == 0 else old_second[j]
-            if i >= 0 and place[i] >= 0:
-                loose[place[i]] = True
-                any_loose = True
-    return any_loose
+            i = memory.first[now, m] if side == 0 else memory.second[now, m]
+            if i >= 0 and bodies.place[i] >= 0:
+                solver.unsettled[bodies.place[i]] = True
+                solver.any_unsettled = True
+    return OK
 
 
-@kernel
-def remember(
-    a, b, slot, normal, impulse, total, tangent, new_a, new_b, new_normal, new_impulse, new_total, new_tangent
-):  # fmt: skip
-    """Keep the contacts that pushed; returns how many."""
-    count = 0
-    for r in range(len(a)):
-        k = slot[r]
-        if total[k] <= 0.0:
+def store_warm_start(state, dt):
+    """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
+    solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
+    if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
+        return OK
+    if solver.contacts > len(memory.work):
+        state.needed = solver.contacts
+        return NEED_WARM_START
+    new, count = 1 - memory.now, 0
+    for r in range(solver.contacts):
+        k, c = solver.slot[r], pairs.resting[r]
+        if solver.total[k] <= 0.0:
             continue
-        new_a[count], new_b[count] = a[r], b[r]
-        new_impulse[count], new_total[count] = impulse[k], total[k]
-        for axis in range(normal.shape[1]):
-            new_normal[count, axis] = normal[k, axis]
-            new_tangent[count, axis] = tangent[k, axis]
+        a, b = pairs.a[c], pairs.b[c]
+        memory.first[new, count], memory.second[new, count] = a, b
+        memory.entity_a[new, count], memory.entity_b[new, count] = entity[a], entity[b]
+        memory.impulse[new, count], memory.total[new, count] = solver.impulse[k], solver.total[k]
+        memory.normal[new, count], memory.tangent[new, count] = solver.normal[k], solver.tangent[k]
         count += 1
-    return count
+    memory.counts[new], memory.rows_version[new] = count, state.version
+    memory.step[new], memory.substep[new] = dt, dt / state.substeps
+    memory.now = new
+    return OK

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
+from ...framework.data.bodies import Bodies
+from ...framework.data.table import Table
 from .accumulation import required_bodies
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
 
 
 def kinetic_energy(dynamic: Any) -> float:
@@ -25,15 +25,15 @@ def momentum(dynamic: Any, dimensions: int) -> np.ndarray:
     return (dynamic.mass[:, None] * dynamic.linear_velocity).sum(axis=0)
 
 
-def potential_energy(state: PhysicsState) -> float:
+def potential_energy(table: Table, bodies: Bodies, gravity: np.ndarray, force_systems: Iterable[Any]) -> float:
     """-Sum of m s g.x and of F.x for gravity and constant forces, plus what force systems say; joules."""
-    dynamic = state.bodies.dynamic
+    dynamic = bodies.dynamic
     if not len(dynamic):
         return 0.0
-    weight = (dynamic.mass * dynamic.gravity_scale)[:, None] * state.gravity
+    weight = (dynamic.mass * dynamic.gravity_scale)[:, None] * gravity
     total = -float(((weight + dynamic.constant_force) * dynamic.position).sum())
-    for system in state.world.force_systems:
-        bodies = required_bodies(state, system) if hasattr(system, "potential_energy") else None
-        if bodies is not None:
-            total += float(system.potential_energy(bodies))  # type: ignore[attr-defined]
+    for system in force_systems:
+        concerned = required_bodies(table, bodies, system) if hasattr(system, "potential_energy") else None
+        if concerned is not None:
+            total += float(system.potential_energy(concerned))
     return total

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...framework.compilation import kernel
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
+from ...framework.jit.record import Record
+from ...framework.schedule.stages import Program
 
 
 @dataclass
@@ -30,6 +26,7 @@ class Motion:
     start_position: np.ndarray
     start_velocity: np.ndarray
     evaluator: Callable[[float], None] | None  # None: no force depends on the state
+    program: Program | None = None  # with the stages of the built-in integrators
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -46,36 +43,17 @@ class Motion:
         return self.evaluator is not None
 
     def evaluate(self, seconds: float) -> None:
-        """Sum the forces anew at the state in the columns, ``seconds`` into the step."""
+        """Sum the forces again at the state in the columns, ``seconds`` into the step."""
         if self.evaluator is not None:
             self.evaluator(seconds)
 
+    @property
+    def state(self) -> Record:
+        """The record that the stages work on."""
+        assert self.program is not None
+        return self.program.state
 
-@kernel
-def limit_distance(points, origins, speed, seconds):
-    """Bring points nearer that are farther than speed * seconds from their origin (speed nan: no limit).
-
-    Scaled by the largest component, so that no square overflows.
-    """
-    for i in range(len(points)):
-        limit = speed[i] * seconds
-        largest = 0.0
-        for k in range(points.shape[1]):
-            largest = max(largest, abs(points[i, k] - origins[i, k]))
-        if limit != limit or largest == 0.0 or not math.isfinite(largest):
-            continue
-        square = 0.0
-        for k in range(points.shape[1]):
-            square += ((points[i, k] - origins[i, k]) / largest) ** 2
-        length = math.sqrt(square)
-        if length > limit / largest:
-            for k in range(points.shape[1]):
-                points[i, k] = origins[i, k] + (points[i, k] - origins[i, k]) / largest * (limit / length)
-
-
-def limit_speeds(state: PhysicsState) -> None:
-    """Shorten the velocities of the dynamic bodies that exceed their max_linear_speed."""
-    dynamic = state.bodies.dynamic
-    state.table.keep("linear_velocity")
-    velocity = dynamic.linear_velocity
-    limit_distance(velocity, np.zeros_like(velocity), dynamic.max_linear_speed, 1.0)
+    def run(self, stage: str, h: float) -> None:
+        """Run a stage of a built-in integrator over ``h`` seconds."""
+        assert self.program is not None
+        self.program.run_one(stage, h)

@@ -3,25 +3,45 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from ...framework.schedule.phases import Phase, System
+from ...framework.jit.record import Record
+from ...framework.plugins.registry import Registry
+from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel
-from .flight import Flight
-from .integrators import CUBIC, LINE, PARABOLA, STANDARD_INTEGRATORS, Integrator, drift
-from .motion import Motion, limit_distance, limit_speeds
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
-
+from ...framework.schedule.stages import Program, PythonPart, Stage
+from ...framework.settings import Settings
+from ..forces.accumulation import ForceAccumulation
+from ..scene import Scene
+from ..staged import StagedSystem
+from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
+from .motion import Motion
+from .stages import (
+    LINE,
+    drift,
+    end_flight,
+    explicit_euler,
+    first_half_kick,
+    keep_start,
+    note_path,
+    runge_kutta_stage,
+    second_half_kick,
+    semi_implicit_euler,
+    verlet_drift,
+    verlet_kick,
+)
 
 STANDARD = frozenset((*STANDARD_INTEGRATORS.values(), Flight))
+FLIES = "free flight of the bodies that forces move, unless nothing acts and none is damped"
+MOTION = ("position", "linear_velocity")
+FORCED = (*MOTION, "force", "inverse_mass", "linear_damping")
 
 
-class Integration(System):
+class Integration(StagedSystem):
     """Writes the free-flight prediction into position and linear_velocity and keeps the start state.
 
     Reads force, inverse_mass, linear_damping; writes position, linear_velocity, previous_position and the path that
@@ -30,75 +50,123 @@ class Integration(System):
 
     phase = Phase.INTEGRATION
     writes = ("position", "linear_velocity", "previous_position")
+    STAGES = (
+        Stage(
+            keep_start, "keeps where the step starts", MOTION,
+            ("previous_position", "start_velocity", "linear_velocity"),
+        ),
+        Stage(
+            drift, "no force acts: position + dt velocity, unless a body is damped", MOTION, ("position",), "standard",
+            "nothing acts",
+        ),
+        Stage(explicit_euler, FLIES, FORCED, MOTION, "explicit_euler"),
+        Stage(semi_implicit_euler, FLIES, FORCED, MOTION, "semi_implicit_euler"),
+        Stage(verlet_drift, FLIES, FORCED, MOTION, "verlet_drift"),
+        Stage(first_half_kick, FLIES, FORCED, (*MOTION, "acceleration"), "first_half_kick"),
+        Stage(second_half_kick, "damping of the second half step", FORCED, ("linear_velocity",), "second_half_kick"),
+        Stage(
+            end_flight, "limits of speed, kinematic bodies, forces for one step", MOTION,
+            (*MOTION, "step_force"),
+        ),
+        Stage(note_path, "the path within the step, on which impacts are found", MOTION, ("path",), "colliders"),
+    )  # fmt: skip
+    ON_DEMAND = (
+        Stage(verlet_kick, "the velocity with the forces at the end", FORCED, ("linear_velocity",), "on demand"),
+        Stage(runge_kutta_stage, "one stage of the classical method", FORCED, MOTION, "on demand"),
+    )
 
-    def __init__(self, state: PhysicsState) -> None:
-        self._state = state
-        self._viewed = -1  # what state.structures was when the views below were taken
+    def __init__(
+        self, program: Program, scene: Scene, forces: ForceAccumulation, registry: Registry,
+        settings: Callable[[], Settings],
+    ) -> None:  # fmt: skip
+        super().__init__(program)
+        self._state: Record = program.state
+        self._scene, self._forces, self._registry, self._settings = scene, forces, registry, settings
+        self._made: dict[Any, Integrator] = {}
         self._motion: Motion
-        self._starts: tuple[np.ndarray, ...]  # previous_position, position, start_velocity, linear_velocity
-        self._path: np.ndarray
+        self._viewed = -1  # the scene's version when the views in the motion were taken
 
-    def process(self, dt: float) -> None:
-        state, table = self._state, self._state.table
-        dynamic, moving = table.stops[0], table.stops[1]
-        arrays = table.arrays
-        if self._viewed != state.structures:
-            self._take_views(dynamic, moving)
-        before, position, start_velocity, velocity = self._starts
-        table.keep("previous_position")
-        np.copyto(before, position)
-        table.keep("position", before)
-        if state.limits_speed:
-            limit_speeds(state)  # systems may have pushed since the forces were summed
-        np.copyto(start_velocity, velocity)
-        # Impacts change the start velocity of a body.
-        table.keep("linear_velocity", None if state.collides else start_velocity)
-        integrator = state.integrator()
-        state.path_degree = integrator.path
-        if dynamic:
-            motion = self._motion
-            if self._drifts(integrator) and drift(motion.position, motion.velocity, motion.damping, dt):
-                state.path_degree = LINE
-            else:
-                motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
-                try:
-                    integrator.advance(motion, dt)
-                except Exception as error:
-                    error.add_note(f"integrator {state.integrator_name!r}")
-                    raise
-            if state.limits_speed:
-                limit_speeds(state)
-                limit_distance(motion.position, motion.start_position, arrays["max_linear_speed"][:dynamic], dt)
-        if moving > dynamic:
-            arrays["position"][dynamic:moving] += dt * arrays["linear_velocity"][dynamic:moving]
-        self._keep_path(integrator, dt, dynamic, moving)
-        if state.pushed or table.everything_kept:
-            table.keep("step_force")
-            arrays["step_force"][:dynamic] = 0.0
-        table.forces_summed = False
-        state.moved = True
-        state.queries.forget()
+    # -- which integrator -------------------------------------------------------------------------
 
-    def _take_views(self, dynamic: int, moving: int) -> None:
+    @property
+    def integrator_name(self) -> str:
+        """As the settings say, unless another one goes with the kind of collision."""
+        settings = self._settings()
+        return "flight" if settings.collision == "event_driven" else settings.integrator
+
+    @property
+    def integrator(self) -> Integrator:
+        make: Any = Flight
+        if self._settings().collision != "event_driven":  # another one may be registered under the name at any time
+            make = self._registry.integrators[self._settings().integrator]
+        if make not in self._made:
+            self._made[make] = make()
+        return self._made[make]
+
+    @property
+    def stages_needed(self) -> tuple[str, ...]:
+        """Names of the stages of the integrator that the program runs."""
+        integrator = self.integrator
+        if type(integrator) not in STANDARD:
+            return ()
+        return ("standard",) if self.in_python else ("standard", *integrator.STAGES)
+
+    @property
+    def in_python(self) -> bool:
+        """Whether the integrator is called from Python: it is a plugin's, or forces change within the step."""
+        return type(self.integrator) not in STANDARD or bool(self.world.force_systems)
+
+    def prepare(self) -> None:
+        """Before a step of other settings, systems or bodies: room and numbers for the integrator."""
+        state, integrator = self._state, self.integrator
+        state.moves_with_old_velocity = bool(getattr(integrator, "moves_with_old_velocity", False))
+        state.flies = isinstance(integrator, Flight)
+        state.force_changes = bool(self.world.force_systems)
+        state.has_force_systems = state.force_changes
+        state.heavy_damping, state.heavy_step = math.inf, 0.0
+        state.path_degree = state.usual_path_degree = integrator.path
+        self._forces.several_evaluations = integrator.evaluations > 1
+        if type(integrator) in STANDARD and (state.flies or state.force_changes):
+            self._scene.reserve(*integrator.COLUMNS)
+        if integrator.path > LINE and state.collides:
+            self._scene.reserve("path_second", "path_third")
+
+    # -- a step -----------------------------------------------------------------------------------
+
+    def _parts(self) -> list[Any]:
+        if not self.in_python:
+            return [self.segment()]
+        return [
+            self.segment("keep_start", "drift"),
+            PythonPart(self.name, self._advance),
+            self.segment("end_flight", "note_path"),
+        ]
+
+    def _advance(self, dt: float) -> None:
+        state, integrator = self._state, self.integrator
+        if not state.dynamic or (state.drifted and type(integrator) in STANDARD):
+            return
+        if self._viewed != self._scene.version:
+            self._take_views()
+        motion = self._motion
+        motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
+        try:
+            integrator.advance(motion, dt)
+        except Exception as error:
+            error.add_note(f"integrator {self.integrator_name!r}")
+            raise
+
+    def _take_views(self) -> None:
         """The arrays are the same until the structure changes."""
-        state, arrays, count = self._state, self._state.table.arrays, self._state.table.count
-        names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping", "previous_position")
-        start_velocity, self._path = state.scratch["start_velocity"], state.scratch["path_velocity"][:moving]
-        self._motion = Motion(*(arrays[name][:dynamic] for name in names), start_velocity[:dynamic], None)
-        self._starts = (
-            arrays["previous_position"][:count], arrays["position"][:count],
-            start_velocity[:moving], arrays["linear_velocity"][:moving],
-        )  # fmt: skip
-        self._viewed = state.structures
-
-    def _drifts(self, integrator: Integrator) -> bool:
-        """Whether nothing acts on any body; all the standard integrators do the same then, unless one is damped."""
-        state = self._state
-        return state.unforced and not state.table.everything_kept and type(integrator) in STANDARD
+        bodies, dynamic = self._state.bodies, self._state.dynamic
+        names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping")
+        names += ("previous_position", "start_velocity")
+        self._motion = Motion(*(getattr(bodies, name)[:dynamic] for name in names), None, self._program)
+        self._viewed = self._scene.version
 
     def _evaluator(self, force: np.ndarray) -> Callable[[float], None]:
         """Sums the forces at a later moment of the step."""
-        forces, start = self._state.forces, self.world.time
+        forces, start = self._forces, self.world.time
         # What systems of the game added after the forces were summed acts throughout the step.
         extra = None if forces.summed is None else force - forces.summed
 
@@ -109,58 +177,28 @@ class Integration(System):
 
         return evaluator
 
-    def _keep_path(self, integrator: object, dt: float, dynamic: int, moving: int) -> None:
-        """x(t) = x0 + p1 t + p2 t^2 + p3 t^3 for the dynamic bodies, x0 + v t for the kinematic ones."""
-        state = self._state
-        if not state.collides:
-            return
-        start, end, v0, v1 = self._starts
-        degree = state.path_degree
-        if degree == LINE:
-            np.copyto(self._path, v0 if getattr(integrator, "moves_with_old_velocity", False) else v1)
-            return
-        np.copyto(self._path, v0)
-        state.allocate_curves(degree)
-        second, third = state.scratch["path_second"], state.scratch["path_third"]
-        travel = end[:dynamic] - start[:dynamic]
-        if isinstance(integrator, Flight) and dynamic:
-            self._path[:dynamic], second[:dynamic] = integrator.velocity, integrator.second
-            third[:dynamic] = 0.0
-            if state.limits_speed:  # whom that may have held back goes straight
-                limit = state.table.arrays["max_linear_speed"][:dynamic]
-                speed, bend = (np.linalg.norm(array, axis=1) for array in (integrator.velocity, integrator.second))
-                held = speed + 2 * dt * bend > limit
-                self._path[:dynamic][held], second[:dynamic][held] = travel[held] / dt, 0.0
-        elif degree == PARABOLA:
-            second[:dynamic] = (travel - dt * v0[:dynamic]) / (dt * dt)
-            third[:dynamic] = 0.0
-        elif degree == CUBIC:  # Hermite: both ends and both velocities
-            second[:dynamic] = (3 * travel - dt * (2 * v0[:dynamic] + v1[:dynamic])) / (dt * dt)
-            third[:dynamic] = (dt * (v0[:dynamic] + v1[:dynamic]) - 2 * travel) / dt**3
-        second[dynamic:moving] = 0.0
-        third[dynamic:moving] = 0.0
+    # -- for world.plan() -------------------------------------------------------------------------
 
     def kernels(self) -> Iterator[PlannedKernel]:
-        state, integrator = self._state, self._state.integrator()
-        if not state.table.stops[0]:
+        if not self.in_python or not self._state.dynamic:
+            yield from super().kernels()
             return
-        if state.limits_speed:
-            yield PlannedKernel("limit_distance", "some body has a max_linear_speed")
-        why = "free flight of the bodies that forces move"
-        if state.forces.nothing_acts() and not state.table.everything_kept and type(integrator) in STANDARD:
-            yield PlannedKernel("drift", "no force acts: position + dt velocity, unless a body is damped")
-            if not state.table.column("linear_damping")[: state.table.stops[0]].any():
-                return
-            why = "some body is damped"
-        called = getattr(integrator, "kernels", None)  # a plugin's need not say
+        linked = {kernel.kernel: kernel for kernel in super().kernels()}
+        for name in ("keep_start", "drift"):
+            if name in linked:
+                yield linked[name]
+        called: Any = getattr(self.integrator, "kernels", None)  # a plugin's need not say
         for name in called(bool(self.world.force_systems)) if called is not None else ():
-            yield PlannedKernel(name, why)
-        if self.world.force_systems and integrator.evaluations > 1:
-            for kernel in state.forces.kernels_of_a_stage():
+            yield PlannedKernel(name, FLIES)
+        if self.world.force_systems and self.integrator.evaluations > 1:
+            for kernel in self._forces.kernels_of_systems():
                 yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")
+        for name in ("end_flight", "note_path"):
+            if name in linked:
+                yield linked[name]
 
     def reason(self) -> str:
-        integrator, name = self._state.integrator(), self._state.integrator_name
+        integrator, name = self.integrator, self.integrator_name
         if isinstance(integrator, Flight):
             return (
                 "exact flight between impacts, whatever Settings.integrator; order 2 in force systems and damping"

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from ...framework.errors import PluginError
 
-if TYPE_CHECKING:
-    from ..state import PhysicsState
 
-
-def filtered(state: PhysicsState, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Those pairs of rows that every filter lets through; PluginError if a filter does not say which."""
-    for plugin, function in state.world.registry.pair_filters:
+def filtered(
+    filters: list[tuple[str, Any]], bodies: Any, first: np.ndarray, second: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Those pairs of rows that every filter (plugin, function) lets through; PluginError if one does not say which."""
+    for plugin, function in filters:
         if not len(first):
             break
         name = f"plugin {plugin}: pair filter {function.__name__}"
         try:
-            may_meet = function(state.bodies, first, second)
+            may_meet = function(bodies, first, second)
         except Exception as error:
             error.add_note(name)
             raise

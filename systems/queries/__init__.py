@@ -1,4 +1,15 @@
-"""Queries of a world between steps: overlap, ray and shape casts, nearest bodies, neighbours within a distance.
+"""Queries of a world between steps: overlap, nearest surfaces, neighbours, ray and shape casts.
 
-Reads positions, shapes, layers and the indexes of the broad phase. Writes nothing but the arrays of results.
+A batch of queries is a record (:mod:`.records`); the verbs write its rows, one call of a compiled function writes what
+is found, and Python copies that. The functions know no shapes: :mod:`carom.systems.shapes.query` evaluates the query
+shape against those of bodies through tables of addresses. Each goes through the two trees of the broad phase, of what
+moves and of what does not, which are built when the first query after a change needs them.
+
+- :mod:`.overlap`: what touches a shape; :mod:`.nearest`: the nearest surface; :mod:`.neighbours`: bodies near bodies
+- :mod:`.casts`: along the path, with :mod:`.first_touch` for each body that comes near
+- :mod:`.candidates`: what these share; :mod:`.kernels`: how Python calls them
+- :mod:`.batch`: memory of batches, query shapes; :mod:`.system`: the verbs
+
+Reads positions, offsets, shapes, their parameters and layers. Writes the record of the batch, and of the state the
+trace that errors name (``row_a`` to ``unsound_b``).
 """

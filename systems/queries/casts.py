@@ -1,43 +1,33 @@
-"""Casts: what a ray or a moving shape meets on a straight way, and where.
+"""Casts: what a ray or a moving shape meets on a straight path, and where.
 
-The time of touch is found with the pair functions alone, which serves any shape: while a shape and a body are apart,
-a plane with the pair's normal lies between them and the gap is at least -depth wide, so the shape is free to move until
-it has closed that gap along the normal; from there it looks again. For convex shapes that never steps past a touch, and
-it converges as Newton's method does (the gap is a convex function of the way): a box in a few steps exactly, a sphere
-with the square of the error, a graze by halves. If the shape does not approach the plane, they never meet. A
-pair that has a sweep of its own says itself when it touches; shapes that are not convex need one.
-
-The way through the tree is cut into slices, for each level of the tree by itself, a few cells long. The level whose
-next slice begins first is looked at first, and once that is beyond the nearest hit, nothing nearer can come.
+The path through a tree is cut into slices, for each level of the tree by itself, a few cells long. The level whose next
+slice begins first is searched first, and once that is beyond the nearest hit, nothing nearer can come.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
-import numpy as np
+from ...framework.compilation import inlined, pasted
+from ...framework.jit.record_type import zero_of
+from ...framework.vectors import add, add_scaled, divided, item, length, replace, sub
+from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
+from ..shapes.query import query_half_extents
+from .candidates import is_wanted, nan_vector
+from .first_touch import LAST_STEP, Path, first_touch
+from .records import ENDLESS
 
-from ...framework.compilation import inlined, kernel
-from ...framework.vectors import add, add_scaled, dot, item, length, replace, row, scale, store, sub
-from ..broad_phase.tree.build import BEGIN, END, EXTENT, INVERSE, LEVELS, ORIGIN, SCALES
-from ..broad_phase.tree.pairs import cover
-from ..broad_phase.tree.queries import cells_of, parts_of, uncertainty
-
-LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
-ROUNDING = 4e-16  # of the distance between the centres: a gap smaller than that is none
-LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
-SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all looked at, in whatever order
+SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
 SLICE = 3.0  # cells; measured: 2 is as good, 6 is worse
-ENDLESS = 1e300  # instead of infinity, which times zero is no number
-FARTHEST = 1e200  # on the way past bodies without end
-MUCH = 1e6  # a way for sweeps may be so many times longer than needed
+SHORTEST = 2.2250738585072014e-308  # m, the smallest normal number: at a length of 0 the distance is 0 too
+
+
+# -- the path ------------------------------------------------------------------------------------
 
 
 @inlined
 def inverse_of(direction):
-    """1 / direction, per axis; along an axis on which it does not move a huge number in place of infinity."""
+    """1 / direction, per axis; a huge number in place of infinity along an axis on which it does not move."""
     result = direction
     for k in range(len(direction)):
         along = item(direction, k)
@@ -46,141 +36,188 @@ def inverse_of(direction):
 
 
 @inlined
-def power_above(length):
-    """A power of two that is larger. With ways of such lengths a sweep finds the same digits, however long they are."""
-    return math.ldexp(1.0, math.frexp(length)[1])
+def path_of(state, batch, tree, q):
+    """The path of query q through a tree."""
+    start, direction = batch.centre[q], batch.direction[q]
+    half = add(query_half_extents(state, batch.query, q), uncertainty(tree, start))
+    return Path(start, direction, inverse_of(direction), half)
 
 
-def make_cast_kernel(against: Any, swept: Any, half_extents: Any) -> Callable[..., int]:
-    """The kernel that moves shapes of one kind through one tree, over the shapes of a scene."""
+@inlined
+def frame_interval(tree, path):
+    """(enter, leave) of the path and the tree's extent, in which nearly all cells in use lie; enter > leave if they do
+    not meet."""
+    back, front = sub(path.start, path.half), add(path.start, path.half)
+    origin, extent = tree.origin[0], tree.extent[0]
+    enter, leave = 0.0, math.inf
+    for k in range(len(back)):
+        one = (item(origin, k) - item(front, k)) * item(path.inverse, k)
+        two = (item(origin, k) + item(extent, k) - item(back, k)) * item(path.inverse, k)
+        enter, leave = max(enter, min(one, two)), min(leave, max(one, two))
+    return enter, leave
 
-    @kernel
-    def cast(
-        query, starts, directions, mask, excluded, only_nearest, table, frame, directory, order, boxes, walk, entity,
-        position, offset, shape_of, material, layers, shapes, count, rows, distances, normals, points, like,
-    ):  # fmt: skip
-        """What each shape meets; ``count`` rows are filled already, returns how many are then.
 
-        query: the parameter columns of the moving shapes; starts (m, d) their centres; directions (m, d) unit vectors
-        (zero: the shapes do not move). walk (2, MAX_LEVELS + 2): memory for the levels in use and their next slices.
-        only_nearest: row q of the results holds what shape q has met so far (-1: nothing) and at which distance (its
-        limit). Otherwise all that the only shape meets is appended; ``distances``, one longer than there are bodies,
-        ends in its limit.
-        """
-        top = int(frame[LEVELS])
-        used, span = 0, 0.0
-        for level in range(top + 1):
-            if table[level, END] > table[level, BEGIN]:
-                walk[0, used] = level
-                used += 1
-        for q in range(len(starts)):
-            start, direction = row(starts, q, like), row(directions, q, like)
-            limit = distances[q] if only_nearest else distances[len(distances) - 1]
-            reach = limit * SLACK
-            half = add(half_extents(query, q, like), uncertainty(start, frame))
-            back, front = sub(start, half), add(start, half)
-            inverse = inverse_of(direction)
-            fine, coarse = 0.0, np.inf  # nearly all cells in use lie within the frame, which the way enters and leaves
-            for k in range(len(like)):
-                one = (frame[ORIGIN + k] - item(front, k)) * item(inverse, k)
-                two = (frame[ORIGIN + k] + frame[EXTENT + k] - item(back, k)) * item(inverse, k)
-                fine, coarse = max(fine, min(one, two)), min(coarse, max(one, two))
-            for k in range(used):
-                walk[1, k] = 0.0
-            while True:
-                turn = 0
-                for other in range(1, used):
-                    if walk[1, other] < walk[1, turn]:
-                        turn = other
-                level, begin = int(walk[0, turn]), walk[1, turn]
-                if not begin <= reach:
-                    break
-                end = np.inf
-                if level < top and begin < coarse and fine <= coarse:
-                    end = fine
-                    if begin >= fine:
-                        end = min(begin + SLICE / (frame[INVERSE] * frame[SCALES + level]), coarse)
-                    if not end > begin:
-                        end = coarse
-                walk[1, turn] = end
-                low, high = add_scaled(start, direction, begin), add_scaled(start, direction, min(end, reach))
-                for k in range(len(like)):
-                    one, two = item(low, k), item(high, k)
-                    low = replace(low, k, min(one, two) - item(half, k))
-                    high = replace(high, k, max(one, two) + item(half, k))
-                first, n0, n1, n2 = cover(low, high, table, frame, level)
-                parts, wraps = parts_of(first, n0, n1, n2, table, level)
-                for part in range(parts):
-                    c, stop = cells_of(part, wraps, first, n0, n1, n2, table, directory, level)
-                    while c < stop:
-                        at = np.uint64(c)  # an index without a sign is taken as it is
-                        c += 1
-                        enter, leave = 0.0, reach
-                        for k in range(len(like)):
-                            one = (boxes[at, k] - item(front, k)) * item(inverse, k)
-                            two = (boxes[at, len(like) + k] - item(back, k)) * item(inverse, k)
-                            low_end, high_end = (one, two) if one < two else (two, one)
-                            enter = low_end if low_end > enter else enter
-                            leave = high_end if high_end < leave else leave
-                        # every body has its turn in the slice in which its box is entered
-                        if not (enter <= leave and begin <= enter < end):
-                            continue
-                        i = np.uint64(order[at])
-                        if layers[material[i], i] & mask == 0 or entity[i] == excluded[q]:
-                            continue
-                        away = sub(add(row(position, i, like), row(offset, i, like)), start)
-                        distance, touches, normal, point = 0.0, False, like, like
-                        if not leave <= span < MUCH * leave:
-                            span = power_above(min(leave, FARTHEST))
-                        way = scale(direction, span)
-                        known, met, part_of_way = swept(query, q, shape_of[i], i, away, way, shapes, like)
-                        if known:
-                            if not met:
-                                continue
-                            distance = part_of_way * span
-                        before = 0.0
-                        for look in range(LOOKS):
-                            d = add_scaled(away, direction, before - distance)
-                            hit, depth, n, spot = against(query, q, shape_of[i], i, d, shapes, like)
-                            rate = dot(direction, n)
-                            if look == 0 or rate > 0.0:  # a step too far by a rounding error may turn the normal round
-                                normal = n
-                            if before == 0.0:
-                                point = spot
-                            if known:
-                                touches = True
-                                if rate > 0.0 or look > 0 or distance == 0.0:
-                                    break
-                                before = min(distance, LAST_STEP * length(away))  # just before, the normal is plain
-                                continue
-                            near = abs(depth) <= ROUNDING * length(d)
-                            touches = hit or (near and (look > 0 or rate > 0.0))
-                            further = distance - depth / rate
-                            if touches or not rate > 0.0:
-                                if near and look > 0 and abs(further - distance) <= LAST_STEP * distance:
-                                    distance = further  # what rounding leaves of the gap is a long way at a graze
-                                break
-                            if further > reach:
-                                break
-                            touches = look == LOOKS - 1
-                            if not further > distance:
-                                touches = True
-                                break
-                            distance = further
-                        if not touches or distance > limit:
-                            continue
-                        place = q if only_nearest else count
-                        if only_nearest:
-                            if distance == limit and rows[q] >= 0 and entity[rows[q]] <= entity[i]:
-                                continue
-                            limit = distance
-                            reach = limit * SLACK
-                        else:
-                            count += 1
-                        rows[place] = i
-                        distances[place] = distance
-                        store(normals, place, sub(like, normal))
-                        store(points, place, add(add_scaled(start, direction, distance), point))
-        return count
+@inlined
+def box_interval(tree, place, path, reach):
+    """(enter, leave) of the path as far as ``reach`` and a box of the tree; enter > leave if they never meet."""
+    back, front, d = sub(path.start, path.half), add(path.start, path.half), len(path.start)
+    enter, leave = 0.0, reach
+    for k in range(d):
+        one = (tree.boxes[place, k] - item(front, k)) * item(path.inverse, k)
+        two = (tree.boxes[place, d + k] - item(back, k)) * item(path.inverse, k)
+        low, high = (one, two) if one < two else (two, one)
+        enter = low if low > enter else enter
+        leave = high if high < leave else leave
+    return enter, leave
 
-    return cast
+
+@inlined
+def slice_box(path, begin, end):
+    """(low, high) of the box around the query's shape on the path from begin to end."""
+    low, high = add_scaled(path.start, path.direction, begin), add_scaled(path.start, path.direction, end)
+    for k in range(len(low)):
+        one, two = item(low, k), item(high, k)
+        low = replace(low, k, min(one, two) - item(path.half, k))
+        high = replace(high, k, max(one, two) + item(path.half, k))
+    return low, high
+
+
+# -- slices --------------------------------------------------------------------------------------
+
+
+@inlined
+def begin_slices(batch, tree):
+    """Note the levels of the tree that hold anything; returns how many."""
+    used = 0
+    for level in range(tree.levels + 1):
+        if tree.level_end[level] > tree.level_begin[level]:
+            batch.slice_level[used], batch.slice_begin[used] = level, 0.0
+            used += 1
+    return used
+
+
+@inlined
+def earliest_slice(batch, used):
+    """Which of the levels in use has the next slice that begins first."""
+    earliest = 0
+    for other in range(1, used):
+        if batch.slice_begin[other] < batch.slice_begin[earliest]:
+            earliest = other
+    return earliest
+
+
+@inlined
+def slice_end(tree, level, begin, enter, leave):
+    """Where the slice of a level that begins there ends; enter, leave: where the path crosses the tree's extent."""
+    end = math.inf
+    if level < tree.levels and begin < leave and enter <= leave:
+        end = enter
+        if begin >= enter:
+            end = min(begin + SLICE / (tree.inverse_cell * tree.level_scale[level]), leave)
+        if not end > begin:
+            end = leave
+    return end
+
+
+# -- hits ----------------------------------------------------------------------------------------
+
+
+@inlined
+def keep_hit(state, batch, q, i, path, touch):
+    """Take row i as what query q meets, unless it has met something before that."""
+    distance, normal, point = touch
+    ids, place = state.bodies.entity, q
+    if distance > batch.search_limit[q]:
+        return
+    if batch.only_nearest:
+        known = batch.row[q]
+        if distance == batch.search_limit[q] and known >= 0 and ids[known] <= ids[i]:
+            return
+        batch.search_limit[q] = distance
+    else:
+        place = batch.hit_count
+        batch.hit_count = place + 1
+    batch.row[place], batch.distance[place] = i, distance
+    batch.normal[place] = sub(zero_of(state), normal)
+    batch.point[place] = add(add_scaled(path.start, path.direction, distance), point)
+
+
+@pasted
+def cast_at(state, batch, tree, q, path, cells, begin, end):
+    """Test the bodies of some cells (their first and last place) whose boxes are entered in the slice begin..end."""
+    for place in range(cells[0], cells[1]):
+        reach = batch.search_limit[q] * SLACK
+        enter, leave = box_interval(tree, place, path, reach)
+        if not (enter <= leave and begin <= enter < end):  # every body has its turn in one slice
+            continue
+        i = tree.order[place]
+        if is_wanted(state, batch, q, i):
+            touches, distance, normal, point = first_touch(state, batch, q, i, path, leave, reach)
+            if touches:
+                keep_hit(state, batch, q, i, path, (distance, normal, point))
+
+
+@pasted
+def cast_through(state, batch, tree, q):
+    """What query q meets of the bodies in a tree."""
+    path = path_of(state, batch, tree, q)
+    enter, leave = frame_interval(tree, path)
+    used = begin_slices(batch, tree)
+    batch.span = 0.0
+    while used > 0:
+        turn = earliest_slice(batch, used)
+        level, begin = batch.slice_level[turn], batch.slice_begin[turn]
+        reach = batch.search_limit[q] * SLACK
+        if not begin <= reach:
+            break
+        end = slice_end(tree, level, begin, enter, leave)
+        batch.slice_begin[turn] = end
+        low, high = slice_box(path, begin, min(end, reach))
+        runs = cover(tree, low, high, level)
+        parts, wraps = parts_of(tree, level, runs)
+        for part in range(parts):
+            cast_at(state, batch, tree, q, path, cells_of(tree, level, runs, part, wraps), begin, end)
+
+
+# -- batches -------------------------------------------------------------------------------------
+
+
+@inlined
+def begin_cast(state, batch, q):
+    """Unit vector and limit of query q (of shapes the length of the way), and nothing found."""
+    way = batch.direction[q]
+    size = length(way)
+    batch.direction[q] = divided(way, size) if size > 0.0 else way
+    batch.limit[q] = min(batch.limit[q] if batch.is_ray else size, ENDLESS)
+    batch.search_limit[q] = batch.limit[q]
+    if batch.only_nearest:
+        batch.row[q], batch.entity[q], batch.distance[q], batch.fraction[q] = -1, -1, math.inf, 1.0
+        batch.normal[q] = batch.point[q] = nan_vector(zero_of(state))
+
+
+@inlined
+def end_cast(state, batch, q, place):
+    """Id and fraction of a hit; of a ray its point, which is more exact than the middle of a contact."""
+    i, distance, limit = batch.row[place], batch.distance[place], batch.limit[q]
+    if i >= 0:
+        batch.entity[place] = state.bodies.entity[i]
+        batch.fraction[place] = distance / max(limit, SHORTEST) if limit < ENDLESS else 0.0
+        if batch.is_ray:
+            batch.point[place] = add_scaled(batch.centre[q], batch.direction[q], distance)
+
+
+def find_hits(state, batch, moving, static, first, stop):
+    """What each query meets first, in its row; or, not ``only_nearest``, all that the only query meets, in any order.
+
+    Returns the number of hits if they are of one query, else that of queries.
+    """
+    batch.hit_count = 0
+    for q in range(first, stop):
+        begin_cast(state, batch, q)
+        for tree in (moving, static):
+            if tree.count > 0:
+                cast_through(state, batch, tree, q)
+    count = stop if batch.only_nearest else batch.hit_count
+    for place in range(count):
+        end_cast(state, batch, place if batch.only_nearest else 0, place)
+    return count

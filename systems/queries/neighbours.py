@@ -1,89 +1,67 @@
-"""Which bodies are near which: distances between their positions, whatever their shapes."""
+"""Neighbours: which bodies are near which; distances between their positions, whatever their shapes."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
-from ...framework.compilation import kernel
-from ...framework.vectors import length, row, sub
-from ...framework.world.hits import Neighbours
-from ..broad_phase.brute_force import FEW, FewBoxes
-from ..broad_phase.tree.build import REACH
-from ..broad_phase.tree.tree import SpatialTree
+from ...framework.compilation import inlined, pasted
+from ...framework.vectors import add, item, length, replace, sub
+from ..broad_phase.tree.cells import REACH, cells_of, cover, parts_of
+from .candidates import NO_ROOM, boxes_overlap, has_layer, order_by_entity
 
-if TYPE_CHECKING:
-    from ..state import PhysicsState
+ALL_LAYERS = -1
 
 
-@kernel
-def within_radius(askers, radius, offsets, candidates, entity, position, wanted, found, bounds, like):
-    """Rows of the candidates that are near each asker, by id; returns how many.
+@inlined
+def search_box(centre, radius):
+    """(low, high) of the box around a sphere, with room for rounding."""
+    reach = centre
+    for k in range(len(centre)):
+        reach = replace(reach, k, radius * (1.0 + REACH) + REACH * abs(item(centre, k)))
+    return sub(centre, reach), add(centre, reach)
 
-    askers (m,) rows; the candidates of asker q are candidates[offsets[q]:offsets[q + 1]]; wanted (n,): rows that may
-    be found; bounds (m + 1,): where each asker's rows in ``found`` end.
+
+@inlined
+def is_in_layers(state, batch, i):
+    """Whether row i is in the layers that are asked for; bodies without a collider are in none but all."""
+    return batch.mask == ALL_LAYERS or (state.bodies.shape[i] >= 0 and has_layer(state, batch, i))
+
+
+@pasted
+def find_near(state, batch, points, q, found):
+    """Append the rows near the body of query q; returns how many there are then, or NO_ROOM."""
+    position, body, radius = state.bodies.position, batch.body[q], batch.radius
+    centre = position[body]
+    low, high = search_box(centre, radius)
+    for level in range(points.levels + 1):
+        if points.level_end[level] == points.level_begin[level]:
+            continue
+        runs = cover(points, low, high, level)
+        parts, wraps = parts_of(points, level, runs)
+        for part in range(parts):
+            begin, end = cells_of(points, level, runs, part, wraps)
+            if found + (end - begin) > len(batch.row):
+                return NO_ROOM
+            for place in range(begin, end):
+                i = points.order[place]
+                if i != body and boxes_overlap(points, place, low, high) and is_in_layers(state, batch, i):
+                    batch.row[found] = i
+                    found += length(sub(position[i], centre)) <= radius
+    return found
+
+
+def find_neighbours(state, batch, points, unused, first, stop):
+    """The neighbours of queries first..stop-1, by id; returns the query to go on with, see find_overlaps.
+
+    points
+        a tree of the bodies' positions, boxes without size
     """
-    count = 0
-    for q in range(len(askers)):
-        i = askers[q]
-        centre = row(position, i, like)
-        begin = count
-        for c in range(offsets[q], offsets[q + 1]):
-            j = candidates[c]
-            if j == i or not wanted[j] or not length(sub(row(position, j, like), centre)) <= radius:
-                continue
-            place = count  # candidates come nearly in order of their ids
-            while place > begin and entity[found[place - 1]] > entity[j]:
-                found[place] = found[place - 1]
-                place -= 1
-            found[place] = j
-            count += 1
-        bounds[q + 1] = count
-    return count
-
-
-class NeighbourSearch:
-    """A tree of all bodies' positions, built when first asked after they have moved."""
-
-    def __init__(self, state: PhysicsState) -> None:
-        self._state = state
-        self._stamp: Any = None
-        self._points: SpatialTree | FewBoxes = FewBoxes(state.dimensions)
-
-    @cached_property
-    def _tree(self) -> SpatialTree:
-        return SpatialTree(self._state.dimensions)
-
-    def find(self, radius: float, mask: int, askers: np.ndarray | None, stamp: Any) -> Neighbours:
-        """The neighbours of some entities or of all; ``stamp`` changes whenever bodies may have moved."""
-        state, table = self._state, self._state.table
-        entity, position = table.column("entity"), table.column("position")
-        if stamp != self._stamp:
-            self._points = FewBoxes(state.dimensions) if table.count <= FEW else self._tree
-            self._points.build(position, position, 0, table.count)
-            self._stamp = stamp
-        if askers is None:
-            rows = np.argsort(entity, kind="stable")
-        else:
-            rows = table.rows_of(askers)
-            if (rows < 0).any():
-                raise KeyError(f"neighbours: entity {int(askers[rows < 0][0])} is no body")
-        places = position[rows]
-        reach = radius * (1.0 + REACH) + REACH * np.abs(places)
-        with np.errstate(invalid="ignore"):  # a body at infinity has no neighbours
-            offsets, candidates = self._points.query(places - reach, places + reach)
-        found, bounds = np.empty(len(candidates), np.int64), np.zeros(len(rows) + 1, np.int64)
-        wanted = np.ones(table.count, bool)
-        if mask != -1 and state.code is not None:
-            layers, collider = table.stacks["collider.layer"], state.scratch["material"][: table.count]
-            shaped = state.scratch["shape"][: table.count] >= 0
-            wanted = shaped & (layers[collider, np.arange(table.count)] & mask != 0)
-        elif mask != -1:
-            wanted[:] = False
-        count = within_radius(
-            rows, radius, offsets, candidates, entity, position, wanted, found, bounds, state.like
-        )
-        found = found[:count]
-        return Neighbours(entity[rows], rows, bounds, entity[found], found)
+    found = np.int64(0)
+    for q in range(first, stop):
+        begin = found
+        found = find_near(state, batch, points, q, found)
+        if found == NO_ROOM:
+            return q
+        order_by_entity(state, batch, begin, found)
+        batch.end[q] = found
+    return stop

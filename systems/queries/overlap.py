@@ -1,48 +1,52 @@
-"""Which candidates of many queries touch the shapes that are asked with."""
+"""Overlap: which shapes touch the shape of a query."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+import numpy as np
 
-from ...framework.compilation import kernel
-from ...framework.vectors import add, row, sub
+from ...framework.compilation import pasted
+from ...framework.vectors import add, sub
+from ..broad_phase.tree.cells import cells_of, cover, parts_of
+from ..shapes.query import evaluate_against
+from .candidates import NO_ROOM, boxes_overlap, has_layer, order_by_entity, to_collider
 
 
-def make_touching_kernel(against: Any) -> Callable[..., int]:
-    """The kernel that tests the candidates of many queries with one kind of shape, over the shapes of a scene."""
+@pasted
+def find_in_tree(state, batch, tree, q, found):
+    """Append the rows of one tree that query q touches; returns how many there are then, or NO_ROOM."""
+    centre = batch.centre[q]
+    low, high = sub(centre, batch.half[q]), add(centre, batch.half[q])
+    for level in range(tree.levels + 1):
+        if tree.level_end[level] == tree.level_begin[level]:
+            continue
+        runs = cover(tree, low, high, level)
+        parts, wraps = parts_of(tree, level, runs)
+        for part in range(parts):
+            begin, end = cells_of(tree, level, runs, part, wraps)
+            if found + (end - begin) > len(batch.row):
+                return NO_ROOM
+            for place in range(begin, end):
+                i = tree.order[place]
+                if boxes_overlap(tree, place, low, high) and has_layer(state, batch, i):
+                    d = to_collider(state, centre, i)
+                    batch.row[found] = i
+                    found += evaluate_against(state, batch.query, q, state.bodies.shape[i], i, d)[0]
+    return found
 
-    @kernel
-    def touching(
-        offsets, rows, other_offsets, other_rows, query, centres, mask, entity, position, offset, shape_of, material,
-        layers, shapes, found, bounds, like,
-    ):  # fmt: skip
-        """Rows of the candidates that each query touches and whose layer it asks for, by id; returns how many.
 
-        Candidates of query q: rows[offsets[q]:offsets[q + 1]] and likewise among the others. query: the parameter
-        columns of the asking shapes. bounds (m + 1,): where each query's rows in ``found`` end.
-        """
-        count = 0
-        for q in range(len(offsets) - 1):
-            centre = row(centres, q, like)
-            begin = count
-            for side in range(2):
-                start = offsets[q] if side == 0 else other_offsets[q]
-                stop = offsets[q + 1] if side == 0 else other_offsets[q + 1]
-                for c in range(start, stop):
-                    i = rows[c] if side == 0 else other_rows[c]
-                    if layers[material[i], i] & mask == 0:
-                        continue
-                    d = sub(add(row(position, i, like), row(offset, i, like)), centre)
-                    if not against(query, q, shape_of[i], i, d, shapes, like)[0]:
-                        continue
-                    place = count  # rows come nearly in order of their ids: each kind of body is sorted
-                    while place > begin and entity[found[place - 1]] > entity[i]:
-                        found[place] = found[place - 1]
-                        place -= 1
-                    found[place] = i
-                    count += 1
-            bounds[q + 1] = count
-        return count
+def find_overlaps(state, batch, moving, static, first, stop):
+    """The hits of queries first..stop-1, by id; returns the query to go on with once the hits are taken away.
 
-    return touching
+    There must be room for as many hits as there are bodies: that is enough for one query.
+    """
+    found = np.int64(0)
+    for q in range(first, stop):
+        begin = found
+        for tree in (moving, static):
+            if tree.count > 0 and found != NO_ROOM:
+                found = find_in_tree(state, batch, tree, q, found)
+        if found == NO_ROOM:
+            return q
+        order_by_entity(state, batch, begin, found)
+        batch.end[q] = found
+    return stop

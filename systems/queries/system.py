@@ -1,123 +1,196 @@
-"""Questions about where things are: what touches a shape, what a ray or a moving shape meets, what is nearest."""
+"""The queries of a world: what touches a shape, what a ray or a moving shape meets, what is nearest, what is near."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
 from ...components import AABBCollider, SphereCollider
-from ...framework.compilation import kernel
-from ...framework.vectors import divided, length, row, store
+from ...framework.data.table import Table
+from ...framework.jit.linking import Linked
+from ...framework.jit.record import Record
+from ...framework.plugins.registry import Registry
 from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours
 from ...framework.world.services import QueryServices
-from ..broad_phase.tree.build import MAX_LEVELS
-from ..shapes.dispatch import parameter_columns
-from .casts import ENDLESS
-from .dispatch import QueryKernels, query_kernels
-from .neighbours import NeighbourSearch
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
+from ..broad_phase.tree.tree import SpatialTree
+from ..shapes.attribution import ErrorAttribution
+from ..shapes.linked_shapes import LinkedShapes, ParameterRecords
+from .batch import CollectedHits, QueryBatch, QueryShape, joined, slices_of
+from .kernels import query_kernels
+from .neighbours import ALL_LAYERS
 
 Point = tuple[float, ...]
 
-SMALLEST = float(np.finfo(float).tiny)
+NEAREST_COLUMNS = ("entity", "row", "distance", "point", "normal")  # as the fields of NearestHits
+NEVER: Any = object()  # in place of a version
 
 
-@kernel
-def unit_vectors(vectors, lengths, units, like):
-    """Lengths and directions of vectors (m, d); zero stays zero."""
-    for i in range(len(vectors)):
-        vector = row(vectors, i, like)
-        lengths[i] = length(vector)
-        store(units, i, divided(vector, lengths[i]) if lengths[i] > 0.0 else vector)
+class Scene(Protocol):
+    """What the queries need to know of the scene."""
+
+    @property
+    def linked(self) -> LinkedShapes | None:
+        """None if nothing has a collider."""
+        ...
+
+    @property
+    def parameter_records(self) -> ParameterRecords:
+        """Of these shapes; read only if there are any."""
+        ...
+
+    @property
+    def version(self) -> Any:
+        """Another value whenever shapes, rows, or where the bodies are may have changed."""
+
+    def refresh(self) -> None:
+        """Bring shapes, rows and the state's columns up to date; called by every query, so it has to be quick."""
+
+    def refresh_rotation(self) -> None:
+        """Bring axes and rotated parameters up to date; called when ``version`` has changed."""
+
+
+class CandidateSearch(Protocol):
+    """The trees of the broad phase."""
+
+    def partitions(self) -> tuple[SpatialTree, SpatialTree]:
+        """Of what moves and of what does not, with boxes around where the bodies are at this moment."""
+        ...
 
 
 class Queries(QueryServices):
-    """Answers from the broad phase's boxes, made anew when the bodies have moved since the last question."""
+    """Answers to queries, from trees that are built when the first query after a change needs them.
 
-    def __init__(self, state: PhysicsState) -> None:
-        self._state = state
-        self._stamp: Any = None
-        self._moves = 0  # times that something has moved besides what the state counts
-        self._asked: dict[type[Any], QueryKernels] = {}  # kernels by the shape that asks
-        self._asked_of: Any = None  # the code of the shapes that they ask for
-        self._neighbours = NeighbourSearch(state)
-        self._walk = np.empty((2, MAX_LEVELS + 2))
+    state
+        the record; queries read count, bodies (entity, position, offset, shape, collider_slot), colliders.layer and
+        shapes.parameters
+    table
+        tells the rows of entities
+    registry
+        the pairs of query shapes and bodies
+    scene, candidate_search
+        see :class:`Scene` and :class:`CandidateSearch`
+    """
+
+    def __init__(
+        self, state: Record, table: Table, registry: Registry, scene: Scene, candidate_search: CandidateSearch
+    ) -> None:
+        self._state, self._table, self._registry, self._scene = state, table, registry, scene
+        self._search, self._dimensions = candidate_search, state.dimensions
+        self._kernels = query_kernels(state.dimensions)
+        self._attribute_errors = ErrorAttribution(registry, state, lambda: scene.linked.shapes if scene.linked else ())
+        self._shapes: dict[tuple[type[Any], bool], QueryShape] = {}  # and whether its parameters are the batch's own
+        self._linked_version: Any = NEVER
+        self._version: Any = NEVER
+        self._trees = 0, 0  # addresses of their records
+        self._points_version: Any = NEVER
+
+    @cached_property
+    def _batch(self) -> QueryBatch:
+        return QueryBatch(self._dimensions)
+
+    @cached_property
+    def _points(self) -> SpatialTree:
+        return SpatialTree(self._dimensions)
 
     def forget(self) -> None:
-        """The next question looks at the bodies anew."""
-        self._moves += 1
+        """Let the next query build the trees again."""
+        self._version = self._points_version = NEVER
 
     # -- what touches a shape ---------------------------------------------------------------------
 
-    def spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
-        half = np.repeat(radii[:, None], centres.shape[1], axis=1)
-        return self._many(SphereCollider, (radii,), centres, half, mask)
-
-    def boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
-        half = (upper - lower) / 2
-        return self._many(AABBCollider, (half,), (lower + upper) / 2, half, mask)
-
     def sphere(self, centre: Point, radius: float, mask: int) -> list[int]:
-        return self._one(SphereCollider, (np.array((radius,)),), centre, (radius,) * len(centre), mask)
+        if self._query_shape(SphereCollider, 1) is None:
+            return []
+        queries = self._batch.record
+        centres, halves = queries.centre, queries.half
+        for k, value in enumerate(centre):
+            centres[0, k], halves[0, k] = value, radius
+        self._batch.radius[0] = radius
+        return self._overlaps_of_one(SphereCollider, mask)
 
     def box(self, lower: Point, upper: Point, mask: int) -> list[int]:
-        centre = tuple((low + high) / 2 for low, high in zip(lower, upper, strict=True))
-        half = tuple((high - low) / 2 for low, high in zip(lower, upper, strict=True))
-        return self._one(AABBCollider, (np.array((half,)),), centre, half, mask)
-
-    def _one(self, component: Any, query: Any, centre: Point, half: Point, mask: int) -> list[int]:
-        kernels = self._kernels(component)
-        if kernels is None:
+        if self._query_shape(AABBCollider, 1) is None:
             return []
-        lower = tuple(c - s for c, s in zip(centre, half, strict=True))
-        upper = tuple(c + s for c, s in zip(centre, half, strict=True))
-        moving, fixed = (boxes.query_one(lower, upper) for boxes in self._state.broad_phase.partitions)
-        ends = np.array((0, len(moving))), np.array((0, len(fixed)))
-        hits = self._touching(kernels, ends[0], moving, ends[1], fixed, query, np.array((centre,)), mask)
-        return hits.entities.tolist()
+        queries = self._batch.record
+        centres, halves = queries.centre, queries.half
+        for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
+            centres[0, k], halves[0, k] = (low + high) / 2, (high - low) / 2
+        return self._overlaps_of_one(AABBCollider, mask)
 
-    def _many(self, component: Any, query: Any, centres: np.ndarray, half: np.ndarray, mask: int) -> Hits:
-        kernels = self._kernels(component)
-        if kernels is None:
-            nobody = np.empty(0, np.int64)
-            return Hits(np.zeros(len(centres) + 1, np.int64), nobody, nobody)
-        lower, upper = centres - half, centres + half
-        moving, fixed = (boxes.query(lower, upper) for boxes in self._state.broad_phase.partitions)
-        return self._touching(kernels, *moving, *fixed, query, centres, mask)
+    def spheres(self, centres: np.ndarray, radii: np.ndarray, mask: int) -> Hits:
+        return self._overlaps(SphereCollider, centres, radii[:, None], mask)
 
-    def _touching(
-        self, kernels: QueryKernels, offsets: Any, rows: Any, other_offsets: Any, other_rows: Any, query: Any,
-        centres: Any, mask: int,
-    ) -> Hits:  # fmt: skip
-        found = np.empty(len(rows) + len(other_rows), np.int64)
-        bounds = np.zeros(len(offsets), np.int64)
-        count = kernels.touching(
-            offsets, rows, other_offsets, other_rows, query, centres, mask, *self._columns(), found, bounds,
-            self._state.like,
-        )  # fmt: skip
-        return Hits(bounds, self._state.table.arrays["entity"][found[:count]], found[:count])
+    def boxes(self, lower: np.ndarray, upper: np.ndarray, mask: int) -> Hits:
+        return self._overlaps(AABBCollider, (lower + upper) / 2, (upper - lower) / 2, mask)
+
+    def _overlaps_of_one(self, component: type[Any], mask: int) -> list[int]:
+        """Ids of the hits of the query in row 0."""
+        queries = self._batch.record
+        self._run(self._kernels.overlaps, component, mask, 0, 1)
+        return queries.entity[: queries.end[0]].tolist()
+
+    def _overlaps(self, component: type[Any], centres: np.ndarray, halves: np.ndarray, mask: int) -> Hits:
+        if self._query_shape(component, len(centres)) is None:
+            return Hits(np.zeros(len(centres) + 1, np.int64), *_no_hits())
+        queries, collected = self._batch.record, CollectedHits(self._batch, len(centres))
+        for some in slices_of(len(centres)):
+            count, first = some.stop - some.start, 0
+            queries.centre[:count], queries.half[:count] = centres[some], halves[some]
+            self._batch.radius[:count] = halves[some, 0]
+            while first < count:
+                stop = self._run(self._kernels.overlaps, component, mask, first, count)
+                collected.take(first, stop)
+                first = stop
+        return Hits(collected.offsets, *collected.entities_and_rows())
 
     # -- what is near -----------------------------------------------------------------------------
 
     def nearest(self, points: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray) -> NearestHits:
-        rows, distances, normals, surface = _unanswered(np.minimum(limits, ENDLESS), points.shape[1])
-        kernels = self._kernels(SphereCollider)
-        if kernels is not None:
-            for boxes in self._state.broad_phase.partitions:
-                if boxes.count:
-                    kernels.nearest(
-                        (np.zeros(len(points)),), points, mask, excluded, *boxes.layout, *self._columns(), rows,
-                        distances, normals, surface, self._state.like,
-                    )  # fmt: skip
-        distances[rows < 0] = np.inf
-        return NearestHits(self._entities(rows), rows, distances, surface, normals)
+        if self._query_shape(SphereCollider, len(points)) is None:
+            return NearestHits(*_nothing(len(points), self._dimensions))
+        queries, pieces = self._batch.record, []
+        for some in slices_of(len(points)):
+            count = some.stop - some.start
+            queries.centre[:count], queries.limit[:count] = points[some], limits[some]
+            queries.excluded[:count], self._batch.radius[:count] = excluded[some], 0.0
+            self._run(self._kernels.nearest, SphereCollider, mask, 0, count)
+            pieces.append(self._batch.copied(slice(count), *NEAREST_COLUMNS))
+        return NearestHits(*joined(pieces))
 
     def neighbours(self, radius: float, mask: int, askers: np.ndarray | None) -> Neighbours:
-        self._state.refresh_structure()
-        return self._neighbours.find(radius, mask, askers, self._current())
+        self._scene.refresh()
+        state, entity = self._state, self._state.bodies.entity
+        if askers is None:
+            rows = np.argsort(entity[: state.count], kind="stable")
+        else:
+            rows = self._table.rows_of(askers)
+            if (rows < 0).any():
+                raise KeyError(f"neighbours: entity {int(askers[rows < 0][0])} is no body")
+        collected = CollectedHits(self._batch, len(rows))
+        if mask == ALL_LAYERS or self._scene.linked is not None:
+            self._reserve(len(rows))
+            points, queries = self._points_tree(), self._batch.record
+            find, queries.radius = self._kernels.neighbours, radius
+            for some in slices_of(len(rows)):
+                count, first = some.stop - some.start, 0
+                queries.body[:count] = rows[some]
+                while first < count:
+                    stop = self._kernels.run(
+                        find.address, state.address, queries.address, points, points, mask, first, count
+                    )
+                    collected.take(first, stop)
+                    first = stop
+        return Neighbours(entity[rows], rows, collected.offsets, *collected.entities_and_rows())
+
+    def _points_tree(self) -> int:
+        """Address of a tree of the bodies' positions, boxes without size."""
+        if self._scene.version != self._points_version:
+            position = self._state.bodies.position
+            self._points.build(position, position, 0, self._state.count)
+            self._points_version = self._scene.version
+        return self._points.record.address
 
     # -- what is met on the way -------------------------------------------------------------------
 
@@ -125,99 +198,127 @@ class Queries(QueryServices):
         self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray,
         only_nearest: bool,
     ) -> CastHits:  # fmt: skip
-        lengths, units = np.empty(len(origins)), np.empty_like(directions)
-        unit_vectors(directions, lengths, units, self._state.like)
-        query = (np.zeros(len(origins)),)
-        hits = self._cast(SphereCollider, query, origins, units, limits, mask, excluded, only_nearest)
-        way = np.where(hits.found, hits.distance, np.nan)[:, None] * units  # one ray if it is not the nearest only
-        hits.point[...] = origins + way  # more exact than the middle of a contact
-        return hits
+        if self._query_shape(SphereCollider, len(origins), sweeps=True) is None:
+            return _no_cast_hits(len(origins), self._dimensions, only_nearest)
+        queries, pieces = self._batch.record, []
+        for some in slices_of(len(origins)):
+            count = some.stop - some.start
+            queries.centre[:count], queries.direction[:count] = origins[some], directions[some]
+            queries.limit[:count], queries.excluded[:count] = limits[some], excluded[some]
+            self._batch.radius[:count] = 0.0
+            pieces.append(self._cast(SphereCollider, count, mask, only_nearest, True))
+        return CastHits(*joined(pieces))
 
     def shapes(
         self, component: type[Any], columns: dict[str, np.ndarray], positions: np.ndarray, displacements: np.ndarray,
         mask: int, excluded: np.ndarray, only_nearest: bool,
     ) -> CastHits:  # fmt: skip
-        lengths, units = np.empty(len(positions)), np.empty_like(displacements)
-        unit_vectors(displacements, lengths, units, self._state.like)
-        shape = self._state.world.registry.shapes[component]
-        unturned = np.broadcast_to(np.eye(self._state.dimensions), (len(positions), *self._state.axes.shape[1:])).copy()
-        query = parameter_columns(shape, columns, unturned)
-        starts = positions + columns["offset"]
-        return self._cast(component, query, starts, units, lengths, mask, excluded, only_nearest)
+        shape = self._query_shape(component, len(positions), own=False, sweeps=True)
+        if shape is None:
+            return _no_cast_hits(len(positions), self._dimensions, only_nearest)
+        queries, pieces = self._batch.record, []
+        for some in slices_of(len(positions)):
+            count = some.stop - some.start
+            shape.bind({name: column[some] for name, column in columns.items()}, count)
+            queries.centre[:count] = positions[some] + columns["offset"][some]
+            queries.direction[:count], queries.excluded[:count] = displacements[some], excluded[some]
+            pieces.append(self._cast(component, count, mask, only_nearest, False))
+        return CastHits(*joined(pieces))
 
     def _cast(
-        self, component: type[Any], query: Any, starts: np.ndarray, units: np.ndarray, limits: np.ndarray, mask: int,
-        excluded: np.ndarray, only_nearest: bool,
-    ) -> CastHits:  # fmt: skip
-        kernels = self._kernels(component)
-        partitions = [boxes for boxes in self._state.broad_phase.partitions if boxes.count]
-        limits = np.minimum(limits, ENDLESS)
-        if only_nearest:
-            rows, distances, normals, points = _unanswered(limits, starts.shape[1])
-        else:
-            room = 1 + sum(boxes.count for boxes in partitions)
-            rows, distances = np.empty(room, np.int64), np.empty(room)
-            normals, points = np.empty((room, starts.shape[1])), np.empty((room, starts.shape[1]))
-            distances[-1] = limits[0]
-        count = 0
-        for boxes in partitions if kernels is not None else ():
-            count = kernels.cast(
-                query, starts, units, mask, excluded, only_nearest, *boxes.layout, self._walk, *self._columns(),
-                count, rows, distances, normals, points, self._state.like,
-            )  # fmt: skip
-        if only_nearest:
-            entity = self._entities(rows)
-        else:
-            entity = self._entities(rows[:count])
-            order = np.lexsort((entity, distances[:count]))
-            entity, rows, distances = entity[order], rows[order], distances[order]
-            normals, points = normals[order], points[order]
-        missed = rows < 0
-        whole = np.maximum(limits, SMALLEST)  # at a length of zero the distance is zero too
-        fractions = np.where(limits < ENDLESS, distances / whole, 0.0)
-        fractions[missed], distances[missed] = 1.0, np.inf
-        return CastHits(entity, rows, distances, points, normals, fractions)
+        self, component: type[Any], count: int, mask: int, only_nearest: bool, is_ray: bool
+    ) -> tuple[np.ndarray, ...]:
+        """Columns of what the queries in the first rows meet."""
+        queries = self._batch.record
+        queries.only_nearest, queries.is_ray = only_nearest, is_ray
+        found = self._run(self._kernels.hits, component, mask, 0, count)
+        which: Any = slice(count if only_nearest else found)
+        if not only_nearest and found > 1:
+            which = np.lexsort((queries.entity[:found], queries.distance[:found]))
+        return self._batch.copied(which, *NEAREST_COLUMNS, "fraction")
 
-    # -- what the kernels get ---------------------------------------------------------------------
+    # -- what the kernels need --------------------------------------------------------------------
 
-    def _current(self) -> Any:
-        """Changes whenever bodies may have moved."""
-        return self._state.motion_stamp, self._moves, self._state.structures, self._state.table.static_version
-
-    def _kernels(self, component: Any) -> QueryKernels | None:
-        """The kernels that ask with that shape, with the boxes made ready for them; None if nothing has a collider."""
-        state = self._state
-        state.refresh_structure()
-        if state.code is None:
-            return None
-        stamp = self._current()
-        if stamp != self._stamp:
-            state.refresh_rotation()
-            state.broad_phase.trees_now()
-            self._stamp = stamp
-        if self._asked_of != (state.code, state.world.registry.version):
-            self._asked_of, self._asked = (state.code, state.world.registry.version), {}
-        if component not in self._asked:
-            self._asked[component] = query_kernels(
-                state.world.registry, state.code.shapes, component, state.dimensions
+    def _run(self, function: Linked, component: type[Any], mask: int, first: int, stop: int) -> int:
+        """Call a function for the queries first..stop-1; errors name the plugin, the pair and the entity."""
+        moving, static = self._trees
+        try:
+            result = self._kernels.run(
+                function.address, self._state.address, self._batch.record.address, moving, static, mask, first, stop
             )
-        return self._asked[component]
+        except Exception as error:
+            self._attribute_errors.describe(error, component)
+            raise
+        if self._state.unsound:
+            self._attribute_errors.check(component)
+        return result
 
-    def _columns(self) -> tuple[Any, ...]:
-        """Those of the bodies: entity, position, offset, shape, the collider that has the layers, layers, shapes."""
-        arrays, scratch = self._state.table.arrays, self._state.scratch
-        layers = self._state.table.stacks["collider.layer"]
-        return (
-            arrays["entity"], arrays["position"], scratch["offset"], scratch["shape"], scratch["material"], layers,
-            self._state.world_shapes,
-        )  # fmt: skip
+    def _query_shape(
+        self, component: type[Any], count: int, own: bool = True, sweeps: bool = False
+    ) -> QueryShape | None:
+        """The shape for so many queries, with everything up to date; None if nothing has a collider.
 
-    def _entities(self, rows: np.ndarray) -> np.ndarray:
-        """The ids of rows, -1 where there is none."""
-        return np.where(rows < 0, -1, self._state.table.arrays["entity"][rows])
+        own
+            its parameters are columns of the batch, else those of the caller
+        sweeps
+            it is going to move
+        """
+        scene = self._scene
+        scene.refresh()
+        if scene.version != self._version:
+            self._renew()
+        if scene.linked is None:
+            return None
+        if count > self._batch.queries or self._state.count > self._batch.results:
+            self._reserve(count)
+        shape = self._shapes.get((component, own))
+        if shape is None:
+            with self._attribute_errors(query=component):
+                shape = QueryShape(self._registry, scene.linked, scene.parameter_records, component)
+            self._shapes[component, own] = shape
+            if own:
+                self._bind(shape)
+        if sweeps and not shape.has_sweeps:
+            with self._attribute_errors(query=component):
+                shape.need_sweeps()
+        self._batch.record.query = shape.record
+        return shape
+
+    def _renew(self) -> None:
+        """Build the trees again, and forget the query shapes if the shapes of the scene are others."""
+        scene = self._scene
+        if scene.linked is not None:
+            version = scene.linked, scene.parameter_records, self._registry.version
+            if version != self._linked_version:
+                self._shapes, self._linked_version = {}, version
+            scene.refresh_rotation()
+            moving, static = self._search.partitions()
+            self._trees = moving.record.address, static.record.address
+        self._version = scene.version
+
+    def _reserve(self, count: int) -> None:
+        """Make room for so many queries, and for hits with all bodies."""
+        if self._batch.reserve(count, self._state.count):
+            for (_, own), shape in self._shapes.items():
+                if own:
+                    self._bind(shape)
+
+    def _bind(self, shape: QueryShape) -> None:
+        columns = {"radius": self._batch.radius, "half_extents": self._batch.half_extents}
+        shape.bind(columns, self._batch.queries)
 
 
-def _unanswered(limits: np.ndarray, dimensions: int) -> tuple[np.ndarray, ...]:
-    """Rows, distances, normals and points before anything is found."""
-    nothing = np.full((len(limits), dimensions), np.nan)
-    return np.full(len(limits), -1), limits.copy(), nothing, nothing.copy()
+def _no_hits() -> tuple[np.ndarray, np.ndarray]:
+    """Entities and rows."""
+    return np.empty(0, np.int64), np.empty(0, np.int64)
+
+
+def _nothing(count: int, dimensions: int) -> tuple[np.ndarray, ...]:
+    """Columns of nearest surfaces where there is nothing."""
+    nothing = np.full((count, dimensions), np.nan)
+    return np.full(count, -1), np.full(count, -1), np.full(count, np.inf), nothing, nothing.copy()
+
+
+def _no_cast_hits(count: int, dimensions: int, only_nearest: bool) -> CastHits:
+    missed = count if only_nearest else 0
+    return CastHits(*_nothing(missed, dimensions), np.ones(missed))

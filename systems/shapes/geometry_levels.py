@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,8 @@ from ...framework.data.handles import Sources
 from ...framework.data.table import Table
 from ...framework.errors import UnhandledPairError
 from ...framework.plugins.registry import Registry
-from .dispatch import half_extents_kernel, parameter_columns
-
-if TYPE_CHECKING:
-    from ..state import PhysicsState
+from .linked_shape import half_extents_of
+from .linked_shapes import LinkedShapes
 
 COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 
@@ -158,18 +156,15 @@ class LevelCheck:
         if collider is SphereCollider:
             return np.repeat(values["radius"][:, None], dimensions, axis=1)
         shape = self._registry.shapes[collider]
-        result = np.empty((count, dimensions))
-        unturned = np.broadcast_to(np.eye(dimensions), (count if shape.rotates else 0, dimensions, dimensions)).copy()
-        parameters = (parameter_columns(shape, values, unturned),)
-        half_extents_kernel(shape, dimensions)(parameters, result, (0.0,) * dimensions)
-        return result
+        unrotated = np.broadcast_to(np.eye(dimensions), (count, dimensions, dimensions)).copy()
+        return half_extents_of(shape, values, unrotated)
 
 
-def check_sensors(state: PhysicsState) -> None:
-    """ValueError if, of the levels of some body, some are sensors by now and some are not."""
-    levels, table, slots = state.levels, state.table, state.slots
-    if len(levels) == 1:
-        return
+def check_sensors(linked: LinkedShapes, levels: np.ndarray, slots: np.ndarray, table: Table) -> None:
+    """ValueError if, of the levels of some body, some are sensors by now and some are not.
+
+    levels (levels, n): shapes of each body; slots: of the shapes in the stacks of the table.
+    """
     sensors = table.stacks[f"{Collider.stack}.sensor"]
     rows = np.flatnonzero(levels[0, : table.count] != levels[-1, : table.count])
     decides = sensors[slots[levels[-1, rows]], rows]
@@ -177,7 +172,7 @@ def check_sensors(state: PhysicsState) -> None:
         mixed = sensors[slots[level[rows]], rows] != decides
         if mixed.any():
             row = rows[np.argmax(mixed)]
-            shapes = [state.code.shapes[index].component for index in (level[row], levels[-1, row])]
+            shapes = [linked.shapes[index].component for index in (level[row], levels[-1, row])]
             raise ValueError(_mixed(int(table.arrays["entity"][row]), *shapes, not decides[np.argmax(mixed)]))
 
 

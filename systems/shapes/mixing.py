@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import math
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ...framework.compilation import inlined
+from ...framework.jit.linking import Linked
 from ...framework.plugins.registry import Registry
 from ...framework.settings import MIXING_RULES
+from .signatures import MIXING_SIGNATURE, call_mixing, named
+from .user_functions import user_function
 
 AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(len(MIXING_RULES))  # in their order
-OWN = len(MIXING_RULES)  # the first of the plugins' rules
+FIRST_PLUGIN_RULE = len(MIXING_RULES)
 
 
 @inlined
-def standard_mix(rule, a, b):
+def mix(state, rule, a, b):
     """The contact's value from those of its two bodies."""
     if rule == MAX:
         return max(a, b)
@@ -26,39 +30,33 @@ def standard_mix(rule, a, b):
         return np.sqrt(a * b)
     if rule == MIN:
         return min(a, b)
-    return a * b
+    if rule == MULTIPLY:
+        return a * b
+    return call_mixing(state.shapes.mixing[rule - FIRST_PLUGIN_RULE], a, b)
 
 
 @inlined
-def mix_friction(mix, rule, a, b):
-    """The contact's friction; who has none of his own (NaN) takes the partner's."""
+def mix_friction(state, rule, a, b):
+    """The contact's friction. NaN: use the other body's coefficient; 0 if neither has one."""
     if a != a:
         a = b
     if b != b:
         b = a
-    return mix(rule, a, b) if a == a else 0.0
+    return mix(state, rule, a, b) if a == a else 0.0
 
 
-@lru_cache(maxsize=64)
-def mixing(rules: tuple[Any, ...]) -> Any:
-    """mix(rule, a, b) with the rules of plugins, compiled functions of two numbers, behind the standard ones."""
-    made = standard_mix
-    for number, function in enumerate(rules, OWN):
-        made = _with_rule(made, number, function)
-    return made
+@cache  # tables hold addresses, so the code must stay
+def linked_rule(function: Any) -> Linked:
+    """A plugin's rule, its answers checked."""
+    rule = user_function(function)
 
-
-def _with_rule(others: Any, number: int, function: Any) -> Any:
-    @inlined
-    def mix(rule, a, b):
-        if rule != number:
-            return others(rule, a, b)
-        mixed = float(function(a, b))
-        if not 0.0 <= mixed < np.inf:
+    def mixed(a, b):
+        value = float(rule(a, b))
+        if not 0.0 <= value < math.inf:
             raise ValueError("a mixing rule of a plugin returned no number from 0")
-        return mixed
+        return value
 
-    return mix
+    return Linked(named(mixed), MIXING_SIGNATURE)
 
 
 def rule_number(registry: Registry, name: str) -> int:

@@ -2,50 +2,51 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...components import Collider
+from ...framework.data.table import Table
 from ...framework.errors import UnhandledPairError
+from ...framework.plugins.registry import Registry
+from .linked_shapes import LinkedShapes
 
-if TYPE_CHECKING:
-    from ..state import PhysicsState
 
-
-def check_pairs(state: PhysicsState) -> None:
+def check_pairs(
+    linked: LinkedShapes, levels: np.ndarray, collider_slot: np.ndarray, table: Table, registry: Registry
+) -> None:
     """UnhandledPairError if two bodies can meet whose shapes no plugin has a pair for.
 
     Two bodies can meet if one of them moves and each one's layer is in the other's mask. Levels of geometry meet level
     by level. Costs nothing in a scene whose shapes all have pairs.
     """
-    if state.code is None or not state.code.unhandled or state.preparing:
-        return
-    for i, j in state.code.unhandled:
-        for level in state.levels:
-            found = _that_can_meet(state, level, i, j)
+    for i, j in linked.unhandled:
+        for level in levels:
+            found = _that_can_meet(table, collider_slot, level, i, j)
             if found is not None:
-                first, second = (state.code.shapes[index].component for index in (i, j))
-                entity = state.table.arrays["entity"]
+                first, second = (linked.shapes[index].component for index in (i, j))
+                entity = table.arrays["entity"]
                 where = f", entity {entity[found[0]]} and entity {entity[found[1]]} for instance"
-                raise UnhandledPairError(state.world.registry.unhandled(first, second, where))
+                raise UnhandledPairError(registry.unhandled(first, second, where))
 
 
-def _that_can_meet(state: PhysicsState, level: np.ndarray, i: int, j: int) -> tuple[int, int] | None:
+def _that_can_meet(
+    table: Table, collider_slot: np.ndarray, level: np.ndarray, i: int, j: int
+) -> tuple[int, int] | None:
     """Rows of two bodies that can meet, the first of shape i in that level, the second of shape j."""
-    for layer_a, mask_a, moves_a, rows_a in _alike(state, level, i):
-        for layer_b, mask_b, moves_b, rows_b in _alike(state, level, j):
+    for layer_a, mask_a, moves_a, rows_a in _alike(table, collider_slot, level, i):
+        for layer_b, mask_b, moves_b, rows_b in _alike(table, collider_slot, level, j):
             others = rows_b[rows_b != rows_a[0]]
             if (moves_a or moves_b) and layer_a & mask_b and layer_b & mask_a and len(others):
                 return int(rows_a[0]), int(others[0])
     return None
 
 
-def _alike(state: PhysicsState, level: np.ndarray, shape: int) -> list[tuple[int, int, int, np.ndarray]]:
+def _alike(
+    table: Table, collider_slot: np.ndarray, level: np.ndarray, shape: int
+) -> list[tuple[int, int, int, np.ndarray]]:
     """(layer, mask, whether it moves, the first two rows) of each kind of body with that shape."""
-    table = state.table
     rows = np.flatnonzero(level[: table.count] == shape)
-    slots = state.scratch["material"][rows]
+    slots = collider_slot[rows]
     layer, mask = (table.stacks[f"{Collider.stack}.{name}"][slots, rows] for name in ("layer", "mask"))
     kinds, which = np.unique(np.stack((layer, mask, rows < table.stops[1])), axis=1, return_inverse=True)
     return [(*kind, rows[which.ravel() == index][:2]) for index, kind in enumerate(kinds.T.tolist())]

@@ -1,28 +1,34 @@
 """The cost of a pair function registered by a plugin, compared with the same maths written into the kernel by hand.
 
-Both are narrow phase kernels on the same candidates. One is generated from the registered functions and includes all
-their overhead: shape dispatch, argument order, the check of the result. The other calls a function that only knows
-radii. Each state has new random positions, because repeating one state would train the branch predictor.
+Both are kernels that run the narrow phase on the same candidates. One calls the linked batches of the registered
+functions and includes all their overhead: sorting by shape, argument order, the check of the result. The other has a
+loop of its own that only knows radii. Each state has new random positions, because repeating one state would train the
+branch predictor.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import inspect
 import math
 import statistics
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
 
 from ....components import Collider, RigidBody, SphereCollider, Transform
 from ....framework import Phase, Plugin, World, column
-from ....framework.compilation import inlined
-from ....framework.vectors import divided, length, scale
+from ....framework.compilation import inlined, kernel
+from ....framework.jit.record import Record, make_record
+from ....framework.jit.record_type import record_at, record_type
+from ....framework.jit.schema import Schema, floats
+from ....framework.vectors import add, divided, length, scale, sub
 from ....plugins import Physics
-from ....systems.narrow_phase.system import make_narrow_kernel
+from ....systems.narrow_phase.stages import collect_contacts, evaluate_pairs, select_pairs
+from ....systems.records import STATE
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, now
 from ...reporting.progress_bar import NO_PROGRESS, Progress
@@ -78,21 +84,66 @@ def disc_sphere(a, b, d):
     return round_round(a.reach, b.radius, d)
 
 
-@inlined
-def one_shape_by_hand(shape_a, a, shape_b, b, d, shapes, like):
-    """The narrow phase function for a world of discs, by hand."""
-    return round_round(shapes[0][0][a], shapes[0][0][b], d)
+RADII = Schema("Radii", first=floats(), second=floats())  # of the first shape and of the second, by row
+
+select, collect, registered_pairs = inlined(select_pairs), inlined(collect_contacts), inlined(evaluate_pairs)
 
 
 @inlined
-def two_shapes_by_hand(shape_a, a, shape_b, b, d, shapes, like):
-    """The narrow phase function for discs and spheres, by hand."""
-    one = shapes[0][0][a] if shape_a == 0 else shapes[1][0][a]
-    two = shapes[0][0][b] if shape_b == 0 else shapes[1][0][b]
-    return round_round(one, two, d)
+def registered(state, radii):
+    """The batches of the registered pairs."""
+    registered_pairs(state, 0.0)
+
+
+@inlined
+def one_shape_by_hand(state, radii):
+    """The loop for a world of discs, by hand."""
+    pairs, radius = state.pairs, radii.first
+    for c in range(pairs.count):
+        a, b = pairs.a[c], pairs.b[c]
+        write_by_hand(state, c, radius[a], radius[b])
+
+
+@inlined
+def two_shapes_by_hand(state, radii):
+    """The loop for discs and spheres, by hand."""
+    pairs, shape, first, second = state.pairs, state.bodies.shape, radii.first, radii.second
+    for c in range(pairs.count):
+        a, b = pairs.a[c], pairs.b[c]
+        write_by_hand(state, c, first[a] if shape[a] == 0 else second[a], first[b] if shape[b] == 0 else second[b])
+
+
+@inlined
+def write_by_hand(state, c, one, two):
+    """Test pair c of two radii."""
+    pairs, position, offset = state.pairs, state.bodies.position, state.bodies.offset
+    a, b = pairs.a[c], pairs.b[c]
+    centre = add(position[a], offset[a])
+    hit, depth, normal, point = round_round(one, two, sub(add(position[b], offset[b]), centre))
+    pairs.hit[c], pairs.depth[c], pairs.normal[c], pairs.point[c] = hit, depth, normal, add(centre, point)
 
 
 BY_HAND = {"discs": one_shape_by_hand, "discs and spheres": two_shapes_by_hand}
+
+
+@cache
+def narrow_kernel(evaluate: Callable[..., None], dimensions: int) -> Callable[..., Any]:
+    """The narrow phase with that loop over the pairs; the kernel returns how many touch or nearly do, and a sum over
+    these."""
+    state_at, radii_at = record_at(record_type(STATE, dimensions)), record_at(record_type(RADII, dimensions))
+
+    @kernel
+    def find_contacts(address, radii, dt):
+        state = state_at(address)
+        select(state, dt)
+        evaluate(state, radii_at(radii))
+        collect(state, dt)
+        places = 0
+        for k in range(state.pairs.found):
+            places += state.pairs.hits[k]
+        return state.pairs.found, places
+
+    return find_contacts
 
 
 @dataclass
@@ -140,33 +191,33 @@ def pair_costs(repeats: int = 15, progress: Progress = NO_PROGRESS, bodies: int 
 
 def _cost(scene: str, dimensions: int, repeats: int, progress: Progress, bodies: int) -> PairCost:
     progress.say(f"{scene}, {dimensions}D")
-    by_hand = make_narrow_kernel(BY_HAND[scene])
+    linked, by_hand = narrow_kernel(registered, dimensions), narrow_kernel(BY_HAND[scene], dimensions)
     with contextlib.ExitStack() as stack:
-        calls = []
+        states = []
         for seed in range(STATES):
             world = stack.enter_context(contextlib.closing(_world(scene, dimensions, seed, bodies)))
-            calls.append(_recorded(world))
-        registered = calls[0][0]
-        _same(registered, by_hand, [arguments for _, arguments in calls])
+            states.append(_prepared(world))
+        calls = [(state.address, radii.address, world.settings.dt) for state, radii in states]
+        _same(linked, by_hand, calls)
         progress.advance(1)
-        candidates = sum(len(arguments[0]) for _, arguments in calls)
-        seconds: dict[Any, list[float]] = {registered: [], by_hand: []}
+        candidates = sum(state.candidates.count for state, _ in states)
+        seconds: dict[Any, list[float]] = {linked: [], by_hand: []}
         for repeat in range(repeats):
             total = dict.fromkeys(seconds, 0.0)
             with no_garbage_collection():
-                for turn, (_, arguments) in enumerate(calls):
+                for turn, arguments in enumerate(calls):
                     order = list(seconds)[:: 1 if (turn + repeat) % 2 == 0 else -1]
-                    for kernel in order:
+                    for find_contacts in order:
                         started = now()
                         for _ in range(CALLS):
-                            kernel(*arguments)
-                        total[kernel] += now() - started
-            for kernel, spent in total.items():
-                seconds[kernel].append(spent / (CALLS * candidates) * 1e9)
+                            find_contacts(*arguments)
+                        total[find_contacts] += now() - started
+            for find_contacts, spent in total.items():
+                seconds[find_contacts].append(spent / (CALLS * candidates) * 1e9)
             progress.advance(1)
-    ratios = [one / two for one, two in zip(seconds[registered], seconds[by_hand], strict=True)]
+    ratios = [one / two for one, two in zip(seconds[linked], seconds[by_hand], strict=True)]
     return PairCost(
-        scene, dimensions, round(candidates / STATES), Spread.of(seconds[registered]), Spread.of(seconds[by_hand]),
+        scene, dimensions, round(candidates / STATES), Spread.of(seconds[linked]), Spread.of(seconds[by_hand]),
         Spread.of(ratios),
     )  # fmt: skip
 
@@ -185,32 +236,24 @@ def _world(scene: str, dimensions: int, seed: int, bodies: int) -> World:
     return world
 
 
-def _recorded(world: World) -> tuple[Any, tuple[Any, ...]]:
-    """The kernel that the world's narrow phase calls for its candidates, and its arguments."""
-    state: Any = world.physics
-    world.run(Phase.INTEGRATION)
-    world.run(Phase.BROAD)
-    kernel, calls = state.kernels.find_contacts, []
-
-    def record(*arguments: Any) -> Any:
-        calls.append(arguments)
-        return kernel(*arguments)
-
-    state.kernels.find_contacts = record
-    try:
-        world.run(Phase.NARROW)
-    finally:
-        state.kernels.find_contacts = kernel
-    (arguments,) = calls
-    names = list(inspect.signature(getattr(kernel, "py_func", kernel)).parameters)
-    arguments = list(arguments)
-    arguments[names.index("dt")] = world.settings.dt  # outside a step nothing moves: the search is smaller
-    return kernel, tuple(arguments)
+def _prepared(world: World) -> tuple[Record, Record]:
+    """The world's state with its candidates in order, as within a step, and the radii of the bodies."""
+    for phase in (Phase.INTEGRATION, Phase.BROAD, Phase.NARROW):
+        world.run(phase)
+    physics: Any = world.physics
+    state, radii = physics.state, make_record(RADII, physics.dimensions)
+    state.moved = True  # outside a step nothing moves: the search is smaller
+    columns = [
+        getattr(record, f"column_{shape.columns[0]}")
+        for shape, record in zip(physics.scene.linked.shapes, physics.scene.parameters.world, strict=True)
+    ]
+    radii.first, radii.second = columns[0], columns[-1]
+    return state, radii
 
 
-def _same(registered: Any, by_hand: Any, states: list[tuple[Any, ...]]) -> None:
+def _same(registered: Any, by_hand: Any, calls: list[tuple[Any, ...]]) -> None:
     """Compile both kernels and check that they find the same contacts; Problem if not."""
-    for arguments in states:
+    for arguments in calls:
         if registered(*arguments) != by_hand(*arguments):
             raise Problem("the pair written by hand finds other contacts than the registered one")
 

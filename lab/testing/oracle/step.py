@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class Oracle:
         self._method = "flight" if self.settings.collision == "event_driven" else self.settings.integrator
         if self._method not in (*INTEGRATORS, "flight"):
             raise ValueError(f"the oracle knows {', '.join(INTEGRATORS)}, got {self.settings.integrator!r}")
-        foreign = [system.name for system in world.systems if not type(system).__module__.startswith("carom.systems.")]
+        foreign = [system.name for system in world.systems if system.parts() is None]
         foreign += [system.name for system in world.force_systems]
         if foreign:
             raise ValueError(f"the oracle does not know what this world's systems do: {', '.join(foreign)}")
@@ -172,14 +173,15 @@ class Oracle:
 
 def _memory_of(world: World, known: set[int]) -> dict[tuple[int, int], Kept]:
     """Warm start data of the world's contacts at rest, as impulses for the present step length."""
-    memory = world.snapshot().tracking[1]
-    dt = world.settings.dt
-    whole, part = dt / memory.step, dt / world.settings.substeps / memory.substep
+    physics: Any = world.physics
+    memory = physics.state.warm_start
+    now, dt = memory.now, world.settings.dt
+    whole, part = dt / memory.step[now], dt / world.settings.substeps / memory.substep[now]
     kept = {}
-    for k in range(memory.count):
-        key = int(memory.entity_a[k]), int(memory.entity_b[k])
-        normal, tangent = memory.normal[k].copy(), memory.tangent[k] * part
-        kept[key] = Kept(normal, float(memory.impulse[k]) * part, tangent, float(memory.total[k]) * whole)
+    for k in range(memory.counts[now]):
+        key = int(memory.entity_a[now, k]), int(memory.entity_b[now, k])
+        normal, tangent = memory.normal[now, k].copy(), memory.tangent[now, k] * part
+        kept[key] = Kept(normal, float(memory.impulse[now, k]) * part, tangent, float(memory.total[now, k]) * whole)
     return {key: value for key, value in kept.items() if known.issuperset(key)}
 
 

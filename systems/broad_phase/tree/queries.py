@@ -1,57 +1,20 @@
-"""Queries of single boxes against one tree; candidates are tested at once, without the range buffers of the pairs."""
+"""Queries of single boxes against one tree; candidates are tested at once, without the ranges of the pairs."""
 
 from __future__ import annotations
 
-from ....framework.compilation import inlined, kernel
-from ....framework.vectors import item, replace, row
-from .build import BASE, BEGIN, CELLS, END, FINE, HIGHEST, LEVELS, LOWEST, ORIGIN, REACH, STRIDE
-from .pairs import cover
+from ....framework.compilation import part
+from ....framework.vectors import item
+from .cells import cells_of, cover, parts_of
 
 SORTED_HERE = 64  # results up to this many are sorted by insertion; longer ones by numpy, from Python
 
-
-@inlined
-def parts_of(first, n0, n1, n2, table, level):
-    """How many parts the runs of cells have that :func:`pairs.cover` has found, and whether any wraps round.
-
-    If one does, each run has two parts, of which the first is what lies beyond the level's end.
-    """
-    last = first + (n1 - 1) * table[level, STRIDE + 1] + (n2 - 1) * table[level, STRIDE + 2]
-    wraps = 1 if first < 0 or last + n0 > table[level, CELLS] else 0
-    return (n1 * n2) << wraps, wraps
+ANSWERED, MORE_FOUND = 0, 1  # what the pass returns
 
 
-@inlined
-def cells_of(part, wraps, first, n0, n1, n2, table, directory, level):
-    """The sorted objects begin..end-1 in one part."""
-    base, size = table[level, BASE], table[level, CELLS]
-    run = part >> wraps
-    layer = 0 if n2 == 1 else run // n1  # a division takes longer than all the rest
-    number = first + (run - layer * n1) * table[level, STRIDE + 1] + layer * table[level, STRIDE + 2]
-    if wraps == 0:
-        return directory[base + number], directory[base + number + n0]
-    number %= size
-    beyond = max(number + n0 - size, 0)
-    if part & 1 == 0:
-        return directory[base], directory[base + beyond]
-    return directory[base + number], directory[base + number + n0 - beyond]
-
-
-@inlined
-def uncertainty(point, frame):
-    """Per axis more than all rounding errors of distances between the point and the boxes that are in cells."""
-    result = point
-    for k in range(len(point)):
-        lowest = abs(frame[ORIGIN + k] + frame[LOWEST + k] * frame[FINE])
-        highest = abs(frame[ORIGIN + k] + frame[HIGHEST + k] * frame[FINE])
-        result = replace(result, k, REACH * (abs(item(point, k)) + max(lowest, highest) + frame[FINE]))
-    return result
-
-
-@inlined
-def _scan(low, high, begin, end, boxes, order, rows, found):
-    """Append the rows of the sorted objects begin..end-1 that overlap; -1 if there is no room for all."""
-    d = len(low)
+@part
+def scan(tree, low, high, begin, end, found):
+    """Append the rows of the boxes begin..end-1 of the tree's order that overlap; -1 if there is no room for all."""
+    boxes, order, rows, d = tree.boxes, tree.order, tree.found, len(low)
     if found < 0 or found + (end - begin) > len(rows):
         return -1
     for k in range(begin, end):
@@ -63,41 +26,45 @@ def _scan(low, high, begin, end, boxes, order, rows, found):
     return found
 
 
-@kernel
-def query_box(low, high, table, frame, directory, order, boxes, rows, found):
-    """Append the rows whose box overlaps low..high (tuples) to ``rows``, in ascending order if they are few.
+@part
+def sort_rows(rows, start, stop):
+    """By insertion: there are few."""
+    for i in range(start + 1, stop):
+        value = rows[i]
+        k = i
+        while k > start and rows[k - 1] > value:
+            rows[k] = rows[k - 1]
+            k -= 1
+        rows[k] = value
 
-    Returns the new length, or -1 if ``rows`` may be too short: a run of cells must fit before it is tested.
+
+@part
+def query_box(tree, low, high, start):
+    """Append the rows of boxes that overlap low..high to ``found``, in ascending order if they are few.
+
+    Returns the new length, or -1 if there may not be room: a run of cells must fit before it is tested.
     """
-    start = found
+    found, valid = start, True
     for q in range(len(low)):
-        if not (item(low, q) <= item(high, q)):  # NaN or empty: overlaps nothing
-            return found
-    for level in range(int(frame[LEVELS]) + 1):
-        if table[level, END] > table[level, BEGIN]:
-            first, n0, n1, n2 = cover(low, high, table, frame, level)
-            parts, wraps = parts_of(first, n0, n1, n2, table, level)
-            for part in range(parts):
-                begin, end = cells_of(part, wraps, first, n0, n1, n2, table, directory, level)
-                found = _scan(low, high, begin, end, boxes, order, rows, found)
+        valid &= item(low, q) <= item(high, q)
+    for level in range(tree.levels + 1 if valid else 0):  # nan or empty: overlaps nothing
+        if tree.level_end[level] > tree.level_begin[level]:
+            runs = cover(tree, low, high, level)
+            parts, wraps = parts_of(tree, level, runs)
+            for part_of_run in range(parts):
+                begin, end = cells_of(tree, level, runs, part_of_run, wraps)
+                found = scan(tree, low, high, begin, end, found)
     if found - start <= SORTED_HERE:
-        for i in range(start + 1, found):
-            value = rows[i]
-            k = i
-            while k > start and rows[k - 1] > value:
-                rows[k] = rows[k - 1]
-                k -= 1
-            rows[k] = value
+        sort_rows(tree.found, start, found)
     return found
 
 
-@kernel
-def query_boxes(lower, upper, table, frame, directory, order, boxes, rows, offsets, begin, like):
-    """query_box for the boxes from ``begin`` on; returns the box to continue at once ``rows`` is larger."""
-    for i in range(begin, len(lower)):
-        low, high = row(lower, i, like), row(upper, i, like)
-        found = query_box(low, high, table, frame, directory, order, boxes, rows, offsets[i])
+def query_boxes(tree, _):
+    """A pass (see :mod:`.passes`): the boxes from ``query_done`` on; MORE_FOUND if there is no room for the next."""
+    for i in range(tree.query_done, tree.query_count):
+        found = query_box(tree, tree.query_lower[i], tree.query_upper[i], tree.offsets[i])
         if found < 0:
-            return i
-        offsets[i + 1] = found
-    return len(lower)
+            tree.query_done = i
+            return MORE_FOUND
+        tree.offsets[i + 1] = found
+    return ANSWERED

@@ -1,86 +1,59 @@
 """Better cells for scenes whose bounds say nothing about their density: distant clusters, heavy tails.
 
 Finer cells than the directory can cover wrap round, and distant places share them; coarser levels are added for what is
-too large or too far out for all others. This runs seldom and only directs passes over the objects: plain Python.
+too large or too far out for all others. This runs seldom and only directs passes over the boxes: plain Python.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from .build import (
-    BEGIN,
-    CELLS,
-    CELLS_PER_OBJECT,
-    CROWDED,
-    CROWDING,
-    END,
-    EXTENT,
-    FINE,
-    INVERSE,
-    LEVELS,
-    LOOSE,
-    MAX_LEVELS,
-    SMALL,
-    SMALLEST_CELL,
-    TOO_MANY,
-    WIDTH,
-)
+from .build import CELLS_PER_BOX, CROWDED, LOOSE, MAX_LEVELS, SMALLEST_CELL, TOO_MANY
 
 IMPROVED = 0.7  # finer cells are kept if they bring crowding below this share of what it was
 
 
-def refine(
-    assign: Callable[[], bool],
-    lower: np.ndarray,
-    upper: np.ndarray,
-    directory: np.ndarray,
-    keys: np.ndarray,
-    table: np.ndarray,
-    frame: np.ndarray,
-) -> None:
-    """Change ``frame`` until ``assign`` (one pass over all objects) finds nothing to complain of, or nothing helps.
+def refine(tree: Any, assign: Callable[[], int]) -> None:
+    """Change the cells of a tree's record until ``assign`` (one pass over all boxes) returns SUITS, or nothing helps.
 
-    ``lower, upper, keys`` are those of the objects alone. At most MAX_LEVELS passes, seldom more than two.
+    At most MAX_LEVELS passes, seldom more than two.
     """
-    before = frame[CROWDING]
+    before, count = tree.crowding, tree.stop - tree.start
     for _ in range(MAX_LEVELS):
-        former = frame.copy()
-        levels, cell = int(frame[LEVELS]), frame[FINE]
+        former = tree.finest_cell, tree.inverse_cell, tree.levels, tree.width.copy()
+        levels, cell = tree.levels, tree.finest_cell
         if levels == MAX_LEVELS - 1:
             return
-        if table[levels, END] - table[levels, BEGIN] > TOO_MANY + len(keys) // 256:
-            frame[LEVELS] = MAX_LEVELS - 1
+        if tree.level_end[levels] - tree.level_begin[levels] > TOO_MANY + count // 256:
+            tree.levels = MAX_LEVELS - 1
             assign()
             continue
-        if before <= CROWDED * (table[0, END] - table[0, BEGIN]) or cell <= 2.0 * frame[SMALL]:
+        if before <= CROWDED * (tree.level_end[0] - tree.level_begin[0]) or cell <= 2.0 * tree.smallest_box:
             return
-        finer = max(_spacing(lower, upper, directory, keys, table), frame[SMALL] * LOOSE, SMALLEST_CELL)
+        finer = max(_spacing(tree), tree.smallest_box * LOOSE, SMALLEST_CELL)
         if finer > 0.5 * cell:
             return
-        frame[FINE], frame[INVERSE] = finer, 1.0 / finer
-        d = lower.shape[1]
+        tree.finest_cell, tree.inverse_cell = finer, 1.0 / finer
         # The directory stays as large as it is, with equal widths: it no longer covers the extent.
-        widest = max(2.0, (CELLS_PER_OBJECT * len(keys)) ** (1 / d) - 1.0)
-        frame[WIDTH : WIDTH + d] = np.minimum(frame[EXTENT : EXTENT + d] / finer, widest)
-        frame[LEVELS] = min(MAX_LEVELS - 1, levels + np.ceil(np.log2(cell) - np.log2(finer)))
+        widest = max(2.0, (CELLS_PER_BOX * count) ** (1 / tree.dimensions) - 1.0)
+        tree.width[0] = np.minimum(tree.extent[0] / finer, widest)
+        tree.levels = min(MAX_LEVELS - 1, int(levels + np.ceil(np.log2(cell) - np.log2(finer))))
         assign()
-        if frame[CROWDING] > IMPROVED * before:  # the objects are in one place: the former cells again
-            frame[:] = former
+        if tree.crowding > IMPROVED * before:  # the boxes are in one place: the former cells again
+            tree.finest_cell, tree.inverse_cell, tree.levels, tree.width[:] = former
             assign()
             return
-        before = frame[CROWDING]
+        before = tree.crowding
 
 
-def _spacing(
-    lower: np.ndarray, upper: np.ndarray, directory: np.ndarray, keys: np.ndarray, table: np.ndarray
-) -> float:
-    """Mean distance of the objects in the fullest cell of level 0: the cell size that would part them; 0 if it is 0."""
-    counts = np.diff(directory[1 : table[0, CELLS] + 2])
+def _spacing(tree: Any) -> float:
+    """Mean distance of the boxes in the fullest cell of level 0: the cell size that would part them; 0 if it is 0."""
+    counts = np.diff(tree.directory[1 : tree.level_cells[0] + 2])
     fullest = int(np.argmax(counts))
-    inside = keys == fullest
-    middle = 0.5 * (lower[inside] + upper[inside])
+    inside = tree.start + np.flatnonzero(tree.keys[: tree.stop - tree.start] == fullest)
+    middle = 0.5 * (tree.lower[inside] + tree.upper[inside])
     widest = float(np.max(np.ptp(middle, axis=0)))
-    return widest / float(counts[fullest]) ** (1.0 / lower.shape[1])
+    return widest / float(counts[fullest]) ** (1.0 / tree.dimensions)

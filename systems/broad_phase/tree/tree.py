@@ -1,29 +1,29 @@
 """The broad phase's spatial tree: which boxes may touch, from a loose quadtree (2D) or octree (3D) without pointers.
 
-How it is laid out stands in :mod:`build`, how pairs are found in :mod:`pairs`. Boxes are closed: boxes that
-share no more than a point overlap. A box with NaN in it, or with a lower corner above its upper one, overlaps nothing;
-an infinite box overlaps all it covers. Same input, same output in the same order.
+How it is laid out stands in :mod:`.build`, how pairs are found in :mod:`.pairs`. Boxes are closed: boxes that share no
+more than a point overlap. A box with nan in it, or with a lower corner above its upper one, overlaps nothing; an
+infinite box overlaps all it covers. Same input, same output in the same order.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import build as tree_build
-from . import pairs as tree_pairs
-from . import queries as tree_queries
+from ....framework.jit.record import Record, make_record
+from ..brute_force import BRUTE_FORCE_MAX
+from ..records import TREE
+from ..stages import CANDIDATE_LIMIT
+from . import build, pairs, queries
+from .passes import tree_passes
 from .refine import refine
 
 Rows: TypeAlias = NDArray[np.int32]
 Corners: TypeAlias = NDArray[np.float64]
 Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
-
-# 8 million candidates: with all that is kept of a pair about 4 gigabytes. A game has 1 to 50 per object.
-CANDIDATE_LIMIT = 1 << 23
 
 
 class CandidateLimitError(RuntimeError):
@@ -44,27 +44,34 @@ class CandidateLimitError(RuntimeError):
 class SpatialTree:
     """A loose quadtree (``dimensions=2``) or octree (3) over the boxes of rows; rebuilt as a whole, buffers reused.
 
+    Up to ``one_cell_max`` boxes it is a single cell: every box is tested. ``record`` is what kernels take.
     ValueError for other dimensions.
     """
 
-    def __init__(self, dimensions: int) -> None:
+    def __init__(self, dimensions: int, one_cell_max: int = BRUTE_FORCE_MAX) -> None:
         if dimensions not in (2, 3):
             raise ValueError(f"dimensions must be 2 or 3, not {dimensions!r}")
         self.dimensions = dimensions
-        self.count = 0  # objects in the tree: rows given to build, less empty and NaN boxes
-        self._like = (0.0,) * dimensions
-        self._table = np.zeros((tree_build.MAX_LEVELS + 2, tree_build.TABLE_COLUMNS), np.int64)
-        self._frame = np.zeros(tree_build.FRAME_SIZE)
-        self._directory = np.zeros(4, np.int32)
-        self._keys = np.empty(0, np.int32)
+        self.record: Record = make_record(TREE, dimensions)
+        self._one_cell_max = one_cell_max
+        self._passes = tree_passes(dimensions)
+        record = self.record
+        record.reserve(1, "origin", "extent", "width", "lowest", "highest")
+        record.reserve(8, "extremes")
+        levels = [name for name in TREE.fields if name.startswith("level_")]
+        record.reserve(build.MAX_LEVELS + 2, *levels)
+        record.level_begin[:], record.level_end[:], record.level_cells[:] = 0, 0, 1
+        record.level_stride[:], record.level_scale[:] = 0, 0.0
+        record.reserve(pairs.CHUNK + pairs.BLOCK, "chunk_owners", "chunk_members")
+        record.reserve(2 * pairs.CHUNK, "first", "second")
+        record.reserve(1024, "found")
+        self._one = np.empty((1, dimensions)), np.empty((1, dimensions)), np.zeros(2, np.int64)
         self._reserve(0)
-        self._ranges = np.empty((0, 3), np.int32)
-        self._first = np.empty(2 * tree_pairs.CHUNK, np.int32)
-        self._second = np.empty(2 * tree_pairs.CHUNK, np.int32)
-        self._chunk_owners = np.empty(tree_pairs.CHUNK + tree_pairs.BLOCK, np.int32)
-        self._chunk_members = np.empty(tree_pairs.CHUNK + tree_pairs.BLOCK, np.int32)
-        self._state = np.zeros(1, np.int64)
-        self._found = np.empty(1024, np.int32)
+
+    @property
+    def count(self) -> int:
+        """Boxes in the tree: rows given to build, without empty and nan boxes."""
+        return self.record.count
 
     def build(self, lower: Corners, upper: Corners, start: int, stop: int) -> None:
         """Put the boxes of rows start..stop-1 into the tree, in place of what it held.
@@ -74,64 +81,40 @@ class SpatialTree:
         """
         if not 0 <= start <= stop <= min(len(lower), len(upper)):
             raise ValueError(f"rows {start}..{stop} are not within the {len(lower)} given")
-        if stop - start > len(self._keys):
-            self._reserve(max(stop - start, len(self._keys) * 3 // 2))
-        table, frame, directory, keys, like = self._table, self._frame, self._directory, self._keys, self._like
-        tree_build.choose_frame(lower, upper, start, stop, frame, like)
-        if not tree_build.assign_cells(lower, upper, start, stop, directory, keys, table, frame, like):
-
-            def assign() -> bool:
-                return tree_build.assign_cells(lower, upper, start, stop, directory, keys, table, frame, like)
-
-            rows = slice(start, stop)
-            refine(assign, lower[rows], upper[rows], directory, keys[: stop - start], table, frame)
-        tree_build.place(
-            lower, upper, start, stop, directory, keys, self._order, self._cells, self._boxes, self._codes, frame, like
-        )
-        self.count = int(table[int(frame[tree_build.LEVELS]), tree_build.END])
-
-    @property
-    def layout(self) -> tuple[NDArray[Any], ...]:
-        """(table, frame, directory, order, boxes) as the kernels take them that walk through the tree."""
-        return self._table, self._frame, self._directory, self._order, self._boxes
+        record, run = self.record, self._passes.run
+        if stop - start > len(record.keys):
+            self._reserve(max(stop - start, len(record.keys) * 3 // 2))
+        if record.lower is not lower or record.upper is not upper:
+            record.lower, record.upper = lower, upper
+        record.start, record.stop = start, stop
+        if stop - start <= self._one_cell_max:
+            run("build_one_cell", record)
+        elif run("build_tree", record) != build.SUITS:
+            refine(record, lambda: run("assign_again", record))
+            run("finish_tree", record)
 
     @property
     def boxes(self) -> Corners:
-        """(count, 2 d): lower and upper corners of the objects, in the tree's order."""
-        return self._boxes[: self.count]
+        """(count, 2 d): lower and upper corners of the boxes, in the tree's order."""
+        return self.record.boxes[: self.count]
 
     @property
     def rows(self) -> Rows:
-        """The objects' rows, in the tree's order."""
-        return self._order[: self.count]
+        """The boxes' rows, in the tree's order."""
+        return self.record.order[: self.count]
 
     def pairs_within(self, limit: int = CANDIDATE_LIMIT) -> tuple[Rows, Rows]:
-        """Rows (first, second) of all pairs of objects whose boxes overlap; each pair once, no order within a pair.
+        """Rows (first, second) of all pairs whose boxes overlap; each pair once, no order within a pair.
 
         The arrays are views that hold until the next call. CandidateLimitError if there are more than ``limit``
         candidates.
         """
         if self.count < 2:
-            return self._first[:0], self._second[:0]
-        wanted = tree_pairs.RANGES_PER_OBJECT * self.count
-        if wanted + tree_pairs.SPARE > len(self._ranges):
+            return self.record.first[:0], self.record.second[:0]
+        wanted = pairs.RANGES_PER_BOX * self.count
+        if wanted + pairs.SPARE > len(self.record.ranges):
             self._grow_ranges(wanted)
-        stop, candidates, levels = tree_pairs.ranges_within_levels(
-            self._table, self._frame, self._directory, self._cells, self._ranges, self._like
-        )
-        if levels > 1:
-            before = stop
-            while True:
-                _, stop, more = self._ranges_between(self, before, True)
-                if stop >= 0:
-                    break
-                self._grow_ranges(wanted, keep=before)
-            candidates += more
-        if candidates > limit:
-            raise CandidateLimitError(candidates, limit)
-        self._state[0] = 0
-        self._test(0, stop, self, self, self._codes)
-        return self._first[: self._state[0]], self._second[: self._state[0]]
+        return self._pairs("within", self, limit, wanted)
 
     def pairs_between(self, other: SpatialTree, limit: int = CANDIDATE_LIMIT) -> tuple[Rows, Rows]:
         """Rows (of self, of other) of all overlapping pairs between two trees; cheap if either is small.
@@ -141,23 +124,18 @@ class SpatialTree:
         if self.dimensions != other.dimensions:
             raise ValueError(f"trees of {self.dimensions} and {other.dimensions} dimensions")
         if self.count == 0 or other.count == 0:
-            return self._first[:0], self._second[:0]
-        while True:
-            middle, stop, candidates = self._ranges_between(other, 0, False)
-            if stop >= 0:
-                break
-            self._grow_ranges(4 * min(self.count, other.count))
-        if candidates > limit:
-            raise CandidateLimitError(candidates, limit)
-        self._state[0] = 0
-        if middle > 0:
-            self._test(0, middle, self, other, self._no_codes)
-        # The second kind of range is owned by objects of the other tree: columns change places.
-        if stop > middle:
-            self._first, self._second = self._second, self._first
-            self._test(middle, stop, other, self, other._no_codes)
-            self._first, self._second = self._second, self._first
-        return self._first[: self._state[0]], self._second[: self._state[0]]
+            return self.record.first[:0], self.record.second[:0]
+        return self._pairs("between", other, limit, 4 * min(self.count, other.count))
+
+    def _pairs(self, kind: str, other: SpatialTree, limit: int, ranges: int) -> tuple[Rows, Rows]:
+        record, run = self.record, self._passes.run
+        while run(f"find_ranges_{kind}", record, other.record) != pairs.DONE:
+            self._grow_ranges(ranges)
+        if record.candidates > limit:
+            raise CandidateLimitError(record.candidates, limit)
+        while run(f"test_{kind}", record, other.record) != pairs.DONE:
+            record.reserve(2 * len(record.first), "first", "second", keep=record.pair_count)
+        return record.first[: record.pair_count], record.second[: record.pair_count]
 
     def query(self, query_lower: Corners, query_upper: Corners) -> tuple[NDArray[np.int64], Rows]:
         """Overlaps of m boxes, (m, d) arrays: box i overlaps rows[offsets[i]:offsets[i + 1]], ascending.
@@ -167,81 +145,38 @@ class SpatialTree:
         query_lower = np.ascontiguousarray(query_lower, np.float64)
         query_upper = np.ascontiguousarray(query_upper, np.float64)
         if not query_lower.shape == query_upper.shape == (len(query_lower), self.dimensions):
-            raise ValueError(
-                f"boxes must be (m, {self.dimensions}), not {query_lower.shape} and {query_upper.shape}"
-            )
+            raise ValueError(f"boxes must be (m, {self.dimensions}), not {query_lower.shape} and {query_upper.shape}")
         offsets = np.zeros(len(query_lower) + 1, np.int64)
-        done = 0
-        while True:
-            done = tree_queries.query_boxes(
-                query_lower, query_upper, self._table, self._frame, self._directory, self._order, self._boxes,
-                self._found, offsets, done, self._like,
-            )  # fmt: skip
-            if done == len(query_lower):
-                break
-            self._grow_found(int(offsets[done]))
-        for i in np.flatnonzero(np.diff(offsets) > tree_queries.SORTED_HERE):
-            self._found[offsets[i] : offsets[i + 1]].sort()
-        return offsets, self._found[: offsets[-1]]
+        return offsets, self._answer(query_lower, query_upper, offsets)
 
     def query_one(self, lower: Vector, upper: Vector) -> Rows:
         """Rows whose box overlaps the one from ``lower`` to ``upper`` (d numbers each), ascending.
 
         A view that holds until the next query. This is the quick way for a single box.
         """
-        low, high = tuple(map(float, lower)), tuple(map(float, upper))
-        if not len(low) == len(high) == self.dimensions:
-            raise ValueError(f"corners must have {self.dimensions} numbers, not {len(low)} and {len(high)}")
-        while True:
-            found = tree_queries.query_box(
-                low, high, self._table, self._frame, self._directory, self._order, self._boxes, self._found, 0
-            )
-            if found >= 0:
-                break
-            self._grow_found(0)
-        rows = self._found[:found]
-        if found > tree_queries.SORTED_HERE:
-            rows.sort()
-        return rows
+        if not len(lower) == len(upper) == self.dimensions:
+            raise ValueError(f"corners must have {self.dimensions} numbers, not {len(lower)} and {len(upper)}")
+        self._one[0][0], self._one[1][0] = lower, upper
+        return self._answer(*self._one)
 
-    def _ranges_between(self, other: SpatialTree, found: int, within: bool) -> tuple[int, int, int]:
-        """See :func:`pairs.ranges_between`."""
-        return tree_pairs.ranges_between(
-            self._table, self._frame, self._directory, self._boxes,
-            other._table, other._frame, other._directory, other._boxes, self._ranges, found, within, self._like,
-        )  # fmt: skip
-
-    def _test(
-        self, position: int, stop: int, owners: SpatialTree, members: SpatialTree, codes: NDArray[np.int64]
-    ) -> None:
-        """Pass 2 over ranges position..stop-1, with a larger output whenever it is full."""
-        while True:
-            position = tree_pairs.overlapping(
-                self._ranges, position, stop, owners._boxes, owners._order, codes,
-                members._boxes, members._order, members._codes, self._chunk_owners, self._chunk_members,
-                self._first, self._second, self._state, self._like,
-            )  # fmt: skip
-            if position >= stop:
-                return
-            self._first = np.concatenate((self._first, np.empty_like(self._first)))
-            self._second = np.concatenate((self._second, np.empty_like(self._second)))
+    def _answer(self, lower: Corners, upper: Corners, offsets: NDArray[np.int64]) -> Rows:
+        record, run = self.record, self._passes.run
+        if record.offsets is not offsets:
+            record.query_lower, record.query_upper, record.offsets = lower, upper, offsets
+        record.query_done, record.query_count = 0, len(offsets) - 1
+        while run("query_boxes", record) != queries.ANSWERED:
+            record.reserve(2 * len(record.found), "found", keep=int(offsets[record.query_done]))
+        found = record.found[: offsets[-1]]
+        if len(found) > queries.SORTED_HERE:  # longer lists are not sorted yet
+            for i in np.flatnonzero(np.diff(offsets) > queries.SORTED_HERE):
+                found[offsets[i] : offsets[i + 1]].sort()
+        return found
 
     def _reserve(self, capacity: int) -> None:
-        d = self.dimensions
-        self._directory = np.zeros(tree_build.directory_size(capacity), np.int32)
-        self._keys = np.empty(capacity, np.int32)
-        self._order = np.empty(capacity, np.int32)
-        self._cells = np.empty(capacity, np.int32)
-        self._boxes = np.empty((capacity, 2 * d))
-        self._codes = np.zeros(capacity + tree_pairs.BLOCK, np.int64)  # read past the end, never used
-        self._no_codes = np.zeros(capacity, np.int64)  # of use between trees, whose frames differ
+        record = self.record
+        record.directory = np.zeros(build.directory_size(capacity), np.int32)
+        record.reserve(capacity, "keys", "order", "cells", "boxes")
+        record.codes = np.zeros(capacity + pairs.BLOCK, np.int64)  # read past the end, never used
 
-    def _grow_ranges(self, wanted: int, keep: int = 0) -> None:
-        larger = np.empty((max(wanted, 2 * len(self._ranges)) + 2 * tree_pairs.SPARE, 3), np.int32)
-        larger[:keep] = self._ranges[:keep]
-        self._ranges = larger
-
-    def _grow_found(self, used: int) -> None:
-        larger = np.empty(2 * len(self._found), np.int32)
-        larger[:used] = self._found[:used]
-        self._found = larger
+    def _grow_ranges(self, wanted: int) -> None:
+        self.record.reserve(max(wanted, 2 * len(self.record.ranges)) + 2 * pairs.SPARE, "ranges")

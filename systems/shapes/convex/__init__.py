@@ -1,4 +1,7 @@
-"""Contacts of convex shapes that have only a support function: GJK for the distance, EPA (2D, 3D) for the overlap.
+"""The pair of any two convex shapes, known by their farthest points in a direction (supports) and their roundings.
 
-Reads two support functions and a displacement. Returns normal, depth and points as any other pair function does.
+gjk walks to the point of their Minkowski difference nearest to the origin: the distance of shapes that are apart.
+epa2d and epa3d find how deep the origin lies inside it: the overlap. pair puts both together, for functions of plugins
+that have the supports at hand, and by address for the tables of a scene: then it is compiled once per dimension, and a
+new convex shape costs its ``support`` and ``rounding`` alone.
 """

@@ -1,4 +1,4 @@
-"""How deep the origin lies in the difference of two shapes in 2D: a polygon grows inside it, nearest edge first."""
+"""Expanding polytope algorithm in 2D: depth of the origin in the difference, by a polygon that grows inside it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import dot, negative, row, store
-from .gjk import ROUNDING, corner, edge, norm, polished, support_points
+from .gjk import ROUNDING, corner, edge, norm, refine_direction, support_points
 
 CORNERS = 64
 
 
 @inlined
-def measure_edge(of_a, of_b, following, normals, heights, i, d):
+def store_edge(of_a, of_b, following, normals, heights, i, d):
     """Note the outward normal of the edge from corner i on, and how far from the origin it is; no edge: infinity."""
     along = edge(of_a, of_b, i, following[i], d)
     size = norm(along)
@@ -30,7 +30,7 @@ def polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
 
     The edge nearest to the origin is a lower bound, how far the difference reaches in the direction of any edge an
     upper one; each new corner splits the nearest edge. They meet for polygons; for smooth shapes the answer is the best
-    upper bound, polished if there are more corners to find than there is room for.
+    upper bound, refined if there are more corners to find than there is room for.
     """
     following, heights = stack_array(CORNERS, 0), stack_array(CORNERS, 0.0)
     normals = stack_array(CORNERS, (0.0, 0.0))
@@ -39,7 +39,7 @@ def polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
     for i in range(3):
         following[i] = (i + 1 + turned) % 3
     for i in range(3):
-        measure_edge(of_a, of_b, following, normals, heights, i, d)
+        store_edge(of_a, of_b, following, normals, heights, i, d)
     count, best, depth = 3, d, math.inf
     for _ in range(2 * CORNERS):
         i = 0
@@ -50,7 +50,7 @@ def polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
             break
         outward = row(normals, i, d)
         if count == CORNERS:
-            best, depth = polished(a, b, d, support_a, support_b, unit, best, depth, size)
+            best, depth = refine_direction(a, b, d, support_a, support_b, unit, best, depth, size)
             break
         point_a, point_b = support_points(a, b, support_a, support_b, unit, negative(outward))
         store(of_a, count, point_a)
@@ -65,7 +65,7 @@ def polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
             heights[i] = math.inf  # as far out as it goes; what is left is rounding
             continue
         following[count], following[i] = following[i], count
-        measure_edge(of_a, of_b, following, normals, heights, i, d)
-        measure_edge(of_a, of_b, following, normals, heights, count, d)
+        store_edge(of_a, of_b, following, normals, heights, i, d)
+        store_edge(of_a, of_b, following, normals, heights, count, d)
         count += 1
     return negative(best), depth

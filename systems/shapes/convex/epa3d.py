@@ -1,4 +1,4 @@
-"""How deep the origin lies in the difference of two shapes in 3D: a polytope grows inside it, nearest face first."""
+"""Expanding polytope algorithm in 3D: depth of the origin in the difference, by a polytope that grows inside it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from ....framework.compilation import inlined, part
 from ....framework.jit.stack_arrays import stack_array
 from ....framework.vectors import add_scaled, divided, dot, negative, row, scale, store
-from .gjk import ROUNDING, corner, cross, edge, face_normal, norm, polished, support_points
+from .gjk import ROUNDING, corner, cross, edge, face_normal, norm, refine_direction, support_points
 
 CORNERS = 64
 FACES = 128  # a closed surface of triangles has twice as many faces as corners, less 4
@@ -15,7 +15,7 @@ EDGES = 192
 
 
 @inlined
-def measure_face(of_a, of_b, faces, normals, heights, waiting, f, d):
+def store_face(of_a, of_b, faces, normals, heights, waiting, f, d):
     """Note the outward normal of face f and its distance from the origin; ``waiting`` is infinite if it has no area."""
     i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
     normal = face_normal(of_a, of_b, i, j, k, d)
@@ -31,15 +31,15 @@ def measure_face(of_a, of_b, faces, normals, heights, waiting, f, d):
 
 
 @inlined
-def open_up(faces, normals, heights, waiting, count, edges, top, seen_from, slack, like):
-    """Take away the faces that the corner sees: (faces left, edges of the hole), -1 edges if there are too many.
+def remove_visible_faces(faces, normals, heights, waiting, count, edges, top, seen_from, slack, d):
+    """Remove the faces visible from the new corner: (faces left, edges of the hole), -1 edges if there are too many.
 
     An edge whose reverse is taken away as well is inside the hole. So the surface stays closed whatever rounding lets
     the corner see.
     """
     rim, f = 0, 0
     while f < count:
-        if not (f == top or dot(row(normals, f, like), seen_from) - heights[f] > slack):
+        if not (f == top or dot(row(normals, f, d), seen_from) - heights[f] > slack):
             f += 1
             continue
         for k in range(3):
@@ -59,13 +59,13 @@ def open_up(faces, normals, heights, waiting, count, edges, top, seen_from, slac
         top = f if top == count else (-1 if top == f else top)
         for k in range(3):
             faces[f, k] = faces[count, k]
-        store(normals, f, row(normals, count, like))
+        store(normals, f, row(normals, count, d))
         heights[f], waiting[f] = heights[count], waiting[count]
     return count, rim
 
 
 @inlined
-def point_behind(of_a, of_b, faces, heights, count, outward, depth, d):
+def witness_point(of_a, of_b, faces, heights, count, outward, depth, d):
     """The point of a that belongs to the point of the surface above the origin.
 
     Of the faces in question, several if they lie in one plane, the one that has it farthest from its rim.
@@ -76,18 +76,18 @@ def point_behind(of_a, of_b, faces, heights, count, outward, depth, d):
             continue
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
         one, two, three = corner(of_a, of_b, i, d), corner(of_a, of_b, j, d), corner(of_a, of_b, k, d)
-        share_i = dot(outward, cross(two, three))
-        share_j = dot(outward, cross(three, one))
-        share_k = dot(outward, cross(one, two))
-        total = share_i + share_j + share_k
-        least = min(share_i, min(share_j, share_k)) / total
+        weight_i = dot(outward, cross(two, three))
+        weight_j = dot(outward, cross(three, one))
+        weight_k = dot(outward, cross(one, two))
+        total = weight_i + weight_j + weight_k
+        least = min(weight_i, min(weight_j, weight_k)) / total
         if total > 0.0 and least > inside:
             inside = least
-            share_i, share_j, share_k = max(share_i, 0.0), max(share_j, 0.0), max(share_k, 0.0)
-            witness = scale(row(of_a, i, d), share_i)
-            witness = add_scaled(witness, row(of_a, j, d), share_j)
-            witness = add_scaled(witness, row(of_a, k, d), share_k)
-            witness = divided(witness, share_i + share_j + share_k)
+            weight_i, weight_j, weight_k = max(weight_i, 0.0), max(weight_j, 0.0), max(weight_k, 0.0)
+            witness = scale(row(of_a, i, d), weight_i)
+            witness = add_scaled(witness, row(of_a, j, d), weight_j)
+            witness = add_scaled(witness, row(of_a, k, d), weight_k)
+            witness = divided(witness, weight_i + weight_j + weight_k)
     return witness
 
 
@@ -96,7 +96,7 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
     """(normal from a to b, depth, point of a) for a tetrahedron in the difference that holds the origin.
 
     The face nearest to the origin is a lower bound, how far the difference reaches in the direction of any face an
-    upper one. They meet for polytopes; for smooth shapes the answer is the best upper bound, polished if
+    upper one. They meet for polytopes; for smooth shapes the answer is the best upper bound, refined if
     there are more corners to find than there is room for.
     """
     faces, edges = stack_array(FACES, (0, 0, 0)), stack_array(EDGES, (0, 0))
@@ -110,7 +110,7 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
     used, count, rim, best, depth = 4, 0, 4, d, math.inf
     for _ in range(4 * CORNERS):
         for f in range(count, count + rim):  # the new ones
-            measure_face(of_a, of_b, faces, normals, heights, waiting, f, d)
+            store_face(of_a, of_b, faces, normals, heights, waiting, f, d)
         count, rim = count + rim, 0
         top = 0
         for f in range(1, count):
@@ -120,7 +120,7 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
             break
         outward = row(normals, top, d)
         if used == CORNERS:
-            best, depth = polished(a, b, d, support_a, support_b, unit, best, depth, size)
+            best, depth = refine_direction(a, b, d, support_a, support_b, unit, best, depth, size)
             break
         point_a, point_b = support_points(a, b, support_a, support_b, unit, negative(outward))
         store(of_a, used, point_a)
@@ -139,11 +139,13 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
         if known < used or reach - heights[top] <= ROUNDING * size:
             waiting[top] = math.inf  # as far out as it goes; what is left is rounding
             continue
-        count, rim = open_up(faces, normals, heights, waiting, count, edges, top, found, ROUNDING * size, d)
+        count, rim = remove_visible_faces(
+            faces, normals, heights, waiting, count, edges, top, found, ROUNDING * size, d
+        )
         if rim < 0 or count + rim > FACES:
             break
         for e in range(rim):
             faces[count + e, 0], faces[count + e, 1], faces[count + e, 2] = edges[e, 0], edges[e, 1], used
         used += 1
-    witness = point_behind(of_a, of_b, faces, heights, count, best, depth + ROUNDING * size, d)
+    witness = witness_point(of_a, of_b, faces, heights, count, best, depth + ROUNDING * size, d)
     return negative(best), depth, witness

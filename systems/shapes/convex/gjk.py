@@ -1,8 +1,8 @@
 """The Minkowski difference of two shapes, and the simplex in it that comes nearest to the origin.
 
-The difference of a and b is the set of all vectors from a point of a to a point of b. The shapes touch where it holds
-the origin; its distance from the origin is that of the shapes, and how deep the origin lies in it is how far they
-overlap. It is never built: what is known of it is the farthest point in a direction, from the two shapes' supports.
+The difference of a and b is the set of all vectors from a point of a to a point of b. The shapes touch if it contains
+the origin; its distance from the origin is that of the shapes, and the depth of the origin in it is their overlap. It
+is never built: the supports of the two shapes give its farthest point in a direction.
 
 A simplex has ``count`` corners, the newest first. Stored are the points of a and of b that they lead from and to, each
 relative to its own centre, in the rows of ``of_a`` and ``of_b``: so an edge that comes from one shape alone is as exact
@@ -20,9 +20,9 @@ from ....framework.vectors import add, add_scaled, divided, dot, item, negative,
 ROUNDING = 2e-15  # of the coordinates: a few times what one support point may be off
 FLAT = 1e-14  # of the coordinates: a difference thinner than that has no inside, a distance below it no direction
 SMALL, LARGE = 1e-50, 1e50  # coordinates in between can be squared twice
-LOOKS = 64  # boxes take 3 to 8, ellipsoids 15 to 40
-POLISHES = 24  # ellipsoids take 6 to 12
-STALLS = 4  # steps that bring less than the rounding of the coordinates, as from one end of a long edge to another
+MAX_STEPS = 64  # boxes take 3 to 8, ellipsoids 15 to 40
+REFINEMENTS = 24  # ellipsoids take 6 to 12
+MAX_STALLS = 4  # steps that bring less than the rounding of the coordinates, as from one end of a long edge to another
 
 
 @part
@@ -44,9 +44,9 @@ def corner(of_a, of_b, i, d):
 
 
 @inlined
-def edge(of_a, of_b, i, k, like):
-    """The way from corner i to corner k."""
-    return sub(sub(row(of_b, k, like), row(of_b, i, like)), sub(row(of_a, k, like), row(of_a, i, like)))
+def edge(of_a, of_b, i, k, d):
+    """The vector from corner i to corner k."""
+    return sub(sub(row(of_b, k, d), row(of_b, i, d)), sub(row(of_a, k, d), row(of_a, i, d)))
 
 
 @inlined
@@ -77,10 +77,10 @@ def face_normal(of_a, of_b, i, j, k, d):
 
 
 @inlined
-def nearest_on_span(of_a, of_b, count, shares, d):
-    """The point nearest to the origin on the line, plane or space through the corners, and their shares in it.
+def nearest_on_span(of_a, of_b, count, weights, d):
+    """The point nearest to the origin on the line, plane or space through the corners, and their weights in it.
 
-    All is reckoned from the corner nearest to the origin, so that the shares of distant corners, which may be tiny, are
+    All is relative to the corner nearest to the origin, so that the weights of distant corners, which may be tiny, are
     exact. On a face (count = d) the point is taken from the face's normal: its direction is good however near it is.
     """
     home, least = 0, math.inf
@@ -89,33 +89,33 @@ def nearest_on_span(of_a, of_b, count, shares, d):
         if dot(way, way) < least:
             home, least = i, dot(way, way)
     base = corner(of_a, of_b, home, d)
-    shares[home] = 1.0
+    weights[home] = 1.0
     if count == 1:
         return base
     i = home + 1 if home + 1 < count else 0
     first = edge(of_a, of_b, home, i, d)
     if count == 2:
-        shares[i] = -dot(base, first) / dot(first, first)
-        shares[home] = 1.0 - shares[i]
+        weights[i] = -dot(base, first) / dot(first, first)
+        weights[home] = 1.0 - weights[i]
         if len(d) == 2:
             normal = (-first[1], first[0])
             return scale(normal, dot(normal, base) / dot(first, first))
-        result = add_scaled(base, first, shares[i])
+        result = add_scaled(base, first, weights[i])
         return add_scaled(result, first, -dot(result, first) / dot(first, first))  # once more: it may be short
     j = i + 1 if i + 1 < count else 0
     second = edge(of_a, of_b, home, j, d)
     if len(d) == 2:
         area = first[0] * second[1] - first[1] * second[0]
-        shares[i] = (base[1] * second[0] - base[0] * second[1]) / area
-        shares[j] = (base[0] * first[1] - base[1] * first[0]) / area
-        shares[home] = 1.0 - shares[i] - shares[j]
+        weights[i] = (base[1] * second[0] - base[0] * second[1]) / area
+        weights[j] = (base[0] * first[1] - base[1] * first[0]) / area
+        weights[home] = 1.0 - weights[i] - weights[j]
         return scale(d, 0.0)
     normal = face_normal(of_a, of_b, home, i, j, d)
     if count == 3:
         square = dot(normal, normal)
-        shares[i] = dot(normal, cross(second, base)) / square
-        shares[j] = dot(normal, cross(base, first)) / square
-        shares[home] = 1.0 - shares[i] - shares[j]
+        weights[i] = dot(normal, cross(second, base)) / square
+        weights[j] = dot(normal, cross(base, first)) / square
+        weights[home] = 1.0 - weights[i] - weights[j]
         return scale(normal, dot(normal, base) / square)
     k = j + 1 if j + 1 < count else 0
     third = edge(of_a, of_b, home, k, d)
@@ -126,43 +126,43 @@ def nearest_on_span(of_a, of_b, count, shares, d):
         volume, doubt = dot(across_j, second), other
     if dot(normal, normal) * dot(third, third) < doubt:
         volume = dot(normal, third)
-    shares[i] = -dot(base, across_i) / volume
-    shares[j] = -dot(base, across_j) / volume
-    shares[k] = -dot(base, normal) / volume
-    shares[home] = 1.0 - shares[i] - shares[j] - shares[k]
+    weights[i] = -dot(base, across_i) / volume
+    weights[j] = -dot(base, across_j) / volume
+    weights[k] = -dot(base, normal) / volume
+    weights[home] = 1.0 - weights[i] - weights[j] - weights[k]
     return scale(d, 0.0)
 
 
 @inlined
-def reduced(of_a, of_b, shares, wanted, count, d):
-    """Keep the corners that carry the point nearest to the origin: (count, that point); ``shares`` are its weights.
+def reduce_simplex(of_a, of_b, weights, target, count, d):
+    """Keep the corners of the feature nearest to the origin: (count, that point); ``weights`` are its weights.
 
-    Wolfe's way: from the present point, go towards the nearest point of the span; where that leaves the simplex, stop
-    and leave out the corner opposite. It ends after as many turns as there are corners, whatever rounding does.
+    Wolfe's algorithm: move from the present point to the nearest point of the span; where that leaves the simplex, stop
+    and drop the opposite corner. It ends after at most as many rounds as there are corners, whatever rounding does.
     """
     while True:
-        nearest = nearest_on_span(of_a, of_b, count, wanted, d)
-        leaves, way = -1, 2.0
+        nearest = nearest_on_span(of_a, of_b, count, target, d)
+        leaving, way = -1, 2.0
         for i in range(count):
-            if not wanted[i] > 0.0:  # nor is a share that is no number, from a simplex without volume
-                until = shares[i] / (shares[i] - wanted[i]) if wanted[i] < shares[i] else 0.0
+            if not target[i] > 0.0:  # nor is a share that is no number, from a simplex without volume
+                until = weights[i] / (weights[i] - target[i]) if target[i] < weights[i] else 0.0
                 if until <= way:
-                    leaves, way = i, until
-        if leaves < 0:
+                    leaving, way = i, until
+        if leaving < 0:
             for i in range(count):
-                shares[i] = wanted[i]
+                weights[i] = target[i]
             return count, nearest
         if way > 0.0:
             for i in range(count):
-                shares[i] += way * (wanted[i] - shares[i])
+                weights[i] += way * (target[i] - weights[i])
         count -= 1
-        store(of_a, leaves, row(of_a, count, d))
-        store(of_b, leaves, row(of_b, count, d))
-        shares[leaves] = shares[count]
+        store(of_a, leaving, row(of_a, count, d))
+        store(of_b, leaving, row(of_b, count, d))
+        weights[leaving] = weights[count]
 
 
 @part
-def approach(a, b, d, support_a, support_b, unit, of_a, of_b):
+def closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b):
     """Walk through the difference towards the origin, from simplex to simplex (Gilbert, Johnson and Keerthi).
 
     Returns (count, nearest, witness, size). count 0: the origin is outside, ``nearest`` is the point of the difference
@@ -170,13 +170,13 @@ def approach(a, b, d, support_a, support_b, unit, of_a, of_b):
     witness: the point of a. size: of the coordinates, which rounding errors go with. count -1: they may be too large or
     too small for ``unit`` 1.
     """
-    shares, wanted = stack_array(4, 0.0), stack_array(4, 0.0)
+    weights, target = stack_array(4, 0.0), stack_array(4, 0.0)
     direction = d
     if dot(d, d) == 0.0:
         direction = replace(d, 0, 1.0)
     nearest, witness = direction, d
     square, size_square, count, stalls = math.inf, dot(d, d), 0, 0
-    for _ in range(LOOKS):
+    for _ in range(MAX_STEPS):
         point_a, point_b = support_points(a, b, support_a, support_b, unit, direction)
         size_square = max(size_square, max(dot(point_a, point_a), dot(point_b, point_b)))
         if count == 0:
@@ -189,56 +189,56 @@ def approach(a, b, d, support_a, support_b, unit, of_a, of_b):
                 break
             store(of_a, count, row(of_a, 0, d))
             store(of_b, count, row(of_b, 0, d))
-            shares[count] = shares[0]
+            weights[count] = weights[0]
         store(of_a, 0, point_a)
         store(of_b, 0, point_b)
-        shares[0] = 0.0 if count > 0 else 1.0
-        count, direction = reduced(of_a, of_b, shares, wanted, count + 1, d)
+        weights[0] = 0.0 if count > 0 else 1.0
+        count, direction = reduce_simplex(of_a, of_b, weights, target, count + 1, d)
         now = dot(direction, direction)
         if not now < square:
             stalls += 1
-            if stalls > STALLS or not math.sqrt(now) <= math.sqrt(square) + ROUNDING * math.sqrt(size_square):
+            if stalls > MAX_STALLS or not math.sqrt(now) <= math.sqrt(square) + ROUNDING * math.sqrt(size_square):
                 break
         square, nearest = now, direction
-        witness = scale(row(of_a, 0, d), shares[0])
+        witness = scale(row(of_a, 0, d), weights[0])
         for i in range(1, count):
-            witness = add_scaled(witness, row(of_a, i, d), shares[i])
+            witness = add_scaled(witness, row(of_a, i, d), weights[i])
         if square <= FLAT * FLAT * size_square:
             return count, nearest, witness, math.sqrt(size_square)
     return 0, nearest, witness, math.sqrt(size_square)
 
 
 @inlined
-def across(of_a, of_b, count, like):
+def perpendicular_to(of_a, of_b, count, d):
     """A unit vector at right angles to a simplex of 1 to d corners."""
-    axis = replace(scale(like, 0.0), 0, 1.0)
+    axis = replace(scale(d, 0.0), 0, 1.0)
     result = axis
     if count > 1:
-        first = edge(of_a, of_b, 0, 1, like)
-        if len(like) == 2:
+        first = edge(of_a, of_b, 0, 1, d)
+        if len(d) == 2:
             result = (-first[1], first[0])
         elif count == 2:
             least = 0
-            for k in range(len(like)):
+            for k in range(len(d)):
                 if abs(item(first, k)) < abs(item(first, least)):
                     least = k
-            result = cross(first, replace(scale(like, 0.0), least, 1.0))
+            result = cross(first, replace(scale(d, 0.0), least, 1.0))
         else:
-            result = face_normal(of_a, of_b, 0, 1, 2, like)
+            result = face_normal(of_a, of_b, 0, 1, 2, d)
         size = norm(result)
         result = divided(result, size) if size > 0.0 else axis
     return result
 
 
 @part
-def completed(a, b, d, support_a, support_b, unit, of_a, of_b, count, size):
+def complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, size):
     """Add corners to a simplex that holds the origin until it has a volume: (count, normal, height).
 
     count 0: the difference is flat, and the origin in it; ``normal`` is across it and leads out over ``height``.
     """
     normal, height = d, 0.0
     while count <= len(d):
-        ahead = across(of_a, of_b, count, d)
+        ahead = perpendicular_to(of_a, of_b, count, d)
         if dot(ahead, d) < 0.0:
             ahead = negative(ahead)
         base = corner(of_a, of_b, 0, d)
@@ -261,15 +261,15 @@ def completed(a, b, d, support_a, support_b, unit, of_a, of_b, count, size):
 
 
 @part
-def polished(a, b, d, support_a, support_b, unit, outward, depth, size):
-    """(outward, depth) lowered as far as a smooth shape lets it be, from a direction that is nearly the best.
+def refine_direction(a, b, d, support_a, support_b, unit, outward, depth, size):
+    """(outward, depth) at a local minimum of the depth, from a direction near it; for smooth shapes.
 
-    The direction turns down the slope of the depth, each step as long as the last two slopes make it (Barzilai and
-    Borwein). The best of all that it passes is kept, so corners and edges do no harm.
+    Gradient descent with the step length of Barzilai and Borwein. The best direction of all rounds is returned, so that
+    corners and edges, where the depth has no gradient, do no harm.
     """
     best, least = outward, depth
     before, slope_before, step = outward, outward, 1.0 / size
-    for turn in range(POLISHES):
+    for turn in range(REFINEMENTS):
         point_a, point_b = support_points(a, b, support_a, support_b, unit, negative(outward))
         found = corner_of(point_a, point_b, d)
         reach = dot(outward, found)

@@ -1,4 +1,4 @@
-"""How two convex shapes meet, whatever they are: all that is known of each is its farthest point in any direction.
+"""The contact of two convex shapes of any kind, from their supports: the farthest point in a direction.
 
 A shape is all that lies within its rounding of its core: a sphere is a rounded point, a capsule a rounded segment, a
 box a core without rounding. Distances are taken between the cores; the roundings are added at the end, exactly.
@@ -15,14 +15,14 @@ from .epa2d import CORNERS as POLYGON_CORNERS
 from .epa2d import polygon_depth
 from .epa3d import CORNERS as POLYTOPE_CORNERS
 from .epa3d import polytope_depth
-from .gjk import LARGE, SMALL, approach, completed, support_points
+from .gjk import LARGE, SMALL, closest_simplex, complete_simplex, support_points
 
 TILT = 1e-6  # radians; edges so close to parallel touch along their length, not at a corner
 SMALLEST_UNIT, LARGEST_UNIT = 1e-300, 1e300
 
 
 @part
-def better_unit(a, b, d, support_a, support_b):
+def suitable_unit(a, b, d, support_a, support_b):
     """The unit in which the largest of all coordinates is about 1; 2 if they are neither large nor small."""
     extent = length(d)
     for side in range(2 * len(d)):
@@ -35,10 +35,10 @@ def better_unit(a, b, d, support_a, support_b):
 
 
 @part
-def shared_middle(a, b, d, support_a, support_b, unit, normal):
-    """2D: the point of a's surface, across the normal, in the middle of what a and b share along it.
+def middle_of_overlap(a, b, d, support_a, support_b, unit, normal):
+    """2D: the point of a's surface in the middle of what a and b share at right angles to the normal.
 
-    A look a little to either side of the normal finds both ends of an edge that lies across it.
+    Supports a little to either side of the normal give both ends of an edge at right angles to it.
     """
     along = (-normal[1], normal[0])
     level, low, high = -math.inf, -math.inf, math.inf
@@ -55,36 +55,36 @@ def shared_middle(a, b, d, support_a, support_b, unit, normal):
 
 
 @part
-def meeting_2d(a, b, d, support_a, support_b, unit):
+def core_contact_2d(a, b, d, support_a, support_b, unit):
     """(fits, depth, normal, point of a's core): how two cores meet in 2D, d and the results in units of 1 / unit.
 
     Not ``fits``: coordinates may be too large or small for the unit, which was 1.
     """
     of_a, of_b = stack_array(POLYGON_CORNERS, (0.0, 0.0)), stack_array(POLYGON_CORNERS, (0.0, 0.0))
-    count, nearest, witness, size = approach(a, b, d, support_a, support_b, unit, of_a, of_b)
+    count, nearest, witness, size = closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b)
     if count < 0:
         return False, 0.0, nearest, witness
     if count == 0:
         distance = length(nearest)
         normal, depth = divided(nearest, distance), -distance
     else:
-        count, normal, depth = completed(a, b, d, support_a, support_b, unit, of_a, of_b, count, size)
+        count, normal, depth = complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, size)
         if count > 0:
             normal, depth = polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size)
-    return True, depth, normal, shared_middle(a, b, d, support_a, support_b, unit, normal)
+    return True, depth, normal, middle_of_overlap(a, b, d, support_a, support_b, unit, normal)
 
 
 @part
-def meeting_3d(a, b, d, support_a, support_b, unit):
+def core_contact_3d(a, b, d, support_a, support_b, unit):
     """The same in 3D."""
     of_a, of_b = stack_array(POLYTOPE_CORNERS, (0.0, 0.0, 0.0)), stack_array(POLYTOPE_CORNERS, (0.0, 0.0, 0.0))
-    count, nearest, witness, size = approach(a, b, d, support_a, support_b, unit, of_a, of_b)
+    count, nearest, witness, size = closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b)
     if count < 0:
         return False, 0.0, nearest, witness
     if count == 0:
         distance = length(nearest)
         return True, -distance, divided(nearest, distance), witness
-    count, normal, depth = completed(a, b, d, support_a, support_b, unit, of_a, of_b, count, size)
+    count, normal, depth = complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, size)
     if count > 0:
         normal, depth, witness = polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size)
     return True, depth, normal, witness
@@ -105,12 +105,12 @@ def convex_convex(a, b, d, support_a, support_b, rounding_a, rounding_b):
     unit = 1.0
     while True:
         if len(d) == 2:
-            fits, depth, normal, point = meeting_2d(a, b, scale(d, unit), support_a, support_b, unit)
+            fits, depth, normal, point = core_contact_2d(a, b, scale(d, unit), support_a, support_b, unit)
         else:
-            fits, depth, normal, point = meeting_3d(a, b, scale(d, unit), support_a, support_b, unit)
+            fits, depth, normal, point = core_contact_3d(a, b, scale(d, unit), support_a, support_b, unit)
         if fits:
             break
-        unit = better_unit(a, b, d, support_a, support_b)
+        unit = suitable_unit(a, b, d, support_a, support_b)
     radius = rounding_a(a)
     depth = radius + rounding_b(b) + depth / unit
     point = add_scaled(divided(point, unit), normal, radius - 0.5 * depth)

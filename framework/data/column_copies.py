@@ -1,0 +1,88 @@
+"""Copies of all columns of a table, made in one call: for a step in which code of the game may write any of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.extending import intrinsic
+
+from ..compilation import kernel
+from ..jit.record import make_record
+from ..jit.record_type import record_at, record_type
+from ..jit.schema import Schema, ints
+
+if TYPE_CHECKING:
+    from .table import Table
+
+BLOCKS = Schema("Blocks", sources=ints(), targets=ints(), sizes=ints())  # addresses, bytes
+
+_blocks_at = record_at(record_type(BLOCKS, 2))
+
+
+@intrinsic
+def _copy_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
+    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        places = [builder.inttoptr(value, byte) for value in values[:2]]
+        cgutils.raw_memcpy(builder, places[0], places[1], values[2], 1)
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64), emit
+
+
+@kernel
+def copy_blocks(address):
+    """Copy every block of the record at that address from its source to its target."""
+    blocks = _blocks_at(address)
+    for k in range(len(blocks.sizes)):
+        _copy_bytes(blocks.targets[k], blocks.sources[k], blocks.sizes[k])
+
+
+class ColumnCopies:
+    """The copies of one table; all but what no step changes: which bodies there are, and their components."""
+
+    def __init__(self, table: Table) -> None:
+        self._table = table
+        self._blocks = make_record(BLOCKS, 2)
+        self._pairs: list[tuple[np.ndarray, np.ndarray]] = []  # copy and column
+        self._buffers: dict[str, np.ndarray] = {}
+        self._made_of: Any = None
+        self.kept = False
+
+    def keep(self) -> None:
+        """Copy all columns."""
+        table = self._table
+        made_of = (table.version, table.members_version, len(table.arrays))
+        if made_of != self._made_of:
+            self._made_of = made_of
+            keys = [key for key in table.arrays if key != "entity" and not key.startswith("has:")]
+            self._pairs = [(self._buffer(key), table.column(key)) for key in keys]
+            self._blocks.sources = np.array([column.ctypes.data for _, column in self._pairs], np.int64)
+            self._blocks.targets = np.array([copy.ctypes.data for copy, _ in self._pairs], np.int64)
+            self._blocks.sizes = np.array([column.nbytes for _, column in self._pairs], np.int64)
+        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+            for copy, column in self._pairs:
+                copy[...] = column
+        else:
+            copy_blocks(self._blocks.address)
+        self.kept = True
+
+    def put_back(self) -> None:
+        """Write the copies into the columns."""
+        for copy, column in self._pairs:
+            column[...] = copy
+
+    def sizes(self) -> list[tuple[str, np.ndarray]]:
+        """The room for copies that there is, by column."""
+        return list(self._buffers.items())
+
+    def _buffer(self, key: str) -> np.ndarray:
+        array, buffer = self._table.arrays[key], self._buffers.get(key)
+        if buffer is None or buffer.shape != array.shape:
+            buffer = self._buffers[key] = np.empty_like(array)
+        return buffer[: self._table.count]

@@ -1,0 +1,93 @@
+"""Functions called through their address: what one kernel needs of another without being compiled into it.
+
+A :class:`Linked` function has a fixed signature and a cache entry of its own; its address goes into a column of a
+record and :func:`linked_call` calls what stands there. So a kernel over pairs of shapes is compiled once,
+whatever the shapes are. Exceptions raised inside go up to whoever called, with their values.
+
+Calls use numba's own convention. Addresses are good for this process only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from numba.core import cgutils
+from numba.core.extending import intrinsic
+
+from ..compilation import linked_dispatcher
+
+JIT = not numba.config.DISABLE_JIT  # type: ignore[attr-defined]
+
+# With the JIT off an address is a place in this list.
+_plain: list[Callable[..., Any]] = [lambda *_: None]
+
+
+class Linked:
+    """A function compiled for one signature, called through its address.
+
+    function
+        plain Python; helpers that it calls are compiled into it
+    signature
+        numba's: ``types.int64(state_type, types.float64)``
+    allocates
+        whether it may make arrays and raise exceptions with values; for functions of plugins
+    """
+
+    def __init__(self, function: Callable[..., Any], signature: Any, allocates: bool = False) -> None:
+        self.function = getattr(function, "py_func", function)
+        self.name = self.function.__name__
+        self.signature = signature
+        self._dispatcher = linked_dispatcher(function, allocates) if JIT else function
+        self._address = 0
+
+    @property
+    def address(self) -> int:
+        """Where its machine code stands; compiles or loads it when first asked for."""
+        if not self._address:
+            self._address = self._find()
+        return self._address
+
+    @property
+    def ready(self) -> bool:
+        """Whether it has been compiled or loaded."""
+        return self._address != 0
+
+    def _find(self) -> int:
+        if not JIT:
+            _plain.append(self.function)
+            return len(_plain) - 1
+        self._dispatcher.compile(self.signature)
+        made = self._dispatcher.overloads[self.signature.args]
+        return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+
+
+def linked_call(signature: Any) -> Any:
+    """The function call(address, *arguments) that calls what stands at an address, of that signature."""
+    result, arguments = signature.return_type, signature.args
+
+    def typing(typing_context: Any, *given: Any) -> Any:
+        def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            convention = context.call_conv
+            kind = convention.get_function_type(result, arguments)
+            function = builder.inttoptr(values[0], kind.as_pointer())
+            answer = cgutils.alloca_once(builder, kind.args[0].pointee)
+            raised = cgutils.alloca_once(builder, kind.args[1].pointee)
+            packed = context.get_arg_packer(arguments).as_arguments(builder, values[1:])
+            code = builder.call(function, [answer, raised, *packed])
+            status = convention._get_return_status(builder, code, builder.load(raised))
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return context.get_returned_value(builder, result, builder.load(answer))
+
+        return result(numba.types.int64, *arguments), emit
+
+    if not JIT:
+        return lambda address, *values: _plain[address](*values)
+    names = ", ".join(f"a{k}" for k in range(len(arguments)))
+    scope = {"typing": typing}
+    exec(f"def call(context, address, {names}): return typing(context, address, {names})", scope)
+    call = intrinsic(scope["call"])
+    call.carom_depends_on = (str(result), *map(str, arguments), typing)
+    return call

@@ -1,0 +1,74 @@
+"""Records as kernels see them with the JIT off (``NUMBA_DISABLE_JIT=1``): the same source runs as plain Python."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numba
+import numpy as np
+
+DISABLED: bool = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
+
+_records: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()  # by address
+
+
+def remember(address: int, record: Any) -> None:
+    """Let kernels find a record by its address."""
+    _records[address] = record
+
+
+def plain_view_at(address: int) -> PlainView:
+    """The record at that address."""
+    return PlainView(_records[int(address)])
+
+
+class PlainView:
+    """A record whose vectors are tuples."""
+
+    __slots__ = ("_record",)
+
+    def __init__(self, record: Any) -> None:
+        object.__setattr__(self, "_record", record)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._record, name)
+        if isinstance(value, np.ndarray):
+            return PlainColumn(value, self._record.schema.fields[name])
+        return PlainView(value) if hasattr(value, "schema") else value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        setattr(self._record, name, value)
+
+    @property
+    def dimensions(self) -> int:
+        return self._record.dimensions
+
+
+class PlainColumn:
+    """A column whose items are numbers and tuples; an index outside of it raises IndexError, also a negative one."""
+
+    __slots__ = ("_field", "array")
+
+    def __init__(self, array: np.ndarray, field: Any) -> None:
+        self.array, self._field = array, field
+
+    def __len__(self) -> int:
+        return self.array.shape[1] if self._field.stacked else len(self.array)
+
+    def _checked(self, index: Any) -> Any:
+        parts = index if isinstance(index, tuple) else (index,)
+        if any(part < 0 for part in parts):
+            raise IndexError(f"index {index} outside of a column of {len(self)} rows")
+        return index
+
+    def __getitem__(self, index: Any) -> Any:
+        item = self.array[self._checked(index)]
+        if not isinstance(item, np.ndarray):
+            return item
+        if self._field.item == "axes":
+            return tuple(tuple(item[:, j]) for j in range(len(item)))
+        return tuple(item)
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self.array[self._checked(index)] = value

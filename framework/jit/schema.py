@@ -1,0 +1,140 @@
+"""Schemas: the columns and scalars of a record, written once for 2D and 3D.
+
+A schema is a list of named fields. :class:`~carom.framework.jit.record.Record` makes the memory for one,
+:class:`~carom.framework.jit.record_type.RecordType` is what compiled code knows it as.
+
+    BODIES = Schema("Bodies", position=vectors(), inverse_mass=floats(), entity=ints())
+    STATE = Schema("State", dt=number(), count=integer(), bodies=BODIES)
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+
+WORD = 8  # bytes: a scalar or the address of another record takes one word, a column two (address, length)
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """One number: ``dtype`` is float64, int64 or bool."""
+
+    dtype: str
+    words = 1
+
+
+@dataclass(frozen=True)
+class Column:
+    """An array with one item per row.
+
+    dtype
+        of numpy
+    item
+        ``scalar``; ``vector``, d floats that kernels see as a tuple; ``axes``, d vectors (the columns of a matrix);
+        ``table``, ``width`` numbers that are read and written one by one: ``column[row, k]``
+    width
+        of a table; a multiple of d if ``per_dimension``
+    stacked
+        several arrays of the same length behind each other, ``column[slot, row]``
+    """
+
+    dtype: str = "float64"
+    item: str = "scalar"
+    width: int = 0
+    per_dimension: bool = False
+    stacked: bool = False
+    words = 2
+
+    def item_shape(self, dimensions: int) -> tuple[int, ...]:
+        """Shape of one row's item in numpy."""
+        if self.item == "vector":
+            return (dimensions,)
+        if self.item == "axes":
+            return (dimensions, dimensions)
+        if self.item == "table":
+            return (self.width * dimensions if self.per_dimension else self.width,)
+        return ()
+
+    def empty(self, rows: int, dimensions: int) -> np.ndarray:
+        """An array for that many rows, not cleared."""
+        return np.empty((rows, *self.item_shape(dimensions)), self.dtype)
+
+
+class Schema:
+    """Named fields in a fixed order; a field may be another schema: the address of a record of it."""
+
+    def __init__(self, name: str, **fields: Field) -> None:
+        self.name = name
+        self.fields = fields
+
+    @cached_property
+    def layout(self) -> dict[str, int]:
+        """Byte offset of each field."""
+        offsets, at = {}, 0
+        for name, field in self.fields.items():
+            offsets[name] = at
+            at += WORD * (1 if isinstance(field, Schema) else field.words)
+        return offsets
+
+    @cached_property
+    def size(self) -> int:
+        """Bytes of a record."""
+        return sum(WORD * (1 if isinstance(field, Schema) else field.words) for field in self.fields.values())
+
+    @cached_property
+    def digest(self) -> str:
+        """Changes whenever compiled code has to: the hash of all fields, those of inner records included."""
+        parts = [(name, f.digest if isinstance(f, Schema) else repr(f)) for name, f in self.fields.items()]
+        return hashlib.sha256(repr((self.name, parts)).encode()).hexdigest()[:16]
+
+
+Field: TypeAlias = Scalar | Column | Schema
+
+
+def number() -> Scalar:
+    """A float."""
+    return Scalar("float64")
+
+
+def integer() -> Scalar:
+    """An integer of 64 bits."""
+    return Scalar("int64")
+
+
+def flag() -> Scalar:
+    """True or False."""
+    return Scalar("bool")
+
+
+def floats(**options: Any) -> Column:
+    """A column of floats."""
+    return Column("float64", **options)
+
+
+def ints(dtype: str = "int64", **options: Any) -> Column:
+    """A column of integers."""
+    return Column(dtype, **options)
+
+
+def flags(**options: Any) -> Column:
+    """A column of bools."""
+    return Column("bool", **options)
+
+
+def vectors(**options: Any) -> Column:
+    """A column of vectors: arrays (n, d) in numpy, tuples of d floats in kernels."""
+    return Column("float64", "vector", **options)
+
+
+def axes() -> Column:
+    """A column of rotation matrices (n, d, d); kernels see the body's axes, a tuple of d vectors."""
+    return Column("float64", "axes")
+
+
+def table(dtype: str, width: int, per_dimension: bool = False) -> Column:
+    """A column of ``width`` numbers per row, times d if ``per_dimension``."""
+    return Column(dtype, "table", width, per_dimension)

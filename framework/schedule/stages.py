@@ -1,0 +1,206 @@
+"""Stages: the compiled pieces of a step, and the program that runs them one after the other in a single call.
+
+The list of stages is the only description of what a step does: ``world.plan()``, ``stats()``, ``profile()``, going back
+after a failed step and docs/architecture.md all read it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from ..compilation import kernel
+from ..jit.linking import Linked, linked_call
+from ..jit.record import Record
+from ..jit.record_type import record_at, record_type
+from ..jit.schema import Schema, integer, ints
+from ..jit.tick_counter import TickClock, read_ticks
+
+# What every state begins with: addresses of the stages (0: not needed), the time that each has taken in ticks of the
+# processor's clock, how often it ran, and the one that runs now.
+PROGRAM_FIELDS: dict[str, Any] = {"program": ints(), "ticks": ints(), "calls": ints(), "stage": integer()}
+PROGRAM = Schema("Program", **PROGRAM_FIELDS)
+MOST_CODES = 64  # codes that a stage may return, 0 included
+
+_program_type = record_type(PROGRAM, 2)
+_program_at = record_at(_program_type)
+_call_stage = linked_call(types.int64(_program_type, types.float64))
+
+
+@kernel
+def run_stages(address, start, stop, dt):
+    """Run the stages start..stop-1 of the program of the state at that address.
+
+    Returns 0, or MOST_CODES times the stage that cannot go on by itself, plus its code.
+    """
+    state = _program_at(address)
+    program, ticks, calls = state.program, state.ticks, state.calls
+    before = read_ticks()
+    for k in range(start, stop):
+        if program[k] != 0:
+            state.stage = k
+            code = _call_stage(program[k], state, dt)
+            now = read_ticks()
+            ticks[k] += now - before
+            calls[k] += 1
+            before = now
+            if code != 0:
+                return k * MOST_CODES + code
+    return 0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A compiled function ``(state, dt) -> code`` without knowledge of shapes.
+
+    reads, writes
+        columns and records; writing a column of the table means that a failed step has to put it back
+    why
+        what it does, for ``world.plan()``
+    needed
+        name of the property of the scene that has to be true; empty: always
+    when
+        what has to happen for it to do something; empty: in every step
+    """
+
+    function: Callable[..., int]
+    why: str
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
+    needed: str = ""
+    when: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.function.__name__
+
+
+class Program:
+    """The stages of one world, in order, with the time they take.
+
+    handlers
+        by code: called with dt when a stage returns it. Below ``afterwards`` the stage then runs again, from there on
+        the next one follows
+    """
+
+    def __init__(
+        self, state: Record, stages: Sequence[Stage], handlers: dict[int, Callable[[float], None]], afterwards: int
+    ) -> None:
+        self.state, self.stages = state, tuple(stages)
+        self.handlers, self._afterwards = handlers, afterwards
+        self.index = {stage.name: k for k, stage in enumerate(self.stages)}
+        self._words = state.words
+        self._addresses = np.zeros(len(stages), np.int64)
+        state.program = self._addresses
+        state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
+        self._clock = TickClock()
+        self.describe_error: Callable[[BaseException], None] = lambda error: None  # adds notes to it
+        self.alarm = 0  # the word of the state that is not 0 when a stage has noted something wrong
+        self.on_alarm: Callable[[], None] = lambda: None
+
+    def link(self, wanted: Callable[[Stage], bool]) -> None:
+        """Compile or load the stages that are wanted; the others are skipped from now on."""
+        for k, stage in enumerate(self.stages):
+            self._addresses[k] = linked_stage(stage, self.state).address if wanted(stage) else 0
+
+    def is_linked(self, name: str) -> bool:
+        """Whether that stage runs."""
+        return self._addresses[self.index[name]] != 0
+
+    def run(self, start: int, stop: int, dt: float) -> None:
+        """Run the stages start..stop-1, and what Python has to do in between."""
+        address = self.state.address
+        while start < stop:
+            try:
+                code = run_stages(address, start, stop, dt)
+            except Exception as error:
+                self.describe_error(error)
+                raise
+            if not code:
+                break
+            start, wanted = divmod(code, MOST_CODES)
+            self.handlers[wanted](dt)
+            if wanted >= self._afterwards:
+                start += 1
+        if self._words[self.alarm]:
+            self.on_alarm()
+
+    def run_one(self, name: str, dt: float) -> None:
+        """Run one stage, linked or not."""
+        k = self.index[name]
+        if not self._addresses[k]:
+            self._addresses[k] = linked_stage(self.stages[k], self.state).address
+        self.run(k, k + 1, dt)
+
+    def counts(self) -> np.ndarray:
+        """(2, n): how often each stage has run so far, and the ticks that it has taken."""
+        return np.stack((self.state.calls, self.state.ticks))
+
+    @property
+    def seconds_per_tick(self) -> float:
+        return self._clock.seconds_per_tick
+
+
+_linked: dict[tuple[Any, Any], Linked] = {}
+
+
+def linked_stage(stage: Stage, state: Record) -> Linked:
+    """The stage's compiled function for states of that kind, one for the process."""
+    kind = record_type(state.schema, state.dimensions)
+    key = (stage.function, kind)
+    if key not in _linked:
+        _linked[key] = Linked(stage.function, types.int64(kind, types.float64))
+    return _linked[key]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Some neighbouring stages of a program: one call from Python, whatever their number."""
+
+    program: Program
+    start: int
+    stop: int
+
+    def __call__(self, dt: float) -> None:
+        self.program.run(self.start, self.stop, dt)
+
+
+@dataclass(frozen=True)
+class PythonPart:
+    """A part of a step that is plain Python, with the name of the system it belongs to."""
+
+    name: str
+    function: Callable[[float], None]
+
+    def __call__(self, dt: float) -> None:
+        self.function(dt)
+
+
+@dataclass(frozen=True)
+class Check:
+    """A Python part that runs only if a word of a record is not 0."""
+
+    words: np.ndarray
+    index: int
+    part: PythonPart
+
+    def __call__(self, dt: float) -> None:
+        if self.words[self.index]:
+            self.part(dt)
+
+
+def merged(parts: Sequence[Any]) -> list[Any]:
+    """The same parts with neighbouring segments of one program joined."""
+    result: list[Any] = []
+    for part in parts:
+        last = result[-1] if result else None
+        both = isinstance(part, Segment) and isinstance(last, Segment)
+        if both and last.program is part.program and last.stop == part.start:
+            result[-1] = Segment(part.program, last.start, part.stop)
+        else:
+            result.append(part)
+    return result

@@ -1,0 +1,200 @@
+"""Stages of BROAD: boxes around the motion of each body, widened where bodies are swept."""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import part
+from ...framework.vectors import add, item, replace
+from ..ccd.search_bounds import GIVE, find_margins, place_at
+from ..codes import OK
+from ..linked_parts import BOUND_SEARCHES, BOX_ROWS, call_bound_searches, call_box_rows
+from ..shapes.dispatch import half_extents, write_rotated
+
+# Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
+MARGIN = 0.1
+
+# Places in ``state.frame``, apart by 3: one value per axis. The largest is the longest edge of any box of what moves.
+LOWEST, HIGHEST, LARGEST = 0, 3, 6
+FRAME_SIZE = 7
+
+
+@part
+def rotated_offset(state, i, local):
+    """An offset of body i, as it is in the world."""
+    axes, d = state.bodies.axes, len(local)
+    result = local
+    for k in range(d):
+        total = 0.0
+        for j in range(d):
+            total += axes[(i * d + k) * d + j] * item(local, j)
+        result = replace(result, k, total)
+    return result
+
+
+@part
+def smallest_of(vector):
+    """Its smallest component."""
+    smallest = vector[0]
+    for k in range(1, len(vector)):
+        smallest = min(smallest, item(vector, k))
+    return smallest
+
+
+@part
+def box_level(state, level, i, before, after):
+    """The box of one level of a body that moves from ``before`` to ``after``; its offset and its extent are noted."""
+    bodies = state.bodies
+    shape = bodies.levels[level, i]
+    at = state.colliders.offset[state.shapes.slots[shape], i]
+    if state.rotated:
+        at = rotated_offset(state, i, at)
+        write_rotated(state, shape, i, state.rotated)
+    bodies.level_offsets[level, i] = at
+    half = half_extents(state, shape, i)
+    smallest = smallest_of(half)
+    bodies.min_extent[i] = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
+    margin = MARGIN * smallest
+    first, last, low, high = add(before, at), add(after, at), at, at
+    for k in range(len(at)):
+        low = replace(low, k, min(item(first, k), item(last, k)) - item(half, k) - margin)
+        high = replace(high, k, max(item(first, k), item(last, k)) + item(half, k) + margin)
+    return low, high
+
+
+@part
+def box_body(state, i, before, after):
+    """Box the motion of a body: the box holds every level, so that what the first one meets is looked at.
+
+    A body without a shape gets a box of nan.
+    """
+    bodies = state.bodies
+    low, high = before, after
+    if bodies.levels[0, i] < 0:
+        for k in range(len(low)):
+            low, high = replace(low, k, math.nan), replace(high, k, math.nan)
+    else:
+        low, high = box_level(state, 0, i, before, after)
+    for level in range(1, state.level_count if bodies.levels[0, i] >= 0 else 1):
+        other_low, other_high = box_level(state, level, i, before, after)
+        for k in range(len(low)):
+            low = replace(low, k, min(item(low, k), item(other_low, k)))
+            high = replace(high, k, max(item(high, k), item(other_high, k)))
+    bodies.lower[i], bodies.upper[i] = low, high
+
+
+@part
+def open_frame(state):
+    """Before the first of the moving bodies' boxes is added."""
+    frame = state.frame
+    for k in range(3):
+        frame[LOWEST + k], frame[HIGHEST + k] = math.inf, -math.inf
+    frame[LARGEST] = 0.0
+
+
+@part
+def add_to_frame(state, i):
+    """Let the frame hold the box of a moving body; one of nan leaves it as it is."""
+    frame, low, high = state.frame, state.bodies.lower[i], state.bodies.upper[i]
+    for k in range(len(low)):  # comparisons with nan are false
+        frame[LOWEST + k] = item(low, k) if item(low, k) < frame[LOWEST + k] else frame[LOWEST + k]
+        frame[HIGHEST + k] = item(high, k) if item(high, k) > frame[HIGHEST + k] else frame[HIGHEST + k]
+        edge = item(high, k) - item(low, k)
+        frame[LARGEST] = edge if edge > frame[LARGEST] else frame[LARGEST]
+
+
+@part
+def statics_moved(state):
+    """Whether a static body stands elsewhere than when its box was made."""
+    bodies, moving, moved = state.bodies, state.moving, False
+    for i in range(moving, state.count):
+        here, before = bodies.position[i], bodies.static_position[i - moving]
+        for k in range(len(here)):
+            moved |= item(here, k) != item(before, k)
+    return moved
+
+
+# Where the motion of a box begins and ends.
+STANDING, MOVING, SEARCHING = range(3)
+
+
+def box_rows(state, start, stop, motion):
+    """Boxes of rows start..stop-1: of bodies that stand, around their motion, or from search_lower to search_upper; the
+    frame holds those of what moves."""
+    bodies = state.bodies
+    if motion != STANDING:
+        open_frame(state)
+    for i in range(start, stop):
+        before, after = bodies.position[i], bodies.position[i]
+        if motion == MOVING and state.moved:
+            before = bodies.previous_position[i]
+        if motion == SEARCHING:
+            before, after = bodies.search_lower[i], bodies.search_upper[i]
+        box_body(state, i, before, after)
+        if motion != STANDING:
+            add_to_frame(state, i)
+    return 0
+
+
+def box_statics(state, dt):
+    """Boxes of what does not move, made again only when it has changed."""
+    bodies, moving = state.bodies, state.moving
+    state.statics_changed = state.statics_stale or statics_moved(state)
+    if state.statics_changed:
+        for i in range(moving, state.count):
+            bodies.previous_position[i] = bodies.position[i]
+            bodies.static_position[i - moving] = bodies.position[i]
+        call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
+        state.statics_stale = False
+        state.statics_version += 1
+    return OK
+
+
+def box_motions(state, dt):
+    """Boxes around the motion of what moves; where bodies are swept, with room for what impacts make of it."""
+    bodies = state.bodies
+    state.neighbours_known_until, state.candidates_ready = math.inf, True
+    call_box_rows(state.links[BOX_ROWS], state, 0, state.moving, MOVING)
+    if state.sweeping and state.moved:
+        for i in range(state.moving):
+            bodies.search_lower[i], bodies.search_upper[i] = bodies.previous_position[i], bodies.position[i]
+        call_bound_searches(state.links[BOUND_SEARCHES], state, 0.0, dt)
+    return OK
+
+
+def bound_searches(state, now, dt):
+    """Boxes around the paths of what moves from ``now`` on, with room for what impacts make of these; or, where that
+    would be too many candidates, around the next part of the paths: until ``state.neighbours_known_until``.
+
+    search_lower, search_upper: the place at ``now`` and at the end when this is called, afterwards the bounds.
+    """
+    bodies = state.bodies
+    crossing = find_margins(state, now, dt - now)
+    state.neighbours_known_until = now + crossing if now + crossing < dt else math.inf
+    if now > 0.0 or state.neighbours_known_until < dt:
+        for i in range(state.moving):
+            bodies.search_upper[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
+        call_box_rows(state.links[BOX_ROWS], state, 0, state.moving, SEARCHING)
+    for i in range(state.moving):
+        margin = bodies.search_margin[i]
+        give = margin + GIVE * bodies.min_extent[i]
+        before, after, lower, upper = bodies.search_lower[i], bodies.search_upper[i], bodies.lower[i], bodies.upper[i]
+        low, high = before, after
+        for k in range(len(before)):
+            lower = replace(lower, k, item(lower, k) - margin)
+            upper = replace(upper, k, item(upper, k) + margin)
+            low = replace(low, k, min(item(before, k), item(after, k)) - give)
+            high = replace(high, k, max(item(before, k), item(after, k)) + give)
+        bodies.lower[i], bodies.upper[i] = lower, upper
+        bodies.search_lower[i], bodies.search_upper[i] = low, high
+        add_to_frame(state, i)
+    return 0
+
+
+def box_rest_of_step(state, dt):
+    """Boxes for what is left of the step, after an impact has sent a body out of its search bounds."""
+    now = state.impacts.until
+    for i in range(state.moving):
+        state.bodies.search_lower[i] = place_at(state, i, now, now)
+    call_bound_searches(state.links[BOUND_SEARCHES], state, now, dt)
+    return OK

@@ -1,0 +1,127 @@
+"""The Python side of the broad phase, for one world: memory of the grids, trees, broad phases of plugins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...framework.jit.record import Record
+from ...framework.plugins.registry import Registry
+from ...framework.settings import AUTOMATIC, Settings
+from ..codes import NEED_CANDIDATES, NEED_CELLS
+from .boxes import FRAME_SIZE
+from .plan import reason_of
+from .plugin_broad_phase import PluginBroadPhase
+from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_count
+from .static_grid import NEVER_BUILT, OUTSIDE_MAX, reserve_static_grid
+from .tree.tree import SpatialTree
+from .uniform_grid import reserve_grid
+
+
+class CandidateSearch:
+    """What the stages that find candidates need of Python.
+
+    state
+        the record of the world; its columns ``bodies.lower``, ``bodies.upper`` hold the boxes
+    box_now
+        makes the boxes of all bodies where they are at this moment, for queries
+    """
+
+    def __init__(
+        self, state: Record, registry: Registry, settings: Callable[[], Settings], box_now: Callable[[], None]
+    ) -> None:
+        self._state, self._settings, self._box_now = state, settings, box_now
+        self._plugin = PluginBroadPhase(registry)
+        self._moving, self._static = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
+        self._static_version = NEVER_BUILT
+        for grid in (state.grid, state.static_grid):
+            grid.reserve(FRAME_SIZE, "frame")
+            grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
+        state.static_grid.version = NEVER_BUILT
+        state.pair_search = NO_SEARCH
+        self.read_settings()
+
+    def read_settings(self) -> None:
+        """Call it when settings have changed."""
+        self._state.uses_plugin_broad_phase = self._settings().broad_phase != AUTOMATIC
+
+    def needs_grids(self) -> bool:
+        """Whether the stages of grids may have to do anything with so many bodies as there are."""
+        return self._state.count >= UNIFORM_GRID_MIN
+
+    # -- what stages ask for ----------------------------------------------------------------------
+
+    def grow(self, code: int) -> None:
+        """Make the room that a stage asks for with NEED_CELLS, or NEED_CANDIDATES for its pairs."""
+        state = self._state
+        if code == NEED_CANDIDATES:
+            candidates = state.candidates
+            candidates.reserve(state.needed, "first", "second", keep=candidates.count)
+        elif code == NEED_CELLS:
+            static = state.count - state.moving
+            if state.pair_search == STATIC_GRID and len(state.static_grid.keys) < static:
+                reserve_static_grid(state.static_grid, static)
+            else:
+                reserve_grid(state.grid, state.moving)
+
+    def find_in_python(self, dt: float) -> None:
+        """Candidates from the broad phase of a plugin, or from trees: no grid suits the boxes of this step."""
+        state = self._state
+        if state.pair_search == PLUGIN:
+            lower, upper = state.bodies.lower[: state.count], state.bodies.upper[: state.count]
+            self._store(*self._plugin.pairs(self._settings().broad_phase, lower, upper, state.moving))
+            return
+        self._build(self._moving, 0, state.moving)
+        self._build_static()
+        self._store(*self._moving.pairs_within())
+        self._store(*self._moving.pairs_between(self._static), after=state.candidates.count)
+
+    def _store(self, first: np.ndarray, second: np.ndarray, after: int = 0) -> None:
+        candidates, stop = self._state.candidates, after + len(first)
+        if stop > len(candidates.first):
+            candidates.reserve(max(stop, 2 * len(candidates.first)), "first", "second", keep=after)
+        candidates.first[after:stop], candidates.second[after:stop] = first, second
+        candidates.count = stop
+
+    # -- indexes for queries ----------------------------------------------------------------------
+
+    def partitions(self) -> tuple[SpatialTree, SpatialTree]:
+        """Indexes of what moves and of what does not, with boxes around where the bodies are at this moment."""
+        known_until = self._state.neighbours_known_until
+        self._box_now()
+        self._state.neighbours_known_until = known_until  # a system within the step may query
+        self._build(self._moving, 0, self._state.moving)
+        self._build_static()
+        return self._moving, self._static
+
+    def make_index(self, count: int) -> SpatialTree:
+        """An index for so many boxes."""
+        return SpatialTree(self._state.dimensions)
+
+    def _build(self, index: SpatialTree, start: int, stop: int) -> None:
+        index.build(self._state.bodies.lower, self._state.bodies.upper, start, stop)
+
+    def _build_static(self) -> None:
+        if self._static_version != self._state.statics_version:
+            self._build(self._static, self._state.moving, self._state.count)
+            self._static_version = self._state.statics_version
+
+    # -- plan -------------------------------------------------------------------------------------
+
+    @property
+    def last(self) -> int:
+        """What found the candidates of the last step, as ``state.pair_search``; before the first step what will."""
+        state = self._state
+        if state.pair_search in (NO_SEARCH, PLUGIN) or state.uses_plugin_broad_phase:
+            return choose_by_count(state.moving, state.count - state.moving)
+        return state.pair_search
+
+    def describe(self) -> str:
+        """How candidates are found, for ``world.plan()``."""
+        state, name = self._state, self._settings().broad_phase
+        if not state.collides:
+            return "no colliders: nothing to do"
+        if name != AUTOMATIC:
+            return f"{name}, as the settings say"
+        return reason_of(self.last, state.moving, state.count - state.moving, state.dimensions)

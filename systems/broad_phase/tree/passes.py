@@ -1,0 +1,51 @@
+"""The tree's kernels as Python calls them: ``(tree, other) -> code``, linked, by the addresses of two records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, cached_property
+from typing import Any
+
+from numba import types
+
+from ....framework.compilation import kernel
+from ....framework.jit.linking import Linked, linked_call
+from ....framework.jit.record_type import record_at, record_type
+from ..records import TREE
+from . import build, pairs, queries
+
+FUNCTIONS: tuple[Callable[..., Any], ...] = (
+    build.build_one_cell, build.build_tree, build.assign_again, build.finish_tree,
+    pairs.find_ranges_within, pairs.find_ranges_between, pairs.test_within, pairs.test_between,
+    queries.query_boxes,
+)  # fmt: skip
+
+
+class TreePasses:
+    """The passes of trees of one dimension; each compiles, or is loaded, when first run."""
+
+    def __init__(self, dimensions: int) -> None:
+        kind = record_type(TREE, dimensions)
+        self._signature = types.int64(kind, kind)
+        self._at = record_at(kind)
+        self.linked = {function.__name__: Linked(function, self._signature) for function in FUNCTIONS}
+
+    @cached_property
+    def _call(self) -> Callable[[int, int, int], int]:
+        at, call = self._at, linked_call(self._signature)
+
+        @kernel
+        def run_tree_pass(function, tree, other):
+            return call(function, at(tree), at(other))
+
+        return run_tree_pass
+
+    def run(self, name: str, tree: Any, other: Any = None) -> int:
+        """Run a pass over the records of a tree, or of two."""
+        return self._call(self.linked[name].address, tree.address, (tree if other is None else other).address)
+
+
+@cache
+def tree_passes(dimensions: int) -> TreePasses:
+    """The passes for worlds of that many dimensions."""
+    return TreePasses(dimensions)

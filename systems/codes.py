@@ -1,0 +1,17 @@
+"""What a stage returns: OK, or why the step cannot go on before Python has done something.
+
+Below AFTERWARDS the stage runs again; the others have done their work, and the next stage follows.
+"""
+
+from __future__ import annotations
+
+OK = 0
+# More rows: ``state.needed`` says how many.
+NEED_CANDIDATES, NEED_PAIRS, NEED_EVENTS, NEED_CONTACTS, NEED_SOLVER, NEED_WARM_START, NEED_CELLS = range(1, 8)
+REFRESH_PAIRS = 8  # a body has left its search bounds: pairs for the rest of the step
+NEED_MERGED, NEED_SWEEPS, NEED_ORDER = 9, 10, 13
+RUN_BROAD, RUN_NARROW = 11, 12  # the phase before has not run: a phase is run alone, or its system was removed
+AFTERWARDS = 32
+FIND_IN_PYTHON = 33  # candidate pairs from a tree, or from the broad phase of a plugin
+FILTER_PAIRS = 34  # pair filters of plugins
+ROTATE = 35  # axes of rotated bodies

@@ -1,0 +1,64 @@
+"""The stages of the contacts' events: the contacts at the end of the step, against those of the step before."""
+
+from __future__ import annotations
+
+from ..codes import NEED_CONTACTS, OK
+
+
+def publish_contacts(state, dt):
+    """The contacts at the end of the step, in canonical order; disabled pairs count as not touching."""
+    pairs, contacts, entity = state.pairs, state.contacts, state.bodies.entity
+    if pairs.touching_count > len(contacts.began):
+        state.needed = pairs.touching_count
+        return NEED_CONTACTS
+    new, count, next_disabled = 1 - contacts.now, 0, 0
+    for r in range(pairs.touching_count):
+        c = pairs.touching[r]
+        while next_disabled < pairs.disabled_count and pairs.disabled[next_disabled] < c:
+            next_disabled += 1
+        enabled = not (next_disabled < pairs.disabled_count and pairs.disabled[next_disabled] == c)
+        contacts.entity_a[new, count], contacts.entity_b[new, count] = entity[pairs.a[c]], entity[pairs.b[c]]
+        contacts.point[new, count], contacts.normal[new, count] = pairs.point[c], pairs.normal[c]
+        contacts.depth[new, count], contacts.impulse[new, count] = pairs.depth[c], pairs.impulse[c]
+        contacts.enabled[new, count] = enabled
+        count += 1
+    contacts.counts[new], contacts.steps[new], contacts.stays[new] = count, state.step_number, 0
+    contacts.now = new
+    state.found_current = False
+    state.contacts_version += 1
+    state.motion_version += 1
+    return OK
+
+
+def compare_contacts(state, dt):
+    """Rows of the contacts that ceased, began and stayed; both lists are in canonical order."""
+    contacts = state.contacts
+    now = contacts.now
+    old, i, j, ends, begins, stays = 1 - now, 0, 0, 0, 0, 0
+    a0, b0, enabled = contacts.entity_a, contacts.entity_b, contacts.enabled
+    count, before, same_ids = contacts.counts[now], contacts.counts[old], not state.ids_changed
+    while i < before or j < count:
+        if i < before and not enabled[old, i]:
+            i += 1
+        elif j < count and not enabled[now, j]:
+            j += 1
+        elif (i < before and not same_ids) or j == count or (
+            i < before
+            and (a0[old, i] < a0[now, j] or (a0[old, i] == a0[now, j] and b0[old, i] < b0[now, j]))
+        ):  # all of them are over
+            contacts.ended[ends] = i
+            ends += 1
+            i += 1
+        elif i == before or a0[old, i] != a0[now, j] or b0[old, i] != b0[now, j]:
+            contacts.began[begins] = j
+            begins += 1
+            j += 1
+        else:
+            contacts.stayed[now, stays] = j
+            stays += 1
+            i += 1
+            j += 1
+    state.ids_changed = False
+    contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
+    state.news = ends + begins + state.impacts.logged + state.impacts.capped + (stays if state.stay_wanted else 0)
+    return OK

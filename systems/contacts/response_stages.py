@@ -1,0 +1,29 @@
+"""The stage that opens the response."""
+
+from __future__ import annotations
+
+from ..codes import OK, RUN_NARROW
+
+
+def begin_response(state, dt):
+    """Where the paths begin; the response is idle if nothing is near anything and nothing rested."""
+    if not state.contacts_ready:
+        return RUN_NARROW
+    bodies, pairs, memory = state.bodies, state.pairs, state.warm_start
+    near = pairs.found if state.moved else pairs.count  # in a step, what is near at its end is among those found
+    unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
+    state.response_idle = near == 0 and not unknown and memory.counts[memory.now] == 0
+    state.impacts_recorded = False
+    if state.response_idle:
+        return OK
+    for c in range(pairs.count):
+        pairs.impulse[c] = 0.0
+    if not state.moved:  # the phase is run alone: the bodies stand where they overlap
+        state.path_degree = 1
+        for i in range(state.count):
+            bodies.previous_position[i] = bodies.position[i]
+            bodies.path_velocity[i] = bodies.linear_velocity[i]
+            bodies.start_velocity[i] = bodies.linear_velocity[i]
+    for i in range(state.count):
+        bodies.origin[i] = bodies.previous_position[i]
+    return OK

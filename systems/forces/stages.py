@@ -1,0 +1,88 @@
+"""The stages of FORCES: velocities within their limits, then gravity, constant and applied forces."""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import part
+from ...framework.jit.record_type import zero_of
+from ...framework.vectors import add, item, replace, scale
+
+
+@part
+def within(point, origin, limit):
+    """The point itself, or on the way to it what is ``limit`` metres from the origin (nan: no limit).
+
+    Scaled by the largest component, so that no square overflows.
+    """
+    largest = 0.0
+    for k in range(len(point)):
+        largest = max(largest, abs(item(point, k) - item(origin, k)))
+    if limit != limit or largest == 0.0 or not math.isfinite(largest):
+        return point
+    square = 0.0
+    for k in range(len(point)):
+        square += ((item(point, k) - item(origin, k)) / largest) ** 2
+    length = math.sqrt(square)
+    if length > limit / largest:
+        for k in range(len(point)):
+            start = item(origin, k)
+            point = replace(point, k, start + (item(point, k) - start) / largest * (limit / length))
+    return point
+
+
+def limit_velocities(state, dt):
+    """Shorten the velocities of the dynamic bodies that exceed their max_linear_speed."""
+    if state.limits_speed:
+        bodies, zero = state.bodies, zero_of(state)
+        for i in range(state.dynamic):
+            bodies.linear_velocity[i] = within(bodies.linear_velocity[i], zero, bodies.max_linear_speed[i])
+    return 0
+
+
+@part
+def is_zero(vector):
+    """Whether every component is 0."""
+    zero = True
+    for k in range(len(vector)):
+        zero &= item(vector, k) == 0.0
+    return zero
+
+
+@part
+def any_force(bodies, dynamic):
+    """(whether a force is given to a dynamic body, whether ``force`` still holds one)."""
+    force, constant = bodies.force, bodies.constant_force
+    applied, for_step = bodies.applied_force, bodies.step_force
+    given, held = False, False
+    for i in range(dynamic):
+        given |= not (is_zero(constant[i]) & is_zero(applied[i]) & is_zero(for_step[i]))
+        held |= not is_zero(force[i])
+    return given, held
+
+
+def sum_forces(state, dt):
+    """force = m g s + the constant force + what was applied; nothing is summed where nothing acts."""
+    bodies, dynamic, gravity = state.bodies, state.dynamic, state.gravity[0]
+    force = bodies.force
+    state.forces_summed = True
+    if dynamic == 0:
+        return 0
+    if not state.has_force_systems and is_zero(gravity):
+        given, held = any_force(bodies, dynamic)
+        if not given:
+            for i in range(dynamic if held else 0):
+                force[i] = zero_of(state)
+            state.unforced, state.pushed = True, False
+            return 0
+    state.force_evaluations += 1
+    mass, gravity_scale, constant = bodies.mass, bodies.gravity_scale, bodies.constant_force
+    applied, for_step = bodies.applied_force, bodies.step_force
+    pushed = False
+    for i in range(dynamic):
+        force[i] = add(scale(gravity, mass[i] * gravity_scale[i]), constant[i])
+        pushed |= not (is_zero(applied[i]) & is_zero(for_step[i]))
+    for i in range(dynamic if pushed else 0):
+        force[i] = add(add(force[i], applied[i]), for_step[i])
+    state.pushed = pushed
+    return 0

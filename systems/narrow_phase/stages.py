@@ -1,0 +1,143 @@
+"""The stages of NARROW: candidates in canonical order, layers, the shapes' functions, and which pairs touch."""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.vectors import length, sub
+from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
+from ..shapes.dispatch import evaluate_batch
+from ..shapes.tolerances import contact_margin
+
+
+def order_candidates(state, dt):
+    """Candidates by the smaller entity id, then by the larger, the row of the smaller id first.
+
+    Two stable counting sorts, by the larger id and by the smaller.
+    """
+    candidates, rank, count = state.candidates, state.bodies.rank, state.candidates.count
+    if not state.candidates_ready:
+        return RUN_BROAD
+    if count > len(candidates.sorted_a) or state.count + 1 > len(candidates.starts):
+        state.needed = count
+        return NEED_ORDER
+    state.candidates_counted += count
+    first, second, starts = candidates.first, candidates.second, candidates.starts
+    half_a, half_b = candidates.half_a, candidates.half_b
+    for i in range(state.count + 1):
+        starts[i] = 0
+    for c in range(count):
+        starts[max(rank[first[c]], rank[second[c]]) + 1] += 1
+    for i in range(1, state.count + 1):
+        starts[i] += starts[i - 1]
+    for c in range(count):
+        a, b = first[c], second[c]
+        if rank[a] > rank[b]:
+            a, b = b, a
+        k = starts[rank[b]]
+        starts[rank[b]] += 1
+        half_a[k], half_b[k] = a, b
+    for i in range(state.count + 1):
+        starts[i] = 0
+    for c in range(count):
+        starts[rank[half_a[c]] + 1] += 1
+    for i in range(1, state.count + 1):
+        starts[i] += starts[i - 1]
+    for c in range(count):
+        k = starts[rank[half_a[c]]]
+        starts[rank[half_a[c]]] += 1
+        candidates.sorted_a[k], candidates.sorted_b[k] = half_a[c], half_b[c]
+    return OK
+
+
+@part
+def all_layers_meet(state):
+    """Whether no layer or mask keeps any two bodies apart (usual, and then no pair need be asked)."""
+    layer, mask = state.colliders.layer, state.colliders.mask
+    apart = False
+    for slot in range(state.slot_count):
+        for i in range(state.count):
+            apart |= mask[slot, i] != -1 or layer[slot, i] == 0
+    return not apart
+
+
+@inlined
+def layers_meet(state, a, b):
+    """Whether each one's layer is in the other's mask."""
+    colliders, slot = state.colliders, state.bodies.collider_slot
+    layer, mask = colliders.layer, colliders.mask
+    return layer[slot[a], a] & mask[slot[b], b] != 0 and layer[slot[b], b] & mask[slot[a], a] != 0
+
+
+@inlined
+def is_solid_pair(state, a, b):
+    """Whether the two push each other: neither is a sensor, and one can be moved."""
+    sensor, bodies = state.colliders.sensor, state.bodies
+    slot, inverse_mass = bodies.collider_slot, bodies.inverse_mass
+    passive = sensor[slot[a], a] or sensor[slot[b], b]
+    return not passive and inverse_mass[a] + inverse_mass[b] > 0.0
+
+
+def select_pairs(state, dt):
+    """The candidates whose layers meet become pairs; they are counted by the shapes of the two bodies."""
+    candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes
+    if candidates.count > len(pairs.a):
+        state.needed = candidates.count
+        return NEED_PAIRS
+    velocity, start = bodies.linear_velocity, bodies.start_velocity
+    for i in range(state.count):
+        bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if state.moved else 0.0
+    shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
+    for k in range(shapes.count * shapes.count + 2):
+        starts[k] = 0
+    all_meet, kept = all_layers_meet(state), 0
+    for c in range(candidates.count):
+        a, b = candidates.sorted_a[c], candidates.sorted_b[c]
+        if all_meet or layers_meet(state, a, b):
+            pairs.a[kept], pairs.b[kept] = a, b
+            pairs.is_solid[kept] = is_solid_pair(state, a, b)
+            one, other = min(shape[a], shape[b]), max(shape[a], shape[b])
+            kind[kept] = one * shapes.count + other
+            starts[kind[kept] + 2] += 1
+            kept += 1
+    pairs.count, pairs.found = kept, 0
+    pairs.resting_count, pairs.disabled_count = 0, 0
+    return OK
+
+
+def evaluate_pairs(state, dt):
+    """Every pair by the linked function of its two shapes, in batches of one kind each."""
+    candidates, pairs, shapes = state.candidates, state.pairs, state.shapes
+    if state.several_levels:
+        return OK
+    starts, bucket, kind = candidates.bucket_starts, candidates.bucket, candidates.kind
+    kinds = shapes.count * shapes.count
+    for k in range(2, kinds + 2):
+        starts[k] += starts[k - 1]
+    for c in range(pairs.count):  # afterwards starts[kind] is where a kind begins
+        k = kind[c] + 1
+        bucket[starts[k]] = c
+        starts[k] += 1
+    for k in range(kinds):
+        if starts[k] < starts[k + 1]:
+            evaluate_batch(state, k, starts[k], starts[k + 1])
+    return OK
+
+
+def collect_contacts(state, dt):
+    """The pairs that touch at the end of their motion, or nearly do."""
+    pairs = state.pairs
+    span, found = dt if state.moved else 0.0, 0
+    for c in range(pairs.count):
+        hit = pairs.hit[c]
+        near = hit or (
+            pairs.is_solid[c] and pairs.depth[c] >= -contact_margin(state, span, pairs.a[c], pairs.b[c])
+        )
+        pairs.near_contact[c] = near
+        if hit or (near and span > 0.0):
+            pairs.hits[found] = c
+            found += 1
+    pairs.found = found
+    state.pairs_counted += pairs.count
+    state.contacts_ready = state.found_current = True
+    state.contacts_version += 1
+    return OK

@@ -1,0 +1,90 @@
+"""The stages that open and close a step, whatever systems there are."""
+
+from __future__ import annotations
+
+from ..framework.compilation import part
+from ..framework.vectors import item
+from .codes import NEED_SWEEPS, OK, ROTATE
+
+DISCRETE = 0
+NOTHING_TESTED = -1  # in place of a row: no pair has been tested yet
+LARGEST = 1.7976931348623157e308  # of all finite numbers
+
+
+@part
+def any_rotation(state):
+    """Whether any body is rotated: an angle that is not 0, in 3D a quaternion with a part beside the first."""
+    rotation, rotated = state.bodies.rotation, False
+    if len(state.gravity[0]) == 2:
+        for i in range(state.count):
+            rotated |= rotation[i] != 0.0
+    else:
+        for i in range(state.count):
+            rotated |= (rotation[4 * i + 1] != 0.0) | (rotation[4 * i + 2] != 0.0) | (rotation[4 * i + 3] != 0.0)
+    return rotated
+
+
+@part
+def any_ccd(state):
+    """Whether any moving body is swept in a discrete world."""
+    ccd, found = state.bodies.ccd, False
+    for i in range(state.moving):
+        found |= ccd[i]
+    return found
+
+
+def keep_state(state, dt):
+    """What a step that fails puts back: columns that the built-in stages overwrite. Nothing is known of this step yet.
+
+    The position is kept in previous_position, by keep_start.
+    """
+    bodies, pairs, impacts = state.bodies, state.pairs, state.impacts
+    state.unforced, state.pushed, state.moved = False, True, False
+    state.forces_summed = state.candidates_ready = state.contacts_ready = False
+    state.news, state.step_force_kept = 0, False
+    pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0
+    impacts.logged = impacts.capped = 0
+    state.candidates.count = 0
+    state.row_a, state.unsound = NOTHING_TESTED, 0
+    if not state.others_write:  # else every column is kept
+        for i in range(state.count):
+            bodies.kept_previous[i] = bodies.previous_position[i]
+        for i in range(state.moving):
+            bodies.kept_velocity[i] = bodies.linear_velocity[i]
+    state.kept = True
+    state.warm_start.before, state.contacts.before = state.warm_start.now, state.contacts.now
+    return OK
+
+
+def read_bodies(state, dt):
+    """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
+    bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
+    for i in range(state.dynamic):
+        inverse_mass[i] = 1.0 / mass[i]
+        limited |= bodies.max_linear_speed[i] == bodies.max_linear_speed[i]
+    for i in range(state.dynamic, state.count):
+        inverse_mass[i] = 0.0
+    state.limits_speed = limited
+    state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))
+    if state.sweeping and not state.sweeps_ready:
+        return NEED_SWEEPS
+    rotated = state.collides and any_rotation(state)
+    if rotated or state.rotated or state.rotation_stale:
+        return ROTATE
+    return OK
+
+
+def check_finite(state, dt):
+    """Whether all positions and velocities of what moves are finite; the step is over."""
+    bodies, finite = state.bodies, True
+    position, velocity = bodies.position, bodies.linear_velocity
+    for i in range(state.moving):
+        x, v = position[i], velocity[i]
+        for k in range(len(x)):
+            finite &= abs(item(x, k)) <= LARGEST
+            finite &= abs(item(v, k)) <= LARGEST
+    state.finite = finite
+    state.moved = state.kept = state.started = False
+    state.motion_version += 1
+    state.bodies_counted += state.moving
+    return OK

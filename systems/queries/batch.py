@@ -1,0 +1,119 @@
+"""The memory behind a record of queries, and the query shapes, of which each has its own parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...framework.data.component import Component
+from ...framework.jit.record import Record, make_record
+from ...framework.plugins.registry import Registry
+from ..broad_phase.tree.build import MAX_LEVELS
+from ..shapes.linked_shapes import LinkedShapes, ParameterRecords
+from ..shapes.parameters import bind, make_parameter_record
+from ..shapes.query import QUERY, linked_query
+from .records import QUERY_BATCH
+
+MOST_QUERIES = 4096  # in one call of a kernel; what larger batches need is not kept
+FIRST_ROOM = 64  # rows
+
+QUERY_COLUMNS = ("centre", "half", "direction", "limit", "search_limit", "excluded", "body", "end")
+RESULT_COLUMNS = ("row", "entity", "distance", "fraction", "normal", "point")
+
+
+def slices_of(count: int) -> Iterator[slice]:
+    """Slices of at most MOST_QUERIES of that many queries; an empty one if there are none."""
+    for start in range(0, max(count, 1), MOST_QUERIES):
+        yield slice(start, min(start + MOST_QUERIES, count))
+
+
+class QueryBatch:
+    """Room for queries, which the verbs write into the columns of ``record``, and for what they find.
+
+    ``radius`` and ``half_extents`` are the parameters of query spheres and boxes.
+    """
+
+    def __init__(self, dimensions: int) -> None:
+        self.record = make_record(QUERY_BATCH, dimensions)
+        self.record.slice_level = np.zeros(MAX_LEVELS + 2, np.int64)
+        self.record.slice_begin = np.zeros(MAX_LEVELS + 2)
+        self.queries = self.results = 0  # rows that there is room for
+        self.reserve(FIRST_ROOM, FIRST_ROOM)
+
+    def reserve(self, queries: int, results: int) -> bool:
+        """Make room; returns whether columns of parameters have been replaced."""
+        queries = min(queries, MOST_QUERIES)
+        if max(queries, results) > self.results:
+            self.results = max(queries, results, 2 * self.results)
+            self.record.reserve(self.results, *RESULT_COLUMNS)
+            self._results = {name: getattr(self.record, name) for name in RESULT_COLUMNS}
+        if queries <= self.queries:
+            return False
+        self.queries = max(queries, 2 * self.queries)
+        self.record.reserve(self.queries, *QUERY_COLUMNS)
+        self.radius, self.half_extents = np.zeros(self.queries), self.record.half
+        return True
+
+    def copied(self, which: slice | np.ndarray, *names: str) -> tuple[np.ndarray, ...]:
+        """Copies of some rows of columns of results."""
+        return tuple([self._results[name][which].copy() for name in names])
+
+
+class CollectedHits:
+    """Hits of overlaps and neighbours, taken out of a batch call by call."""
+
+    def __init__(self, batch: QueryBatch, count: int) -> None:
+        self._record = batch.record
+        self.offsets = np.zeros(count + 1, np.int64)
+        self._queries = self._hits = 0  # taken so far
+        self._pieces: list[tuple[np.ndarray, ...]] = []
+
+    def take(self, first: int, stop: int) -> None:
+        """Take the hits of the queries first..stop-1 of the batch, which are all it holds."""
+        if stop > first:
+            ends = self._record.end[first:stop]
+            self.offsets[self._queries + 1 : self._queries + 1 + stop - first] = ends + self._hits
+            found = int(ends[-1])
+            self._pieces.append((self._record.entity[:found].copy(), self._record.row[:found].copy()))
+            self._queries += stop - first
+            self._hits += found
+
+    def entities_and_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """All that was taken."""
+        return joined(self._pieces) if self._pieces else (np.empty(0, np.int64), np.empty(0, np.int64))
+
+
+class QueryShape:
+    """A shape that queries are made with, against the shapes of a scene; ``record`` is one of ``QUERY``."""
+
+    def __init__(
+        self, registry: Registry, linked: LinkedShapes, bodies: ParameterRecords, component: type[Component]
+    ) -> None:
+        self._linked, self._bodies = linked_query(registry, linked, component), bodies
+        self.record: Record = make_record(QUERY, linked.dimensions)
+        self._parameters = make_parameter_record(self._linked.shape, linked.dimensions)
+        self._identity = np.empty((0, linked.dimensions, linked.dimensions))
+        self.has_sweeps = False
+        self._linked.fill(self.record, self._parameters, bodies)
+
+    def need_sweeps(self) -> None:
+        """Link the sweeps of its pairs too, which only casts use."""
+        self._linked.fill(self.record, self._parameters, self._bodies, sweeps=True)
+        self.has_sweeps = True
+
+    def bind(self, columns: Mapping[str, np.ndarray], count: int) -> None:
+        """Use these parameters for as many queries; shapes of queries are not rotated."""
+        axes = None
+        if self._linked.shape.rotates:
+            if len(self._identity) < count:
+                d = self._identity.shape[1]
+                self._identity = np.broadcast_to(np.eye(d), (count, d, d)).copy()
+            axes = self._identity
+        bind(self._parameters, self._linked.shape, columns, axes)
+
+
+def joined(pieces: list[tuple[np.ndarray, ...]]) -> tuple[Any, ...]:
+    """Columns of several pieces behind each other."""
+    return pieces[0] if len(pieces) == 1 else tuple(map(np.concatenate, zip(*pieces, strict=True)))

@@ -1,0 +1,96 @@
+"""When a moving query shape first touches a body, from the pair functions alone or from the pair's sweep.
+
+While a shape and a body are apart, a plane with the pair's normal lies between them and the gap is at least -depth
+wide. So the shape can move until it has closed that gap along the normal; there the pair is evaluated again. For
+convex shapes that never steps past a touch, and it converges as Newton's method does (the gap is a convex function of
+the way): a box in a few steps exactly, a sphere with the square of the error, a graze by halves. If the shape does not
+approach the plane, they never touch. A pair with a sweep returns the time directly; shapes that are not convex need
+one.
+"""
+
+from __future__ import annotations
+
+import collections
+import math
+
+from ...framework.compilation import inlined, part, pasted
+from ...framework.vectors import add_scaled, dot, length, scale
+from ..shapes.query import evaluate_against, sweep_against
+from .candidates import to_collider
+
+MAX_STEPS = 100  # a graze takes about 30; what still approaches after that counts as touching
+ROUNDING = 4e-16  # of the distance between the centres: a gap smaller than that is none
+LAST_STEP = 1e-9  # of the way: the most that rounding is made up for
+LONGEST_SPAN = 1e200  # m; on the way past bodies without end
+SPAN_RATIO = 1e6  # the way that a sweep is given may be so many times longer than needed
+
+# start: centre of the query's shape; direction: unit vector; inverse: 1 / direction; half: half extents, with room for
+# rounding.
+Path = collections.namedtuple("Path", "start direction inverse half")
+
+
+@inlined
+def power_above(distance):
+    """A power of two that is larger. With such spans a sweep finds the same digits, however long the way is."""
+    return math.ldexp(1.0, math.frexp(distance)[1])
+
+
+@part
+def touch_at(state, batch, q, i, path, away, distance):
+    """(normal, point) of the touch at a distance that is known."""
+    shape, direction = state.bodies.shape[i], path.direction
+    d = add_scaled(away, direction, 0.0 - distance)
+    _, _, normal, point = evaluate_against(state, batch.query, q, shape, i, d)
+    if distance > 0.0 and not dot(direction, normal) > 0.0:  # a rounding error too far may reverse the normal
+        before = min(distance, LAST_STEP * length(away))
+        d = add_scaled(away, direction, before - distance)
+        _, _, other, _ = evaluate_against(state, batch.query, q, shape, i, d)
+        if dot(direction, other) > 0.0:
+            normal = other
+    return normal, point
+
+
+@part
+def search_touch(state, batch, q, i, path, away, reach):
+    """(touches, distance, normal, point) by steps along the path; reach: where to give up."""
+    shape, direction = state.bodies.shape[i], path.direction
+    distance, touches, normal, point = 0.0, False, away, away
+    for step in range(MAX_STEPS):
+        d = add_scaled(away, direction, 0.0 - distance)
+        hit, depth, here, point = evaluate_against(state, batch.query, q, shape, i, d)
+        rate = dot(direction, here)
+        if step == 0 or rate > 0.0:  # a rounding error too far may reverse the normal
+            normal = here
+        near = abs(depth) <= ROUNDING * length(d)
+        touches = hit or (near and (step > 0 or rate > 0.0))
+        further = distance - depth / rate if rate != 0.0 else math.inf
+        if touches or not rate > 0.0:
+            if near and step > 0 and abs(further - distance) <= LAST_STEP * distance:
+                distance = further  # what rounding leaves of the gap is a long way at a graze
+            break
+        if further > reach:
+            break
+        touches = step == MAX_STEPS - 1
+        if not further > distance:
+            touches = True
+            break
+        distance = further
+    return touches, distance, normal, point
+
+
+@pasted
+def first_touch(state, batch, q, i, path, leave, reach):
+    """(touches, distance, normal, point) of query q on its path and row i, whose box it leaves at ``leave``."""
+    away = to_collider(state, path.start, i)
+    if not leave <= batch.span < SPAN_RATIO * leave:
+        batch.span = power_above(min(leave, LONGEST_SPAN))
+    span = batch.span
+    known, touches, time = sweep_against(
+        state, batch.query, q, state.bodies.shape[i], i, away, scale(path.direction, span)
+    )
+    if not known:
+        return search_touch(state, batch, q, i, path, away, reach)
+    if not touches:
+        return False, 0.0, away, away
+    normal, point = touch_at(state, batch, q, i, path, away, time * span)
+    return True, time * span, normal, point

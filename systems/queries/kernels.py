@@ -1,0 +1,52 @@
+"""How Python calls the compiled functions of queries: one kernel per dimension, which knows neither them nor shapes."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from numba import types
+
+from ...framework.compilation import kernel
+from ...framework.jit.linking import Linked, linked_call
+from ...framework.jit.record_type import record_at, record_type
+from ..broad_phase.records import TREE
+from ..records import STATE
+from ..shapes.attribution import NOTHING_TESTED
+from ..shapes.signatures import named
+from .casts import find_hits
+from .nearest import find_nearest
+from .neighbours import find_neighbours
+from .overlap import find_overlaps
+from .records import QUERY_BATCH
+
+
+class QueryKernels:
+    """Functions of a batch of queries, by address; each compiles or loads when its address is asked for.
+
+    All are called as ``run(function.address, state, batch, moving, static, mask, first, stop)``: addresses of records,
+    the layers, and the queries first..stop-1 of the batch. They return the query to go on with.
+    """
+
+    def __init__(self, dimensions: int) -> None:
+        state, batch, tree = (record_type(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
+        signature = types.int64(state, batch, tree, tree, types.int64, types.int64)
+        state_at, batch_at, tree_at, call = record_at(state), record_at(batch), record_at(tree), linked_call(signature)
+
+        def run_queries(function, state, batch, moving, static, mask, first, stop):
+            known, queries = state_at(state), batch_at(batch)
+            known.row_a, known.unsound = NOTHING_TESTED, 0
+            queries.mask = mask
+            return call(function, known, queries, tree_at(moving), tree_at(static), first, stop)
+
+        self.run: Any = kernel(named(run_queries))
+        self.overlaps = Linked(find_overlaps, signature)
+        self.nearest = Linked(find_nearest, signature)
+        self.hits = Linked(find_hits, signature)
+        self.neighbours = Linked(find_neighbours, signature)
+
+
+@cache
+def query_kernels(dimensions: int) -> QueryKernels:
+    """The same kernels for all worlds of that dimension."""
+    return QueryKernels(dimensions)

@@ -1,0 +1,41 @@
+"""The record of a batch of queries: what is asked, what is found, and the memory of the kernels."""
+
+from __future__ import annotations
+
+from ...framework.jit.schema import Schema, flag, floats, integer, ints, number, vectors
+from ..shapes.query import QUERY
+
+ENDLESS = 1e300  # m; in place of infinity, which times zero is nan
+
+# Queries are rows 0..m-1. Overlaps and neighbours write any number of hits per query, those of query q before
+# ``end[q]``. So does a cast of one shape for all that it meets. Nearest surfaces and first hits are in row q.
+QUERY_BATCH = Schema(
+    "QueryBatch",
+    query=QUERY,  # functions and parameters of the query shape
+    # options, for all queries
+    mask=integer(),  # layers
+    only_nearest=flag(),  # casts
+    is_ray=flag(),
+    radius=number(),  # neighbours, m
+    # queries
+    centre=vectors(),
+    half=vectors(),  # overlaps: half extents
+    direction=vectors(),  # casts: unit vector, 0 if the shape does not move
+    limit=floats(),  # m; how far to look
+    excluded=ints(),  # entity to leave out; -1: none
+    body=ints(),  # neighbours: the row of the body itself
+    # results
+    end=ints(),
+    row=ints(),  # -1: nothing found
+    entity=ints(),
+    distance=floats(),
+    fraction=floats(),
+    normal=vectors(),
+    point=vectors(),
+    # memory of a cast
+    hit_count=integer(),
+    search_limit=floats(),  # limit, or distance of the nearest hit so far
+    slice_level=ints(),  # levels of the tree in use
+    slice_begin=floats(),  # and where the next slice of each begins, m
+    span=number(),  # m; length of the way that sweeps are given
+)

@@ -1,0 +1,371 @@
+"""The records of one world: all arrays and numbers that the compiled stages of a step read and write.
+
+``State`` is what a stage gets; it holds the numbers of the step and the addresses of the other records. Units are SI; n
+rows of bodies are ordered dynamic, kinematic, static. A column that a scene does not need has no rows.
+"""
+
+from __future__ import annotations
+
+from ..framework.jit.schema import Schema, flag, flags, floats, integer, ints, number, table, vectors
+from ..framework.schedule.stages import PROGRAM_FIELDS
+from .broad_phase.records import GRID
+
+BODIES = Schema(
+    "Bodies",
+    # columns of the table
+    entity=ints(),
+    position=vectors(),
+    previous_position=vectors(),
+    linear_velocity=vectors(),
+    force=vectors(),
+    mass=floats(),
+    inverse_mass=floats(),  # 0 for what cannot be moved
+    gravity_scale=floats(),
+    linear_damping=floats(),
+    max_linear_speed=floats(),  # nan: no limit
+    constant_force=vectors(),
+    applied_force=vectors(),
+    step_force=vectors(),
+    ccd=flags(),
+    rotation=floats(),  # one angle, in 3D four numbers per body
+    # the start of the step, for going back when it fails
+    kept_previous=vectors(),
+    kept_velocity=vectors(),
+    kept_step_force=vectors(),
+    # flight: x(t) = origin + path_velocity t + path_second t^2 + path_third t^3 within the step
+    start_velocity=vectors(),
+    origin=vectors(),
+    path_velocity=vectors(),
+    path_second=vectors(),
+    path_third=vectors(),
+    flight_velocity=vectors(),  # of an event-driven world, after the first half kick
+    acceleration=vectors(),
+    rk_middle=vectors(),
+    rk_speeds=vectors(),
+    rk_kicks=vectors(),
+    # colliders
+    rank=ints("int32"),  # place in the order of entity ids
+    collider_slot=ints("int8"),  # slot of the collider that gives layer, mask and material
+    shape=ints("int8"),  # of the last level; -1: none
+    offset=vectors(),  # of the last level, in the world
+    levels=ints("int8", stacked=True),  # shapes, cheapest first, the last one repeated
+    level_offsets=vectors(stacked=True),
+    level_not_enclosing=flags(),  # a rotated level may reach out of the one around it
+    axes=floats(),  # rotation matrices (n, d, d), flat
+    min_extent=floats(),  # smallest full extent of the shape; 0 for what has no end
+    force_speed_change=floats(),  # by which forces change the speed in this step
+    lower=vectors(),  # boxes around the motion
+    upper=vectors(),
+    static_position=vectors(),  # of the static bodies when their boxes were made, from row 0
+    # swept bodies
+    search_margin=floats(),
+    search_lower=vectors(),  # where the centre may be while all neighbours are known
+    search_upper=vectors(),
+    # response
+    impact_count=ints(),
+    counted_impacts=ints(),  # those that the cap counts
+    last_impact=floats(),  # s since the start of the step
+    cluster_root=ints("int32"),
+    cluster_next=ints("int32"),
+    cluster_tail=ints("int32"),
+    cluster_inverse_mass=floats(),
+    supported=flags(),  # the resting prediction has changed its velocity
+    support_change=vectors(),
+    held=flags(),  # a contact at rest has pushed it
+    place=ints("int32"),  # among the bodies of the solver; -1 between steps
+)
+
+# Fields that every collider has, by the slot of its type and the row.
+COLLIDERS = Schema(
+    "Colliders",
+    offset=vectors(stacked=True),
+    restitution=floats(stacked=True),
+    friction=floats(stacked=True),
+    sensor=flags(stacked=True),
+    layer=ints(stacked=True),
+    mask=ints(stacked=True),
+)
+
+# Linked functions and parameters of the scene's shapes, cheapest first; a pair is at first * count + second, where
+# first <= second.
+SHAPES = Schema(
+    "Shapes",
+    count=integer(),
+    slots=ints(),  # in the stacks of the colliders
+    parameters=ints(),  # addresses of the shapes' parameter records, as they are in the world
+    own_parameters=ints(),  # the same as the components have them, before rotation
+    bounds=ints(),
+    rotated=ints(),  # 0 for shapes that rotation does not change
+    concave=flags(),
+    flipped=flags(),  # pairs that are registered as (second, first); the functions below take them so
+    evaluate=ints(),
+    batch=ints(),
+    sweep=ints(),  # 0: no closed form
+    corner=ints(),  # 0: touches of corners are contacts
+    mixing=ints(),  # rules of plugins
+)
+
+CANDIDATES = Schema(
+    "Candidates",
+    count=integer(),
+    first=ints("int32"),
+    second=ints("int32"),
+    half_a=ints("int32"),
+    half_b=ints("int32"),
+    starts=ints("int32"),
+    sorted_a=ints("int32"),
+    sorted_b=ints("int32"),
+    kind=ints("int32"),  # pair of shapes
+    bucket=ints("int32"),  # candidates by pair of shapes
+    bucket_starts=ints("int32"),
+)
+
+# Pairs whose layers meet, a's entity id the smaller, in canonical order.
+PAIRS = Schema(
+    "Pairs",
+    count=integer(),
+    a=ints("int32"),
+    b=ints("int32"),
+    is_solid=flags(),  # they push each other
+    hit=flags(),
+    near_contact=flags(),  # the response may concern them
+    crossed=flags(),
+    depth=floats(),
+    impulse=floats(),
+    parting=ints("uint8"),
+    normal=vectors(),
+    point=vectors(),
+    found=integer(),  # contacts of the narrow phase: hits
+    hits=ints("int32"),
+    disabled_count=integer(),
+    disabled=ints("int32"),
+    resting_count=integer(),
+    resting=ints("int32"),
+    touching_count=integer(),
+    touching=ints("int32"),
+    place=ints("int32"),  # while two lists are merged
+)
+
+IMPACTS = Schema(
+    "Impacts",
+    active=flag(),  # something may bounce in this step
+    sweeps=flag(),  # bodies are swept
+    # queue
+    waiting=integer(),
+    event_pair=ints("int32"),
+    event_count_a=ints(),  # impact_count of both bodies when the event was made
+    event_count_b=ints(),
+    event_kind=ints("int8"),
+    event_time=floats(),
+    event_key=ints(),
+    event_change=floats(),  # of the speed along the normal
+    event_normal=vectors(),
+    event_point=vectors(),
+    event_pull=vectors(),  # change of velocity along the surface
+    heap=ints("int32"),
+    heads=ints("int32"),
+    links=ints("int32"),
+    looks=ints("int32"),
+    # the loop
+    linked=flag(),
+    last_pair=integer(),
+    cluster=integer(),
+    now=number(),
+    until=number(),
+    # what has happened in this step
+    logged=integer(),
+    capped=integer(),
+    crossings=integer(),
+    log_pair=ints("int32"),
+    log_time=floats(),
+    log_impulse=floats(),
+    log_normal=vectors(),
+    log_point=vectors(),
+)
+
+# Contacts at rest and their bodies, while they are solved.
+SOLVER = Schema(
+    "Solver",
+    contacts=integer(),
+    first=ints("uint32"),
+    second=ints("uint32"),
+    slot=ints("int32"),  # place of contact r in these columns, which are sorted by colour
+    colour=ints("int8"),
+    normal=vectors(),
+    tangent=vectors(),
+    gap=floats(),
+    mass=floats(),
+    friction=floats(),
+    extent=floats(),
+    impulse=floats(),
+    total=floats(),
+    opening=floats(),
+    pushing=floats(),
+    in_block=flags(),
+    worked=flags(),
+    parting=flags(),
+    active=flags(),
+    soft=flags(),
+    light_of=ints("int32"),
+    before=ints("int32"),
+    blocks=integer(),
+    block=table("int32", 2),
+    has_friction=flag(),
+    bodies=integer(),
+    body_row=ints("int32"),
+    used=ints(),
+    last=ints("int32"),
+    velocity=vectors(),
+    shift=vectors(),
+    acceleration=vectors(),
+    inverse_mass=floats(),
+    unsettled=flags(),
+    any_unsettled=flag(),
+    starts=ints(),
+)
+
+# Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
+WARM_START = Schema(
+    "WarmStart",
+    now=integer(),
+    before=integer(),  # ``now`` at the start of the step
+    counts=ints(),
+    entity_a=ints(stacked=True),
+    entity_b=ints(stacked=True),
+    normal=vectors(stacked=True),
+    impulse=floats(stacked=True),
+    total=floats(stacked=True),
+    tangent=vectors(stacked=True),
+    first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
+    second=ints("int32", stacked=True),
+    rows_version=ints(),
+    step=floats(),
+    substep=floats(),
+    work=floats(),
+)
+
+# Contacts at the end of the step and of the one before: [now, i] and [1 - now, i].
+CONTACTS = Schema(
+    "Contacts",
+    now=integer(),
+    counts=ints(),
+    entity_a=ints(stacked=True),
+    entity_b=ints(stacked=True),
+    point=vectors(stacked=True),
+    normal=vectors(stacked=True),
+    depth=floats(stacked=True),
+    impulse=floats(stacked=True),
+    enabled=flags(stacked=True),
+    ends=integer(),
+    begins=integer(),
+    before=integer(),  # ``now`` at the start of the step
+    stays=ints(),  # one for each of the two
+    ended=ints("int32"),
+    began=ints("int32"),
+    stayed=ints("int32", stacked=True),
+    steps=ints(),  # numbers of the steps that the contacts are of
+)
+
+STATE = Schema(
+    "State",
+    **PROGRAM_FIELDS,
+    links=ints(),  # addresses of parts of stages, see linked_parts
+    needed=integer(),  # rows that a stage asks for
+    # the scene
+    count=integer(),
+    dynamic=integer(),  # rows before it are dynamic
+    moving=integer(),  # rows before it move
+    version=integer(),  # of the table's rows
+    gravity=vectors(),  # one row
+    collides=flag(),
+    several_levels=flag(),
+    level_count=integer(),
+    slot_count=integer(),  # types of colliders in the stacks
+    has_force_systems=flag(),
+    rotated=flag(),  # some body is
+    limits_speed=flag(),
+    others_write=flag(),  # code that is not carom's runs in the step
+    # settings
+    dt_cubed=number(),
+    substeps=integer(),
+    mode=integer(),
+    slop=number(),  # below 0: from the sizes
+    restitution_threshold=number(),  # below 0: from the forces
+    max_impacts=integer(),
+    restitution_rule=integer(),
+    friction_rule=integer(),
+    moves_with_old_velocity=flag(),  # the integrator's straight path
+    flies=flag(),  # event-driven: exact flight between impacts
+    force_changes=flag(),  # with position, velocity or time
+    uses_plugin_broad_phase=flag(),
+    # the step
+    unforced=flag(),
+    pushed=flag(),
+    moved=flag(),
+    sweeping=flag(),
+    path_degree=integer(),
+    usual_path_degree=integer(),  # of the integrator
+    force_travels=number(),
+    step_number=integer(),
+    neighbours_known_until=number(),
+    any_support=flag(),
+    heavy_damping=number(),
+    heavy_step=number(),
+    rk_stage=integer(),
+    drifted=flag(),
+    damped=flag(),
+    rotation_stale=flag(),  # axes have to be made, whether some body is rotated or not
+    statics_stale=flag(),  # their boxes have to be made again
+    statics_changed=flag(),  # they were, in this step
+    statics_version=integer(),
+    frame=floats(),  # extent of the moving bodies' boxes
+    pair_search=integer(),  # what finds candidates in this step, see broad_phase.stages
+    response_idle=flag(),  # nothing is near anything, and nothing rested
+    ids_changed=flag(),  # ids mean other entities than in the last step
+    contacts_version=integer(),
+    motion_version=integer(),  # changes whenever bodies may have moved
+    stay_wanted=flag(),  # contact_stay has a handler
+    news=integer(),  # events of contacts that Python has to hear of
+    finite=flag(),
+    # what an error names
+    row_a=integer(),
+    row_b=integer(),
+    unsound=integer(),
+    unsound_a=integer(),
+    unsound_b=integer(),
+    # counters
+    bodies_counted=integer(),
+    force_evaluations=integer(),
+    candidates_counted=integer(),
+    pairs_counted=integer(),
+    contacts_counted=integer(),
+    resting_counted=integer(),
+    impacts_counted=integer(),
+    capped_counted=integer(),
+    refreshes_counted=integer(),
+    first_level_tests=integer(),
+    first_level_hits=integer(),
+    false_positives=integer(),
+    forces_summed=flag(),  # ``force`` holds the sum of this step
+    sweeps_ready=flag(),
+    kept=flag(),  # keep_state has run
+    started=flag(),  # keep_start has run
+    step_force_kept=flag(),
+    impacts_recorded=flag(),  # in the history of world.contacts
+    found_current=flag(),  # the contacts are those of the narrow phase
+    candidates_ready=flag(),
+    contacts_ready=flag(),
+    # records
+    bodies=BODIES,
+    colliders=COLLIDERS,
+    shapes=SHAPES,
+    candidates=CANDIDATES,
+    pairs=PAIRS,
+    merged=PAIRS,  # room for the pairs of the rest of the step
+    impacts=IMPACTS,
+    solver=SOLVER,
+    warm_start=WARM_START,
+    contacts=CONTACTS,
+    grid=GRID,  # of what moves
+    static_grid=GRID,
+)

@@ -1,0 +1,178 @@
+"""Room for what stages ask for, and the other things that Python does between two stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..framework.jit.record import Record
+from ..framework.jit.schema import Column
+from .broad_phase.search import CandidateSearch
+from .codes import (
+    FIND_IN_PYTHON,
+    NEED_CANDIDATES,
+    NEED_CELLS,
+    NEED_CONTACTS,
+    NEED_EVENTS,
+    NEED_MERGED,
+    NEED_ORDER,
+    NEED_PAIRS,
+    NEED_SOLVER,
+    NEED_SWEEPS,
+    NEED_WARM_START,
+    REFRESH_PAIRS,
+    ROTATE,
+    RUN_BROAD,
+    RUN_NARROW,
+)
+from .impacts.stages import ALL
+from .records import IMPACTS
+from .scene import Scene
+
+COLOURS = 64
+SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
+ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
+EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
+LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
+SOLVER_BODIES = ("body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled")
+SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
+
+
+class Room:
+    """Gives the records of one world the rows that stages ask for; MemoryError names what asked for how much."""
+
+    def __init__(self, state: Record, scene: Scene, search: CandidateSearch) -> None:
+        self._state, self._scene, self._search = state, scene, search
+        for record in (state.warm_start, state.contacts):
+            record.counts = np.zeros(2, np.int64)
+        state.warm_start.rows_version = np.full(2, -1, np.int64)
+        state.warm_start.step, state.warm_start.substep = np.ones(2), np.ones(2)
+        state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
+        state.solver.starts = np.zeros(COLOURS, np.int64)
+        state.frame = np.zeros(7)
+        self._grow_warm_start(0.0, 16)
+        self._grow_contacts(0.0, 16)
+
+    def handlers(self, simulation: Any) -> dict[int, Callable[[float], None]]:
+        """What to do for each code; ``simulation`` has the systems that run when a phase before them has not."""
+        growing = {
+            NEED_ORDER: self._grow_order, NEED_PAIRS: self._grow_pairs, NEED_EVENTS: self._grow_events,
+            NEED_CONTACTS: self._grow_contacts, NEED_SOLVER: self._grow_solver,
+            NEED_WARM_START: self._grow_warm_start, NEED_MERGED: self._grow_merged,
+        }  # fmt: skip
+        return {
+            **{code: self._named(grow) for code, grow in growing.items()},
+            NEED_CANDIDATES: self._named(lambda dt: self._search.grow(NEED_CANDIDATES)),
+            NEED_CELLS: self._named(lambda dt: self._search.grow(NEED_CELLS)),
+            NEED_SWEEPS: simulation.make_sweeps_ready,
+            FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
+            ROTATE: lambda dt: self._scene.refresh_rotation(),
+            RUN_BROAD: lambda dt: simulation.broad_phase.process(dt),
+            RUN_NARROW: lambda dt: simulation.narrow_phase.process(dt),
+            REFRESH_PAIRS: lambda dt: self._refresh_pairs(simulation, dt),
+        }
+
+    def _named(self, grow: Callable[[float], None]) -> Callable[[float], None]:
+        def handler(dt: float) -> None:
+            state = self._state
+            try:
+                grow(dt)
+            except MemoryError as error:
+                raise MemoryError(f"no memory for {state.needed} rows, which stage {state.stage} asks for") from error
+
+        return handler
+
+    def _grow_order(self, dt: float) -> None:
+        candidates, state = self._state.candidates, self._state
+        if state.needed > len(candidates.sorted_a):
+            candidates.reserve(_with_spare(state.needed), *ORDER)
+        candidates.reserve(state.count + 1, "starts")
+        kinds = state.shapes.count**2 + 2
+        candidates.reserve(kinds, "bucket_starts")
+
+    def _grow_pairs(self, dt: float) -> None:
+        state = self._state
+        self._reserve_pairs(state.pairs, _with_spare(state.needed))
+
+    def _grow_merged(self, dt: float) -> None:
+        state = self._state
+        self._reserve_pairs(state.merged, _with_spare(state.needed))
+
+    def _reserve_pairs(self, pairs: Record, rows: int) -> None:
+        columns = [name for name, field in pairs.schema.fields.items() if isinstance(field, Column)]
+        pairs.reserve(rows, *columns, keep=len(pairs.a))
+
+    def _grow_events(self, dt: float) -> None:
+        """Whichever is too small: room for the search among all pairs, the queue, the log."""
+        impacts, state = self._state.impacts, self._state
+        if len(impacts.looks) <= 2 * state.pairs.count:
+            impacts.reserve(_with_spare(2 * state.pairs.count) + 1, "links", "looks")
+        if len(impacts.heads) < state.count:
+            impacts.reserve(self._scene.table.capacity, "heads")
+        old = len(impacts.heap)
+        if state.needed > old:
+            size = _with_spare(state.needed)
+            impacts.reserve(size, "heap", *EVENTS, keep=old)
+            impacts.heap[old:size] = np.arange(old, size)
+        if impacts.logged == len(impacts.log_pair):
+            impacts.reserve(_with_spare(impacts.logged), *LOG, keep=impacts.logged)
+        impacts.linked = False
+
+    def _grow_solver(self, dt: float) -> None:
+        solver, state = self._state.solver, self._state
+        per_contact = [
+            name
+            for name, field in solver.schema.fields.items()
+            if isinstance(field, Column) and name not in SOLVER_OTHERS
+        ]
+        if state.needed > len(solver.first):
+            solver.reserve(_with_spare(state.needed), *per_contact)
+        solver.reserve(self._scene.table.capacity, *SOLVER_BODIES)
+
+    def _grow_warm_start(self, dt: float, rows: int = 0) -> None:
+        memory = self._state.warm_start
+        _grow_stacked(memory, rows or _with_spare(self._state.needed))
+        memory.reserve(memory.entity_a.shape[1], "work")
+
+    def _grow_contacts(self, dt: float, rows: int = 0) -> None:
+        contacts = self._state.contacts
+        _grow_stacked(contacts, rows or _with_spare(self._state.needed))
+        contacts.reserve(contacts.entity_a.shape[1], "began", "ended")
+
+    def _find_candidates(self, simulation: Any, dt: float) -> None:
+        """Trees, which from now on hold whole motions, or the broad phase of a plugin."""
+        self._search.find_in_python(dt)
+        simulation.queries.forget()
+
+    def _refresh_pairs(self, simulation: Any, dt: float) -> None:
+        """An impact has sent a body out of its search bounds: pairs for what is left of the step."""
+        state, program = self._state, simulation.program
+        now = state.impacts.until
+        program.run_one("box_rest_of_step", dt)
+        found = simulation.broad_phase.segment("choose_search")
+        program.run(found.start, found.stop, dt)
+        program.run_one("order_candidates", dt)
+        simulation.narrow_phase.filter_candidates()
+        program.run_one("merge_pairs", dt)
+        state.pairs, state.merged = state.merged, state.pairs
+        impacts = state.impacts
+        impacts.waiting, impacts.last_pair, impacts.linked = 0, ALL, False
+        impacts.now, impacts.until = now, state.neighbours_known_until
+
+
+def _with_spare(rows: int) -> int:
+    """So many rows and half as many again, up to a limit: numbers of pairs change from step to step."""
+    return rows + min(rows // 2, SPARE) + 16
+
+
+def _grow_stacked(record: Record, rows: int) -> None:
+    """More rows in the columns of which there are two, keeping both."""
+    for name, field in record.schema.fields.items():
+        if isinstance(field, Column) and field.stacked:
+            before = getattr(record, name)
+            after = np.zeros((2, rows, *field.item_shape(record.dimensions)), field.dtype)
+            if before.shape[0] == 2:
+                after[:, : before.shape[1]] = before
+            setattr(record, name, after)

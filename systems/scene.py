@@ -1,0 +1,226 @@
+"""The scene of one world as the stages see it: which shapes there are, and every column where the records find it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..components import AABBCollider, Collider
+from ..framework.data.table import Table
+from ..framework.jit.record import Record
+from ..framework.plugins.registry import Registry
+from ..framework.settings import Settings
+from .shapes.geometry_levels import arrange, in_order
+from .shapes.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
+from .shapes.rotation import axes_of
+
+# Columns of the table by their name in ``bodies``.
+TABLE_COLUMNS = (
+    "entity", "position", "previous_position", "linear_velocity", "force", "mass", "inverse_mass", "gravity_scale",
+    "linear_damping", "max_linear_speed", "constant_force", "applied_force", "step_force", "ccd",
+)  # fmt: skip
+STACKED_COLUMNS = ("offset", "restitution", "friction", "sensor", "layer", "mask")
+
+# Columns that are made within a step or when rows have moved, by what needs them.
+FLIGHT = ("start_velocity", "kept_previous", "kept_velocity", "kept_step_force")
+COLLISIONS = (
+    "origin", "path_velocity", "min_extent", "force_speed_change", "lower", "upper", "rank", "collider_slot",
+    "static_position", "impact_count", "counted_impacts", "supported", "support_change", "held", "place",
+)  # fmt: skip
+CURVES = ("path_second", "path_third")
+SWEEPS = (
+    "search_margin", "search_lower", "search_upper", "last_impact", "cluster_root", "cluster_next", "cluster_tail",
+    "cluster_inverse_mass",
+)  # fmt: skip
+HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
+SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
+PER_BODY = (*FLIGHT, *COLLISIONS, *CURVES, *SWEEPS, *HALF_KICKS, *SEVERAL_EVALUATIONS)
+# Static bodies do not move: what stands in their rows of these stays 0.
+ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third")
+
+
+class Scene:
+    """What follows from the bodies, their colliders and the plugins; refreshed when these change.
+
+    linked
+        the functions of the shapes that are present, cheapest first; None without colliders
+    version
+        grows whenever anything was made again
+    """
+
+    def __init__(self, state: Record, table: Table, registry: Registry, settings: Callable[[], Settings]) -> None:
+        self.state, self.table, self.registry = state, table, registry
+        self._settings = settings
+        self.prepared: set[type[Any]] = set()  # colliders whose functions are kept ready
+        self.version = 0
+        self.linked: LinkedShapes | None = None
+        self.parameters: ParameterRecords | None = None
+        self.levels = np.empty((1, 0), np.int8)
+        self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
+        self.rotated = False
+        self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
+        self.rotated_columns: dict[str, np.ndarray] = {}
+        self._axes = np.empty((0, state.dimensions, state.dimensions))
+
+    # -- structure --------------------------------------------------------------------------------
+
+    def refresh(self) -> bool:
+        """Follow which bodies and colliders there are; True if that has changed."""
+        table = self.table
+        key = table.version + table.members_version + self.registry.version  # all of them only grow
+        if key == self.structure:
+            return False
+        self.structure = key
+        self.version += 1
+        bodies, count, moving = self.state.bodies, table.count, table.stops[1]
+        table.arrays["linear_velocity"][moving:count] = 0.0
+        present = self._present_colliders()
+        self._bind_table()
+        self.reserve(*FLIGHT)
+        if present:
+            self.reserve(*COLLISIONS)
+        for name in ZERO_WHERE_STATIC:
+            if len(getattr(bodies, name)):
+                getattr(bodies, name)[moving:count] = 0.0
+        present = self._place_levels(present)
+        self.state.collides = bool((self.levels[0, :moving] >= 0).any())
+        self.linked = linked_shapes(self.registry, present, self.state.dimensions) if present else None
+        self.parameters = ParameterRecords(self.linked) if self.linked else None
+        if self.linked is not None:
+            bodies.rank[np.argsort(table.arrays["entity"][:count], kind="stable")] = np.arange(count)
+            bodies.place[:] = -1
+        self._bind_shapes()
+        self.state.statics_stale = self.state.rotation_stale = True
+        return True
+
+    def forget(self) -> None:
+        """Make everything again at the next refresh."""
+        self.structure = -1
+
+    def _present_colliders(self) -> list[type[Any]]:
+        table = self.table
+        known = table.stacked_types(Collider.stack)
+        present = [c for c in known if c in self.prepared or table.has_mask(c)[: table.count].any()]
+        return in_order(self.registry, present)
+
+    def _bind_table(self) -> None:
+        """The table's arrays, which are others after it has grown."""
+        state, table = self.state, self.table
+        bodies, arrays = state.bodies, table.arrays
+        for name in TABLE_COLUMNS:
+            setattr(bodies, name, arrays[name])
+        bodies.rotation = arrays["rotation"].reshape(-1)
+        for name in STACKED_COLUMNS:
+            stack = table.stacks.get(f"{Collider.stack}.{name}")
+            if stack is not None:
+                setattr(state.colliders, name, stack)
+                state.slot_count = len(stack)
+        state.count, (state.dynamic, state.moving, _) = table.count, table.stops
+        state.version = table.version
+
+    def reserve(self, *names: str) -> None:
+        """Room for every row that the table can hold in these columns of the bodies."""
+        bodies, capacity = self.state.bodies, self.table.capacity
+        for name in names:
+            if len(getattr(bodies, name)) != capacity:
+                field = bodies.schema.fields[name]
+                setattr(bodies, name, np.zeros((capacity, *field.item_shape(self.state.dimensions)), field.dtype))
+                if name == "place":
+                    bodies.place[:] = -1
+
+    def _place_levels(self, present: list[type[Any]]) -> list[type[Any]]:
+        """Which shapes each body has, cheapest first; returns the shapes that are tested."""
+        table, state, count = self.table, self.state, self.table.count
+        masks = [table.has_mask(component)[:count] for component in present]
+        levels = arrange(np.array(masks).reshape(len(present), count))
+        slots = np.array([table.slot_of(component) for component in present], np.int64)
+        if present:
+            state.bodies.collider_slot[:count] = slots[levels[-1]]
+        if self._settings().geometry == "bounds" and len(levels) > 1:  # shapes that are never tested cost nothing
+            levels = levels[:1]
+            used = [index for index, c in enumerate(present) if c in self.prepared or (levels == index).any()]
+            levels = np.where(levels < 0, -1, np.searchsorted(used, levels)).astype(np.int8)
+            present, slots = [present[index] for index in used], slots[used]
+        state.shapes.slots = slots
+        self._set_levels(levels)
+        boxes = present.index(AABBCollider) if AABBCollider in present else len(present)
+        if len(levels) > 1:
+            self.stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
+        return present
+
+    def _set_levels(self, levels: np.ndarray) -> None:
+        """The last level decides; it is also known as the body's shape."""
+        state, bodies, capacity = self.state, self.state.bodies, self.table.capacity
+        several = len(levels) > 1
+        self.levels = np.full((len(levels), capacity), -1, np.int8)
+        self.levels[:, : levels.shape[1]] = levels
+        rows = capacity if (levels >= 0).any() else 0
+        offsets = np.zeros((len(levels), rows, state.dimensions))
+        bodies.levels, bodies.level_offsets = self.levels, offsets
+        bodies.shape, bodies.offset = self.levels[-1], offsets[-1]
+        bodies.level_not_enclosing = np.zeros(capacity if several else 0, bool)
+        self.stretches = np.zeros(levels.shape[1] if several else 0, bool)
+        state.several_levels, state.level_count = several, len(levels)
+
+    def _bind_shapes(self) -> None:
+        """The parameter columns of each shape: as the components have them, and as they are in the world."""
+        if self.linked is None or self.parameters is None:
+            self.state.shapes.count = 0
+            return
+        for number, shape in enumerate(self.linked.shapes):
+            keys = {name: shape.component.columns[name].key for name in shape.columns}
+            columns = {name: self.table.arrays[key] for name, key in keys.items()}
+            rotated = None
+            if self.rotated and shape.turned is not None:
+                rotated = {name: self._rotated_column(key, columns[name]) for name, key in keys.items()}
+            self.parameters.bind(number, columns, self._axes, rotated)
+        self.parameters.fill(self.state.shapes)
+
+    def _rotated_column(self, key: str, own: np.ndarray) -> np.ndarray:
+        """Room for a shape's parameter as it is in the world."""
+        column = self.rotated_columns.get(key)
+        if column is None or column.shape != own.shape:
+            column = self.rotated_columns[key] = np.zeros_like(own)
+        return column
+
+    def link_shapes(self, sweeps: bool) -> None:
+        """Compile or load the functions of the shapes; sweeps: also those of swept bodies and casts."""
+        if self.linked is not None:
+            self.linked.fill(self.state.shapes, sweeps)
+
+    # -- what changes from step to step -----------------------------------------------------------
+
+    def refresh_rotation(self) -> None:
+        """Axes of the bodies where something needs them; the shapes' parameters as they are in the world then."""
+        if self.linked is None:
+            return
+        table, bodies = self.table, self.state.bodies
+        rotation = table.column("rotation")
+        before, self.rotated = self.rotated, any_rotated(rotation)
+        self.state.rotated, self.state.rotation_stale = self.rotated, False
+        count, needed = table.count, self.rotated or self.linked.needs_axes
+        fresh = needed and len(self._axes) != table.capacity
+        if fresh:
+            self._axes = np.zeros((table.capacity, self.state.dimensions, self.state.dimensions))
+            bodies.axes = self._axes.reshape(-1)
+        if fresh or self.rotated != before:
+            self._bind_shapes()
+            self.state.statics_stale = True
+        if needed:
+            self._axes[:count] = axes_of(rotation, self.state.dimensions)
+        if self.state.several_levels:  # a box that is stretched may reach out of the level around it
+            turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
+            bodies.level_not_enclosing[:count] = self.stretches & turned
+
+    def refresh_statics(self) -> None:
+        """The boxes of static bodies are made again if any of these may have changed."""
+        if self.table.static_version != self.static_version:
+            self.static_version = self.table.static_version
+            self.state.statics_stale = True
+
+
+def any_rotated(rotation: np.ndarray) -> bool:
+    """Whether any angle is not 0, in 3D any quaternion has a part beside the first."""
+    return bool(rotation.any() if rotation.ndim == 1 else rotation[:, 1:].any())

@@ -1,0 +1,515 @@
+"""The physics of one world: its table, its records, the program of its steps and the systems that it serves."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..components import Collider, RigidBody, Transform
+from ..framework.data.adoption import Adoption
+from ..framework.data.bodies import Bodies
+from ..framework.data.column_copies import ColumnCopies, copy_blocks
+from ..framework.data.component import Component
+from ..framework.data.table import Table
+from ..framework.jit.record import make_record
+from ..framework.schedule.phases import System
+from ..framework.schedule.plan import PlannedColumn, PlannedKernel
+from ..framework.schedule.stages import Program, Segment, Stage
+from ..framework.settings import AUTOMATIC, MIXING_RULES
+from ..framework.world.contacts import Contacts, EntityLookup
+from ..framework.world.services import PhysicsServices
+from .broad_phase.boxes import bound_searches, box_rest_of_step, box_rows
+from .broad_phase.search import CandidateSearch
+from .broad_phase.system import BroadPhase
+from .ccd.refresh_pairs import merge_pairs
+from .ccd.search_bounds import DISCRETE, MODES
+from .ccd.time_of_impact import first_touch
+from .codes import AFTERWARDS
+from .contacts.events import ContactEvents, RecordedContacts
+from .contacts.response import Response
+from .forces.accumulation import ForceAccumulation
+from .forces.energy import kinetic_energy, momentum, potential_energy
+from .impacts.find import is_held_by_edge, kind_beyond_cap
+from .impacts.stages import take_swept_event, watch_bounds
+from .integration.system import Integration
+from .linked_parts import (
+    BOUND_SEARCHES,
+    BOX_ROWS,
+    FIRST_TOUCH,
+    HELD_BY_EDGE,
+    KIND_BEYOND_CAP,
+    TAKE_SWEPT,
+    WATCH_BOUNDS,
+    address_of,
+)
+from .linked_parts import COUNT as LINKED_PART_COUNT
+from .narrow_phase.system import NarrowPhase
+from .opening import check_finite, keep_state, read_bodies
+from .planned_columns import planned_columns
+from .preparation import prepare
+from .queries.system import Queries
+from .records import STATE
+from .room import Room
+from .scene import SWEEPS, Scene
+from .shapes.attribution import ErrorAttribution
+from .shapes.geometry_levels import LevelCheck, check_sensors
+from .shapes.linked_shapes import LinkedShapes, ParameterRecords
+from .shapes.mixing import rule_number
+from .shapes.pair_coverage import check_pairs
+
+if TYPE_CHECKING:
+    from ..framework.world.world import World
+
+OPENING = (
+    Stage(keep_state, "keeps what a failed step puts back", ("previous_position", "linear_velocity"), ("kept",)),
+    Stage(
+        read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",
+        ("mass", "rotation", "ccd", "max_linear_speed"), ("inverse_mass",),
+    ),
+)  # fmt: skip
+CLOSING = (Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),)
+ON_DEMAND = (
+    Stage(box_rest_of_step, "boxes around the rest of the paths", ("path",), ("boxes",), "swept bodies"),
+    Stage(merge_pairs, "the pairs of the rest of the step", ("pairs", "candidates"), ("merged",), "swept bodies"),
+    *Integration.ON_DEMAND,
+)
+# The stages of a step in their order: what plan(), stats(), profile() and docs/architecture.md read.
+SYSTEMS = (ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, ContactEvents)
+STAGES = (*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND)
+
+# Parts of stages by their place in ``state.links``.
+LINKED_PARTS = {
+    BOX_ROWS: box_rows,
+    BOUND_SEARCHES: bound_searches,
+    FIRST_TOUCH: first_touch,
+    HELD_BY_EDGE: is_held_by_edge,
+    KIND_BEYOND_CAP: kind_beyond_cap,
+    TAKE_SWEPT: take_swept_event,
+    WATCH_BOUNDS: watch_bounds,
+}
+
+COUNTERS = {
+    "bodies": "bodies_counted",
+    "candidates": "candidates_counted",
+    "pairs": "pairs_counted",
+    "contacts": "contacts_counted",
+    "impacts": "impacts_counted",
+    "capped_impacts": "capped_counted",
+    "rounds": "refreshes_counted",
+    "resting_contacts": "resting_counted",
+    "first_level_tests": "first_level_tests",
+    "first_level_hits": "first_level_hits",
+    "false_positives": "false_positives",
+    "force_evaluations": "force_evaluations",
+}
+
+
+class Simulation(PhysicsServices):
+    """What a physics plugin gives to a world."""
+
+    def __init__(self, world: World, dimensions: int, gravity: Any) -> None:
+        self._world, self.dimensions = world, dimensions
+        self.state = make_record(STATE, dimensions)
+        self.table = _make_table(dimensions)
+        self.table.clock = world.clock  # type: ignore[attr-defined]
+        self.table.forces_are_summed = lambda: self.state.forces_summed
+        self.set_gravity(gravity)
+        self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
+        self.adoption = Adoption(self.table, Transform, _makes_body, LevelCheck(self.table, world.registry))
+        self.bodies = Bodies(self.table)
+        lookup = EntityLookup(self._living_with)
+        source = RecordedContacts(self.state)
+        self.contacts = Contacts(dimensions, lookup, self._running_step, source)
+        self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
+        self._room = Room(self.state, self.scene, self.search)
+        self.state.links = np.zeros(LINKED_PART_COUNT, np.int64)
+        self.program = Program(self.state, STAGES, self._room.handlers(self), AFTERWARDS)
+        self._attribution = ErrorAttribution(
+            world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
+        )
+        self.program.describe_error, self.program.on_alarm = self._attribution.describe, self._attribution.check
+        self.program.alarm = self.state.word_of("unsound")
+        self.queries = Queries(self.state, self.table, world.registry, QueriedScene(self), self.search)
+        self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies)
+        self.integration = Integration(
+            self.program, self.scene, self.forces, world.registry, lambda: world.settings
+        )
+        self.broad_phase = BroadPhase(self.program, self.search)
+        self.narrow_phase = NarrowPhase(self.program, self.scene, world.registry, self.bodies)
+        self.response = Response(self.program, self.contacts, lambda: world.settings)
+        self.contact_events = ContactEvents(self.program, source, self.contacts, lookup, lambda: world.settings)
+        self.parts_version = 0
+        self._linked_version = self._linked_forces = -1  # of the scene, and how many force systems there were
+        self._shapes_key: Any = None
+        self._must_check = False  # in every step: sensors among levels, pairs that no plugin has
+        self._copies = ColumnCopies(self.table)
+        self._words = self.state.words
+        self._step_number, self._others_write = (self.state.word_of(name) for name in ("step_number", "others_write"))
+        self._finite, self._pushed = (self.state.word_of(name) for name in ("finite", "pushed"))
+        self._found_current = self.state.word_of("found_current")
+        self._contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
+        self._generation = self.table.generation
+        self.preparing = False  # a small world in which all shapes are together, see preparation
+
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """The built-in systems, in the order of a step."""
+        return (
+            self.forces, self.integration, self.broad_phase, self.narrow_phase, self.response, self.contact_events,
+        )  # fmt: skip
+
+    # -- settings ---------------------------------------------------------------------------------
+
+    def check_settings(self, settings: Any) -> None:
+        registry = self._world.registry
+        for name, known in (
+            ("integrator", registry.integrators),
+            ("restitution_mixing", (*MIXING_RULES, *registry.mixing_rules)),
+            ("friction_mixing", (*MIXING_RULES, *registry.mixing_rules)),
+            ("broad_phase", (AUTOMATIC, *registry.broad_phases)),
+        ):
+            value = getattr(settings, name)
+            if value not in known:
+                near = difflib.get_close_matches(value, known, 1)
+                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {value!r}{hint}")
+
+    def take_settings(self, settings: Any) -> None:
+        state, registry = self.state, self._world.registry
+        state.dt_cubed, state.substeps = cubed(settings.dt), settings.substeps
+        state.mode = MODES[settings.collision]
+        state.slop = -1.0 if settings.slop is None else float(settings.slop)
+        threshold = settings.restitution_threshold
+        state.restitution_threshold = -1.0 if threshold is None else float(threshold)
+        state.max_impacts = settings.impact_cap
+        state.restitution_rule = rule_number(registry, settings.restitution_mixing)
+        state.friction_rule = rule_number(registry, settings.friction_mixing)
+        self.search.read_settings()
+        self.scene.forget()
+        self._linked_version = -1
+
+    def set_gravity(self, gravity: Any) -> None:
+        vector = np.array(gravity, float)
+        if vector.ndim == 0 and vector == 0:
+            vector = np.zeros(self.dimensions)
+        if vector.shape != (self.dimensions,) or not np.isfinite(vector).all():
+            raise ValueError(f"gravity must be {self.dimensions} finite numbers, got {gravity!r}")
+        vector.flags.writeable = False
+        self.gravity = vector
+        self.state.gravity = vector[None].copy()
+
+    # -- a step -----------------------------------------------------------------------------------
+
+    def begin_step(self, others_write: bool) -> None:
+        table, scene, words = self.table, self.scene, self._words
+        words[self._step_number] = self._world.clock.step_count
+        self._contacts_before = self.contacts.columns_now() if words[self._found_current] else None
+        structure = table.version + table.members_version + self._world.registry.version
+        if structure != scene.structure or table.static_version != scene.static_version:
+            self._refresh()
+        if self._must_check:
+            self._check()
+        force_systems = len(self._world.force_systems)
+        if scene.version != self._linked_version or force_systems != self._linked_forces:
+            self._link()
+            self._linked_forces = force_systems
+        if others_write or words[self._others_write]:
+            self._take_care(others_write)
+
+    def _take_care(self, others_write: bool) -> None:
+        """Code of the game runs in this step, or did in the last one."""
+        state = self.state
+        if others_write != state.others_write:
+            state.others_write = others_write
+            self.parts_version += 1
+        if others_write:
+            state.stay_wanted = self._world.events.wanted("contact_stay")
+            self._copies.keep()
+
+    def _refresh(self) -> None:
+        """Follow which bodies and colliders there are."""
+        scene, state, table = self.scene, self.state, self.table
+        if scene.refresh():
+            table.frames_applied = True
+            if not state.collides:
+                state.warm_start.counts[:] = 0
+            linked = scene.linked
+            self._must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
+        scene.refresh_statics()
+        if table.generation != self._generation:
+            self._generation, state.ids_changed = table.generation, True
+
+    def _check(self) -> None:
+        """Errors of colliders that changes of their columns may bring about in any step."""
+        scene, state, linked = self.scene, self.state, self.scene.linked
+        if linked is None:
+            return
+        if state.several_levels:
+            check_sensors(linked, scene.levels, state.shapes.slots, self.table)
+        if linked.unhandled and not self.preparing:
+            check_pairs(linked, scene.levels, state.bodies.collider_slot, self.table, self._world.registry)
+
+    def _link(self) -> None:
+        """Compile or load what the scene can need: nothing is left for the middle of a game."""
+        self.integration.prepare()
+        self.parts_version += 1
+        state = self.state
+        collides, sweeps = state.collides, state.collides and (state.mode != DISCRETE or self._any_ccd())
+        state.sweeps_ready = sweeps
+        if sweeps:
+            self.scene.reserve(*SWEEPS)
+        conditions = {
+            "": True,
+            "dynamic bodies": state.dynamic > 0,
+            "colliders": collides,
+            "contacts": collides or bool(state.contacts.counts.any()),
+            "one level": collides and not state.several_levels,
+            "several levels": collides and state.several_levels,
+            "many bodies": collides and self.search.needs_grids(),
+            "swept bodies": sweeps,
+            **dict.fromkeys(self.integration.stages_needed, state.dynamic > 0),
+        }
+        try:
+            self._link_shapes(sweeps)
+            self._link_parts(sweeps)
+            self.program.link(lambda stage: conditions.get(stage.needed, False))
+        except Exception as error:
+            self._linked_version = -1
+            self._attribution.describe(error)
+            raise
+        self._linked_version = self.scene.version
+
+    def _link_parts(self, sweeps: bool) -> None:
+        """The parts of stages that are called by address; those of swept bodies only where there are any."""
+        links = self.state.links
+        for place, function in LINKED_PARTS.items():
+            if not links[place] and (sweeps or place == BOX_ROWS) and self.state.collides:
+                links[place] = address_of(place, function, self.dimensions)
+
+    def _link_shapes(self, sweeps: bool) -> None:
+        key = (self.scene.version, sweeps)
+        if key != self._shapes_key:
+            self.scene.link_shapes(sweeps)
+            self._shapes_key = key
+
+    def refresh_for_queries(self) -> None:
+        """Between two steps: shapes, rows and columns up to date."""
+        if self.table.in_step:
+            return
+        self._refresh()
+        self._link_shapes(self.state.sweeps_ready)
+
+    def _box_now(self) -> None:
+        """Boxes around the bodies where they are at this moment."""
+        state = self.state
+        before = state.moved, state.candidates_ready
+        if not state.links[BOX_ROWS]:
+            state.links[BOX_ROWS] = address_of(BOX_ROWS, box_rows, self.dimensions)
+        state.moved = False
+        self.program.run_one("box_statics", 0.0)
+        self.program.run_one("box_motions", 0.0)
+        state.moved, state.candidates_ready = before
+
+    def _any_ccd(self) -> bool:
+        return bool(self.table.arrays["ccd"][: self.table.stops[1]].any())
+
+    def make_sweeps_ready(self, dt: float) -> None:
+        """Some body is swept from now on."""
+        self._link()
+
+    def opening(self) -> list[Any]:
+        return [Segment(self.program, 0, len(OPENING))]
+
+    def closing(self) -> list[Any]:
+        start = self.program.index[CLOSING[0].function.__name__]
+        return [Segment(self.program, start, start + len(CLOSING))]
+
+    def abandon_step(self) -> None:
+        state, table, bodies = self.state, self.table, self.state.bodies
+        if state.others_write:
+            if self._copies.kept:
+                self._copies.put_back()
+        elif state.kept:
+            self._put_back(bodies)
+        self._copies.kept = False
+        if state.kept:
+            state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
+        self.contacts.forget_step(state.step_number)
+        state.moved = state.forces_summed = state.found_current = state.kept = state.started = False
+        state.impacts.logged = 0
+        state.contacts_version += 1
+        if self._contacts_before is not None:
+            self.contacts.show(self._contacts_before)
+        if len(bodies.place):
+            bodies.place[:] = -1
+        table.static_version += 1
+        self.queries.forget()
+
+    def _put_back(self, bodies: Any) -> None:
+        """What keep_state and the integration have kept."""
+        state, count, moving, dynamic = self.state, self.state.count, self.state.moving, self.state.dynamic
+        if state.started:
+            bodies.position[:count] = bodies.previous_position[:count]
+        bodies.linear_velocity[:moving] = bodies.kept_velocity[:moving]
+        bodies.previous_position[:count] = bodies.kept_previous[:count]
+        if state.step_force_kept:
+            bodies.step_force[:dynamic] = bodies.kept_step_force[:dynamic]
+
+    def end_step(self) -> None:
+        self._copies.kept = False
+        if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
+            self.contacts.columns_now()
+        if not self._words[self._finite]:
+            self.report_faults("")
+
+    def report_faults(self, prefix: str) -> None:
+        """Name the bodies whose state is not finite in the world's faults; they disturb no others."""
+        moving, arrays = self.table.stops[1], self.table.arrays
+        for name in ("position", "linear_velocity"):
+            column = arrays[name][:moving]
+            for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
+                entity = int(arrays["entity"][row])
+                self._world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
+
+    def end_window(self) -> None:
+        table, words = self.table, self._words
+        if words[self._pushed] or words[self._others_write]:
+            table.arrays["applied_force"][: table.stops[0]] = 0.0
+        if table.frames_applied:
+            table.arrays["applied_frame"][: table.stops[0]] = -1  # else state_hash would tell frame rates apart
+            table.frames_applied = False
+
+    # -- snapshots --------------------------------------------------------------------------------
+
+    def tracking_state(self) -> Any:
+        state = self.state
+        kept = {}
+        for name in ("warm_start", "contacts"):
+            record = getattr(state, name)
+            numbers = {field: getattr(record, field) for field in record.schema.fields if field == "now"}
+            kept[name] = numbers, {key: array.copy() for key, array in record.columns().items()}
+        return kept
+
+    def restore_tracking(self, kept: Any) -> None:
+        state = self.state
+        for name, (numbers, columns) in kept.items():
+            record = getattr(state, name)
+            for key, array in columns.items():
+                setattr(record, key, array)
+            for field, number in numbers.items():
+                setattr(record, field, number)
+        state.warm_start.rows_version[:] = -1
+        state.found_current = False
+        state.contacts_version += 1
+
+    # -- looking inside ---------------------------------------------------------------------------
+
+    def system_of_stage(self, stage: int) -> str:
+        return _SYSTEM_OF_STAGE[stage]
+
+    def look_ahead(self, others_write: bool) -> None:
+        self.begin_step(others_write)
+        self._copies.kept = False
+        self.scene.refresh_rotation()
+        state = self.state
+        state.sweeping = state.collides and (state.mode != DISCRETE or self._any_ccd())
+
+    def planned_kernels(self) -> Iterator[PlannedKernel]:
+        for stage in (*OPENING, *CLOSING):
+            yield PlannedKernel(stage.name, stage.why, stage.when)
+        if self.state.others_write:
+            yield PlannedKernel(copy_blocks.__name__, "copies of all columns: code of the game may write any of them")
+
+    def planned_columns(self) -> Iterator[PlannedColumn]:
+        return planned_columns(self)
+
+    def kept_columns(self) -> list[tuple[str, np.ndarray]]:
+        """The room for copies of columns, where code of the game runs in a step."""
+        return self._copies.sizes()
+
+    def counters(self) -> dict[str, int]:
+        return {name: getattr(self.state, field) for name, field in COUNTERS.items()}
+
+    def reset_counters(self) -> None:
+        for field in COUNTERS.values():
+            setattr(self.state, field, 0)
+
+    # -- answers ----------------------------------------------------------------------------------
+
+    def kinetic_energy(self) -> float:
+        return kinetic_energy(self.bodies.dynamic)
+
+    def potential_energy(self) -> float:
+        return potential_energy(self.table, self.bodies, self.gravity, self._world.force_systems)
+
+    def momentum(self) -> np.ndarray:
+        return momentum(self.bodies.dynamic, self.dimensions)
+
+    def prepare(self, components: tuple[type[Any], ...]) -> None:
+        """See :mod:`preparation`."""
+        prepare(self, self._world, components)
+
+    def _running_step(self) -> int | None:
+        return self._world.step_count if self.table.in_step else None
+
+    def _living_with(self, entity: int, component: type[Any]) -> bool:
+        return self._world.entity_exists(entity) and self._world.has_component(entity, component)
+
+
+class QueriedScene:
+    """What queries see of the scene."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation, self._scene = simulation, simulation.scene
+
+    @property
+    def linked(self) -> LinkedShapes | None:
+        return self._scene.linked
+
+    @property
+    def parameter_records(self) -> ParameterRecords:
+        assert self._scene.parameters is not None
+        return self._scene.parameters
+
+    @property
+    def version(self) -> Any:
+        return self._scene.version, self._scene.table.static_version, self._scene.state.motion_version
+
+    def refresh(self) -> None:
+        self._simulation.refresh_for_queries()
+
+    def refresh_rotation(self) -> None:
+        self._scene.refresh_rotation()
+
+
+_SYSTEM_OF_STAGE = (
+    *("" for _ in OPENING),
+    *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
+    *("" for _ in CLOSING),
+    *(BroadPhase.__name__, NarrowPhase.__name__),
+    *(Integration.__name__ for _ in Integration.ON_DEMAND),
+)
+
+
+def _make_table(dimensions: int) -> Table:
+    table = Table(dimensions)
+    for component in (Transform, RigidBody):
+        table.add_component_type(component)
+    for key in ("previous_position", "force"):
+        table.add_array(key, "vector")
+    table.add_array("inverse_mass")
+    return table
+
+
+def cubed(dt: float) -> float:
+    """dt^3, inf where that overflows."""
+    return dt**3 if dt < 1e100 else math.inf
+
+
+def _makes_body(component: type[Component]) -> bool:
+    """A Transform together with one of these is a body."""
+    return component is RigidBody or issubclass(component, Collider)

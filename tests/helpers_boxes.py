@@ -1,0 +1,98 @@
+"""The broad phase without a world: boxes in a state's record, the stages run over them, and pairs by brute force."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from carom.framework.jit.record import make_record
+from carom.framework.schedule.stages import Program, Stage
+from carom.framework.settings import Settings
+from carom.systems import codes
+from carom.systems.broad_phase import stages
+from carom.systems.broad_phase.boxes import FRAME_SIZE, HIGHEST, LARGEST, LOWEST
+from carom.systems.broad_phase.search import CandidateSearch
+from carom.systems.records import STATE
+
+SEARCH = (
+    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few, stages.search_static_grid,
+)  # fmt: skip
+
+
+def uniform_grid_alone(state, dt):
+    """A uniform grid of what moves, however few that is."""
+    state.candidates.count = 0
+    state.pair_search = stages.UNIFORM_GRID
+    return stages.use_uniform_grid(state)
+
+
+def begin_static_grid(state, dt):
+    """Bodies that do not move are put into a grid, however few they are."""
+    state.candidates.count = 0
+    state.pair_search = stages.STATIC_GRID
+    return codes.OK
+
+
+UNIFORM_GRID_ALONE = (uniform_grid_alone,)
+STATIC_GRID_ALONE = (begin_static_grid, stages.place_statics, stages.search_static_grid)
+
+
+class Boxes:
+    """Boxes of bodies of which the first move; ``asked`` are the codes that stages have returned."""
+
+    def __init__(self, dimensions, registry=None, settings=None, functions=SEARCH):
+        self.state = make_record(STATE, dimensions)
+        self.state.collides = True
+        self.state.frame = np.zeros(FRAME_SIZE)
+        self.search = CandidateSearch(self.state, registry, lambda: settings or Settings(), lambda: None)
+        self.asked = []
+        wanted = (codes.NEED_CANDIDATES, codes.NEED_CELLS, codes.FIND_IN_PYTHON)
+        handlers = {code: self._handler(code) for code in wanted}
+        self._program = Program(self.state, [Stage(f, "") for f in functions], handlers, codes.AFTERWARDS)
+        self._program.link(lambda stage: True)
+
+    def _handler(self, code):
+        def handle(dt):
+            self.asked.append(code)
+            if code == codes.FIND_IN_PYTHON:
+                self.search.find_in_python(dt)
+            else:
+                self.search.grow(code)
+
+        return handle
+
+    def set(self, lower, upper, moving, statics_changed=True):
+        """Take these corners (n, d)."""
+        state, d = self.state, lower.shape[1]
+        state.bodies.lower, state.bodies.upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        state.count, state.moving = len(lower), moving
+        state.statics_version += statics_changed
+        state.frame[LOWEST : LOWEST + 3], state.frame[HIGHEST : HIGHEST + 3] = np.inf, -np.inf
+        state.frame[LARGEST] = 0.0
+        with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+            warnings.simplefilter("ignore")  # all of a column may be nan
+            state.frame[LOWEST : LOWEST + d] = np.fmin.reduce(lower[:moving], axis=0, initial=np.inf)
+            state.frame[HIGHEST : HIGHEST + d] = np.fmax.reduce(upper[:moving], axis=0, initial=-np.inf)
+            state.frame[LARGEST] = np.fmax.reduce(upper[:moving] - lower[:moving], axis=None, initial=0.0)
+
+    def find(self):
+        """Rows (first, second) of the candidates."""
+        self._program.run(0, len(self._program.stages), 0.0)
+        candidates = self.state.candidates
+        return candidates.first[: candidates.count], candidates.second[: candidates.count]
+
+
+def pair_set(first, second):
+    """The pairs as a set of (smaller, larger), after checking that none is there twice."""
+    pairs = {(min(p), max(p)) for p in zip(first.tolist(), second.tolist(), strict=True)}
+    assert len(pairs) == len(first)
+    return pairs
+
+
+def overlapping(lower, upper, moving):
+    """By brute force: pairs of boxes that share a point, one of them among the first."""
+    meet = np.ones((moving, len(lower)), bool)
+    for q in range(lower.shape[1]):
+        meet &= (lower[:moving, None, q] <= upper[:, q]) & (lower[:, q] <= upper[:moving, None, q])
+    return {(i, j) for i, j in zip(*(rows.tolist() for rows in np.nonzero(meet)), strict=True) if i < j}

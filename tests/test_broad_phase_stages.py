@@ -1,0 +1,203 @@
+"""The stages that find candidates: each search gives the same exact set of pairs as brute force."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers_boxes import Boxes, overlapping, pair_set
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import both_dimensions
+
+from carom.framework.errors import PluginError
+from carom.framework.settings import Settings
+from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
+from carom.systems.broad_phase.stages import BRUTE_FORCE, CANDIDATE_LIMIT, PLUGIN, STATIC_GRID, TREE, UNIFORM_GRID
+from carom.systems.broad_phase.tree.tree import CandidateLimitError
+from carom.systems.codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS
+
+
+def spread(rng, count, d, half=0.5):
+    """Boxes of one size, one per two to three times their volume."""
+    centre = rng.random((count, d)) * (2.5 * max(count, 1)) ** (1 / d)
+    return centre - half, centre + half
+
+
+def mixed(rng, count, d):
+    """Boxes of many sizes."""
+    centre, half = rng.random((count, d)) * count ** (1 / d), 10.0 ** rng.uniform(-2, 1, (count, 1))
+    return centre - half, centre + half
+
+
+@both_dimensions
+@pytest.mark.parametrize(
+    ("moving", "static", "search"),
+    [
+        (0, 0, BRUTE_FORCE), (1, 0, BRUTE_FORCE), (20, 1, BRUTE_FORCE), (0, 40, BRUTE_FORCE),
+        (BRUTE_FORCE_MAX, BRUTE_FORCE_MAX, BRUTE_FORCE), (BRUTE_FORCE_MAX + 1, 0, UNIFORM_GRID),
+        (700, 700, UNIFORM_GRID), (0, 300, STATIC_GRID), (5, BRUTE_FORCE_MAX + 1, STATIC_GRID),
+        (700, 701, STATIC_GRID), (100, 2000, STATIC_GRID),
+    ],
+)  # fmt: skip
+def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
+    lower, upper = spread(np.random.default_rng(1), moving + static, d)
+    boxes = Boxes(d)
+    boxes.set(lower, upper, moving)
+    assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
+    assert boxes.state.pair_search == boxes.search.last == search
+    assert FIND_IN_PYTHON not in boxes.asked
+
+
+@both_dimensions
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_any_boxes(d, data):
+    """Sizes, crowds, nan, infinities, touching boxes, in one world that changes: always the set of brute force."""
+    rng = np.random.default_rng(data.draw(st.integers(0, 10**6)))
+    boxes = Boxes(d)
+    for _ in range(3):
+        count = data.draw(st.sampled_from([0, 3, 50, 193, 250, 600]))
+        moving = data.draw(st.sampled_from([0, count, count // 2, count // 10, max(count - 2, 0), min(count, 193)]))
+        lower, upper = data.draw(st.sampled_from([spread, mixed]))(rng, count, d)
+        if data.draw(st.booleans()):
+            lower, upper = np.round(lower) - 0.5, np.round(upper) + 0.5
+        if count > 20 and data.draw(st.booleans()):
+            rows = rng.integers(0, count, 5)
+            lower[rows[0]], upper[rows[1], 0], lower[rows[2], d - 1], upper[rows[3]] = np.nan, np.nan, -np.inf, np.inf
+            lower[rows[4]], upper[rows[4]] = -np.inf, np.inf
+        boxes.set(lower, upper, moving)
+        assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
+        lower[:moving] += 0.3  # the static boxes are where they were
+        upper[:moving] += 0.3
+        boxes.set(lower, upper, moving, statics_changed=False)
+        assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
+
+
+@both_dimensions
+@pytest.mark.parametrize(("moving", "static"), [(600, 0), (600, 30), (600, 700), (20, 700)])
+def test_uneven_boxes_are_left_to_trees(d, moving, static):
+    rng = np.random.default_rng(2)
+    lower, upper = mixed(rng, moving + static, d)
+    boxes = Boxes(d)
+    boxes.set(lower, upper, moving)
+    assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
+    assert boxes.state.pair_search == TREE
+    assert ("quadtree" if d == 2 else "octree") in boxes.search.describe()
+    lower, upper = spread(rng, moving + static, d)  # and grids take over again
+    boxes.set(lower, upper, moving)
+    assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
+    assert boxes.state.pair_search in (UNIFORM_GRID, STATIC_GRID)
+
+
+def test_memory_grows_once_and_static_boxes_are_kept():
+    lower, upper = spread(np.random.default_rng(3), 1500, 2)
+    boxes = Boxes(2)
+    boxes.set(lower, upper, 500)
+    boxes.find()
+    assert {NEED_CELLS, NEED_CANDIDATES} <= set(boxes.asked)
+    boxes.asked.clear()
+    boxes.find()
+    assert boxes.asked == []
+    grid = boxes.state.static_grid
+    assert grid.version == boxes.state.statics_version
+    grid.order[:] = 0  # seen only if the grid is not built again
+    boxes.find()
+    assert not grid.order.any()
+    boxes.set(lower, upper, 500)
+    assert pair_set(*boxes.find()) == overlapping(lower, upper, 500)
+
+
+def test_room_for_one_grid_leaves_the_other_as_it_is():
+    """The grid of static boxes is there already when that of the first 193 moving ones needs room."""
+    lower, upper = spread(np.random.default_rng(9), 1000, 2)
+    boxes = Boxes(2)
+    boxes.set(lower, upper, 0)
+    boxes.find()
+    boxes.set(lower[:700], upper[:700], BRUTE_FORCE_MAX + 1)
+    assert pair_set(*boxes.find()) == overlapping(lower[:700], upper[:700], BRUTE_FORCE_MAX + 1)
+    assert boxes.state.pair_search == STATIC_GRID
+
+
+def test_one_pair_more_than_there_is_room_for():
+    lower, upper = spread(np.random.default_rng(4), 400, 2)
+    boxes = Boxes(2)
+    boxes.set(lower, upper, 400)
+    expected = pair_set(*boxes.find())
+    for room in range(len(expected) - 3, len(expected) + 3):
+        boxes.state.candidates.first, boxes.state.candidates.second = (np.empty(room, np.int32) for _ in range(2))
+        assert pair_set(*boxes.find()) == expected
+
+
+def test_no_colliders_no_candidates():
+    boxes = Boxes(2)
+    lower, upper = spread(np.random.default_rng(5), 100, 2)
+    boxes.set(lower, upper, 100)
+    assert len(boxes.find()[0]) > 0
+    boxes.state.collides = False
+    assert len(boxes.find()[0]) == 0
+    assert boxes.search.describe() == "no colliders: nothing to do"
+
+
+def test_the_limit_of_candidates():
+    """Each of 3,000 small boxes meets each of 2,900 that cover everything: the tree counts them and refuses."""
+    lower, upper = spread(np.random.default_rng(6), 5900, 2)
+    lower[3000:], upper[3000:] = -1.0, 1e3
+    boxes = Boxes(2)
+    boxes.set(lower, upper, 3000)
+    with pytest.raises(CandidateLimitError, match=f"exceed the limit of {CANDIDATE_LIMIT}"):
+        boxes.find()
+    assert len(boxes.state.candidates.first) == CANDIDATE_LIMIT
+
+
+def plugin_boxes(answer):
+    """Boxes of 10 bodies, 6 of which move, with a broad phase that answers so."""
+    broad_phase = type("Strange", (), {"pairs": lambda self, lower, upper, moving: answer(lower, upper, moving)})
+    registry = SimpleNamespace(broad_phases={"strange": broad_phase})
+    boxes = Boxes(2, registry, Settings(broad_phase="strange"))
+    lower, upper = spread(np.random.default_rng(7), 10, 2)
+    boxes.set(lower, upper, 6)
+    return boxes
+
+
+def test_a_broad_phase_of_a_plugin():
+    def all_pairs(lower, upper, moving):
+        assert (len(lower), len(upper), moving) == (10, 10, 6)
+        assert not lower.flags.writeable
+        rows = np.triu_indices(len(lower), 1)
+        keep = rows[0] < moving
+        return rows[0][keep], rows[1][keep]
+
+    boxes = plugin_boxes(all_pairs)
+    assert len(pair_set(*boxes.find())) == 45 - 6
+    assert boxes.state.pair_search == PLUGIN
+    assert boxes.search.describe() == "strange, as the settings say"
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (None, "must return two arrays of rows, got None"),
+        (([0.5], [1.5]), "must return two integer arrays of one length"),
+        (([0, 1], [1]), "must return two integer arrays of one length"),
+        (([0], [10]), "returned rows 0 and 10: a pair is of two of the 10 rows"),
+        (([7], [8]), "at least one of them among the 6 that move"),
+    ],
+)
+def test_what_a_plugin_must_not_return(answer, message):
+    with pytest.raises(PluginError, match=message):
+        plugin_boxes(lambda *_: answer).find()
+
+
+@both_dimensions
+def test_indexes_for_queries(d):
+    lower, upper = spread(np.random.default_rng(8), 900, d)
+    boxes = Boxes(d)
+    for moving, count in ((300, 900), (10, 30)):
+        boxes.set(lower[:count], upper[:count], moving)
+        for index, rows in zip(boxes.search.partitions(), (range(moving), range(moving, count)), strict=True):
+            assert sorted(index.rows.tolist()) == list(rows)
+            assert (index.record.levels == 0) == (len(rows) <= BRUTE_FORCE_MAX)
+            meet = ((lower[rows] <= upper[5]) & (lower[5] <= upper[rows])).all(axis=1)
+            assert index.query_one(lower[5], upper[5]).tolist() == (rows[0] + np.flatnonzero(meet)).tolist()
