@@ -52,8 +52,8 @@ class Room:
         state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
         state.solver.starts = np.zeros(COLOURS, np.int64)
         state.frame = np.zeros(7)
-        self._grow_warm_start(0.0, 16)
-        self._grow_contacts(0.0, 16)
+        _grow_stacked(state.warm_start, 0)
+        _grow_stacked(state.contacts, 0)
 
     def handlers(self, simulation: Any) -> dict[int, Callable[[float], None]]:
         """What to do for each code; ``simulation`` has the systems that run when a phase before them has not."""
@@ -131,14 +131,14 @@ class Room:
             solver.reserve(_with_spare(state.needed), *per_contact)
         solver.reserve(self._scene.table.capacity, *SOLVER_BODIES)
 
-    def _grow_warm_start(self, dt: float, rows: int = 0) -> None:
+    def _grow_warm_start(self, dt: float) -> None:
         memory = self._state.warm_start
-        _grow_stacked(memory, rows or _with_spare(self._state.needed))
+        _grow_stacked(memory, _with_spare(self._state.needed))
         memory.reserve(memory.entity_a.shape[1], "work")
 
-    def _grow_contacts(self, dt: float, rows: int = 0) -> None:
+    def _grow_contacts(self, dt: float) -> None:
         contacts = self._state.contacts
-        _grow_stacked(contacts, rows or _with_spare(self._state.needed))
+        _grow_stacked(contacts, _with_spare(self._state.needed))
         contacts.reserve(contacts.entity_a.shape[1], "began", "ended")
 
     def _find_candidates(self, simulation: Any, dt: float) -> None:
@@ -152,7 +152,7 @@ class Room:
         now = state.impacts.until
         program.run_one("box_rest_of_step", dt)
         found = simulation.broad_phase.segment("choose_search")
-        program.run(found.start, found.stop, dt)
+        found(dt)
         program.run_one("order_candidates", dt)
         simulation.narrow_phase.filter_candidates()
         program.run_one("merge_pairs", dt)

@@ -116,7 +116,8 @@ class Plan:
         for column in self.columns:
             groups.setdefault((column.of, column.group, column.reason), []).append(column)
         of = ""
-        for key, columns in groups.items():
+        kinds = list(dict.fromkeys(key[0] for key in groups))
+        for key, columns in sorted(groups.items(), key=lambda group: kinds.index(group[0][0])):
             if key[0] != of:
                 of = key[0]
                 total = sum(column.bytes for column in self.columns if column.of == of)

@@ -32,13 +32,12 @@ class Profiler:
         self._profiled = Totals()  # inside profiles that have ended
         self._profile_start: Totals | None = None
 
-    def add(self, system: str, seconds: float, waited: float) -> None:
-        """A Python system has run; waited: seconds that kernels were compiled or loaded in it."""
+    def add(self, system: str, seconds: float) -> None:
+        """A Python system has run."""
         self._sums.seconds[system] = self._sums.seconds.get(system, 0.0) + seconds
-        self._sums.waited += waited
 
     def wait(self, seconds: float) -> None:
-        """Stages were compiled or loaded."""
+        """Kernels were compiled or loaded in a step."""
         self._sums.waited += seconds
 
     @contextmanager
@@ -65,7 +64,7 @@ class Profiler:
     def _counts(self) -> np.ndarray:
         """Calls and ticks of all stages since the world began."""
         physics = self._pipeline.world.physics
-        return np.zeros((2, 0), np.int64) if physics is None else physics.program.counts()
+        return np.zeros((3, 0)) if physics is None else physics.program.counts()
 
     def _stages(self) -> Totals:
         """What all stages have taken since measuring began."""
@@ -73,9 +72,9 @@ class Profiler:
         if physics is None:
             return totals
         program = physics.program
-        calls, ticks = program.counts() - self._before
-        seconds = (ticks * program.seconds_per_tick).tolist()
-        for k, (stage, count) in enumerate(zip(program.stages, calls.tolist(), strict=True)):
+        counts = program.counts() - self._before
+        seconds = program.seconds_of(counts).tolist()
+        for k, (stage, count) in enumerate(zip(program.stages, counts[0].astype(int).tolist(), strict=True)):
             if count:
                 system = physics.system_of_stage(k)
                 totals.calls[system, stage.name] = count

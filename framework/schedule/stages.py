@@ -6,6 +6,7 @@ after a failed step and docs/architecture.md all read it.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from ..compilation import kernel
+from ..compilation import kernel, log
 from ..jit.linking import Linked, linked_call
 from ..jit.record import Record
 from ..jit.record_type import record_at, record_type
@@ -98,6 +99,8 @@ class Program:
         state.program = self._addresses
         state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
         self._clock = TickClock()
+        self._python_seconds = np.zeros(len(stages))  # of what Python has done for each stage
+        self.inside = 0.0  # s of stages that Python has run within a step: not to be counted twice
         self.describe_error: Callable[[BaseException], None] = lambda error: None  # adds notes to it
         self.alarm = 0  # the word of the state that is not 0 when a stage has noted something wrong
         self.on_alarm: Callable[[], None] = lambda: None
@@ -123,26 +126,39 @@ class Program:
             if not code:
                 break
             start, wanted = divmod(code, MOST_CODES)
-            self.handlers[wanted](dt)
+            self._handle(start, wanted, dt)
             if wanted >= self._afterwards:
                 start += 1
         if self._words[self.alarm]:
             self.on_alarm()
+
+    def _handle(self, stage: int, code: int, dt: float) -> None:
+        """What a stage asks of Python, which counts as time of that stage."""
+        inside, waited, began = self.inside, log.waited, time.perf_counter()
+        self.handlers[code](dt)
+        passed = time.perf_counter() - began - (log.waited - waited)
+        self._python_seconds[stage] += passed - (self.inside - inside)
+
+    def run_inside(self, start: int, stop: int, dt: float) -> None:
+        """The same as :meth:`run`, for Python code that is a part of a step itself."""
+        inside, waited, began = self.inside, log.waited, time.perf_counter()
+        self.run(start, stop, dt)
+        self.inside = inside + time.perf_counter() - began - (log.waited - waited)
 
     def run_one(self, name: str, dt: float) -> None:
         """Run one stage, linked or not."""
         k = self.index[name]
         if not self._addresses[k]:
             self._addresses[k] = linked_stage(self.stages[k], self.state).address
-        self.run(k, k + 1, dt)
+        self.run_inside(k, k + 1, dt)
 
     def counts(self) -> np.ndarray:
-        """(2, n): how often each stage has run so far, and the ticks that it has taken."""
-        return np.stack((self.state.calls, self.state.ticks))
+        """(3, n): how often each stage has run so far, its ticks, and the seconds that Python has worked for it."""
+        return np.stack((self.state.calls, self.state.ticks, self._python_seconds))
 
-    @property
-    def seconds_per_tick(self) -> float:
-        return self._clock.seconds_per_tick
+    def seconds_of(self, counts: np.ndarray) -> np.ndarray:
+        """The seconds of each stage, from a difference of :meth:`counts`."""
+        return counts[1] * self._clock.seconds_per_tick + counts[2]
 
 
 _linked: dict[tuple[Any, Any], Linked] = {}
@@ -166,7 +182,7 @@ class Segment:
     stop: int
 
     def __call__(self, dt: float) -> None:
-        self.program.run(self.start, self.stop, dt)
+        self.program.run_inside(self.start, self.stop, dt)
 
 
 @dataclass(frozen=True)

@@ -125,8 +125,8 @@ class Pipeline:
         physics = self.world.physics
         if physics is not None and not physics.adoption.settled():
             self.synchronize()
+        waited, order = log.waited, self.order
         self._begin(others_write)
-        order = self.order
         if self._parts_order != order.version or (physics is not None and self._parts_physics != physics.parts_version):
             self._make_parts()
         self._run_parts(self._parts, dt)
@@ -137,6 +137,8 @@ class Pipeline:
         esper_bridge.running.discard(self.world.name)
         self.clock.step_count += 1
         self.profiler.steps += 1
+        if log.waited != waited:
+            self.profiler.wait(log.waited - waited)
         if order.changed:
             with esper_bridge.context(self.world.name):
                 order.apply()
@@ -157,11 +159,14 @@ class Pipeline:
             raise
 
     def _run_python(self, part: PythonPart, dt: float) -> None:
-        """A system in Python: its time is taken, less what it has waited for the compiler."""
+        """A system in Python: its time is taken, less that of stages inside and what it has waited for the compiler."""
         self._at = part.name
+        physics = self.world.physics
+        inside = 0.0 if physics is None else physics.program.inside
         waited, started = log.waited, time.perf_counter()
         part.function(dt)
-        self.profiler.add(part.name, time.perf_counter() - started - (log.waited - waited), log.waited - waited)
+        seconds = time.perf_counter() - started - (log.waited - waited)
+        self.profiler.add(part.name, seconds - (0.0 if physics is None else physics.program.inside - inside))
         self._at = ""
 
     @property
@@ -209,7 +214,6 @@ class Pipeline:
         if physics is None:
             return
         physics.table.in_step = True
-        waited = log.waited
         try:
             physics.begin_step(others_write)
         except BaseException as error:
@@ -217,8 +221,6 @@ class Pipeline:
                 self.fail("Physics", error)
             self.roll_back()
             raise
-        if log.waited != waited:
-            self.profiler.wait(log.waited - waited)
 
     def _open_window(self) -> None:
         physics = self.world.physics

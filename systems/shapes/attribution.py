@@ -49,7 +49,7 @@ class ErrorAttribution:
         state = self._state
         uncompiled = isinstance(error, NumbaError) or state.row_a == NOTHING_TESTED
         about = self._uncompiled(error) if uncompiled else self._describe(state.row_a, state.row_b, query)
-        if about:
+        if about and about not in getattr(error, "__notes__", ()):  # numba raises the same object once more
             error.add_note(about)
 
     def check(self, query: type[Component] | None = None) -> None:
