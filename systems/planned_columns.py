@@ -23,10 +23,12 @@ TABLE = {
     "force": "the sum of forces",
     "inverse_mass": "0 for what cannot be moved",
 }
+STANDING = "where it stood when its box was made"
 MASKS = "which components it has"
 GROUPS = (
     ("the step", ("start_velocity",), "velocity at the start of the step, for the path"),
     ("collisions", COLLISIONS, "some body has a collider: boxes, extents, the path in the step, the response"),
+    ("collisions", ("support_change",), "contacts have rested"),
     ("curved paths", CURVES, "the integrator's paths are curved"),
     ("swept bodies", SWEEPS, "bodies are swept along their paths: how far impacts may send them"),
     (
@@ -109,6 +111,8 @@ def _bodies(simulation: Simulation) -> Iterator[PlannedColumn]:
     for group, names, reason in GROUPS:
         for name in names:
             yield from _column(name, "body", group, getattr(bodies, name), capacity, reason)
+    standing = bodies.static_position
+    yield from _column("static_position", "static body", "collisions", standing, len(standing), STANDING)
     yield from _column("stretches", "body", "shapes", simulation.scene.stretches, capacity, NOT_ENCLOSING)
     yield from _column("level_not_enclosing", "body", "shapes", bodies.level_not_enclosing, capacity, NOT_ENCLOSING)
     for key, array in sorted(simulation.scene.rotated_columns.items()):

@@ -14,6 +14,7 @@ from .codes import (
     FIND_IN_PYTHON,
     NEED_CANDIDATES,
     NEED_CELLS,
+    NEED_COLUMNS,
     NEED_CONTACTS,
     NEED_EVENTS,
     NEED_MERGED,
@@ -37,6 +38,8 @@ ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
 EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = ("body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled")
+# What these stages need of the bodies before they do anything.
+COLUMNS_OF = {"end_flight": "kept_step_force", "predict_rest": "support_change"}
 SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
 
 
@@ -66,6 +69,7 @@ class Room:
             **{code: self._named(grow) for code, grow in growing.items()},
             NEED_CANDIDATES: self._named(lambda dt: self._search.grow(NEED_CANDIDATES)),
             NEED_CELLS: self._named(lambda dt: self._search.grow(NEED_CELLS)),
+            NEED_COLUMNS: lambda dt: self._scene.reserve(COLUMNS_OF[simulation.program.stages[self._state.stage].name]),
             NEED_SWEEPS: simulation.make_sweeps_ready,
             FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
             ROTATE: lambda dt: self._scene.refresh_rotation(),

@@ -24,10 +24,10 @@ TABLE_COLUMNS = (
 STACKED_COLUMNS = ("offset", "restitution", "friction", "sensor", "layer", "mask")
 
 # Columns that are made within a step or when rows have moved, by what needs them.
-FLIGHT = ("start_velocity", "kept_previous", "kept_velocity", "kept_step_force")
+FLIGHT = ("start_velocity", "kept_previous", "kept_velocity")
 COLLISIONS = (
     "origin", "path_velocity", "min_extent", "force_speed_change", "lower", "upper", "rank", "collider_slot",
-    "static_position", "impact_count", "counted_impacts", "supported", "support_change", "held", "place",
+    "impact_count", "counted_impacts", "supported", "held", "place",
 )  # fmt: skip
 CURVES = ("path_second", "path_third")
 SWEEPS = (
@@ -36,7 +36,7 @@ SWEEPS = (
 )  # fmt: skip
 HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
-PER_BODY = (*FLIGHT, *COLLISIONS, *CURVES, *SWEEPS, *HALF_KICKS, *SEVERAL_EVALUATIONS)
+RARELY = ("kept_step_force", "support_change")  # made when the first stage asks for them
 # Static bodies do not move: what stands in their rows of these stays 0.
 ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third")
 
@@ -81,6 +81,8 @@ class Scene:
         self.reserve(*FLIGHT)
         if present:
             self.reserve(*COLLISIONS)
+            if len(bodies.static_position) < count - moving:
+                bodies.reserve((count - moving) * 3 // 2, "static_position")
         for name in ZERO_WHERE_STATIC:
             if len(getattr(bodies, name)):
                 getattr(bodies, name)[moving:count] = 0.0

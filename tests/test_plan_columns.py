@@ -56,9 +56,9 @@ def near(world, *components):
     return world
 
 
-STEP = {"start_velocity", "levels", "kept_previous", "kept_velocity", "kept_step_force"}
+STEP = {"start_velocity", "levels", "kept_previous", "kept_velocity"}
 COLLISIONS = {"path_velocity", "origin", "min_extent", "collider_slot", "force_speed_change", "lower", "upper", "rank"}
-COLLISIONS |= {"level_offsets", "static_position", "supported", "support_change", "held", "place"}
+COLLISIONS |= {"level_offsets", "supported", "held", "place"}
 COLLISIONS |= {"impact_count", "counted_impacts"}
 SOLVER = {"body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled"}
 CURVES = {"path_second", "path_third"}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.vectors import add_scaled, dot, sub
-from ..codes import OK
+from ..codes import NEED_COLUMNS, OK
 from .warm_start import find_rows, scale_to
 
 
@@ -80,6 +80,8 @@ def predict_rest(state, dt):
         bodies.supported[i] = False
     if state.response_idle or memory.counts[memory.now] == 0:
         return OK
+    if len(bodies.support_change) < state.count:
+        return NEED_COLUMNS
     scale_to(state, dt)
     find_rows(state)
     state.any_support = True

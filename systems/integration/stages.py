@@ -12,6 +12,7 @@ import math
 from ...framework.compilation import inlined, part
 from ...framework.jit.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, scale, sub
+from ..codes import NEED_COLUMNS
 from ..forces.stages import within
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
@@ -245,6 +246,9 @@ def end_flight(state, dt):
     """Limits of speed, kinematic bodies, and the forces of this step, which have done their work."""
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity = bodies.position, bodies.linear_velocity
+    state.step_force_kept = state.pushed and not state.others_write  # else every column is kept
+    if state.step_force_kept and len(bodies.kept_step_force) < state.count:
+        return NEED_COLUMNS
     if state.limits_speed:
         for i in range(dynamic):
             limit = bodies.max_linear_speed[i]
@@ -252,9 +256,9 @@ def end_flight(state, dt):
             position[i] = within(position[i], bodies.previous_position[i], limit * dt)
     for i in range(dynamic, state.moving):
         position[i] = add_scaled(position[i], velocity[i], dt)
-    state.step_force_kept = state.pushed or state.others_write
     for i in range(dynamic if state.step_force_kept else 0):
         bodies.kept_step_force[i] = bodies.step_force[i]
+    for i in range(dynamic if state.pushed or state.others_write else 0):
         bodies.step_force[i] = zero_of(state)
     state.forces_summed, state.moved = False, True
     state.motion_version += 1
