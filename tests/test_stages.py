@@ -1,0 +1,168 @@
+"""The list of stages: what the page says of it, the records that stages work on, and the builds that run them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import System, World
+from carom.framework.jit.record import make_record
+from carom.framework.jit.schema import Schema, flags, integer, ints, number, vectors
+from carom.lab.commands.stages import Stages
+from carom.lab.reporting.text_tables import between_marks
+from carom.plugins import Physics
+from carom.systems import ContactEvents
+
+ROOT = Path(__file__).resolve().parent.parent
+INNER = Schema("TestInner", total=number())
+OUTER = Schema(
+    "TestOuter", count=integer(), place=vectors(), hit=flags(), order=ints("int32", stacked=True), inner=INNER
+)
+
+BOUNCING = """
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import World
+from carom.plugins import Physics
+
+world = World(Physics(dimensions=2, gravity=(0.0, -9.81)))
+for k in range(6):
+    restitution = 0.5 if k % 2 else 0.0
+    world.create_entity(
+        Transform((0.9 * k, 2.0 + k)), RigidBody(), SphereCollider(0.5, restitution=restitution, friction=0.3))
+world.create_entity(Transform((0.0, 0.0)), AABBCollider((50.0, 0.5)))
+for _ in range(80):
+    world.step()
+assert len(world.contacts) > 3
+print(world.state_hash())
+"""
+
+
+def test_the_page_shows_the_stages_that_run():
+    """``carom stages --into docs/architecture.md`` writes what the page has to hold."""
+    _, written, _ = between_marks(ROOT / "docs" / "architecture.md", "carom stages")
+    assert written.strip() == Stages().table().markdown()
+
+
+def test_every_stage_is_described_and_its_file_is_there():
+    for stages in Stages().as_dict().values():
+        for stage in stages:
+            assert stage["what"]
+            assert f"def {stage['stage']}(state, " in (ROOT / str(stage["file"])).read_text(encoding="utf-8")
+
+
+def hash_under(**variables):
+    command = [sys.executable, "-W", "ignore", "-c", BOUNCING]
+    result = subprocess.run(command, env={**os.environ, **variables}, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_plain_python_gives_the_same_bits():
+    assert hash_under(NUMBA_DISABLE_JIT="1") == hash_under()
+
+
+@pytest.mark.slow
+def test_the_checked_build_gives_the_same_bits():
+    assert hash_under(CAROM_CHECK="1") == hash_under()
+
+
+def test_the_checked_build_names_the_column_and_the_index(tmp_path):
+    source = """
+from carom.framework.compilation import kernel
+from carom.framework.jit.record import make_record
+from carom.framework.jit.record_type import record_at, record_type
+from carom.framework.jit.schema import Schema, floats
+
+SCHEMA = Schema("Shelf", weight=floats())
+shelf_at = record_at(record_type(SCHEMA, 2))
+
+@kernel
+def weight_of(address, i):
+    return shelf_at(address).weight[i]
+
+shelf = make_record(SCHEMA, 2)
+shelf.reserve(3, "weight")
+for i in (3, -1):
+    try:
+        weight_of(shelf.address, i)
+    except IndexError as error:
+        print(error)
+"""
+    path = tmp_path / "shelf.py"
+    path.write_text(source, encoding="utf-8")
+    result = subprocess.run(
+        [sys.executable, str(path)], env={**os.environ, "CAROM_CHECK": "1"}, capture_output=True, text=True
+    )
+    said = result.stdout.splitlines()
+    assert len(said) == 2, result.stderr
+    assert "Shelf.weight" in said[0]
+    assert "3, 3" in said[0]
+    assert "-1, 3" in said[1]
+
+
+# -- records --------------------------------------------------------------------------------------
+
+
+def test_a_record_holds_what_is_assigned_and_grows_without_losing_it():
+    record = make_record(OUTER, 3)
+    record.count, record.inner.total = 7, 0.5
+    record.place = np.arange(6.0).reshape(2, 3)
+    record.reserve(5, "place", keep=2)
+    record.reserve(5, "hit")
+    assert (record.count, record.inner.total) == (7, 0.5)
+    assert record.place.shape == (5, 3)
+    assert record.place[:2].ravel().tolist() == list(range(6))
+    assert len(record.hit) == 5
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [("place", np.zeros((2, 2))), ("hit", np.zeros(2)), ("order", np.zeros(3, np.int32))],
+    ids=["another dimension", "another type", "one axis too few"],
+)
+def test_an_array_of_another_kind_is_refused_by_name(name, array):
+    record = make_record(OUTER, 3)
+    with pytest.raises(ValueError, match=f"TestOuter.{name} takes arrays of"):
+        setattr(record, name, array)
+
+
+# -- systems around stages ------------------------------------------------------------------------
+
+
+def falling(*systems):
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)))
+    world.create_entity(Transform((0.0, 0.0)), AABBCollider((5.0, 0.5)))
+    world.create_entity(Transform((0.0, 1.5)), RigidBody(), SphereCollider(0.5))
+    for system in systems:
+        world.add_system(system)
+    return world
+
+
+class Idle(System):
+    def process(self, dt):
+        """Nothing: that it is there splits the step into several calls."""
+
+
+def test_a_system_between_the_stages_changes_no_bit():
+    worlds = falling(), falling(Idle())
+    for _ in range(60):
+        for world in worlds:
+            world.step()
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+    assert len(worlds[0].contacts) == 1
+
+
+def test_without_its_system_the_events_end_and_the_rest_goes_on():
+    world, usual = falling(), falling()
+    world.remove_system(next(s for s in world.systems if isinstance(s, ContactEvents)))
+    for _ in range(60):
+        world.step()
+        usual.step()
+        assert not len(world.contacts.begin)
+    assert (world.bodies.position == usual.bodies.position).all()
