@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.compilation import pasted
-from ...framework.data.array_columns import ArrayColumn
-from ...framework.jit.record import Record, make_record
-from ...framework.jit.record_type import rows_of
-from ...framework.jit.schema import Column, Schema, axes, floats, integer, table, vectors
-from ...framework.plugins.registry import Shape
+from ....framework.compilation import pasted
+from ....framework.data.array_columns import ArrayColumn
+from ....framework.jit.record import Record, make_record
+from ....framework.jit.record_type import rows_of
+from ....framework.jit.schema import Column, Schema, axes, floats, integer, table, vectors
+from ....framework.plugins.registry import Shape
 
 # What every parameter record begins with.
 HEADER_FIELDS = {"support": integer(), "rounding": integer()}  # addresses; 0 until a generic convex pair needs them

@@ -1,6 +1,7 @@
 """The linked functions of a pair of shapes, made around the functions that a plugin has registered for it.
 
-All take the two shapes in the order in which the pair is registered; callers turn them round (:mod:`dispatch`).
+All take the two shapes in the order in which the pair is registered; callers turn them round
+(:mod:`carom.systems.shapes.dispatch`).
 """
 
 from __future__ import annotations
@@ -10,13 +11,13 @@ from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any
 
-from ...framework.compilation import inlined
-from ...framework.jit.linking import Linked
-from ...framework.jit.record_type import record_at, record_type
-from ...framework.plugins.registry import Convex, Pair, Shape
-from ...framework.vectors import dot
+from ....framework.compilation import inlined
+from ....framework.jit.linking import Linked
+from ....framework.jit.record_type import record_at, record_type
+from ....framework.plugins.registry import Convex, Pair, Shape
+from ....framework.vectors import dot
 from .batches import batch_by_address, in_given_order, in_order_of_shapes, make_batch
-from .convex.by_address import convex_at, rounding_argument, support_argument
+from .convex_by_address import convex_at, rounding_argument, support_argument
 from .parameters import array_of, parameter_schema, parameter_tuple, parameters_source
 from .signatures import (
     NOT_FINITE,

@@ -11,8 +11,8 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.extending import intrinsic
 from numba.core.typing.templates import signature
 
-from ...framework.compilation import Part, inlined
-from ...framework.vectors import dot, scale
+from ....framework.compilation import Part, inlined
+from ....framework.vectors import dot, scale
 
 _compiled: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 _arguments: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()

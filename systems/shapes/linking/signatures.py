@@ -9,10 +9,10 @@ from typing import Any
 from numba import types
 from numba.core.extending import intrinsic
 
-from ...framework.compilation import deep_hash
-from ...framework.jit.linking import JIT, linked_call
-from ...framework.jit.record_type import RecordType, record_type
-from ..records import STATE
+from ....framework.compilation import deep_hash
+from ....framework.jit.linking import JIT, linked_call
+from ....framework.jit.record_type import RecordType, record_type
+from ...records import STATE
 
 # Values of ``state.unsound``: what was wrong with an answer of a plugin's function.
 NOT_FINITE = 1

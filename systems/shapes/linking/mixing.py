@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.compilation import inlined
-from ...framework.jit.linking import Linked
-from ...framework.plugins.registry import Registry
-from ...framework.settings import MIXING_RULES
+from ....framework.compilation import inlined
+from ....framework.jit.linking import Linked
+from ....framework.plugins.registry import Registry
+from ....framework.settings import MIXING_RULES
 from .signatures import MIXING_SIGNATURE, call_mixing, named
 from .user_functions import user_function
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...framework.compilation import inlined
-from ...framework.vectors import add, negative, sub
+from ....framework.compilation import inlined
+from ....framework.vectors import add, negative, sub
 from .signatures import call_evaluate
 
 

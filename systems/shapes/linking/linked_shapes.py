@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.data.component import Component
-from ...framework.jit.record import Record
-from ...framework.plugins.registry import Pair, Registry, Shape
+from ....framework.data.component import Component
+from ....framework.jit.record import Record
+from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
 from .linked_shape import LinkedShape, linked_shape
 from .mixing import linked_rule

@@ -8,7 +8,7 @@ import sys
 import types
 from typing import Any
 
-from ...framework.compilation import deep_hash
+from ....framework.compilation import deep_hash
 
 
 def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:

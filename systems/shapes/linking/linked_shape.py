@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.compilation import kernel
-from ...framework.data.array_columns import ArrayColumn
-from ...framework.jit.linking import Linked
-from ...framework.jit.record import make_record
-from ...framework.jit.record_type import record_at, record_type, rows_of
-from ...framework.jit.schema import Schema, vectors
-from ...framework.plugins.registry import Shape
-from ..records import STATE
+from ....framework.compilation import kernel
+from ....framework.data.array_columns import ArrayColumn
+from ....framework.jit.linking import Linked
+from ....framework.jit.record import make_record
+from ....framework.jit.record_type import record_at, record_type, rows_of
+from ....framework.jit.schema import Schema, vectors
+from ....framework.plugins.registry import Shape
+from ...records import STATE
 from .parameters import (
     array_of,
     bind,
