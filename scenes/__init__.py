@@ -3,42 +3,18 @@
 Every scene follows one protocol, ``build(settings, seed=0) -> World``; ``settings=None`` selects the scene's
 own default. A file given to ``carom run FILE.py`` follows the same protocol.
 
+The scenes are in folders by subject: motion, impacts, gases, rest and levels. All can be imported from here.
+
 >>> from carom import scenes
 >>> world = scenes.get("billiards").build(seed=3)
 """
 
-from . import (
-    asteroids,
-    billiards,
-    bouncing,
-    bullets,
-    conveyor,
-    cradle,
-    drops,
-    fastgas,
-    freefall,
-    galperin,
-    gas2d,
-    gas3d,
-    jump,
-    lift,
-    maze,
-    mixed2d,
-    oblique,
-    orbit,
-    pile2d,
-    pile3d,
-    platforms,
-    player,
-    player_query,
-    pyramid,
-    shots,
-    spring,
-    stack,
-    static_world,
-    thermal_gas,
-)
+from .gases import asteroids, fastgas, gas2d, gas3d, mixed2d, player_query, thermal_gas
+from .impacts import billiards, bouncing, bullets, cradle, drops, galperin, oblique, shots
+from .levels import conveyor, lift, maze, platforms, player, static_world
+from .motion import freefall, jump, orbit, spring
 from .protocol import Build, Scene
+from .rest import pile, pile2d, pile3d, pyramid, stack
 
 _SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -89,4 +65,39 @@ def get(name: str) -> Scene:
         raise KeyError(f"no scene named {name!r}; there are: {', '.join(_SCENES)}") from None
 
 
-__all__ = ["Build", "Scene", "get", "names"]
+__all__ = [
+    "Build",
+    "Scene",
+    "asteroids",
+    "billiards",
+    "bouncing",
+    "bullets",
+    "conveyor",
+    "cradle",
+    "drops",
+    "fastgas",
+    "freefall",
+    "galperin",
+    "gas2d",
+    "gas3d",
+    "get",
+    "jump",
+    "lift",
+    "maze",
+    "mixed2d",
+    "names",
+    "oblique",
+    "orbit",
+    "pile",
+    "pile2d",
+    "pile3d",
+    "platforms",
+    "player",
+    "player_query",
+    "pyramid",
+    "shots",
+    "spring",
+    "stack",
+    "static_world",
+    "thermal_gas",
+]

@@ -14,7 +14,7 @@ from numba import types
 from ..framework.jit.linking import Linked
 from ..framework.jit.record_type import record_type
 from .records import STATE
-from .shapes.signatures import call_in_dimension, vector_type
+from .shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
 BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS = range(7)

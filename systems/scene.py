@@ -13,7 +13,7 @@ from ..framework.jit.record import Record
 from ..framework.plugins.registry import Registry
 from ..framework.settings import Settings
 from .shapes.geometry_levels import arrange, in_order
-from .shapes.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
+from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
 from .shapes.rotation import axes_of
 
 # Columns of the table by their name in ``bodies``.

@@ -57,8 +57,8 @@ from .room import Room
 from .scene import SWEEPS, Scene
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
-from .shapes.linked_shapes import LinkedShapes, ParameterRecords
-from .shapes.mixing import rule_number
+from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
+from .shapes.linking.mixing import rule_number
 from .shapes.pair_coverage import check_pairs
 
 if TYPE_CHECKING:

@@ -31,10 +31,10 @@ from carom.plugins.tile_grid import TileGridCollider
 from carom.systems.records import STATE
 from carom.systems.shapes import dispatch, query
 from carom.systems.shapes.attribution import ErrorAttribution
-from carom.systems.shapes.linked_shape import half_extents_of
-from carom.systems.shapes.linked_shapes import ParameterRecords, linked_shapes
-from carom.systems.shapes.mixing import mix, mix_friction, rule_number
-from carom.systems.shapes.parameters import bind, make_parameter_record, parameter_tuple
+from carom.systems.shapes.linking.linked_shape import half_extents_of
+from carom.systems.shapes.linking.linked_shapes import ParameterRecords, linked_shapes
+from carom.systems.shapes.linking.mixing import mix, mix_friction, rule_number
+from carom.systems.shapes.linking.parameters import bind, make_parameter_record, parameter_tuple
 
 COMMON = {"offset": 0.0, "restitution": 0.0, "friction": None, "sensor": False, "layer": 1, "mask": -1}
 PLUGINS = (standard_shapes, capsule.plugin, half_space.plugin)

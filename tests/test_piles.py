@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
 import pytest
 from helpers_rest import G, depths
 from worlds import make_world
 
+from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework.errors import StepError
 from carom.scenes import pile
@@ -16,7 +15,7 @@ from carom.scenes import pile
 
 def fall(dimensions, n, e, seconds):
     """A pile after ``seconds``: (kinetic energy per body in units of m g d, depths, escaped)."""
-    with importlib.import_module(f"carom.scenes.pile{dimensions}d").build(n=n) as world:
+    with getattr(scenes, f"pile{dimensions}d").build(n=n) as world:
         world.bodies.dynamic.sphere_collider.restitution[:] = e
         for _ in range(round(seconds * 60)):
             world.step()

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
 import pytest
 
+from carom import scenes
 from carom.components import AABBCollider
 from carom.framework import Settings
 from carom.scenes import conveyor, cradle, galperin, lift, pile, platforms, pyramid, stack
@@ -80,7 +79,7 @@ def test_a_pile_comes_to_rest(name, n, dimensions, seconds):
 
     Spheres without friction slip past each other longer than discs.
     """
-    with importlib.import_module(f"carom.scenes.{name}").build(n=n) as world:
+    with getattr(scenes, name).build(n=n) as world:
         steps(world, seconds)
         position = world.bodies.dynamic.position
         inside = (position > 0.4) & (position < pile.width(n, dimensions) - 0.4)

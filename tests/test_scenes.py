@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import math
 import re
 from pathlib import Path
@@ -218,6 +217,6 @@ def test_settings_of_a_scene_can_be_replaced():
 
 def test_every_scene_is_a_module_with_build():
     for name in scenes.names():
-        world = importlib.import_module(f"carom.scenes.{name}").build(Settings(), seed=1)
+        world = getattr(scenes, name).build(Settings(), seed=1)
         assert isinstance(world, World)
         world.close()

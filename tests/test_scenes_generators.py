@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 import math
 
@@ -27,7 +26,7 @@ def draws(seed=0):
 
 
 def make(name, **options):
-    return importlib.import_module(f"carom.scenes.{name}").build(**options)
+    return getattr(scenes, name).build(**options)
 
 
 def gas(n, dimensions, seed=0):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import itertools
 
 import numpy as np
 import pytest
 
+from carom import scenes
 from carom.components import AABBCollider, Transform
 from carom.framework import Settings
 from carom.scenes import conveyor, galperin, lift, maze, platforms
@@ -139,7 +139,7 @@ def test_pi_in_counts():
 )
 def test_the_same_seed_gives_the_same_bits(name, options):
     """After 90 steps, with everything that systems create meanwhile."""
-    build = importlib.import_module(f"carom.scenes.{name}").build
+    build = getattr(scenes, name).build
     hashes = []
     for _ in range(2):
         with build(Settings(), seed=4, **options) as world:

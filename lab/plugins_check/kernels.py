@@ -17,11 +17,11 @@ from ...framework.jit.record_type import record_at, record_type
 from ...framework.jit.schema import Schema, flags, floats, vectors
 from ...framework.plugins.registry import Pair, Shape
 from ...systems.records import STATE
-from ...systems.shapes.linked_pair import LinkedPair, linked_pair
-from ...systems.shapes.linked_shape import linked_shape
-from ...systems.shapes.linked_shapes import set_support
-from ...systems.shapes.parameters import HEADER
-from ...systems.shapes.signatures import (
+from ...systems.shapes.linking.linked_pair import LinkedPair, linked_pair
+from ...systems.shapes.linking.linked_shape import linked_shape
+from ...systems.shapes.linking.linked_shapes import set_support
+from ...systems.shapes.linking.parameters import HEADER
+from ...systems.shapes.linking.signatures import (
     call_evaluate,
     call_rounding,
     call_support,

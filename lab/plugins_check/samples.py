@@ -13,8 +13,8 @@ from ...framework.data.array_columns import ArrayColumn
 from ...framework.data.columns import REQUIRED, Column
 from ...framework.jit.record import Record
 from ...framework.plugins.registry import Shape
-from ...systems.shapes.linked_shape import half_extents_of
-from ...systems.shapes.parameters import bind, make_parameter_record
+from ...systems.shapes.linking.linked_shape import half_extents_of
+from ...systems.shapes.linking.parameters import bind, make_parameter_record
 from ...systems.shapes.rotation import axes_of
 
 ORDINARY = 10_000  # poses of a pair

@@ -11,8 +11,8 @@ from ...framework.data.component import Component
 from ...framework.jit.record import Record, make_record
 from ...framework.plugins.registry import Registry
 from ..broad_phase.tree.build import MAX_LEVELS
-from ..shapes.linked_shapes import LinkedShapes, ParameterRecords
-from ..shapes.parameters import bind, make_parameter_record
+from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
+from ..shapes.linking.parameters import bind, make_parameter_record
 from ..shapes.query import QUERY, linked_query
 from .records import QUERY_BATCH
 

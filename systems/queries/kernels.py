@@ -13,7 +13,7 @@ from ...framework.jit.record_type import record_at, record_type
 from ..broad_phase.records import TREE
 from ..records import STATE
 from ..shapes.attribution import NOTHING_TESTED
-from ..shapes.signatures import named
+from ..shapes.linking.signatures import named
 from .casts import find_hits
 from .nearest import find_nearest
 from .neighbours import find_neighbours

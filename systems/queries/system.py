@@ -16,7 +16,7 @@ from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours
 from ...framework.world.services import QueryServices
 from ..broad_phase.tree.tree import SpatialTree
 from ..shapes.attribution import ErrorAttribution
-from ..shapes.linked_shapes import LinkedShapes, ParameterRecords
+from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
 from .batch import CollectedHits, QueryBatch, QueryShape, joined, slices_of
 from .kernels import query_kernels
 from .neighbours import ALL_LAYERS

@@ -8,12 +8,12 @@ linked functions, compiled once per shape or pair and called through tables of a
 - per shape: ``bounds``, ``rotated``, and ``support`` and ``rounding`` for pairs that are compiled once for all convex
   shapes.
 
-Kernels import :mod:`dispatch` and :mod:`query`, which take numbers of shapes. Python makes :mod:`linked_shapes`, which
-fills the tables, and wraps calls of kernels in :mod:`attribution`, which names the plugin when its function fails.
+Kernels import :mod:`dispatch` and :mod:`query`, which take numbers of shapes. Python makes
+:mod:`linking.linked_shapes`, which fills the tables, and wraps calls of kernels in :mod:`attribution`, which names the
+plugin when its function fails.
 
-Modules, each using those before it: user_functions, source, parameters (records of the shapes' columns), signatures,
-convex/ (the pair of any two convex shapes), batches, linked_pair, linked_shape, mixing, linked_shapes, dispatch, query,
-attribution.
+Modules, each using those before it: convex/ (the geometry of any two convex shapes), linking/ (the functions and
+tables), dispatch, query, attribution.
 
 Reads the columns of colliders, positions and offsets; writes hit, depth, normal and point of candidates, the trace
 (``row_a`` to ``unsound_b`` of the state) and the shapes' parameters as rotated.

@@ -14,7 +14,7 @@ from ...framework.data.component import Component
 from ...framework.errors import PluginError
 from ...framework.jit.record import Record
 from ...framework.plugins.registry import Registry, Shape
-from .signatures import ALONE, OUT_OF_TIME
+from .linking.signatures import ALONE, OUT_OF_TIME
 
 BUILT_IN = "standard shapes"  # the plugin of carom's own shapes
 NOTHING_TESTED = -1

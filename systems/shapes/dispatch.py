@@ -9,10 +9,10 @@ import math
 
 from ...framework.compilation import inlined
 from ...framework.vectors import negative
-from .batches import turned_back
-from .mixing import mix as mix
-from .mixing import mix_friction as mix_friction
-from .signatures import call_batch, call_bounds, call_corner, call_evaluate, call_rotated, call_sweep
+from .linking.batches import turned_back
+from .linking.mixing import mix as mix
+from .linking.mixing import mix_friction as mix_friction
+from .linking.signatures import call_batch, call_bounds, call_corner, call_evaluate, call_rotated, call_sweep
 
 
 @inlined

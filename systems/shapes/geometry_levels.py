@@ -18,8 +18,8 @@ from ...framework.data.handles import Sources
 from ...framework.data.table import Table
 from ...framework.errors import UnhandledPairError
 from ...framework.plugins.registry import Registry
-from .linked_shape import half_extents_of
-from .linked_shapes import LinkedShapes
+from .linking.linked_shape import half_extents_of
+from .linking.linked_shapes import LinkedShapes
 
 COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 

@@ -8,7 +8,7 @@ from ...components import Collider
 from ...framework.data.table import Table
 from ...framework.errors import UnhandledPairError
 from ...framework.plugins.registry import Registry
-from .linked_shapes import LinkedShapes
+from .linking.linked_shapes import LinkedShapes
 
 
 def check_pairs(

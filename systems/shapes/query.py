@@ -18,10 +18,10 @@ from ...framework.jit.record import Record
 from ...framework.jit.schema import Schema, flags, integer, ints
 from ...framework.plugins.registry import Registry, Shape
 from ...framework.vectors import add, negative
-from .linked_pair import LinkedPair, convex_sides, linked_pair
-from .linked_shape import linked_shape
-from .linked_shapes import LinkedShapes, ParameterRecords, set_support
-from .signatures import call_bounds, call_evaluate, call_sweep
+from .linking.linked_pair import LinkedPair, convex_sides, linked_pair
+from .linking.linked_shape import linked_shape
+from .linking.linked_shapes import LinkedShapes, ParameterRecords, set_support
+from .linking.signatures import call_bounds, call_evaluate, call_sweep
 
 QUERY = Schema(
     "Query",

@@ -2,6 +2,6 @@
 
 gjk walks to the point of their Minkowski difference nearest to the origin: the distance of shapes that are apart.
 epa2d and epa3d find how deep the origin lies inside it: the overlap. pair puts both together, for functions of plugins
-that have the supports at hand, and by address for the tables of a scene: then it is compiled once per dimension, and a
-new convex shape costs its ``support`` and ``rounding`` alone.
+that have the supports at hand, and for supports that linking/convex_by_address calls through the tables of a scene:
+then it is compiled once per dimension, and a new convex shape costs its ``support`` and ``rounding`` alone.
 """

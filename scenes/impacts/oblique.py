@@ -1,0 +1,41 @@
+"""One disc hits another off centre: positions and velocities after one impact, in round numbers.
+
+The first comes from (-3, 0.6) at 1 m/s along x, the second is at rest at the origin. Both have radius 0.5, so they
+touch after 2.2 s, when the first is at (-0.8, 0.6); the impact's normal is (0.8, -0.6). Equal masses and restitution 1
+give the velocities (0.36, 0.48) and (0.64, -0.48), and after 3 s the positions (-0.512, 0.984) and (0.512, -0.384).
+"""
+
+from __future__ import annotations
+
+from ...components import RigidBody, SphereCollider, Transform
+from ...framework import Settings, World
+from ...plugins import Physics
+from ..protocol import Scene
+from ..sizes import real
+
+RADIUS = 0.5
+START = (-3.0, 0.6)
+SPEED = 1.0
+
+
+def build(settings: Settings | None = None, seed: int = 0, *, mass: float = 1.0, restitution: float = 1.0) -> World:
+    """A disc of 1 kg hits one of ``mass`` kg; ``restitution`` of both. ``seed`` changes nothing."""
+    mass, restitution = real(mass, "mass", above=True), real(restitution, "restitution")
+    settings = settings or Settings.balanced().replace(collision="continuous")
+    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
+    for position, speed, kilograms in ((START, SPEED, 1.0), ((0.0, 0.0), 0.0, mass)):
+        world.create_entity(
+            Transform(position),
+            RigidBody(mass=kilograms, linear_velocity=(speed, 0.0)),
+            SphereCollider(radius=RADIUS, restitution=restitution),
+        )
+    return world
+
+
+SCENE = Scene(
+    name="oblique",
+    description="a disc strikes another off centre: one impact, known in round numbers",
+    build=build,
+    seconds=3.0,
+    view=((-4.0, -2.0), (2.0, 2.0)),
+)

@@ -1,0 +1,61 @@
+"""A pyramid of unit boxes: each row has one box less than the row below and is offset by half a box.
+
+Restitution 0, mass 1, gravity 9.81. It must stand, with friction 0.6 and without. A spacing
+of 1.1 leaves gaps between the boxes of a row.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...components import AABBCollider, RigidBody, Transform
+from ...framework import Settings, World
+from ...plugins import Physics
+from ..protocol import Scene
+from ..sizes import real, whole
+from ..walls import block
+
+ROWS = 50
+FRICTION = 0.6
+GRAVITY = 9.81
+GROUND = 200.0  # metres wide, or twice the pyramid's width if that is more
+
+
+def initial_positions(rows: int, spacing: float = 1.0) -> NDArray[np.float64]:
+    """(rows (rows + 1) / 2, 2), row by row from the ground: row j has rows - j boxes, centres at height 0.5 + j."""
+    return np.array(
+        [((i - (boxes - 1) / 2) * spacing, 0.5 + rows - boxes) for boxes in range(rows, 0, -1) for i in range(boxes)]
+    )
+
+
+def build(
+    settings: Settings | None = None,
+    seed: int = 0,
+    *,
+    rows: int = ROWS,
+    friction: float = FRICTION,
+    spacing: float = 1.0,
+) -> World:
+    """``rows`` rows, ``spacing`` >= 1 metre from centre to centre in a row; ``seed`` changes nothing."""
+    rows, friction, spacing = whole(rows, "rows"), real(friction, "friction"), real(spacing, "spacing", 1.0)
+    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings or Settings.balanced())
+    reach = max(GROUND / 2, rows * spacing)
+    block(world, (-reach, -1.0), (reach, 0.0), friction=friction)
+    positions = initial_positions(rows, spacing)
+    world.create_entities(
+        len(positions),
+        Transform.many(positions),
+        RigidBody.many(mass=1.0),
+        AABBCollider.many(half_extents=(0.5, 0.5), friction=friction),
+    )
+    return world
+
+
+SCENE = Scene(
+    name="pyramid",
+    description="1,275 boxes in 50 rows stand by friction",
+    build=build,
+    seconds=8.0,
+    view=((-30.0, -1.0), (30.0, 52.0)),
+)

@@ -1,0 +1,34 @@
+"""Convex shapes whose support is called by address: for functions that are compiled once for all of them."""
+
+from __future__ import annotations
+
+from ....framework.compilation import inlined
+from ....framework.jit.record_type import record_at, record_type
+from .parameters import HEADER
+from .signatures import call_rounding, call_support
+from .user_functions import as_argument
+
+# The header has no vectors, so it is the same in 2D and 3D.
+_header_at = record_at(record_type(HEADER, 2))
+
+
+@inlined
+def convex_at(address, i):
+    """Row i of the parameter record at an address, as the two functions below take it: addresses and row."""
+    header = _header_at(address)
+    return header.support, header.rounding, address, i
+
+
+@inlined
+def support_by_address(shape, direction):
+    """The farthest point of the core in a direction."""
+    return call_support(shape[0], shape[2], shape[3], direction)
+
+
+@inlined
+def rounding_by_address(shape):
+    """How far the shape reaches beyond its core."""
+    return call_rounding(shape[1], shape[2], shape[3])
+
+
+support_argument, rounding_argument = as_argument(support_by_address), as_argument(rounding_by_address)

@@ -1,0 +1,148 @@
+"""The linked functions of one shape: bounds, parameters as rotated, and support and rounding for the generic pair."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache, cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from ....framework.compilation import kernel
+from ....framework.data.array_columns import ArrayColumn
+from ....framework.jit.linking import Linked
+from ....framework.jit.record import make_record
+from ....framework.jit.record_type import record_at, record_type, rows_of
+from ....framework.jit.schema import Schema, vectors
+from ....framework.plugins.registry import Shape
+from ...records import STATE
+from .parameters import (
+    array_of,
+    bind,
+    make_parameter_record,
+    parameter_schema,
+    parameter_tuple,
+    parameters_source,
+)
+from .signatures import (
+    ALONE,
+    NOT_FINITE,
+    ROUNDING_SIGNATURE,
+    bounds_signature,
+    call_bounds,
+    rotated_signature,
+    support_signature,
+)
+from .source import source_module
+from .user_functions import user_function
+
+
+class LinkedShape:
+    """The linked functions of a shape; each compiles or loads when its address is asked for."""
+
+    def __init__(self, shape: Shape, dimensions: int) -> None:
+        self.shape, self.dimensions = shape, dimensions
+
+    @cached_property
+    def bounds(self) -> Linked:
+        """Half extents; notes the row in the state, also if they are no numbers from 0."""
+        wrong = " and ".join(f"half[{k}] >= 0.0" for k in range(self.dimensions))
+        made = self._function(
+            "def bounds(state, p, i):",
+            "state.row_a, state.row_b = i, ALONE",
+            f"half = function({self._parameters('p')}, {self.dimensions})",
+            f"if not ({wrong}):",
+            "    state.unsound, state.unsound_a, state.unsound_b = NOT_FINITE, i, ALONE",
+            "return half",
+            function=self.shape.bounds,
+        )
+        return Linked(made.bounds, bounds_signature(self.dimensions))
+
+    @cached_property
+    def rotated(self) -> Linked | None:
+        """Writes the parameters of a row as rotated, copies them if no body is; None if rotation changes nothing."""
+        if self.shape.turned is None:
+            return None
+        names = [f"column_{name}" for name in self.shape.columns]
+        arrays = [isinstance(self.shape.component.columns[name], ArrayColumn) for name in self.shape.columns]
+        writes = [
+            f"    at(p).{name}[i] = {f'at(own).{name}[i]' if array else f'new[{place}]'}"
+            for place, (name, array) in enumerate(zip(names, arrays, strict=True))
+        ]
+        made = self._function(
+            "def rotated(state, own, p, i, is_rotated):",
+            "if is_rotated:",
+            f"    matrix = rows_of(at(own).matrices, i * {self.dimensions}, i * {self.dimensions} + {self.dimensions})",
+            f"    new = function({self._parameters('own')}, matrix)",
+            *writes,
+            "else:",
+            *(f"    at(p).{name}[i] = at(own).{name}[i]" for name in names),
+            "return 0",
+            function=self.shape.turned,
+        )
+        return Linked(made.rotated, rotated_signature(self.dimensions))
+
+    @cached_property
+    def support(self) -> Linked:
+        source = f"return function({self._parameters('p')}, direction)"
+        made = self._function("def support(p, i, direction):", source, function=self.shape.support)
+        return Linked(made.support, support_signature(self.dimensions))
+
+    @cached_property
+    def rounding(self) -> Linked:
+        source = f"return function({self._parameters('p')})"
+        made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
+        return Linked(made.rounding, ROUNDING_SIGNATURE)
+
+    def _parameters(self, address: str) -> str:
+        return parameters_source(self.shape, f"at({address})", "i", "Parameters")
+
+    def _function(self, header: str, *lines: str, function: Any) -> Any:
+        scope = {
+            "function": user_function(function), "Parameters": parameter_tuple(self.shape), "array_of": array_of,
+            "at": record_at(record_type(parameter_schema(self.shape), self.dimensions)), "rows_of": rows_of,
+            "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
+        }  # fmt: skip
+        title = f'"""{self.shape.component.__name__}, {self.dimensions}D."""\n\n'
+        return source_module(title + "\n    ".join([header, *lines]) + "\n", scope)
+
+
+@cache
+def linked_shape(shape: Shape, dimensions: int) -> LinkedShape:
+    """The functions of that shape, the same ones for all worlds of this process."""
+    return LinkedShape(shape, dimensions)
+
+
+# -- boxes around shapes that are in no world yet ---------------------------------------------------
+
+_HALF_EXTENTS = Schema("HalfExtents", half=vectors())
+
+
+@lru_cache(maxsize=2)
+def _half_extents_kernel(dimensions: int) -> Any:
+    state_at, result_at = record_at(record_type(STATE, dimensions)), record_at(record_type(_HALF_EXTENTS, dimensions))
+
+    @kernel
+    def half_extents(state_address, address, parameters, result_address):
+        state, result = state_at(state_address), result_at(result_address)
+        for i in range(len(result.half)):
+            result.half[i] = call_bounds(address, state, parameters, i)
+
+    return half_extents
+
+
+@lru_cache(maxsize=2)
+def _scratch_state(dimensions: int) -> Any:
+    return make_record(STATE, dimensions)
+
+
+def half_extents_of(shape: Shape, columns: Mapping[str, np.ndarray], axes: np.ndarray) -> np.ndarray:
+    """(n, d) half extents of n shapes of one kind; ``axes`` (n, d, d) their rotation matrices."""
+    count, dimensions = axes.shape[:2]
+    parameters, result = make_parameter_record(shape, dimensions), make_record(_HALF_EXTENTS, dimensions)
+    bind(parameters, shape, columns, axes)
+    result.half = np.empty((count, dimensions))
+    state = _scratch_state(dimensions)
+    address = linked_shape(shape, dimensions).bounds.address
+    _half_extents_kernel(dimensions)(state.address, address, parameters.address, result.address)
+    return result.half

@@ -1,0 +1,67 @@
+"""How the restitutions or frictions of two bodies become the contact's."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ....framework.compilation import inlined
+from ....framework.jit.linking import Linked
+from ....framework.plugins.registry import Registry
+from ....framework.settings import MIXING_RULES
+from .signatures import MIXING_SIGNATURE, call_mixing, named
+from .user_functions import user_function
+
+AVERAGE, GEOMETRIC_MEAN, MAX, MIN, MULTIPLY = range(len(MIXING_RULES))  # in their order
+FIRST_PLUGIN_RULE = len(MIXING_RULES)
+
+
+@inlined
+def mix(state, rule, a, b):
+    """The contact's value from those of its two bodies."""
+    if rule == MAX:
+        return max(a, b)
+    if rule == AVERAGE:
+        return 0.5 * (a + b)
+    if rule == GEOMETRIC_MEAN:
+        return np.sqrt(a * b)
+    if rule == MIN:
+        return min(a, b)
+    if rule == MULTIPLY:
+        return a * b
+    return call_mixing(state.shapes.mixing[rule - FIRST_PLUGIN_RULE], a, b)
+
+
+@inlined
+def mix_friction(state, rule, a, b):
+    """The contact's friction. NaN: use the other body's coefficient; 0 if neither has one."""
+    if a != a:
+        a = b
+    if b != b:
+        b = a
+    return mix(state, rule, a, b) if a == a else 0.0
+
+
+@cache  # tables hold addresses, so the code must stay
+def linked_rule(function: Any) -> Linked:
+    """A plugin's rule, its answers checked."""
+    rule = user_function(function)
+
+    def mixed(a, b):
+        value = float(rule(a, b))
+        if not 0.0 <= value < math.inf:
+            raise ValueError("a mixing rule of a plugin returned no number from 0")
+        return value
+
+    return Linked(named(mixed), MIXING_SIGNATURE)
+
+
+def rule_number(registry: Registry, name: str) -> int:
+    """What kernels know the rule by; ValueError if neither carom nor a plugin of the world has it."""
+    known = (*MIXING_RULES, *registry.mixing_rules)
+    if name not in known:
+        raise ValueError(f"mixing rules of this world are {', '.join(known)}, got {name!r}")
+    return known.index(name)

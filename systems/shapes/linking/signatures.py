@@ -1,0 +1,121 @@
+"""Signatures of the functions that are linked to the shapes, and the calls that fit them in 2D and 3D."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from numba import types
+from numba.core.extending import intrinsic
+
+from ....framework.compilation import deep_hash
+from ....framework.jit.linking import JIT, linked_call
+from ....framework.jit.record_type import RecordType, record_type
+from ...records import STATE
+
+# Values of ``state.unsound``: what was wrong with an answer of a plugin's function.
+NOT_FINITE = 1
+OUT_OF_TIME = 2  # a sweep's time is not from 0 to 1
+ALONE = -1  # in place of a second row: the bounds of the first
+
+_ROW, _ADDRESS, _NUMBER = types.int64, types.int64, types.float64
+
+
+def vector_type(dimensions: int) -> Any:
+    """d floats."""
+    return types.UniTuple(_NUMBER, dimensions)
+
+
+@cache
+def evaluate_signature(dimensions: int) -> Any:
+    """(state, parameters of a, row a, parameters of b, row b, d) -> (hit, depth, normal, point)."""
+    state, vector = record_type(STATE, dimensions), vector_type(dimensions)
+    contact = types.Tuple((types.boolean, _NUMBER, vector, vector))
+    return contact(state, _ADDRESS, _ROW, _ADDRESS, _ROW, vector)
+
+
+@cache
+def batch_signature(dimensions: int) -> Any:
+    """(state, start, stop) -> 0."""
+    return types.int64(record_type(STATE, dimensions), types.int64, types.int64)
+
+
+@cache
+def sweep_signature(dimensions: int) -> Any:
+    """(state, parameters of a, row a, parameters of b, row b, d, v) -> (hit, time)."""
+    state, vector = record_type(STATE, dimensions), vector_type(dimensions)
+    return types.Tuple((types.boolean, _NUMBER))(state, _ADDRESS, _ROW, _ADDRESS, _ROW, vector, vector)
+
+
+@cache
+def corner_signature(dimensions: int) -> Any:
+    """(state, parameters of a, row a, parameters of b, row b, d, slop) -> bool."""
+    state, vector = record_type(STATE, dimensions), vector_type(dimensions)
+    return types.boolean(state, _ADDRESS, _ROW, _ADDRESS, _ROW, vector, _NUMBER)
+
+
+@cache
+def bounds_signature(dimensions: int) -> Any:
+    """(state, parameters, row) -> half extents."""
+    return vector_type(dimensions)(record_type(STATE, dimensions), _ADDRESS, _ROW)
+
+
+@cache
+def rotated_signature(dimensions: int) -> Any:
+    """(state, own parameters, parameters as rotated, row, whether bodies are rotated) -> 0."""
+    return types.int64(record_type(STATE, dimensions), _ADDRESS, _ADDRESS, _ROW, types.boolean)
+
+
+@cache
+def support_signature(dimensions: int) -> Any:
+    """(parameters, row, direction) -> farthest point of the core."""
+    return vector_type(dimensions)(_ADDRESS, _ROW, vector_type(dimensions))
+
+
+ROUNDING_SIGNATURE = _NUMBER(_ADDRESS, _ROW)
+MIXING_SIGNATURE = _NUMBER(_NUMBER, _NUMBER)
+
+
+def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
+    """call(address, *arguments) for a signature of each dimension; the types of the arguments tell which."""
+    calls = {dimensions: linked_call(signature_of(dimensions)) for dimensions in (2, 3)}
+    if not JIT:
+        return calls[2]  # an address is all it takes
+
+    def typing(context: Any, address: Any, *given: Any) -> Any:
+        for kind in given:
+            if isinstance(kind, RecordType):
+                return calls[kind.dimensions]._defn(context, address, *given)
+            if isinstance(kind, types.BaseTuple) and kind.count in calls:
+                return calls[kind.count]._defn(context, address, *given)
+        return None
+
+    names = ", ".join(f"a{k}" for k in range(len(signature_of(2).args)))
+    scope = {"typing": typing}
+    exec(f"def call(context, address, {names}): return typing(context, address, {names})", scope)
+    call: Any = intrinsic(scope["call"])
+    call.carom_depends_on = tuple(made.carom_depends_on for made in calls.values())
+    return call
+
+
+call_evaluate = call_in_dimension(evaluate_signature)
+call_batch = call_in_dimension(batch_signature)
+call_sweep = call_in_dimension(sweep_signature)
+call_corner = call_in_dimension(corner_signature)
+call_bounds = call_in_dimension(bounds_signature)
+call_rotated = call_in_dimension(rotated_signature)
+call_support = call_in_dimension(support_signature)
+call_rounding = linked_call(ROUNDING_SIGNATURE)
+call_mixing = linked_call(MIXING_SIGNATURE)
+
+
+def named(function: Any) -> Any:
+    """The function with a hash of all it depends on in its name.
+
+    Machine code is found by symbol name, and numba's names tell apart only functions of one process: of two that one
+    factory made in different processes, both loaded from the cache, one would run in place of the other.
+    """
+    if JIT:
+        function.__qualname__ = f"{function.__name__}_{deep_hash(function)[:16]}"
+    return function

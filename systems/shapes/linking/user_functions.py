@@ -1,0 +1,100 @@
+"""Functions of plugins, compiled so that ``raise ValueError("text", value)`` works in them, and can be arguments."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numba
+from numba import types
+from numba.core.dispatcher import Dispatcher
+from numba.core.extending import intrinsic
+from numba.core.typing.templates import signature
+
+from ....framework.compilation import Part, inlined
+from ....framework.vectors import dot, scale
+
+_compiled: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+_arguments: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+
+
+def user_function(function: Any) -> Any:
+    """The same function with allocation allowed; one for all callers, so that they share its compiled code."""
+    if not isinstance(function, Dispatcher):  # with the JIT off
+        return function
+    if function not in _compiled:
+        author = getattr(function, "author", None)
+        if author is not None:
+            _compiled[function] = _finite_support(user_function(author))
+        else:
+            _compiled[function] = _allocating(function)
+    return _compiled[function]
+
+
+def _allocating(function: Any) -> Any:
+    options: dict[str, Any] = {**function.targetoptions, "_nrt": True}
+    for name in ("nopython", "boundscheck"):
+        options.pop(name, None)
+    made: Any = numba.njit(**options)(function.py_func)
+    made.__class__ = Part
+    return made
+
+
+def _finite_support(support: Any) -> Any:
+    """The support function with its answers checked: what is made of a wrong one need not look wrong."""
+
+    @inlined
+    def finite_support(shape, direction):
+        point = support(shape, direction)
+        if dot(point, scale(point, 0.0)) != 0.0 and dot(direction, scale(direction, 0.0)) == 0.0:
+            raise ValueError("support returned a point that is not finite")
+        return point
+
+    return finite_support
+
+
+def as_argument(function: Any) -> Any:
+    """The function in a form that kernels can hand to others as an argument and still be kept on disk.
+
+    numba hands on a dispatcher by its address in this process, and a kernel in which that address survives cannot be
+    cached: as when a function that is not inlined gets it.
+    """
+    if not isinstance(function, Dispatcher):
+        return function
+    if function not in _arguments:
+        _arguments[function] = _without_address(function)
+    return _arguments[function]
+
+
+def _without_address(function: Any) -> Any:
+    def typing(context: Any, *arguments: Any) -> Any:
+        kind = types.Dispatcher(function)
+        found = kind.get_call_type(context, arguments, {})
+
+        def emit(target: Any, builder: Any, sig: Any, values: Any) -> Any:
+            return target.get_function(kind, found)(builder, values)
+
+        return signature(found.return_type, *found.args), emit
+
+    names = ", ".join(f"a{k}" for k in range(function.py_func.__code__.co_argcount))
+    scope = {"typing": typing}
+    exec(f"def {function.py_func.__name__}(context, {names}): return typing(context, {names})", scope)
+    made: Any = intrinsic(scope[function.py_func.__name__])
+    made.carom_depends_on = function
+    return made
+
+
+def is_long(function: Any) -> bool:
+    """Whether the function, or one that it calls, asks to stay out of its callers (``part`` instead of ``inlined``)."""
+    return isinstance(function, Dispatcher) and _reaches_part(function, set())
+
+
+def _reaches_part(function: Any, seen: set[Any]) -> bool:
+    options, plain = function.targetoptions, function.py_func
+    if not options.get("forceinline") and options.get("inline") != "always":
+        return True
+    seen.add(function)
+    captured = [cell.cell_contents for cell in plain.__closure__ or ()]
+    named = [plain.__globals__.get(name) for name in plain.__code__.co_names]
+    called = [value for value in (*captured, *named) if isinstance(value, Dispatcher) and value not in seen]
+    return any(_reaches_part(value, seen) for value in called)
