@@ -19,13 +19,16 @@ from .rectangles import (
     WAITING,
     box_around,
     cell_at,
+    cells_in,
     faces_like,
     gaps,
     grown,
     halved,
     hidden,
+    load_cells,
     rectangle,
     sharp,
+    store_cells,
     tile_support,
     tiles_in,
 )
@@ -35,41 +38,124 @@ SEEN = 8  # recent rectangles that are not tested again
 
 
 @part
+def box_on_map(b, at, support, rounding):
+    """The box around the shape: left, right, lower, upper end relative to the map's lower left corner."""
+    left, right, lower, upper = box_around(b, support, rounding(b))
+    return at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
+
+
+@part
+def cells_under(box, tile, size):
+    """First column and row, last column and row under a box; and the rectangle of cells that it touches.
+
+    A shape that ends exactly where a cell begins touches that cell and the one before.
+    """
+    left, right, lower, upper = box
+    first_column, last_column = cell_at(left / tile, size[0]), cell_at(right / tile, size[0])
+    first_row, last_row = cell_at(lower / tile, size[1]), cell_at(upper / tile, size[1])
+    x0, y0 = first_column, first_row
+    if x0 > 0 and left <= x0 * tile:
+        x0 -= 1
+    if y0 > 0 and lower <= y0 * tile:
+        y0 -= 1
+    return (first_column, first_row, last_column, last_row), (x0, y0, last_column + 1, last_row + 1)
+
+
+@part
+def around(cells, ring, size):
+    """The rectangle with so many more cells on each side, as far as the map goes."""
+    x0, y0, x1, y1 = cells
+    return max(x0 - ring, 0), max(y0 - ring, 0), min(x1 + ring, size[0]), min(y1 + ring, size[1])
+
+
+@part
+def ring_with_tiles(sums, stride, touched, size):
+    """By how many cells to enlarge the searched area around the shape until it contains tiles; -1: there are none."""
+    ring = 0
+    while True:
+        cells = around(touched, ring, size)
+        if tiles_in(sums, stride, cells) > 0.0:
+            return ring
+        if cells_in(cells) == size[0] * size[1]:
+            return -1
+        ring = 2 * ring + 1
+
+
+@part
+def ring_to_search(ring, nearest, inner_depth, faces, tile, size):
+    """By how many cells the searched area must be enlarged to contain the nearest face.
+
+    A shape may be farther from a near tile than its box is; then another tile may be nearer.
+    """
+    need = ring if nearest <= 0.0 else int(min(nearest / tile, 1.0 * size[0] + size[1])) + 1
+    if inner_depth > 0.0 and nearest == math.inf:
+        need = ring  # deep inside
+    if faces != ALL:
+        need = max(need, 1)  # floors may be nearer than the requested walls, or the reverse
+    return need
+
+
+@part
+def grown_within(sums, stride, cells, limits, turn):
+    """A rectangle full of tiles, grown within limits: first in width, then in height; in turn 1 the other way round."""
+    for k in range(4):
+        side = k if turn == 0 else (k + 2) % 4
+        room = cells[0] - limits[0]
+        if side == 1:
+            room = limits[2] - cells[2]
+        elif side == 2:
+            room = cells[1] - limits[1]
+        elif side == 3:
+            room = limits[3] - cells[3]
+        cells = grown(sums, stride, cells, side, room)
+    return cells
+
+
+@part
+def contains_cells(seen, count, cells):
+    """True if one of the first ``count`` stored rectangles is this one."""
+    found = False
+    for k in range(count):
+        found |= load_cells(seen, k) == cells
+    return found
+
+
+@part
+def gaps_of_boxes(box, cells, tile):
+    """How far a box is from a rectangle along x and y (negative: overlap)."""
+    gap_left, gap_right = gaps(box[0], box[1], cells[0], cells[2], tile)
+    gap_lower, gap_upper = gaps(box[2], box[3], cells[1], cells[3], tile)
+    return max(gap_left, gap_right), max(gap_lower, gap_upper)
+
+
+@part
+def width_above_face(box, cells, n, tile):
+    """How much of a box is above the face of a rectangle that has the normal n."""
+    if abs(n[0]) > abs(n[1]):
+        return min(box[3], cells[3] * tile) - max(box[2], cells[1] * tile)
+    return min(box[1], cells[2] * tile) - max(box[0], cells[0] * tile)
+
+
+@part
 def deepest_contact(a, b, d, support, rounding):
     """The contact with the rectangle of tiles that the shape overlaps most, or is nearest to."""
     sums, tile = a.sums, a.tile_size
     columns = int(sums[0, 0])
     stride = columns + 1
     rows = (len(sums) - 1) // stride - 1
-    middle = (0.5 * columns * tile, 0.5 * rows * tile)
-    # The box around the shape, relative to the map's lower left corner.
+    size, middle = (columns, rows), (0.5 * columns * tile, 0.5 * rows * tile)
     at = add(d, middle)
-    left, right, lower, upper = box_around(b, support, rounding(b))
-    left, right, lower, upper = at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
-    i0, i1 = cell_at(left / tile, columns), cell_at(right / tile, columns)
-    j0, j1 = cell_at(lower / tile, rows), cell_at(upper / tile, rows)
-    column0, row0 = i0, j0
-    # A shape that ends exactly where a cell begins touches that cell and the one before.
-    if i0 > 0 and left <= i0 * tile:
-        i0 -= 1
-    if j0 > 0 and lower <= j0 * tile:
-        j0 -= 1
-    # Enlarge the searched area around the shape until it contains tiles.
-    ring = 0
-    while True:
-        x0, y0 = max(i0 - ring, 0), max(j0 - ring, 0)
-        x1, y1 = min(i1 + 1 + ring, columns), min(j1 + 1 + ring, rows)
-        if tiles_in(sums, stride, x0, y0, x1, y1) > 0.0:
-            break
-        if x0 == 0 and y0 == 0 and x1 == columns and y1 == rows:
-            return False, -math.inf, (0.0, 1.0), (0.0, 0.0)
-        ring = 2 * ring + 1
+    box = box_on_map(b, at, support, rounding)
+    under, touched = cells_under(box, tile, size)
+    ring = ring_with_tiles(sums, stride, touched, size)
+    if ring < 0:
+        return False, -math.inf, (0.0, 1.0), (0.0, 0.0)
     # How far rectangles may grow beyond the shape: cut ends must never be the nearest way out.
-    beyond = DEEP + max(i1 - i0, j1 - j0)
-    waiting = stack_array(WAITING, (0, 0, 0, 0))
-    seen = stack_array(SEEN, (0, 0, 0, 0))
+    beyond = DEEP + max(touched[2] - touched[0], touched[3] - touched[1]) - 1
+    limits = around(touched, beyond, size)
+    waiting, seen = stack_array(WAITING, (0, 0, 0, 0)), stack_array(SEEN, (0, 0, 0, 0))
     count, tested = 1, 0
-    waiting[0, 0], waiting[0, 1], waiting[0, 2], waiting[0, 3] = x0, y0, x1, y1
+    store_cells(waiting, 0, around(touched, ring, size))
     hit, depth, normal, point, width = False, -math.inf, (0.0, 1.0), (0.0, 0.0), 0.0
     # The deepest wall and floor (ceiling) contacts: signed depth along their axis.
     wall, floor = 0.0, 0.0
@@ -80,61 +166,34 @@ def deepest_contact(a, b, d, support, rounding):
     tie = TIE * tile
     while True:
         if count == 0:
-            # A shape may be farther from a near tile than its box is; then another tile may be nearer.
-            need = ring if nearest <= 0.0 else int(min(nearest / tile, 1.0 * columns + rows)) + 1
-            if inner_depth > 0.0 and nearest == math.inf:
-                need = ring  # deep inside
-            if a.faces != ALL:
-                need = max(need, 1)  # floors may be nearer than the requested walls, or the reverse
+            need = ring_to_search(ring, nearest, inner_depth, a.faces, tile, size)
             if need <= ring:
                 break
             ring, count = need, 1
-            waiting[0, 0], waiting[0, 1] = max(i0 - ring, 0), max(j0 - ring, 0)
-            waiting[0, 2], waiting[0, 3] = min(i1 + 1 + ring, columns), min(j1 + 1 + ring, rows)
+            store_cells(waiting, 0, around(touched, ring, size))
         count -= 1
-        x0, y0, x1, y1 = waiting[count, 0], waiting[count, 1], waiting[count, 2], waiting[count, 3]
-        inside = tiles_in(sums, stride, x0, y0, x1, y1)
-        if inside == 0.0:
+        block = load_cells(waiting, count)
+        inside = tiles_in(sums, stride, block)
+        gap_x, gap_y = gaps_of_boxes(box, block, tile)
+        apart_x, apart_y = max(gap_x, 0.0), max(gap_y, 0.0)
+        if inside == 0.0 or apart_x * apart_x + apart_y * apart_y > nearest_square:
             continue
-        gap_left, gap_right = gaps(left, right, x0, x1, tile)
-        gap_lower, gap_upper = gaps(lower, upper, y0, y1, tile)
-        apart_x, apart_y = max(gap_left, gap_right, 0.0), max(gap_lower, gap_upper, 0.0)
-        square = apart_x * apart_x + apart_y * apart_y
-        if square > nearest_square:
-            continue
-        if inside < (x1 - x0) * (y1 - y0):
-            across, up = at[0] >= 0.5 * (x0 + x1) * tile, at[1] >= 0.5 * (y0 + y1) * tile
-            count = halved(waiting, count, x0, y0, x1, y1, across, up)
+        if inside < cells_in(block):
+            across, up = at[0] >= 0.5 * (block[0] + block[2]) * tile, at[1] >= 0.5 * (block[1] + block[3]) * tile
+            count = halved(waiting, count, block, across, up)
             continue
         for turn in range(2):
-            # Grow in width, then in height; then the other way round.
-            u0, v0, u1, v1 = x0, y0, x1, y1
-            for k in range(4):
-                side = k if turn == 0 else (k + 2) % 4
-                room = min(u0, u0 - i0 + beyond)
-                if side == 1:
-                    room = min(columns - u1, i1 + 1 + beyond - u1)
-                elif side == 2:
-                    room = min(v0, v0 - j0 + beyond)
-                elif side == 3:
-                    room = min(rows - v1, j1 + 1 + beyond - v1)
-                u0, v0, u1, v1 = grown(sums, stride, u0, v0, u1, v1, side, room)
-            known = False
-            for k in range(min(tested, SEEN)):
-                known |= seen[k, 0] == u0 and seen[k, 1] == v0 and seen[k, 2] == u1 and seen[k, 3] == v1
-            if known:
+            cells = grown_within(sums, stride, block, limits, turn)
+            if contains_cells(seen, min(tested, SEEN), cells):
                 continue
-            place = tested % SEEN
-            seen[place, 0], seen[place, 1], seen[place, 2], seen[place, 3] = u0, v0, u1, v1
+            store_cells(seen, tested % SEEN, cells)
             tested += 1
-            gap_left, gap_right = gaps(left, right, u0, u1, tile)
-            gap_lower, gap_upper = gaps(lower, upper, v0, v1, tile)
-            gap_x, gap_y = max(gap_left, gap_right), max(gap_lower, gap_upper)
+            gap_x, gap_y = gaps_of_boxes(box, cells, tile)
             if -max(gap_x, gap_y) < min(depth, 0.0) - tie:  # the depth is at most the overlap of the boxes
                 continue
-            extent, centre = rectangle(u0, v0, u1, v1, tile, middle)
+            extent, centre = rectangle(cells, tile, middle)
             touches, deep, n, p = convex_convex(extent, b, sub(d, centre), tile_support, support, sharp, rounding)
-            if hidden(sums, stride, u0, v0, u1, v1, n, column0, row0, i1, j1):
+            if hidden(sums, stride, cells, n, under):
                 if deep > inner_depth:
                     inner_depth, inner_normal, inner_point = deep, n, add(centre, p)
                 continue
@@ -148,9 +207,7 @@ def deepest_contact(a, b, d, support, rounding):
             elif deep > abs(floor) and abs(n[0]) <= SLANT:
                 floor = deep if n[1] > 0.0 else -deep
             # Of two equally deep contacts take the one with more of the shape above the face.
-            along = min(right, u1 * tile) - max(left, u0 * tile)
-            if abs(n[0]) > abs(n[1]):
-                along = min(upper, v1 * tile) - max(lower, v0 * tile)
+            along = width_above_face(box, cells, n, tile)
             if deep > depth + tie or (deep >= depth - tie and along > width):
                 hit, depth, normal, point, width = touches, deep, n, add(centre, p), along
     if nearest > 0.0 and inner_depth > 0.0 and a.faces != WALLS:

@@ -1,4 +1,4 @@
-"""Rectangles of cells: columns x0 to x1, rows y0 to y1 (from below), with exclusive ends.
+"""Rectangles of cells: (x0, y0, x1, y1) stands for columns x0 to x1, rows y0 to y1 (from below), with exclusive ends.
 
 Counting their tiles, growing them, and their shapes.
 """
@@ -14,21 +14,41 @@ TIE = 1e-9  # of a tile: contacts whose depths differ by less count as equally d
 
 
 @plugin.kernel
-def tiles_in(sums, stride, x0, y0, x1, y1):
+def load_cells(stored, i):
+    """The rectangle in a row of an array."""
+    return stored[i, 0], stored[i, 1], stored[i, 2], stored[i, 3]
+
+
+@plugin.kernel
+def store_cells(stored, i, cells):
+    """Store a rectangle in a row of an array."""
+    stored[i, 0], stored[i, 1], stored[i, 2], stored[i, 3] = cells
+
+
+@plugin.kernel
+def tiles_in(sums, stride, cells):
     """The number of tiles in a rectangle."""
+    x0, y0, x1, y1 = cells
     low, high = 1 + y0 * stride, 1 + y1 * stride
     return (sums[high + x1, 0] - sums[high + x0, 0]) - (sums[low + x1, 0] - sums[low + x0, 0])
 
 
 @plugin.kernel
-def full(sums, stride, x0, y0, x1, y1):
-    """True if all its cells are tiles."""
-    return tiles_in(sums, stride, x0, y0, x1, y1) == (x1 - x0) * (y1 - y0)
+def cells_in(cells):
+    """The number of its cells."""
+    return (cells[2] - cells[0]) * (cells[3] - cells[1])
 
 
 @plugin.kernel
-def moved_side(x0, y0, x1, y1, side, way):
+def full(sums, stride, cells):
+    """True if all its cells are tiles."""
+    return tiles_in(sums, stride, cells) == cells_in(cells)
+
+
+@plugin.kernel
+def moved_side(cells, side, way):
     """The rectangle with its side (left, right, lower, upper) moved outwards."""
+    x0, y0, x1, y1 = cells
     if side == 0:
         return x0 - way, y0, x1, y1
     if side == 1:
@@ -39,18 +59,17 @@ def moved_side(x0, y0, x1, y1, side, way):
 
 
 @part
-def grown(sums, stride, x0, y0, x1, y1, side, room):
+def grown(sums, stride, cells, side, room):
     """A rectangle full of tiles with one side moved outwards, by at most ``room``, as far as it stays full."""
     low, high = 0, max(room, 0)
     step = high  # most often it can grow by all or by nothing
     while low < high:
-        u0, v0, u1, v1 = moved_side(x0, y0, x1, y1, side, step)
-        if full(sums, stride, u0, v0, u1, v1):
+        if full(sums, stride, moved_side(cells, side, step)):
             low = step
         else:
             high = step - 1
         step = 1 if low == 0 and step == max(room, 0) else (low + high + 1) // 2
-    return moved_side(x0, y0, x1, y1, side, low)
+    return moved_side(cells, side, low)
 
 
 @plugin.kernel
@@ -81,8 +100,9 @@ def sharp(half):
 
 
 @plugin.kernel
-def halved(waiting, count, x0, y0, x1, y1, right_first, upper_first):
+def halved(waiting, count, cells, right_first, upper_first):
     """Push both halves of a rectangle, cut across its longer side, at index ``count``; the first one goes on top."""
+    x0, y0, x1, y1 = cells
     cut_x, cut_y = x1, y1  # of the left or lower half
     if x1 - x0 >= y1 - y0:
         cut_x = (x0 + x1) // 2
@@ -109,8 +129,9 @@ def box_around(b, support, around):
 
 
 @plugin.kernel
-def rectangle(x0, y0, x1, y1, tile, middle):
+def rectangle(cells, tile, middle):
     """Its half extents, and its centre relative to that of the map."""
+    x0, y0, x1, y1 = cells
     extent = (0.5 * (x1 - x0) * tile, 0.5 * (y1 - y0) * tile)
     return extent, (0.5 * (x0 + x1) * tile - middle[0], 0.5 * (y0 + y1) * tile - middle[1])
 
@@ -122,27 +143,30 @@ def faces_like(n, faces):
 
 
 @plugin.kernel
-def solid(sums, stride, x0, y0, x1, y1):
+def solid(sums, stride, cells):
     """True if the cells are all tiles; there are none beyond the map."""
+    x0, y0, x1, y1 = cells
     if x0 < 0 or y0 < 0 or x1 >= stride or 1 + (y1 + 1) * stride > len(sums):
         return False
-    return full(sums, stride, x0, y0, x1, y1)
+    return full(sums, stride, cells)
 
 
 @part
-def hidden(sums, stride, x0, y0, x1, y1, n, column0, row0, column1, row1):
+def hidden(sums, stride, cells, n, under):
     """True if the face or corner where a shape meets a rectangle is internal: it borders on other tiles.
 
-    n: the contact's normal; column0 to row1: the cells under the shape's box.
+    n: the contact's normal; under: first column and row, last column and row under the shape's box.
     """
+    x0, y0, x1, y1 = cells
+    column0, row0, column1, row1 = under
     beside = x1 if n[0] > 0.0 else x0 - 1
     above = y1 if n[1] > 0.0 else y0 - 1
     if abs(n[0]) > SLANT and abs(n[1]) > SLANT:
         x, y = x1 - 1 if n[0] > 0.0 else x0, y1 - 1 if n[1] > 0.0 else y0
-        side, top = solid(sums, stride, beside, y, beside + 1, y + 1), solid(sums, stride, x, above, x + 1, above + 1)
-        return side or top
+        side = solid(sums, stride, (beside, y, beside + 1, y + 1))
+        return side or solid(sums, stride, (x, above, x + 1, above + 1))
     if abs(n[0]) > SLANT:
         first, last = min(max(row0, y0), y1 - 1), min(max(row1, y0), y1 - 1)
-        return solid(sums, stride, beside, first, beside + 1, last + 1)
+        return solid(sums, stride, (beside, first, beside + 1, last + 1))
     first, last = min(max(column0, x0), x1 - 1), min(max(column1, x0), x1 - 1)
-    return solid(sums, stride, first, above, last + 1, above + 1)
+    return solid(sums, stride, (first, above, last + 1, above + 1))

@@ -13,10 +13,13 @@ from .rectangles import (
     TIE,
     WAITING,
     box_around,
+    cells_in,
     faces_like,
     halved,
+    load_cells,
     rectangle,
     sharp,
+    store_cells,
     tile_support,
     tiles_in,
 )
@@ -49,23 +52,24 @@ def first_touch(a, b, d, v, support, rounding):
     left, right, lower, upper = box_around(b, support, rounding(b))
     left, right, lower, upper = at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
     waiting = stack_array(WAITING, (0, 0, 0, 0))
-    waiting[0, 0], waiting[0, 1], waiting[0, 2], waiting[0, 3] = 0, 0, columns, rows
+    store_cells(waiting, 0, (0, 0, columns, rows))
     count, best = 1, math.inf
     tie = TIE * tile
     while count > 0:
         count -= 1
-        x0, y0, x1, y1 = waiting[count, 0], waiting[count, 1], waiting[count, 2], waiting[count, 3]
-        inside = tiles_in(sums, stride, x0, y0, x1, y1)
+        cells = load_cells(waiting, count)
+        inside = tiles_in(sums, stride, cells)
         if inside == 0.0:
             continue
+        x0, y0, x1, y1 = cells
         enter, leave = passing(left, right, v[0], x0 * tile - tie, x1 * tile + tie, 0.0, min(best, 1.0))
         enter, leave = passing(lower, upper, v[1], y0 * tile - tie, y1 * tile + tie, enter, leave)
         if not enter <= leave:
             continue
-        if inside < (x1 - x0) * (y1 - y0):
-            count = halved(waiting, count, x0, y0, x1, y1, v[0] < 0.0, v[1] < 0.0)
+        if inside < cells_in(cells):
+            count = halved(waiting, count, cells, v[0] < 0.0, v[1] < 0.0)
             continue
-        extent, centre = rectangle(x0, y0, x1, y1, tile, middle)
+        extent, centre = rectangle(cells, tile, middle)
         time = enter
         for look in range(LOOKS):
             way = sub(add_scaled(d, v, time), centre)

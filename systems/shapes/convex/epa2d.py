@@ -25,7 +25,7 @@ def store_edge(of_a, of_b, following, normals, heights, i, d):
 
 
 @part
-def polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
+def polygon_depth(pair, d, of_a, of_b, size):
     """(normal from a to b, depth) for a triangle in the difference that holds the origin.
 
     The edge nearest to the origin is a lower bound, how far the difference reaches in the direction of any edge an
@@ -50,9 +50,9 @@ def polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
             break
         outward = row(normals, i, d)
         if count == CORNERS:
-            best, depth = refine_direction(a, b, d, support_a, support_b, unit, best, depth, size)
+            best, depth = refine_direction(pair, d, best, depth, size)
             break
-        point_a, point_b = support_points(a, b, support_a, support_b, unit, negative(outward))
+        point_a, point_b = support_points(pair, negative(outward))
         store(of_a, count, point_a)
         store(of_b, count, point_b)
         found = corner(of_a, of_b, count, d)

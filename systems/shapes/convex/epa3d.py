@@ -1,4 +1,8 @@
-"""Expanding polytope algorithm in 3D: depth of the origin in the difference, by a polytope that grows inside it."""
+"""Expanding polytope algorithm in 3D: depth of the origin in the difference, by a polytope that grows inside it.
+
+Its ``surface`` is (faces, normals, heights, waiting): a row per face with its corners, counter-clockwise from outside;
+its outward normal; its distance from the origin; the same for faces that may still move outwards, infinity for others.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +19,9 @@ EDGES = 192
 
 
 @inlined
-def store_face(of_a, of_b, faces, normals, heights, waiting, f, d):
+def store_face(of_a, of_b, surface, f, d):
     """Note the outward normal of face f and its distance from the origin; ``waiting`` is infinite if it has no area."""
+    faces, normals, heights, waiting = surface
     i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
     normal = face_normal(of_a, of_b, i, j, k, d)
     size = norm(normal)
@@ -31,12 +36,13 @@ def store_face(of_a, of_b, faces, normals, heights, waiting, f, d):
 
 
 @inlined
-def remove_visible_faces(faces, normals, heights, waiting, count, edges, top, seen_from, slack, d):
+def remove_visible_faces(surface, count, edges, top, seen_from, slack, d):
     """Remove the faces visible from the new corner: (faces left, edges of the hole), -1 edges if there are too many.
 
     An edge whose reverse is taken away as well is inside the hole. So the surface stays closed whatever rounding lets
     the corner see.
     """
+    faces, normals, heights, waiting = surface
     rim, f = 0, 0
     while f < count:
         if not (f == top or dot(row(normals, f, d), seen_from) - heights[f] > slack):
@@ -92,7 +98,7 @@ def witness_point(of_a, of_b, faces, heights, count, outward, depth, d):
 
 
 @part
-def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
+def polytope_depth(pair, d, of_a, of_b, size):
     """(normal from a to b, depth, point of a) for a tetrahedron in the difference that holds the origin.
 
     The face nearest to the origin is a lower bound, how far the difference reaches in the direction of any face an
@@ -102,15 +108,16 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
     faces, edges = stack_array(FACES, (0, 0, 0)), stack_array(EDGES, (0, 0))
     normals = stack_array(FACES, (0.0, 0.0, 0.0))
     heights, waiting = stack_array(FACES, 0.0), stack_array(FACES, 0.0)
+    surface = (faces, normals, heights, waiting)
     turned = 0 if dot(face_normal(of_a, of_b, 0, 1, 2, d), edge(of_a, of_b, 0, 3, d)) > 0.0 else 1
-    for f in range(4):  # face f is opposite to corner f, its corners counter-clockwise from outside
+    for f in range(4):  # face f is opposite to corner f
         faces[f, 0] = 1 if f == 0 else 0
         faces[f, 1 + (f + turned) % 2] = 2 if f < 2 else 1
         faces[f, 2 - (f + turned) % 2] = 3 if f < 3 else 2
     used, count, rim, best, depth = 4, 0, 4, d, math.inf
     for _ in range(4 * CORNERS):
         for f in range(count, count + rim):  # the new ones
-            store_face(of_a, of_b, faces, normals, heights, waiting, f, d)
+            store_face(of_a, of_b, surface, f, d)
         count, rim = count + rim, 0
         top = 0
         for f in range(1, count):
@@ -120,9 +127,9 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
             break
         outward = row(normals, top, d)
         if used == CORNERS:
-            best, depth = refine_direction(a, b, d, support_a, support_b, unit, best, depth, size)
+            best, depth = refine_direction(pair, d, best, depth, size)
             break
-        point_a, point_b = support_points(a, b, support_a, support_b, unit, negative(outward))
+        point_a, point_b = support_points(pair, negative(outward))
         store(of_a, used, point_a)
         store(of_b, used, point_b)
         found = corner(of_a, of_b, used, d)
@@ -139,9 +146,7 @@ def polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size):
         if known < used or reach - heights[top] <= ROUNDING * size:
             waiting[top] = math.inf  # as far out as it goes; what is left is rounding
             continue
-        count, rim = remove_visible_faces(
-            faces, normals, heights, waiting, count, edges, top, found, ROUNDING * size, d
-        )
+        count, rim = remove_visible_faces(surface, count, edges, top, found, ROUNDING * size, d)
         if rim < 0 or count + rim > FACES:
             break
         for e in range(rim):

@@ -4,6 +4,8 @@ The difference of a and b is the set of all vectors from a point of a to a point
 the origin; its distance from the origin is that of the shapes, and the depth of the origin in it is their overlap. It
 is never built: the supports of the two shapes give its farthest point in a direction.
 
+``pair`` stands for both: (a, b, support of a, support of b, unit). Lengths are in units of 1 / unit.
+
 A simplex has ``count`` corners, the newest first. Stored are the points of a and of b that they lead from and to, each
 relative to its own centre, in the rows of ``of_a`` and ``of_b``: so an edge that comes from one shape alone is as exact
 as that shape, however small it is against the other or far away.
@@ -26,8 +28,9 @@ MAX_STALLS = 4  # steps that bring less than the rounding of the coordinates, as
 
 
 @part
-def support_points(a, b, support_a, support_b, unit, direction):
-    """The points of a and of b, in units of 1 / unit, where the difference reaches least far along ``direction``."""
+def support_points(pair, direction):
+    """The points of a and of b where the difference reaches least far along ``direction``."""
+    a, b, support_a, support_b, unit = pair
     return scale(support_a(a, direction), unit), scale(support_b(b, negative(direction)), unit)
 
 
@@ -162,14 +165,15 @@ def reduce_simplex(of_a, of_b, weights, target, count, d):
 
 
 @part
-def closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b):
+def closest_simplex(pair, d, of_a, of_b):
     """Walk through the difference towards the origin, from simplex to simplex (Gilbert, Johnson and Keerthi).
 
     Returns (count, nearest, witness, size). count 0: the origin is outside, ``nearest`` is the point of the difference
     nearest to it; otherwise the simplex of so many corners holds the origin, or is as near to it as can be told.
     witness: the point of a. size: of the coordinates, which rounding errors go with. count -1: they may be too large or
-    too small for ``unit`` 1.
+    too small for unit 1.
     """
+    unit = pair[4]
     weights, target = stack_array(4, 0.0), stack_array(4, 0.0)
     direction = d
     if dot(d, d) == 0.0:
@@ -177,7 +181,7 @@ def closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b):
     nearest, witness = direction, d
     square, size_square, count, stalls = math.inf, dot(d, d), 0, 0
     for _ in range(MAX_STEPS):
-        point_a, point_b = support_points(a, b, support_a, support_b, unit, direction)
+        point_a, point_b = support_points(pair, direction)
         size_square = max(size_square, max(dot(point_a, point_a), dot(point_b, point_b)))
         if count == 0:
             if unit == 1.0 and not SMALL * SMALL < size_square < LARGE * LARGE:
@@ -231,7 +235,7 @@ def perpendicular_to(of_a, of_b, count, d):
 
 
 @part
-def complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, size):
+def complete_simplex(pair, d, of_a, of_b, count, size):
     """Add corners to a simplex that holds the origin until it has a volume: (count, normal, height).
 
     count 0: the difference is flat, and the origin in it; ``normal`` is across it and leads out over ``height``.
@@ -244,7 +248,7 @@ def complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, siz
         base = corner(of_a, of_b, 0, d)
         farthest, height = -1.0, math.inf
         for _ in range(2):
-            point_a, point_b = support_points(a, b, support_a, support_b, unit, ahead)
+            point_a, point_b = support_points(pair, ahead)
             out = -dot(ahead, corner_of(point_a, point_b, d))
             reach = out + dot(ahead, base)
             if reach > farthest:
@@ -261,7 +265,7 @@ def complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, siz
 
 
 @part
-def refine_direction(a, b, d, support_a, support_b, unit, outward, depth, size):
+def refine_direction(pair, d, outward, depth, size):
     """(outward, depth) at a local minimum of the depth, from a direction near it; for smooth shapes.
 
     Gradient descent with the step length of Barzilai and Borwein. The best direction of all rounds is returned, so that
@@ -270,7 +274,7 @@ def refine_direction(a, b, d, support_a, support_b, unit, outward, depth, size):
     best, least = outward, depth
     before, slope_before, step = outward, outward, 1.0 / size
     for turn in range(REFINEMENTS):
-        point_a, point_b = support_points(a, b, support_a, support_b, unit, negative(outward))
+        point_a, point_b = support_points(pair, negative(outward))
         found = corner_of(point_a, point_b, d)
         reach = dot(outward, found)
         slope = add_scaled(found, outward, -reach)

@@ -22,12 +22,12 @@ SMALLEST_UNIT, LARGEST_UNIT = 1e-300, 1e300
 
 
 @part
-def suitable_unit(a, b, d, support_a, support_b):
-    """The unit in which the largest of all coordinates is about 1; 2 if they are neither large nor small."""
+def suitable_unit(pair, d):
+    """The unit in which the largest of all coordinates is about 1; 2 if they are neither large nor small in unit 1."""
     extent = length(d)
     for side in range(2 * len(d)):
         axis = replace(scale(d, 0.0), side // 2, 1.0 if side % 2 == 0 else -1.0)
-        point_a, point_b = support_points(a, b, support_a, support_b, 1.0, axis)
+        point_a, point_b = support_points(pair, axis)
         extent = max(extent, max(length(point_a), length(point_b)))
     if extent == 0.0 or SMALL < extent < LARGE:
         return 2.0
@@ -35,7 +35,7 @@ def suitable_unit(a, b, d, support_a, support_b):
 
 
 @part
-def middle_of_overlap(a, b, d, support_a, support_b, unit, normal):
+def middle_of_overlap(pair, d, normal):
     """2D: the point of a's surface in the middle of what a and b share at right angles to the normal.
 
     Supports a little to either side of the normal give both ends of an edge at right angles to it.
@@ -44,7 +44,7 @@ def middle_of_overlap(a, b, d, support_a, support_b, unit, normal):
     level, low, high = -math.inf, -math.inf, math.inf
     for turn in range(2):
         side = TILT if turn == 0 else -TILT
-        point_a, point_b = support_points(a, b, support_a, support_b, unit, add_scaled(normal, along, side))
+        point_a, point_b = support_points(pair, add_scaled(normal, along, side))
         at_a, at_b = dot(along, point_a), dot(along, add(d, point_b))
         level = max(level, dot(normal, point_a))
         if turn == 0:  # the high end of a, the low end of b
@@ -55,38 +55,38 @@ def middle_of_overlap(a, b, d, support_a, support_b, unit, normal):
 
 
 @part
-def core_contact_2d(a, b, d, support_a, support_b, unit):
-    """(fits, depth, normal, point of a's core): how two cores meet in 2D, d and the results in units of 1 / unit.
+def core_contact_2d(pair, d):
+    """(fits, depth, normal, point of a's core): how two cores meet in 2D, all in units of 1 / unit.
 
     Not ``fits``: coordinates may be too large or small for the unit, which was 1.
     """
     of_a, of_b = stack_array(POLYGON_CORNERS, (0.0, 0.0)), stack_array(POLYGON_CORNERS, (0.0, 0.0))
-    count, nearest, witness, size = closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b)
+    count, nearest, witness, size = closest_simplex(pair, d, of_a, of_b)
     if count < 0:
         return False, 0.0, nearest, witness
     if count == 0:
         distance = length(nearest)
         normal, depth = divided(nearest, distance), -distance
     else:
-        count, normal, depth = complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, size)
+        count, normal, depth = complete_simplex(pair, d, of_a, of_b, count, size)
         if count > 0:
-            normal, depth = polygon_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size)
-    return True, depth, normal, middle_of_overlap(a, b, d, support_a, support_b, unit, normal)
+            normal, depth = polygon_depth(pair, d, of_a, of_b, size)
+    return True, depth, normal, middle_of_overlap(pair, d, normal)
 
 
 @part
-def core_contact_3d(a, b, d, support_a, support_b, unit):
+def core_contact_3d(pair, d):
     """The same in 3D."""
     of_a, of_b = stack_array(POLYTOPE_CORNERS, (0.0, 0.0, 0.0)), stack_array(POLYTOPE_CORNERS, (0.0, 0.0, 0.0))
-    count, nearest, witness, size = closest_simplex(a, b, d, support_a, support_b, unit, of_a, of_b)
+    count, nearest, witness, size = closest_simplex(pair, d, of_a, of_b)
     if count < 0:
         return False, 0.0, nearest, witness
     if count == 0:
         distance = length(nearest)
         return True, -distance, divided(nearest, distance), witness
-    count, normal, depth = complete_simplex(a, b, d, support_a, support_b, unit, of_a, of_b, count, size)
+    count, normal, depth = complete_simplex(pair, d, of_a, of_b, count, size)
     if count > 0:
-        normal, depth, witness = polytope_depth(a, b, d, support_a, support_b, unit, of_a, of_b, size)
+        normal, depth, witness = polytope_depth(pair, d, of_a, of_b, size)
     return True, depth, normal, witness
 
 
@@ -104,13 +104,14 @@ def convex_convex(a, b, d, support_a, support_b, rounding_a, rounding_b):
     """
     unit = 1.0
     while True:
+        pair = (a, b, support_a, support_b, unit)
         if len(d) == 2:
-            fits, depth, normal, point = core_contact_2d(a, b, scale(d, unit), support_a, support_b, unit)
+            fits, depth, normal, point = core_contact_2d(pair, scale(d, unit))
         else:
-            fits, depth, normal, point = core_contact_3d(a, b, scale(d, unit), support_a, support_b, unit)
+            fits, depth, normal, point = core_contact_3d(pair, scale(d, unit))
         if fits:
             break
-        unit = suitable_unit(a, b, d, support_a, support_b)
+        unit = suitable_unit(pair, d)
     radius = rounding_a(a)
     depth = radius + rounding_b(b) + depth / unit
     point = add_scaled(divided(point, unit), normal, radius - 0.5 * depth)
