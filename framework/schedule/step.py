@@ -123,8 +123,10 @@ class Pipeline:
     def _run(self, dt: float, others_write: bool) -> None:
         """Open the step, run its parts, close it."""
         physics = self.world.physics
-        if physics is not None and not physics.adoption.settled():
-            self.synchronize()
+        if physics is not None:
+            physics.contacts.take_deferred()
+            if not physics.adoption.settled():
+                self.synchronize()
         waited, order = log.waited, self.order
         self._begin(others_write)
         if self._parts_order != order.version or (physics is not None and self._parts_physics != physics.parts_version):
@@ -237,6 +239,7 @@ class Pipeline:
         physics = self.world.physics
         if physics is None or self.in_step or physics.adoption.settled():
             return
+        physics.contacts.take_deferred()
         with esper_bridge.context(self.world.name):
             physics.adoption.synchronize()
 
@@ -248,6 +251,8 @@ class Pipeline:
             if self.processors.changed:
                 self.order.reconcile()
             self.synchronize()
+            if physics is not None:
+                physics.contacts.take_deferred()
             self._begin(True)
             parts = [] if physics is None else [*physics.opening()]
             for system in [s for s in self.order.systems if s.phase == phase]:

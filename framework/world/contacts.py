@@ -178,6 +178,7 @@ class Contacts(ContactRows):
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
         self._window = 0  # number of the step that the window was opened with
         self._recorded = False  # something has happened since
+        self._deferred: Callable[[], None] | None = None  # records what the last step has brought
 
     # -- what users read --------------------------------------------------------------------------
 
@@ -216,7 +217,7 @@ class Contacts(ContactRows):
 
     def open_window(self, step: int) -> None:
         """Forget what the last window held; ``step`` is the next one's number."""
-        self._window = step
+        self._window, self._deferred = step, None
         if self._recorded:
             self._recorded = False
             for chunks in self._chunks.values():
@@ -226,6 +227,16 @@ class Contacts(ContactRows):
         """``enabled`` of the contacts as they are; None if nothing has read their columns, so that all are."""
         return self._own_columns["enabled"] if self._columns_of == self._source.version else None
 
+    def defer(self, record: Callable[[], None]) -> None:
+        """Let ``record`` be called when somebody reads the events, or before they are lost; most are never read."""
+        self._deferred = record
+
+    def take_deferred(self) -> None:
+        """The next step begins, or rows are about to move: record what has been deferred."""
+        if self._deferred is not None:
+            record, self._deferred = self._deferred, None
+            record()
+
     def record(self, history: str, columns: dict[str, np.ndarray]) -> None:
         if len(columns["entity_a"]):
             self._recorded = True
@@ -233,6 +244,7 @@ class Contacts(ContactRows):
 
     def forget_step(self, step: int) -> None:
         """Drop the events of a step that has failed."""
+        self._deferred = None
         for name, chunks in self._chunks.items():
             self._chunks[name] = [chunk for chunk in chunks if chunk["step"][0] != step]
 
@@ -246,15 +258,18 @@ class Contacts(ContactRows):
 
     def state(self) -> Any:
         """The contacts and the events of the window, for a snapshot."""
+        self.take_deferred()
         return self._columns, {name: list(chunks) for name, chunks in self._chunks.items()}
 
     def restore_state(self, state: Any) -> None:
         columns, histories = state
+        self._deferred = None
         self.show(columns)
         self._chunks = {name: list(rows) for name, rows in histories.items()}
         self._recorded, self._window = True, -1
 
     def _history(self, name: str) -> ContactRows:
+        self.take_deferred()
         chunks, step = self._chunks[name], self._running_step()
         if step is not None:
             chunks = [chunk for chunk in chunks if chunk["step"][0] == step]

@@ -143,7 +143,7 @@ class ContactEvents(StagedSystem):
         state = self._state
         news = state.word_of("news")
         if not state.others_write:  # nor has any event a handler
-            return [self.segment(), Check(state.words, news, PythonPart(self.name, self._record))]
+            return [self.segment(), Check(state.words, news, PythonPart(self.name, self._defer))]
         tell = Check(state.words, news, PythonPart(self.name, self._tell))
         return [PythonPart(self.name, self._take_disabled), self.segment(), tell]
 
@@ -153,13 +153,20 @@ class ContactEvents(StagedSystem):
         if enabled is not None and not self._state.found_current:
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
-    def _record(self, dt: float) -> None:
-        """Note what has begun, ended and bounced."""
+    def _defer(self, dt: float) -> None:
+        """Nobody looks within the step: what has happened is recorded when it is read."""
+        self._report_capped()
+        self._contacts.defer(self._record)
+
+    def _report_capped(self) -> None:
         if self._impacts.capped:
             self.world.report_fault(
                 f"step {self.world.step_count}: {self._impacts.capped} impacts beyond {self._settings().impact_cap} "
                 f"of a body in one step"
             )
+
+    def _record(self) -> None:
+        """Record what has begun, ended and bounced."""
         source = self._source
         source.record_impacts()
         if self._touching.begins:
@@ -169,7 +176,8 @@ class ContactEvents(StagedSystem):
 
     def _tell(self, dt: float) -> None:
         """Note it and call the handlers."""
-        self._record(dt)
+        self._report_capped()
+        self._record()
         source, events = self._source, self.world.events
         begin = source.began() if events.wanted("contact_begin") else None
         end = source.ended() if events.wanted("contact_end") else None
