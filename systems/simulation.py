@@ -206,7 +206,7 @@ class Simulation(PhysicsServices):
 
     def begin_step(self, others_write: bool) -> None:
         table, scene, words = self.table, self.scene, self._words
-        words[self._step_number] = self._world.clock.step_count
+        words[self._step_number] = self.table.clock.step_count
         self._contacts_before = self.contacts.columns_now() if words[self._found_current] else None
         structure = table.version + table.members_version + self._world.registry.version
         if structure != scene.structure or table.static_version != scene.static_version:
@@ -326,7 +326,7 @@ class Simulation(PhysicsServices):
 
     def closing(self) -> list[Any]:
         start = self.program.index[CLOSING[0].function.__name__]
-        return [Segment(self.program, start, start + len(CLOSING))]
+        return [Segment(self.program, start, start + len(CLOSING)), *self.contact_events.closing()]
 
     def abandon_step(self) -> None:
         state, table, bodies = self.state, self.table, self.state.bodies

@@ -42,6 +42,7 @@ class Pipeline:
         self.in_step = False
         self.profiler = Profiler(self)
         self.faults: list[str] = []
+        self._events = world.events
         self._in_window = False
         self._parts: list[Any] = []  # what a step runs, in order
         self._parts_order = self._parts_physics = -1  # versions that the parts were made of
@@ -88,7 +89,9 @@ class Pipeline:
             return
         self._in_window = True
         try:
-            for _ in range(steps):
+            for k in range(steps):
+                if k and self.world.physics is not None:
+                    self.world.physics.contacts.take_deferred()
                 others_write = self.others_write()
                 if others_write or self._dead or self.processors.changed:  # code of the game needs its context
                     with esper_bridge.context(self.world.name):
@@ -123,10 +126,8 @@ class Pipeline:
     def _run(self, dt: float, others_write: bool) -> None:
         """Open the step, run its parts, close it."""
         physics = self.world.physics
-        if physics is not None:
-            physics.contacts.take_deferred()
-            if not physics.adoption.settled():
-                self.synchronize()
+        if physics is not None and not physics.adoption.settled():
+            self.synchronize()
         waited, order = log.waited, self.order
         self._begin(others_write)
         if self._parts_order != order.version or (physics is not None and self._parts_physics != physics.parts_version):
@@ -185,7 +186,7 @@ class Pipeline:
 
     def others_write(self) -> bool:
         """Whether code that is not carom's runs in a step."""
-        return self.order.foreign or self.world.events.any_handlers()
+        return self.order.foreign or self._events.any_handlers()
 
     def _make_parts(self) -> None:
         """The parts of all processors in esper's order, between those that open and close a step."""

@@ -278,7 +278,8 @@ class World(EntityVerbs, QueryVerbs):
 
     def step(self) -> None:
         """One fixed step of ``settings.dt``."""
-        self._open()
+        if self.closed:
+            self._open()
         self._pipeline.step()
 
     def advance(self, seconds: float) -> int:

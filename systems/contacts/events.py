@@ -141,11 +141,16 @@ class ContactEvents(StagedSystem):
 
     def _parts(self) -> list[Any]:
         state = self._state
-        news = state.word_of("news")
         if not state.others_write:  # nor has any event a handler
-            return [self.segment(), Check(state.words, news, PythonPart(self.name, self._defer))]
-        tell = Check(state.words, news, PythonPart(self.name, self._tell))
+            return [self.segment()]
+        tell = Check(state.words, state.word_of("news"), PythonPart(self.name, self._tell))
         return [PythonPart(self.name, self._take_disabled), self.segment(), tell]
+
+    def closing(self) -> list[Any]:
+        """What follows the last stage of all, so that the step is one call where no code of the game runs in it."""
+        state = self._state
+        defer = Check(state.words, state.word_of("news"), PythonPart(self.name, self._defer))
+        return [] if state.others_write else [defer]
 
     def _take_disabled(self, dt: float) -> None:
         """Contacts that a system has disabled after RESPONSE count as not touching."""
