@@ -84,7 +84,9 @@ def check_finite(state, dt):
             finite &= abs(item(x, k)) <= LARGEST
             finite &= abs(item(v, k)) <= LARGEST
     state.finite = finite
-    state.moved = state.kept = state.started = False
+    state.moved = False
+    failed = state.unsound != 0  # which Python sees after this stage, and goes back
+    state.kept, state.started = state.kept and failed, state.started and failed
     state.motion_version += 1
     state.bodies_counted += state.moving
     return OK
