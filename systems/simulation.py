@@ -52,9 +52,9 @@ from .opening import check_finite, keep_state, read_bodies
 from .planned_columns import planned_columns
 from .preparation import prepare
 from .queries.system import Queries
-from .records import STATE
+from .records import BODIES, COLLIDERS, STATE
 from .room import Room
-from .scene import SWEEPS, Scene
+from .scene import SWEEPS, TABLE_COLUMNS, Scene
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
@@ -73,13 +73,39 @@ OPENING = (
 )  # fmt: skip
 CLOSING = (Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),)
 ON_DEMAND = (
-    Stage(box_rest_of_step, "boxes around the rest of the paths", ("path",), ("boxes",), "swept bodies"),
+    Stage(
+        box_rest_of_step, "boxes around the rest of the paths", ("path_velocity",), ("lower", "upper"), "swept bodies",
+    ),
     Stage(merge_pairs, "the pairs of the rest of the step", ("pairs", "candidates"), ("merged",), "swept bodies"),
     *Integration.ON_DEMAND,
 )
+# What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
+CONDITIONS = (
+    "", "dynamic bodies", "colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies",
+    "standard", "on demand",
+)  # fmt: skip
+# Columns of the table that a failed step puts back, and those that every step makes again.
+PUT_BACK = ("position", "linear_velocity", "previous_position", "step_force", "force", "inverse_mass")
+
+
+def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+    """The stages; ValueError for a name that nothing has, or a column that a failed step would leave changed."""
+    fields = {*STATE.fields, *BODIES.fields, *COLLIDERS.fields}
+    for stage in stages:
+        for name in (*stage.reads, *stage.writes):
+            if name not in fields:
+                raise ValueError(f"stage {stage.name}: no record in systems/records.py has {name!r}")
+        for name in stage.writes:
+            if name in TABLE_COLUMNS and name not in PUT_BACK:
+                raise ValueError(f"stage {stage.name} writes {name}, which a failed step does not put back")
+        if stage.needed not in (*CONDITIONS, stage.name):
+            raise ValueError(f"stage {stage.name}: needed must be one of {', '.join(CONDITIONS)}, got {stage.needed!r}")
+    return stages
+
+
 # The stages of a step in their order: what plan(), stats(), profile() and docs/architecture.md read.
 SYSTEMS = (ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, ContactEvents)
-STAGES = (*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND)
+STAGES = check_stages((*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND))
 
 # Parts of stages by their place in ``state.links``.
 LINKED_PARTS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from carom.lab.commands.stages import Stages
 from carom.lab.reporting.text_tables import between_marks
 from carom.plugins import Physics
 from carom.systems import ContactEvents
+from carom.systems.simulation import CLOSING, check_stages
 
 ROOT = Path(__file__).resolve().parent.parent
 INNER = Schema("TestInner", total=number())
@@ -166,3 +168,17 @@ def test_without_its_system_the_events_end_and_the_rest_goes_on():
         usual.step()
         assert not len(world.contacts.begin)
     assert (world.bodies.position == usual.bodies.position).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"needed": "dynamic bodys"}, "needed must be one of .*, got 'dynamic bodys'"),
+        ({"writes": ("fast_cout",)}, "no record in systems/records.py has 'fast_cout'"),
+        ({"writes": ("mass",)}, "writes mass, which a failed step does not put back"),
+    ],
+    ids=["a condition that nothing has", "a column that nothing has", "a column that would not be undone"],
+)
+def test_a_stage_that_the_step_cannot_keep_its_promises_for_is_refused(change, message):
+    with pytest.raises(ValueError, match=f"stage check_finite.*{message}"):
+        check_stages((dataclasses.replace(CLOSING[0], **change),))

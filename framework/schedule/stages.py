@@ -1,7 +1,7 @@
 """Stages: the compiled pieces of a step, and the program that runs them one after the other in a single call.
 
-The list of stages is the only description of what a step does: ``world.plan()``, ``stats()``, ``profile()``, going back
-after a failed step and docs/architecture.md all read it.
+The list of stages is the only description of what a step does: ``world.plan()``, ``stats()``, ``profile()`` and
+docs/architecture.md all read it, and it is checked that a failed step puts back what they write.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from .resting_prediction import predict_rest
 from .solver import solve_contacts
 from .warm_start import match_warm_start, store_warm_start
 
-MOTION = ("position", "linear_velocity", "path")
+MOTION = ("position", "linear_velocity", "path_velocity")
 NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"
 
 
@@ -36,7 +36,7 @@ class Response(StagedSystem):
     phase = Phase.RESPONSE
     writes = ("normal_impulse",)
     STAGES = (
-        Stage(begin_response, "where the paths begin", ("pairs",), ("path",), "colliders"),
+        Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), "colliders"),
         Stage(
             predict_rest, "what carried a body carries it in the prediction too", ("warm_start",), MOTION, "colliders",
             RESTED,

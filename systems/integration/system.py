@@ -68,7 +68,9 @@ class Integration(StagedSystem):
             end_flight, "limits of speed, kinematic bodies, forces for one step", MOTION,
             (*MOTION, "step_force"),
         ),
-        Stage(note_path, "the path within the step, on which impacts are found", MOTION, ("path",), "colliders"),
+        Stage(
+            note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",
+        ),
     )  # fmt: skip
     ON_DEMAND = (
         Stage(verlet_kick, "the velocity with the forces at the end", FORCED, ("linear_velocity",), "on demand"),

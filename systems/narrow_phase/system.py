@@ -37,8 +37,8 @@ class NarrowPhase(StagedSystem):
         ),
         Stage(collect_contacts, "which pairs touch or nearly do", ("pairs",), ("pairs",), "colliders"),
         Stage(
-            sweep_pairs, "which pairs touch on their paths only", ("pairs", "path"), ("pairs",), "swept bodies",
-            "pairs are near each other",
+            sweep_pairs, "which pairs touch on their paths only", ("pairs", "path_velocity"), ("pairs",),
+            "swept bodies", "pairs are near each other",
         ),
     )  # fmt: skip
 
