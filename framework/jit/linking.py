@@ -10,6 +10,7 @@ Calls use numba's own convention. Addresses are good for this process only.
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import attrgetter
 from typing import Any
 
 import numba
@@ -59,8 +60,8 @@ class Linked:
             _plain.append(self.function)
             return len(_plain) - 1
         self._dispatcher.compile(self.signature)
-        made = self._dispatcher.overloads[self.signature.args]
-        return made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+        machine_code, description = attrgetter("library", "fndesc")(self._dispatcher.overloads[self.signature.args])
+        return machine_code.get_pointer_to_function(description.llvm_func_name)
 
 
 def linked_call(signature: Any) -> Any:

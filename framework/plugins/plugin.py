@@ -73,7 +73,7 @@ class Plugin:
             bounds, support, rounding, turned = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
             shape = Shape(
                 component, float(cost), pasted(bounds), None if turned is None else inlined(turned), self.name,
-                None if support is None else _finite(inlined(support)),
+                None if support is None else checked_support(inlined(support)),
                 inlined(rounding or _no_rounding) if support is not None else None,
             )  # fmt: skip
             self._register(self.shapes, component, shape)
@@ -253,7 +253,7 @@ def _compiled(function: Any) -> Any:
     return function if hasattr(function, "py_func") else inlined(function)
 
 
-def _finite(support: Any) -> Any:
+def checked_support(support: Any) -> Any:
     """The support function, whose answers are looked at: what is made of a wrong one need not look wrong."""
 
     @inlined

@@ -11,8 +11,8 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.extending import intrinsic
 from numba.core.typing.templates import signature
 
-from ....framework.compilation import Part, inlined
-from ....framework.vectors import dot, scale
+from ....framework.compilation import Part
+from ....framework.plugins.plugin import checked_support
 
 _compiled: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 _arguments: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
@@ -25,7 +25,7 @@ def user_function(function: Any) -> Any:
     if function not in _compiled:
         author = getattr(function, "author", None)
         if author is not None:
-            _compiled[function] = _finite_support(user_function(author))
+            _compiled[function] = checked_support(user_function(author))
         else:
             _compiled[function] = _allocating(function)
     return _compiled[function]
@@ -38,19 +38,6 @@ def _allocating(function: Any) -> Any:
     made: Any = numba.njit(**options)(function.py_func)
     made.__class__ = Part
     return made
-
-
-def _finite_support(support: Any) -> Any:
-    """The support function with its answers checked: what is made of a wrong one need not look wrong."""
-
-    @inlined
-    def finite_support(shape, direction):
-        point = support(shape, direction)
-        if dot(point, scale(point, 0.0)) != 0.0 and dot(direction, scale(direction, 0.0)) == 0.0:
-            raise ValueError("support returned a point that is not finite")
-        return point
-
-    return finite_support
 
 
 def as_argument(function: Any) -> Any:
