@@ -12,18 +12,18 @@ import gc
 import logging
 import os
 import time
-import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeVar
 
-import numba
+from numba import config
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
+from numba.core.types import unliteral
 
 from .jit.cache import CACHE_FOLDER_VARIABLE, KernelCache, cache_folder
 from .jit.hash import deep_hash as deep_hash
+from .jit.pipeline import kernel_compiler, part_compiler
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -51,7 +51,7 @@ log = CompilationLog()
 CHECKED = os.environ.get("CAROM_CHECK", "") not in ("", "0")  # a build that checks every index into a record
 
 # A wrapper for C callers costs compile time and serves none of our kernels.
-_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def kernel(function: Function) -> Function:
@@ -61,34 +61,56 @@ def kernel(function: Function) -> Function:
     cannot make arrays: without numba's reference counting, which costs more than the work itself where arrays are
     passed in tuples. Use :func:`allocating_kernel` for those that must.
     """
-    return _kept(numba.njit(**_OPTIONS, _nrt=CHECKED)(function))
+    return _kept(Kernel, function, _nrt=CHECKED)
+
+
+def untimed_kernel(function: Function) -> Function:
+    """Like :func:`kernel`, for what is called so often that :func:`time_calls` must add nothing to the call."""
+    return _kept(KeptDispatcher, function, _nrt=CHECKED)
 
 
 def allocating_kernel(function: Function) -> Function:
     """Like :func:`kernel`, for functions that make arrays; keep hot loops out of them."""
-    return _kept(numba.njit(**_OPTIONS)(function))
+    return _kept(Kernel, function)
 
 
 def part(function: Function) -> Function:
     """For functions that only kernels call: nothing on disk of their own; called from Python they stay Python."""
-    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, _nrt=CHECKED)(function))
+    return _part(function)
 
 
 def inlined(function: Function) -> Function:
     """Like :func:`part`, for small helpers that must disappear into the kernels which call them."""
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "forceinline": True, "_nrt": CHECKED}
-    return _as_part(numba.njit(**options)(function))
+    return _part(function, forceinline=True)
 
 
 def pasted(function: Function) -> Function:
     """Like :func:`inlined`, but before types are known: branches on arguments that are constants at the call vanish."""
-    return _as_part(numba.njit(**_OPTIONS, no_cpython_wrapper=True, inline="always", _nrt=CHECKED)(function))
+    return _part(function, inline="always")
+
+
+def allocating_part(function: Any) -> Any:
+    """The same part with its options, but it may make arrays and raise exceptions with values."""
+    return Part(function.py_func, targetoptions={**function.targetoptions, "_nrt": True}, pipeline_class=part_compiler)
 
 
 def linked_dispatcher(function: Any, allocates: bool) -> Any:
     """For functions that are called through their address alone, see :mod:`~carom.framework.jit.linking`."""
-    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": allocates or CHECKED}
-    return _kept(numba.njit(**options)(getattr(function, "py_func", function)))
+    plain = getattr(function, "py_func", function)
+    return _kept(KeptDispatcher, plain, no_cpython_wrapper=True, _nrt=allocates or CHECKED)
+
+
+def _kept(kind: type[KeptDispatcher], function: Any, **options: Any) -> Any:
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return function
+    return kind(function, targetoptions={**_OPTIONS, **options}, pipeline_class=kernel_compiler)
+
+
+def _part(function: Any, **options: Any) -> Any:
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return function
+    options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED, **options}
+    return Part(function, targetoptions=options, pipeline_class=part_compiler)
 
 
 class Wait:
@@ -122,8 +144,12 @@ class Wait:
         global_compiler_lock.release()
 
 
-class Kernel(CPUDispatcher):
-    """numba's dispatcher, with the cost of compiling and loading noted."""
+class KeptDispatcher(CPUDispatcher):
+    """numba's dispatcher, with machine code kept on disk, and the cost of compiling and loading noted."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._cache = KernelCache(self, _announce)
 
     def compile(self, sig: Any) -> Any:
         with Wait() as wait:
@@ -148,8 +174,20 @@ class Kernel(CPUDispatcher):
         with Wait():
             return super().typeof_pyval(val)
 
-    def _reduce_class(self) -> type[CPUDispatcher]:
-        return Kernel  # in cached files, even while the kernel is timed
+
+class Kernel(KeptDispatcher):
+    """One whose calls from Python can be timed."""
+
+    def __call__(self, *args: Any) -> Any:
+        if _timing is None:
+            return super().__call__(*args)
+        waited = log.waited
+        started = time.perf_counter_ns()
+        result = super().__call__(*args)
+        elapsed = time.perf_counter_ns() - started
+        if _timing is not None:
+            _timing(self.py_func.__name__, elapsed, log.waited != waited)
+        return result
 
 
 class Part(CPUDispatcher):
@@ -158,53 +196,26 @@ class Part(CPUDispatcher):
     def __call__(self, *args: Any) -> Any:
         return self.py_func(*args)
 
-
-def _as_part(dispatcher: Any) -> Any:
-    if isinstance(dispatcher, Dispatcher):  # a plain function when NUMBA_DISABLE_JIT is set
-        dispatcher.__class__ = Part
-    return dispatcher
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What numba asks for at a call; constants are compiled for as any number of their type is."""
+        return super().get_call_template([unliteral(kind) for kind in args], kws)
 
 
-class TimedKernel(Kernel):
-    """What all kernels are while :func:`time_calls` is on: calls from Python are timed."""
-
-    def __call__(self, *args: Any) -> Any:
-        waited = log.waited
-        started = time.perf_counter_ns()
-        result = Kernel.__call__(self, *args)
-        elapsed = time.perf_counter_ns() - started
-        if _timing is not None:
-            _timing(self.py_func.__name__, elapsed, log.waited != waited)
-        return result
-
-
-_kernels: weakref.WeakSet[Kernel] = weakref.WeakSet()  # all there are
 _timing: Callable[[str, int, bool], None] | None = None
 
 
 def time_calls(record: Callable[[str, int, bool], None] | None) -> None:
     """From now on call ``record(kernel, nanoseconds, compiled)`` after each call of a kernel; None: no more.
 
-    compiled: whether that call had to compile or load it first. Kernels change their class for it, so that nothing at
-    all is added to a call that is not timed; one that is costs about 0.3 microseconds more.
+    compiled: whether that call had to compile or load it first. A call that is timed costs about 0.3 microseconds more.
     """
     global _timing
     _timing = record
-    for dispatcher in list(_kernels):
-        dispatcher.__class__ = Kernel if record is None else TimedKernel
 
 
 def timing() -> bool:
     """Whether calls are timed at the moment."""
     return _timing is not None
-
-
-def _kept(dispatcher: Any) -> Any:
-    if isinstance(dispatcher, Dispatcher):  # a plain function when NUMBA_DISABLE_JIT is set
-        dispatcher.__class__ = Kernel if _timing is None else TimedKernel
-        dispatcher._cache = KernelCache(dispatcher, _announce)  # type: ignore[attr-defined]
-        _kernels.add(dispatcher)  # type: ignore[arg-type]
-    return dispatcher
 
 
 def _announce(dispatcher: Any) -> None:

@@ -17,7 +17,6 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.extending import _Intrinsic
-from numba.extending import intrinsic
 
 from .compilation import inlined
 
@@ -54,8 +53,8 @@ def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callabl
         names = ", ".join(f"a{i}" for i in range(count))
         scope = {"typing": typing}
         exec(f"def {function.__name__}(context, {names}): return typing(context, {names})", scope)
-        made = intrinsic(scope[function.__name__])
-        made.__class__ = _Emitted
+        made = _Emitted(function.__name__, scope[function.__name__])
+        made._register()
         made.plain = function
         made.__doc__ = function.__doc__
         made.carom_depends_on = (function, emit, signature)

@@ -44,7 +44,9 @@ class ColumnType(types.Type):
         self.field, self.label = field, label
         self.dtype = from_dtype(np.dtype(field.dtype))
         shape = field.item_shape(dimensions)
-        self.item: Any = self.dtype
+        narrow = isinstance(self.dtype, types.Integer) and self.dtype.signed
+        self.number: Any = types.int64 if narrow else self.dtype  # kernels see integers of one width
+        self.item: Any = self.number
         for count in reversed(shape if field.item != "table" else ()):
             self.item = types.UniTuple(self.item, count)
         self.width = 1
@@ -192,7 +194,7 @@ def _index_type(column: ColumnType, index: Any) -> Any:
         if column.field.stacked:
             return types.UniTuple(types.intp, 2), column.item
         if column.field.item in ("table", "vector"):
-            return types.UniTuple(types.intp, 2), column.dtype
+            return types.UniTuple(types.intp, 2), column.number
     return None
 
 
@@ -253,7 +255,8 @@ def _item_place(context: Any, builder: Any, column: ColumnType, value: Any, inde
 def _load_number(context: Any, builder: Any, column: ColumnType, place: Any, k: int) -> Any:
     if k:
         place = builder.gep(place, [_WORD(k)], inbounds=True)
-    return context.data_model_manager[column.dtype].from_data(builder, builder.load(place))
+    value = context.data_model_manager[column.dtype].from_data(builder, builder.load(place))
+    return context.cast(builder, value, column.dtype, column.number)
 
 
 @lower_cast(ColumnType, ColumnType)
@@ -265,7 +268,7 @@ def _same_column(context: Any, builder: Any, one: Any, other: Any, value: Any) -
 def _load_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     column = sig.args[0]
     place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
-    if one or column.item == column.dtype:
+    if one or column.item == column.number:
         return _load_number(context, builder, column, place, 0)
     result = ir.Constant(context.get_value_type(column.item), ir.Undefined)
     if column.field.item == "vector":
@@ -285,8 +288,9 @@ def _set_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     column = sig.args[0]
     place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
     model = context.data_model_manager[column.dtype]
-    if one or column.item == column.dtype:
-        builder.store(model.as_data(builder, values[2]), place)
+    if one or column.item == column.number:
+        value = context.cast(builder, values[2], column.number, column.dtype)
+        builder.store(model.as_data(builder, value), place)
     elif column.field.item == "vector":
         for k in range(column.width):
             target = builder.gep(place, [_WORD(k)], inbounds=True) if k else place

@@ -12,7 +12,7 @@ from numba import types
 from numba.core import cgutils
 from numba.core.extending import intrinsic
 
-from ..compilation import kernel
+from ..compilation import untimed_kernel
 
 _WORD = ir.IntType(64)
 _HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")  # elsewhere reading it may be forbidden
@@ -43,7 +43,7 @@ def _compiled_ticks(typing_context: Any) -> Any:
 read_ticks: Any = time.perf_counter_ns if numba.config.DISABLE_JIT else _compiled_ticks  # type: ignore[attr-defined]
 
 
-@kernel
+@untimed_kernel
 def ticks_now() -> int:
     """The counter, for Python."""
     return read_ticks()

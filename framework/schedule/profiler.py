@@ -10,15 +10,10 @@ import numpy as np
 
 from .. import compilation
 from ..errors import CaromError
-from ..jit.tick_counter import ticks_now
 from .profile_report import OUTSIDE, Stats, Totals, units_of
-from .stages import run_stages
 
 if TYPE_CHECKING:
     from .step import Pipeline
-
-
-OWN = (run_stages.__name__, ticks_now.__name__)  # stages are counted one by one
 
 
 class Profiler:
@@ -55,7 +50,7 @@ class Profiler:
             self._profile_start = None
 
     def _record(self, kernel: str, nanoseconds: int, compiled: bool) -> None:
-        if compiled or kernel in OWN:
+        if compiled:
             return
         key, sums = (self._pipeline.at or OUTSIDE, kernel), self._sums
         sums.calls[key] = sums.calls.get(key, 0) + 1

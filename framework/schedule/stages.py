@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from ..compilation import kernel, log
+from ..compilation import log, untimed_kernel
 from ..jit.linking import Linked, linked_call
 from ..jit.record import Record
 from ..jit.record_type import record_at, record_type
@@ -32,7 +32,7 @@ _program_at = record_at(_program_type)
 _call_stage = linked_call(types.int64(_program_type, types.float64))
 
 
-@kernel
+@untimed_kernel
 def run_stages(address, start, stop, dt):
     """Run the stages start..stop-1 of the program of the state at that address.
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-import numba
 from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import intrinsic
 from numba.core.typing.templates import signature
 
-from ....framework.compilation import Part
+from ....framework.compilation import allocating_part
 from ....framework.plugins.plugin import checked_support
 
 _compiled: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
@@ -27,17 +26,8 @@ def user_function(function: Any) -> Any:
         if author is not None:
             _compiled[function] = checked_support(user_function(author))
         else:
-            _compiled[function] = _allocating(function)
+            _compiled[function] = allocating_part(function)
     return _compiled[function]
-
-
-def _allocating(function: Any) -> Any:
-    options: dict[str, Any] = {**function.targetoptions, "_nrt": True}
-    for name in ("nopython", "boundscheck"):
-        options.pop(name, None)
-    made: Any = numba.njit(**options)(function.py_func)
-    made.__class__ = Part
-    return made
 
 
 def as_argument(function: Any) -> Any:

@@ -1,0 +1,103 @@
+"""How kernels are compiled: the shortened way gives the code that numba's own gives."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+import pytest
+from numba.core.compiler import Compiler
+
+from carom.framework.compilation import KeptDispatcher, Kernel, Part, allocating_kernel, kernel, part
+from carom.framework.jit import pipeline
+
+jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing compiles")
+
+
+@part
+def halved(x):
+    return 0.5 * x
+
+
+@part
+def rooted(x):
+    if x < 0.0:
+        raise ValueError("no root of a negative number")
+    return math.sqrt(halved(x))
+
+
+@part
+def twice(count):
+    return 2 * count
+
+
+@kernel
+def rooted_kernel(x):
+    return rooted(x) + halved(x)
+
+
+@allocating_kernel
+def nested(n):
+    total = 0
+    for k in range(n):
+        total += sum([j * k for j in range(3)])
+    return total
+
+
+def compiled(function, way=pipeline.kernel_compiler):
+    """The kernel compiled anew, in that way."""
+    made = KeptDispatcher(function.py_func, targetoptions=function.targetoptions, pipeline_class=way)
+    made._cache.disable()
+    return made
+
+
+@jit
+def test_same_bits_as_numbas_own_way():
+    plain = compiled(rooted_kernel, Compiler)
+    values = np.random.default_rng(1).uniform(0, 10, 100).tolist()
+    assert [rooted_kernel(x) for x in values] == [plain(x) for x in values]
+    assert [rooted_kernel(x) for x in values] == [rooted_kernel.py_func(x) for x in values]
+
+
+@jit
+def test_parts_raise_through_kernels():
+    """The environments of parts, from which errors are made, are set though parts have no machine code."""
+    with pytest.raises(ValueError, match="no root of a negative number"):
+        rooted_kernel(-1.0)
+
+
+@jit
+def test_parts_have_no_machine_code():
+    compiled(rooted_kernel)(1.0)
+    (result,) = rooted.overloads.values()
+    assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
+
+
+@jit
+def test_constants_share_the_code_of_numbers():
+    @kernel
+    def doubles(count):
+        return twice(3) + twice(4) + twice(count)
+
+    assert compiled(doubles)(5) == 24
+    assert len(twice.overloads) == 1
+
+
+@jit
+def test_functions_with_closures_compile_whole():
+    assert compiled(nested)(4) == nested.py_func(4)
+
+
+@jit
+def test_python_runs_a_part_as_written():
+    assert isinstance(halved, Part)
+    assert halved(3.0) == 1.5
+    assert not isinstance(halved, Kernel)
+
+
+def test_versions_that_were_not_tried_compile_as_numba_does():
+    first, last = pipeline.TRIED
+    tried = first <= numba.version_info.short <= last
+    assert (pipeline.kernel_compiler is Compiler) == (not tried)
+    assert (pipeline.part_compiler is Compiler) == (not tried)
