@@ -7,6 +7,7 @@ import math
 import numba
 import numpy as np
 import pytest
+from llvmlite.binding import Linkage
 from numba.core.compiler import Compiler
 
 from carom.framework.compilation import KeptDispatcher, Kernel, Part, allocating_kernel, kernel, part
@@ -30,6 +31,16 @@ def rooted(x):
 @part
 def twice(count):
     return 2 * count
+
+
+@part
+def recursive(x):
+    return x if x < 1.0 else recursive(x - 1.0) * recursive(x - 2.0) + 1.0
+
+
+@kernel
+def long_kernel(x):
+    return recursive(x)
 
 
 @kernel
@@ -72,6 +83,18 @@ def test_parts_have_no_machine_code():
     compiled(rooted_kernel)(1.0)
     (result,) = rooted.overloads.values()
     assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
+
+
+@jit
+def test_parts_are_private_to_their_kernel():
+    """Else the code of two cached kernels could hold two parts of one name, and the first would serve both."""
+    made = compiled(long_kernel)
+    made(2.0)
+    (result,) = made.overloads.values()
+    names = {function.name: function.linkage for function in result.library._final_module.functions}
+    shared = [name for name, linkage in names.items() if linkage == Linkage.linkonce_odr]
+    assert not shared
+    assert any("recursive" in name and linkage == Linkage.internal for name, linkage in names.items())
 
 
 @jit

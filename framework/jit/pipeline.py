@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
 import numba
+from llvmlite.binding import Linkage
 from numba import _dynfunc  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core import typed_passes, types, untyped_passes
 from numba.core.codegen import JITCodeLibrary
@@ -82,6 +83,13 @@ class _KernelLibrary(JITCodeLibrary):
         # The linker skips what nothing has asked for so far: callers come before what they call.
         self._linking_libraries = list(reversed(_with_needed(self._linking_libraries, {})))
         super().finalize()
+
+    def _optimize_final_module(self) -> None:
+        # Parts are the kernel's own: two kernels from the cache may each hold another part of one name.
+        for function in self._final_module.functions:
+            if function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
 
 
 def _with_needed(libraries: list[Any], found: dict[Any, None]) -> dict[Any, None]:
