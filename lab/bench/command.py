@@ -125,11 +125,11 @@ def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path |
     output.show(result, [bench_startup.table(result)], [])
 
 
-@bench_command.command("pairs", short_help="What a pair of a plugin costs, next to one written by hand.")
+@bench_command.command("pairs", short_help="What a pair of a plugin costs, next to a built-in one and by hand.")
 @repeats_option(15, RUNS)
 @shown_options
 def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
-    """Time the narrow phase with a registered pair, and with the same maths written into its kernel by hand."""
+    """Time the narrow phase with a registered pair, with a built-in one, and with the same maths written by hand."""
     output = Output.checked("carom bench pairs", as_json, as_markdown, into, None)
     with Bar(Console(stderr=True)) as bar:
         result = bench_pairs.pair_costs(repeats, bar)

@@ -89,16 +89,19 @@ def select_pairs(state, dt):
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):
         starts[k] = 0
-    all_meet, kept = all_layers_meet(state), 0
+    all_meet, several, kept = all_layers_meet(state), shapes.count > 1, 0
     for c in range(candidates.count):
         a, b = candidates.sorted_a[c], candidates.sorted_b[c]
         if all_meet or layers_meet(state, a, b):
             pairs.a[kept], pairs.b[kept] = a, b
             pairs.is_solid[kept] = is_solid_pair(state, a, b)
-            one, other = min(shape[a], shape[b]), max(shape[a], shape[b])
-            kind[kept] = one * shapes.count + other
-            starts[kind[kept] + 2] += 1
+            if several:
+                one, other = min(shape[a], shape[b]), max(shape[a], shape[b])
+                kind[kept] = one * shapes.count + other
+                starts[kind[kept] + 2] += 1
             kept += 1
+    if not several:
+        starts[2] = kept
     pairs.count, pairs.found = kept, 0
     pairs.resting_count, pairs.disabled_count = 0, 0
     return OK
@@ -106,14 +109,20 @@ def select_pairs(state, dt):
 
 def evaluate_pairs(state, dt):
     """Every pair by the linked function of its two shapes, in batches of one kind each."""
-    candidates, pairs, shapes = state.candidates, state.pairs, state.shapes
-    if state.several_levels:
+    candidates, count, shapes = state.candidates, state.pairs.count, state.shapes.count
+    if state.several_levels or count == 0:
         return OK
     starts, bucket, kind = candidates.bucket_starts, candidates.bucket, candidates.kind
-    kinds = shapes.count * shapes.count
+    only = kind[0] if shapes > 1 else 0
+    if starts[only + 2] == count:  # they need no sorting
+        for c in range(count):
+            bucket[c] = c
+        evaluate_batch(state, only, 0, count)
+        return OK
+    kinds = shapes * shapes
     for k in range(2, kinds + 2):
         starts[k] += starts[k - 1]
-    for c in range(pairs.count):  # afterwards starts[kind] is where a kind begins
+    for c in range(count):  # afterwards starts[kind] is where a kind begins
         k = kind[c] + 1
         bucket[starts[k]] = c
         starts[k] += 1

@@ -9,7 +9,7 @@ import math
 
 from ...framework.compilation import inlined
 from ...framework.vectors import negative
-from .linking.batches import turned_back
+from .linking.batches import SOUND, repeat_batch, turned_back
 from .linking.mixing import mix as mix
 from .linking.mixing import mix_friction as mix_friction
 from .linking.signatures import call_batch, call_bounds, call_corner, call_evaluate, call_rotated, call_sweep
@@ -44,7 +44,8 @@ def evaluate_batch(state, kind, start, stop):
     """Write hit, depth, normal and point of the pairs ``bucket[start:stop]``, which are of that ``kind``."""
     address = state.shapes.batch[kind]
     if address != 0:
-        call_batch(address, state, start, stop)
+        if call_batch(address, state, start, stop) != SOUND:
+            repeat_batch(state, start, stop)
     else:
         pairs, bucket = state.pairs, state.candidates.bucket
         for k in range(start, stop):

@@ -6,7 +6,6 @@ All take the two shapes in the order in which the pair is registered; callers tu
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any
@@ -15,12 +14,10 @@ from ....framework.compilation import inlined
 from ....framework.jit.linking import Linked
 from ....framework.jit.record_type import record_at, record_type
 from ....framework.plugins.registry import Convex, Pair, Shape
-from ....framework.vectors import dot
-from .batches import batch_by_address, in_given_order, in_order_of_shapes, make_batch
+from .batches import batch_by_address, checked, in_given_order, in_order_of_shapes, make_batch
 from .convex_by_address import convex_at, rounding_argument, support_argument
 from .parameters import array_of, parameter_schema, parameter_tuple, parameters_source
 from .signatures import (
-    NOT_FINITE,
     OUT_OF_TIME,
     batch_signature,
     corner_signature,
@@ -30,25 +27,6 @@ from .signatures import (
 )
 from .source import source_module
 from .user_functions import as_argument, is_long, user_function
-
-
-@inlined
-def is_sound(hit, depth, normal, point):
-    """Whether what a pair's function returned is a contact, or a miss."""
-    if hit:
-        return math.isfinite(depth + dot(normal, normal) + dot(point, point))
-    return depth < math.inf
-
-
-@inlined
-def checked(state, a, b, d, contact):
-    """The contact as it is; a miss, and a note in the state, if it is not finite though the bodies are."""
-    hit, depth, normal, point = contact
-    if is_sound(hit, depth, normal, point):
-        return hit, depth, normal, point
-    if math.isfinite(dot(d, d)):
-        state.unsound, state.unsound_a, state.unsound_b = NOT_FINITE, a, b
-    return False, -math.inf, d, d
 
 
 @inlined
@@ -103,7 +81,7 @@ class LinkedPair:
         if is_long(self.pair.function):
             return _batch_by_address(self.dimensions)
         order = in_given_order if self.first is self.second else in_order_of_shapes
-        made = make_batch(self._contact, checked, order, *self._records)
+        made = make_batch(self._contact, order, *self._records)
         return Linked(named(made), batch_signature(self.dimensions))
 
     @cached_property

@@ -37,7 +37,7 @@ def evaluate_signature(dimensions: int) -> Any:
 
 @cache
 def batch_signature(dimensions: int) -> Any:
-    """(state, start, stop) -> 0."""
+    """(state, start, stop) -> whether all answers were sound, see batches."""
     return types.int64(record_type(STATE, dimensions), types.int64, types.int64)
 
 
