@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
-import math
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,127 +10,45 @@ import numpy as np
 from ..components import Collider, RigidBody, Transform
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
-from ..framework.data.column_copies import ColumnCopies, copy_blocks
+from ..framework.data.column_copies import ColumnCopies
 from ..framework.data.component import Component
 from ..framework.data.table import Table
 from ..framework.jit.record import make_record
 from ..framework.schedule.phases import System
 from ..framework.schedule.plan import PlannedColumn, PlannedKernel
-from ..framework.schedule.stages import Program, Segment, Stage
-from ..framework.settings import AUTOMATIC, MIXING_RULES
+from ..framework.schedule.stages import Program, Segment
 from ..framework.world.contacts import Contacts, EntityLookup
 from ..framework.world.services import PhysicsServices
-from .broad_phase.boxes import bound_searches, box_rest_of_step, box_rows
+from .broad_phase.boxes import box_rows
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .ccd.refresh_pairs import merge_pairs
-from .ccd.search_bounds import DISCRETE, MODES
-from .ccd.time_of_impact import first_touch
+from .ccd.search_bounds import DISCRETE
 from .codes import AFTERWARDS
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
-from .forces.energy import kinetic_energy, momentum, potential_energy
-from .impacts.find import is_held_by_edge, kind_beyond_cap
-from .impacts.stages import take_swept_event, watch_bounds
+from .inspection.counters import counters_of, reset
+from .inspection.energies import kinetic_energy, momentum, potential_energy
+from .inspection.planned_columns import planned_columns
+from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
-from .linked_parts import (
-    BOUND_SEARCHES,
-    BOX_ROWS,
-    FIRST_TOUCH,
-    HELD_BY_EDGE,
-    KIND_BEYOND_CAP,
-    TAKE_SWEPT,
-    WATCH_BOUNDS,
-    address_of,
-)
+from .linked_parts import BOX_ROWS, address_of
 from .linked_parts import COUNT as LINKED_PART_COUNT
 from .narrow_phase.system import NarrowPhase
-from .opening import check_finite, keep_state, read_bodies
-from .planned_columns import planned_columns
 from .preparation import prepare
+from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
-from .records import BODIES, COLLIDERS, STATE
+from .records import STATE
 from .room import Room
-from .scene import SWEEPS, TABLE_COLUMNS, Scene
+from .scene import SWEEPS, Scene
+from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
-from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
-from .shapes.linking.mixing import rule_number
 from .shapes.pair_coverage import check_pairs
+from .stage_list import CLOSING, LINKED_PARTS, OPENING, STAGES, SYSTEM_OF_STAGE
 
 if TYPE_CHECKING:
     from ..framework.world.world import World
-
-OPENING = (
-    Stage(keep_state, "keeps what a failed step puts back", ("previous_position", "linear_velocity"), ("kept",)),
-    Stage(
-        read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",
-        ("mass", "rotation", "ccd", "max_linear_speed"), ("inverse_mass",),
-    ),
-)  # fmt: skip
-CLOSING = (Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),)
-ON_DEMAND = (
-    Stage(
-        box_rest_of_step, "boxes around the rest of the paths", ("path_velocity",), ("lower", "upper"), "swept bodies",
-    ),
-    Stage(merge_pairs, "the pairs of the rest of the step", ("pairs", "candidates"), ("merged",), "swept bodies"),
-    *Integration.ON_DEMAND,
-)
-# What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
-CONDITIONS = (
-    "", "dynamic bodies", "colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies",
-    "standard", "on demand",
-)  # fmt: skip
-# Columns of the table that a failed step puts back, and those that every step makes again.
-PUT_BACK = ("position", "linear_velocity", "previous_position", "step_force", "force", "inverse_mass")
-
-
-def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
-    """The stages; ValueError for a name that nothing has, or a column that a failed step would leave changed."""
-    fields = {*STATE.fields, *BODIES.fields, *COLLIDERS.fields}
-    for stage in stages:
-        for name in (*stage.reads, *stage.writes):
-            if name not in fields:
-                raise ValueError(f"stage {stage.name}: no record in systems/records.py has {name!r}")
-        for name in stage.writes:
-            if name in TABLE_COLUMNS and name not in PUT_BACK:
-                raise ValueError(f"stage {stage.name} writes {name}, which a failed step does not put back")
-        if stage.needed not in (*CONDITIONS, stage.name):
-            raise ValueError(f"stage {stage.name}: needed must be one of {', '.join(CONDITIONS)}, got {stage.needed!r}")
-    return stages
-
-
-# The stages of a step in their order: what plan(), stats(), profile() and docs/architecture.md read.
-SYSTEMS = (ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, ContactEvents)
-STAGES = check_stages((*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND))
-
-# Parts of stages by their place in ``state.links``.
-LINKED_PARTS = {
-    BOX_ROWS: box_rows,
-    BOUND_SEARCHES: bound_searches,
-    FIRST_TOUCH: first_touch,
-    HELD_BY_EDGE: is_held_by_edge,
-    KIND_BEYOND_CAP: kind_beyond_cap,
-    TAKE_SWEPT: take_swept_event,
-    WATCH_BOUNDS: watch_bounds,
-}
-
-COUNTERS = {
-    "bodies": "bodies_counted",
-    "candidates": "candidates_counted",
-    "pairs": "pairs_counted",
-    "contacts": "contacts_counted",
-    "impacts": "impacts_counted",
-    "capped_impacts": "capped_counted",
-    "rounds": "refreshes_counted",
-    "resting_contacts": "resting_counted",
-    "first_level_tests": "first_level_tests",
-    "first_level_hits": "first_level_hits",
-    "false_positives": "false_positives",
-    "force_evaluations": "force_evaluations",
-}
-
 
 class Simulation(PhysicsServices):
     """What a physics plugin gives to a world."""
@@ -159,7 +75,8 @@ class Simulation(PhysicsServices):
         )
         self.program.describe_error, self.program.on_alarm = self._attribution.describe, self._attribution.check
         self.program.alarm = self.state.word_of("unsound")
-        self.queries = Queries(self.state, self.table, world.registry, QueriedScene(self), self.search)
+        queried = QueriedScene(self.scene, self.refresh_for_queries)
+        self.queries = Queries(self.state, self.table, world.registry, queried, self.search)
         self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies)
         self.integration = Integration(
             self.program, self.scene, self.forces, world.registry, lambda: world.settings
@@ -191,42 +108,17 @@ class Simulation(PhysicsServices):
     # -- settings ---------------------------------------------------------------------------------
 
     def check_settings(self, settings: Any) -> None:
-        registry = self._world.registry
-        for name, known in (
-            ("integrator", registry.integrators),
-            ("restitution_mixing", (*MIXING_RULES, *registry.mixing_rules)),
-            ("friction_mixing", (*MIXING_RULES, *registry.mixing_rules)),
-            ("broad_phase", (AUTOMATIC, *registry.broad_phases)),
-        ):
-            value = getattr(settings, name)
-            if value not in known:
-                near = difflib.get_close_matches(value, known, 1)
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
-                raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {value!r}{hint}")
+        check_settings(settings, self._world.registry)
 
     def take_settings(self, settings: Any) -> None:
-        state, registry = self.state, self._world.registry
-        state.dt_cubed, state.substeps = cubed(settings.dt), settings.substeps
-        state.mode = MODES[settings.collision]
-        state.slop = -1.0 if settings.slop is None else float(settings.slop)
-        threshold = settings.restitution_threshold
-        state.restitution_threshold = -1.0 if threshold is None else float(threshold)
-        state.max_impacts = settings.impact_cap
-        state.restitution_rule = rule_number(registry, settings.restitution_mixing)
-        state.friction_rule = rule_number(registry, settings.friction_mixing)
+        write_settings(self.state, settings, self._world.registry)
         self.search.read_settings()
         self.scene.forget()
         self._linked_version = -1
 
     def set_gravity(self, gravity: Any) -> None:
-        vector = np.array(gravity, float)
-        if vector.ndim == 0 and vector == 0:
-            vector = np.zeros(self.dimensions)
-        if vector.shape != (self.dimensions,) or not np.isfinite(vector).all():
-            raise ValueError(f"gravity must be {self.dimensions} finite numbers, got {gravity!r}")
-        vector.flags.writeable = False
-        self.gravity = vector
-        self.state.gravity = vector[None].copy()
+        self.gravity = gravity_vector(gravity, self.dimensions)
+        self.state.gravity = self.gravity[None].copy()
 
     # -- a step -----------------------------------------------------------------------------------
 
@@ -435,7 +327,7 @@ class Simulation(PhysicsServices):
     # -- looking inside ---------------------------------------------------------------------------
 
     def system_of_stage(self, stage: int) -> str:
-        return _SYSTEM_OF_STAGE[stage]
+        return SYSTEM_OF_STAGE[stage]
 
     def look_ahead(self, others_write: bool) -> None:
         self.begin_step(others_write)
@@ -444,25 +336,17 @@ class Simulation(PhysicsServices):
         state = self.state
         state.sweeping = state.collides and (state.mode != DISCRETE or self._any_ccd())
 
-    def planned_kernels(self) -> Iterator[PlannedKernel]:
-        for stage in (*OPENING, *CLOSING):
-            yield PlannedKernel(stage.name, stage.why, stage.when)
-        if self.state.others_write:
-            yield PlannedKernel(copy_blocks.__name__, "copies of all columns: code of the game may write any of them")
+    def planned_kernels(self) -> Iterable[PlannedKernel]:
+        return planned_kernels(self.state)
 
-    def planned_columns(self) -> Iterator[PlannedColumn]:
-        return planned_columns(self)
-
-    def kept_columns(self) -> list[tuple[str, np.ndarray]]:
-        """The room for copies of columns, where code of the game runs in a step."""
-        return self._copies.sizes()
+    def planned_columns(self) -> Iterable[PlannedColumn]:
+        return planned_columns(self.state, self.table, self.scene, self._copies)
 
     def counters(self) -> dict[str, int]:
-        return {name: getattr(self.state, field) for name, field in COUNTERS.items()}
+        return counters_of(self.state)
 
     def reset_counters(self) -> None:
-        for field in COUNTERS.values():
-            setattr(self.state, field, 0)
+        reset(self.state)
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -486,41 +370,6 @@ class Simulation(PhysicsServices):
         return self._world.entity_exists(entity) and self._world.has_component(entity, component)
 
 
-class QueriedScene:
-    """What queries see of the scene."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation, self._scene = simulation, simulation.scene
-
-    @property
-    def linked(self) -> LinkedShapes | None:
-        return self._scene.linked
-
-    @property
-    def parameter_records(self) -> ParameterRecords:
-        assert self._scene.parameters is not None
-        return self._scene.parameters
-
-    @property
-    def version(self) -> Any:
-        return self._scene.version, self._scene.table.static_version, self._scene.state.motion_version
-
-    def refresh(self) -> None:
-        self._simulation.refresh_for_queries()
-
-    def refresh_rotation(self) -> None:
-        self._scene.refresh_rotation()
-
-
-_SYSTEM_OF_STAGE = (
-    *("" for _ in OPENING),
-    *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
-    *("" for _ in CLOSING),
-    *(BroadPhase.__name__, NarrowPhase.__name__),
-    *(Integration.__name__ for _ in Integration.ON_DEMAND),
-)
-
-
 def _make_table(dimensions: int) -> Table:
     table = Table(dimensions)
     for component in (Transform, RigidBody):
@@ -529,11 +378,6 @@ def _make_table(dimensions: int) -> Table:
         table.add_array(key, "vector")
     table.add_array("inverse_mass")
     return table
-
-
-def cubed(dt: float) -> float:
-    """dt^3, inf where that overflows."""
-    return dt**3 if dt < 1e100 else math.inf
 
 
 def _makes_body(component: type[Component]) -> bool:

@@ -19,7 +19,7 @@ from carom.lab.commands.stages import Stages
 from carom.lab.reporting.text_tables import between_marks
 from carom.plugins import Physics
 from carom.systems import ContactEvents
-from carom.systems.simulation import CLOSING, check_stages
+from carom.systems.stage_list import CLOSING, check_stages
 
 ROOT = Path(__file__).resolve().parent.parent
 INNER = Schema("TestInner", total=number())

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ...framework.schedule.stages import Stage
-from ...systems.simulation import CLOSING, ON_DEMAND, OPENING, SYSTEMS
+from ...systems.stage_list import CLOSING, ON_DEMAND, OPENING, SYSTEMS
 from ..reporting.output import Output
 from ..reporting.text_tables import TextTable
 from .options import shown_options

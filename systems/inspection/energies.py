@@ -9,7 +9,7 @@ import numpy as np
 
 from ...framework.data.bodies import Bodies
 from ...framework.data.table import Table
-from .accumulation import required_bodies
+from ..forces.accumulation import required_bodies
 
 
 def kinetic_energy(dynamic: Any) -> float:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..framework.data.columns import REQUIRED
-from ..framework.schedule.plan import PlannedColumn
-from .room import SOLVER_BODIES
-from .scene import COLLISIONS, CURVES, HALF_KICKS, SEVERAL_EVALUATIONS, SWEEPS
-
-if TYPE_CHECKING:
-    from .simulation import Simulation
+from ...framework.data.column_copies import ColumnCopies
+from ...framework.data.columns import REQUIRED
+from ...framework.data.table import Table
+from ...framework.jit.record import Record
+from ...framework.schedule.plan import PlannedColumn
+from ..room import SOLVER_BODIES
+from ..scene import COLLISIONS, CURVES, HALF_KICKS, SEVERAL_EVALUATIONS, SWEEPS, Scene
 
 FIELDS = "what the game has set"
 DEFAULTS = "at their defaults, there because handles and world.bodies write in place"
@@ -61,13 +60,15 @@ NO_ROWS = {
 }  # fmt: skip
 
 
-def planned_columns(simulation: Simulation) -> Iterator[PlannedColumn]:
-    """All arrays of bodies, then of pairs, contacts and impacts."""
-    yield from _fields(simulation)
-    yield from _table(simulation)
-    yield from _bodies(simulation)
+def planned_columns(state: Record, table: Table, scene: Scene, copies: ColumnCopies) -> Iterator[PlannedColumn]:
+    """All arrays of bodies, then of pairs, contacts and impacts; ``copies``: the room for those of all columns."""
+    yield from _fields(table)
+    yield from _table(table)
+    yield from _bodies(state.bodies, table.capacity, scene)
+    for key, copy in copies.sizes():
+        yield from _column(f"copy of {key}", "body", "going back", copy, len(copy), UNDO)
     for name, of, group, reason in RECORDS:
-        record = getattr(simulation.state, name)
+        record = getattr(state, name)
         for key, array in record.columns().items():
             rows = array.shape[1] if record.schema.fields[key].stacked else len(array)
             if rows > 2 and key not in NO_ROWS.get(name, ()):  # fewer: numbers of the whole record
@@ -80,13 +81,12 @@ def _column(name: str, of: str, group: str, array: np.ndarray, rows: int, reason
         yield PlannedColumn(name, of, group, array.nbytes // rows, reason)
 
 
-def _fields(simulation: Simulation) -> Iterator[PlannedColumn]:
+def _fields(table: Table) -> Iterator[PlannedColumn]:
     """Of each component type, first those that hold something."""
-    table = simulation.table
     for component in table.component_types:
         used, unused = [], []
         for column in component.columns.values():
-            same = table.column(column.key) == column.empty_value(simulation.dimensions)
+            same = table.column(column.key) == column.empty_value(table.dimensions)
             default = same | (table.column(column.key) != table.column(column.key))  # nan is None
             has = table.has_mask(component)[: table.count]
             (used if column.default is REQUIRED or not default[has].all() else unused).append(column)
@@ -96,8 +96,7 @@ def _fields(simulation: Simulation) -> Iterator[PlannedColumn]:
                 yield from _column(column.key, "body", component.__name__, array, table.capacity, reason)
 
 
-def _table(simulation: Simulation) -> Iterator[PlannedColumn]:
-    table = simulation.table
+def _table(table: Table) -> Iterator[PlannedColumn]:
     for key, reason in TABLE.items():
         yield from _column(key, "body", "the table", table.arrays[key], table.capacity, reason)
     for component in table.component_types:
@@ -106,18 +105,13 @@ def _table(simulation: Simulation) -> Iterator[PlannedColumn]:
         )
 
 
-def _bodies(simulation: Simulation) -> Iterator[PlannedColumn]:
-    bodies, capacity = simulation.state.bodies, simulation.table.capacity
+def _bodies(bodies: Record, capacity: int, scene: Scene) -> Iterator[PlannedColumn]:
     for group, names, reason in GROUPS:
         for name in names:
             yield from _column(name, "body", group, getattr(bodies, name), capacity, reason)
     standing = bodies.static_position
     yield from _column("static_position", "static body", "collisions", standing, len(standing), STANDING)
-    yield from _column("stretches", "body", "shapes", simulation.scene.stretches, capacity, NOT_ENCLOSING)
+    yield from _column("stretches", "body", "shapes", scene.stretches, capacity, NOT_ENCLOSING)
     yield from _column("level_not_enclosing", "body", "shapes", bodies.level_not_enclosing, capacity, NOT_ENCLOSING)
-    for key, array in sorted(simulation.scene.rotated_columns.items()):
+    for key, array in sorted(scene.rotated_columns.items()):
         yield from _column(f"{key}, rotated", "body", "rotation", array, capacity, ROTATED)
-    for key, copy in simulation.kept_columns():
-        yield from _column(f"copy of {key}", "body", "going back", copy, len(copy), UNDO)
-
-

@@ -1,0 +1,31 @@
+"""The numbers that ``world.stats()`` shows, by the fields of the state that hold them."""
+
+from __future__ import annotations
+
+from ...framework.jit.record import Record
+
+COUNTERS = {
+    "bodies": "bodies_counted",
+    "candidates": "candidates_counted",
+    "pairs": "pairs_counted",
+    "contacts": "contacts_counted",
+    "impacts": "impacts_counted",
+    "capped_impacts": "capped_counted",
+    "rounds": "refreshes_counted",
+    "resting_contacts": "resting_counted",
+    "first_level_tests": "first_level_tests",
+    "first_level_hits": "first_level_hits",
+    "false_positives": "false_positives",
+    "force_evaluations": "force_evaluations",
+}
+
+
+def counters_of(state: Record) -> dict[str, int]:
+    """The counters by the names that users read."""
+    return {name: getattr(state, field) for name, field in COUNTERS.items()}
+
+
+def reset(state: Record) -> None:
+    """Count from 0 again."""
+    for field in COUNTERS.values():
+        setattr(state, field, 0)

@@ -1,0 +1,91 @@
+"""The stages of a step in their order, the only description of one: what plan(), stats(), profile() and
+docs/architecture.md read; and the parts of stages that are called by address."""
+
+from __future__ import annotations
+
+from ..framework.schedule.stages import Stage
+from .broad_phase.boxes import bound_searches, box_rest_of_step, box_rows
+from .broad_phase.system import BroadPhase
+from .ccd.refresh_pairs import merge_pairs
+from .ccd.time_of_impact import first_touch
+from .contacts.events import ContactEvents
+from .contacts.response import Response
+from .forces.accumulation import ForceAccumulation
+from .impacts.find import is_held_by_edge, kind_beyond_cap
+from .impacts.stages import take_swept_event, watch_bounds
+from .integration.system import Integration
+from .linked_parts import (
+    BOUND_SEARCHES,
+    BOX_ROWS,
+    FIRST_TOUCH,
+    HELD_BY_EDGE,
+    KIND_BEYOND_CAP,
+    TAKE_SWEPT,
+    WATCH_BOUNDS,
+)
+from .narrow_phase.system import NarrowPhase
+from .opening import check_finite, keep_state, read_bodies
+from .records import BODIES, COLLIDERS, STATE
+from .scene import TABLE_COLUMNS
+
+OPENING = (
+    Stage(keep_state, "keeps what a failed step puts back", ("previous_position", "linear_velocity"), ("kept",)),
+    Stage(
+        read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",
+        ("mass", "rotation", "ccd", "max_linear_speed"), ("inverse_mass",),
+    ),
+)  # fmt: skip
+CLOSING = (Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),)
+ON_DEMAND = (
+    Stage(
+        box_rest_of_step, "boxes around the rest of the paths", ("path_velocity",), ("lower", "upper"), "swept bodies",
+    ),
+    Stage(merge_pairs, "the pairs of the rest of the step", ("pairs", "candidates"), ("merged",), "swept bodies"),
+    *Integration.ON_DEMAND,
+)
+# What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
+CONDITIONS = (
+    "", "dynamic bodies", "colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies",
+    "standard", "on demand",
+)  # fmt: skip
+# Columns of the table that a failed step puts back, and those that every step makes again.
+PUT_BACK = ("position", "linear_velocity", "previous_position", "step_force", "force", "inverse_mass")
+
+
+def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
+    """The stages; ValueError for a name that nothing has, or a column that a failed step would leave changed."""
+    fields = {*STATE.fields, *BODIES.fields, *COLLIDERS.fields}
+    for stage in stages:
+        for name in (*stage.reads, *stage.writes):
+            if name not in fields:
+                raise ValueError(f"stage {stage.name}: no record in systems/records.py has {name!r}")
+        for name in stage.writes:
+            if name in TABLE_COLUMNS and name not in PUT_BACK:
+                raise ValueError(f"stage {stage.name} writes {name}, which a failed step does not put back")
+        if stage.needed not in (*CONDITIONS, stage.name):
+            raise ValueError(f"stage {stage.name}: needed must be one of {', '.join(CONDITIONS)}, got {stage.needed!r}")
+    return stages
+
+
+SYSTEMS = (ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, ContactEvents)
+STAGES = check_stages((*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND))
+
+# Parts of stages by their place in ``state.links``.
+LINKED_PARTS = {
+    BOX_ROWS: box_rows,
+    BOUND_SEARCHES: bound_searches,
+    FIRST_TOUCH: first_touch,
+    HELD_BY_EDGE: is_held_by_edge,
+    KIND_BEYOND_CAP: kind_beyond_cap,
+    TAKE_SWEPT: take_swept_event,
+    WATCH_BOUNDS: watch_bounds,
+}
+
+# The system of each stage; "" for those that open and close a step.
+SYSTEM_OF_STAGE = (
+    *("" for _ in OPENING),
+    *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
+    *("" for _ in CLOSING),
+    *(BroadPhase.__name__, NarrowPhase.__name__),
+    *(Integration.__name__ for _ in Integration.ON_DEMAND),
+)
