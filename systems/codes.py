@@ -14,5 +14,4 @@ NEED_COLUMNS = 14  # columns of the bodies that few scenes need: which ones foll
 RUN_BROAD, RUN_NARROW = 11, 12  # the phase before has not run: a phase is run alone, or its system was removed
 AFTERWARDS = 32
 FIND_IN_PYTHON = 33  # candidate pairs from a tree, or from the broad phase of a plugin
-FILTER_PAIRS = 34  # pair filters of plugins
-ROTATE = 35  # axes of rotated bodies
+ROTATE = 34  # axes of rotated bodies

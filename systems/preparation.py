@@ -123,7 +123,7 @@ def _crowd(world: World, collider: type[Collider], count: int) -> None:
 
 
 def _ask(world: World, colliders: list[type[Collider]]) -> None:
-    """One question of each kind, of one and of many."""
+    """One query of each kind, of one and of many."""
     d = world.dimensions
     origin, ahead = np.zeros(d), np.eye(d)[0]
     points, ways = np.zeros((2, d)), np.ones((2, d))

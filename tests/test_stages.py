@@ -15,10 +15,12 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
 from carom.framework.jit.record import make_record
 from carom.framework.jit.schema import Schema, flags, integer, ints, number, vectors
+from carom.framework.schedule.stages import Program, Stage
 from carom.lab.commands.stages import Stages
 from carom.lab.reporting.text_tables import between_marks
 from carom.plugins import Physics
 from carom.systems import ContactEvents
+from carom.systems.records import STATE
 from carom.systems.stage_list import CLOSING, check_stages
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -182,3 +184,28 @@ def test_without_its_system_the_events_end_and_the_rest_goes_on():
 def test_a_stage_that_the_step_cannot_keep_its_promises_for_is_refused(change, message):
     with pytest.raises(ValueError, match=f"stage check_finite.*{message}"):
         check_stages((dataclasses.replace(CLOSING[0], **change),))
+
+
+def half_done(state, dt):
+    if dt > 1.0:
+        return 0
+
+
+def not_done(state, dt):
+    state.count = 3
+
+
+def of_another_code(state, dt):
+    return 77
+
+
+@pytest.mark.parametrize("function", [half_done, not_done])
+def test_a_stage_that_returns_no_code_is_refused(function):
+    with pytest.raises(ValueError, match=f"stage {function.__name__} must return a code on every path: 0, or"):
+        Stage(function, "nothing")
+
+
+def test_a_stage_that_returns_an_unknown_code_is_named():
+    program = Program(make_record(STATE, 2), (Stage(of_another_code, "nothing"),), {3: lambda dt: None}, 32)
+    with pytest.raises(ValueError, match=r"stage of_another_code returned 77, .*: these are 3, and 0 for"):
+        program.run_one("of_another_code", 0.0)

@@ -6,6 +6,7 @@ docs/architecture.md all read it, and it is checked that a failed step puts back
 
 from __future__ import annotations
 
+import dis
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,7 +26,6 @@ from ..jit.tick_counter import TickClock, read_ticks
 # processor's clock, how often it ran, and the one that runs now.
 PROGRAM_FIELDS: dict[str, Any] = {"program": ints(), "ticks": ints(), "calls": ints(), "stage": integer()}
 PROGRAM = Schema("Program", **PROGRAM_FIELDS)
-MOST_CODES = 64  # codes that a stage may return, 0 included
 
 _program_type = record_type(PROGRAM, 2)
 _program_at = record_at(_program_type)
@@ -36,7 +36,7 @@ _call_stage = linked_call(types.int64(_program_type, types.float64))
 def run_stages(address, start, stop, dt):
     """Run the stages start..stop-1 of the program of the state at that address.
 
-    Returns 0, or MOST_CODES times the stage that cannot go on by itself, plus its code.
+    Returns 0, or the code of the stage that cannot go on by itself, which is in ``state.stage``.
     """
     state = _program_at(address)
     program, ticks, calls = state.program, state.ticks, state.calls
@@ -50,7 +50,7 @@ def run_stages(address, start, stop, dt):
             calls[k] += 1
             before = now
             if code != 0:
-                return k * MOST_CODES + code
+                return code
     return 0
 
 
@@ -75,9 +75,24 @@ class Stage:
     needed: str = ""
     when: str = ""
 
+    def __post_init__(self) -> None:
+        if _may_return_nothing(self.function):
+            raise ValueError(f"stage {self.name} must return a code on every path: 0, or what it asks of Python")
+
     @property
     def name(self) -> str:
         return self.function.__name__
+
+
+def _may_return_nothing(function: Callable[..., Any]) -> bool:
+    """Whether the function ends without a return statement on some path, or says ``return None``."""
+    before: Any = None
+    for instruction in dis.get_instructions(function):
+        value = {"RETURN_CONST": instruction, "RETURN_VALUE": before}.get(instruction.opname)
+        if value is not None and value.opname in ("RETURN_CONST", "LOAD_CONST") and value.argval is None:
+            return True
+        before = instruction
+    return False
 
 
 class Program:
@@ -94,7 +109,7 @@ class Program:
         self.state, self.stages = state, tuple(stages)
         self.handlers, self._afterwards = handlers, afterwards
         self.index = {stage.name: k for k, stage in enumerate(self.stages)}
-        self._words = state.words
+        self._words, self._stage = state.words, state.word_of("stage")
         self._addresses = np.zeros(len(stages), np.int64)
         state.program = self._addresses
         state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
@@ -125,15 +140,21 @@ class Program:
                 raise
             if not code:
                 break
-            start, wanted = divmod(code, MOST_CODES)
-            self._handle(start, wanted, dt)
-            if wanted >= self._afterwards:
+            start = int(self._words[self._stage])
+            self._handle(start, code, dt)
+            if code >= self._afterwards:
                 start += 1
         if self._words[self.alarm]:
             self.on_alarm()
 
     def _handle(self, stage: int, code: int, dt: float) -> None:
         """What a stage asks of Python, which counts as time of that stage."""
+        if code not in self.handlers:
+            known = ", ".join(map(str, sorted(self.handlers)))
+            raise ValueError(
+                f"stage {self.stages[stage].name} returned {code}, which is no code of a stage: these are {known}, and "
+                f"0 for what is done"
+            )
         inside, waited, began = self.inside, log.waited, time.perf_counter()
         self.handlers[code](dt)
         passed = time.perf_counter() - began - (log.waited - waited)

@@ -158,7 +158,7 @@ class Pipeline:
                     self._run_python(part.part, dt)
         except BaseException as error:
             at, self._at = self._at or self._system_at(), ""
-            self.fail(at, error)
+            self.fail(f"system {at}", error)
             raise
 
     def _run_python(self, part: PythonPart, dt: float) -> None:
@@ -221,7 +221,7 @@ class Pipeline:
             physics.begin_step(others_write)
         except BaseException as error:
             if hasattr(error, "__notes__"):  # it comes from a plugin's function
-                self.fail("Physics", error)
+                self.fail("compiling what the bodies' shapes need", error)
             self.roll_back()
             raise
 
@@ -269,15 +269,15 @@ class Pipeline:
 
     # -- when something raises --------------------------------------------------------------------
 
-    def fail(self, name: str, error: BaseException) -> None:
-        """A system has raised: back to the start of the step, and an error that names it."""
+    def fail(self, what: str, error: BaseException) -> None:
+        """A system, or something else in a step, has raised: back to its start, and an error that says what failed."""
         step = self.clock.step_count
         undone = self.roll_back()
         if isinstance(error, StepError) or not isinstance(error, Exception):
             return
         where = "".join(f"{note}: " for note in getattr(error, "__notes__", ()))
         raise StepError(
-            f"system {name} failed in step {step} of world {self.world.name!r}: {where}{type(error).__name__}: {error}"
+            f"{what} failed in step {step} of world {self.world.name!r}: {where}{type(error).__name__}: {error}"
             + (" (carom's columns and clock are back at the start of the step)" if undone else "")
         ) from error
 

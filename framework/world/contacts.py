@@ -16,8 +16,8 @@ import numpy as np
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
-    """One contact, seen from ``entity_a``: the normal points from a to b."""
+class ContactFields:
+    """The fields of a contact."""
 
     entity_a: int
     entity_b: int
@@ -28,21 +28,24 @@ class Contact:
     step: int
     time_of_impact: float  # seconds since the start of the step; nan if this is no impact
 
+
+class Contact(ContactFields):
+    """One contact, seen from ``entity_a``: the normal points from a to b."""
+
+    __slots__ = ()
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(
+            f"a contact is a copy of its row, {name} cannot be set; write the columns: "
+            "world.contacts.enabled[i] = False"
+        )
+
     def flipped(self) -> Contact:
         """The same contact seen from the other body."""
         return Contact(
             self.entity_b, self.entity_a, self.point, -self.normal, self.depth, self.normal_impulse, self.step,
             self.time_of_impact,
         )  # fmt: skip
-
-
-def _refuse(contact: Contact, name: str, value: Any) -> None:
-    raise AttributeError(
-        f"a contact is a copy of its row, {name} cannot be set; write the columns: world.contacts.enabled[i] = False"
-    )
-
-
-Contact.__setattr__ = _refuse  # type: ignore[method-assign]  # the generated one cannot say this
 
 
 class ContactRows:

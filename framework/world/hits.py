@@ -1,4 +1,4 @@
-"""Answers to queries: lists of ids for many questions at once, and hits with a place.
+"""Answers to queries: lists of ids for many queries at once, and hits with a place.
 
 Columns named ``row`` and ``rows`` are places in the columns of ``world.bodies``; they hold until the next structural
 change, as views do.

@@ -1,4 +1,4 @@
-"""Questions to a world about where things are."""
+"""Queries: what a world has where."""
 
 from __future__ import annotations
 

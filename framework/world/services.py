@@ -18,7 +18,7 @@ from .hits import CastHits, Hits, NearestHits, Neighbours
 
 
 class QueryServices(ABC):
-    """Answers to the questions of ``world``, which has checked the arguments: arrays are contiguous, of right shape."""
+    """Answers to the queries of ``world``, which has checked the arguments: arrays are contiguous, of right shape."""
 
     @abstractmethod
     def sphere(self, centre: tuple[float, ...], radius: float, mask: int) -> list[int]:
@@ -60,7 +60,7 @@ class QueryServices(ABC):
 
     @abstractmethod
     def forget(self) -> None:
-        """The next question looks at the bodies anew."""
+        """The next query builds its trees again."""
 
 
 class PhysicsServices(ABC):

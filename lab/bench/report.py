@@ -44,9 +44,9 @@ def times(rows: list[Row], repeats: int) -> TextTable:
         )
         for row in rows
     ]
-    what = "ms per 1,000 questions" if rows and all(row.unit != "step" for row in rows) else "ms per step"
+    what = "ms per 1,000 queries" if rows and all(row.unit != "step" for row in rows) else "ms per step"
     if len({row.unit for row in rows}) > 1:
-        what = "ms per step, of player_query per 1,000 questions"
+        what = "ms per step, of player_query per 1,000 queries"
     medians = f"medians of {repeats} repeats" if repeats > 1 else "one repeat"
     title = f"{what}: {medians}; ratio: pymunk's time over carom's"
     return TextTable(title, ("scene", "carom", "pymunk", "index", "ratio", "from .. to", "target"), cells)
@@ -84,7 +84,7 @@ def answers(rows: list[Row]) -> TextTable:
         figure = next(iter(row.quality[engines[0]]))
         values = [f"{row.quality[engine][figure]:,.6g}" for engine in engines]
         cells.append((row.label, figure, *values))
-    return TextTable("answers to 1,000 questions", ("scene", "what", *engines), cells, words=2)
+    return TextTable("answers to 1,000 queries", ("scene", "what", *engines), cells, words=2)
 
 
 def remarks(result: Result) -> list[str]:

@@ -20,7 +20,8 @@ def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
     if search == TREE:
         beside = f" and against that of {static} static ones" if static else ""
         return f"{tree} of {moving} moving bodies against itself{beside}"
-    return f"every pair of {moving} moving and {static} static bodies; a {tree} above {BRUTE_FORCE_MAX}"
+    more = f"above {BRUTE_FORCE_MAX} a uniform grid, or a {tree} where this does not suit"
+    return f"every pair of {moving} moving and {static} static bodies; {more}"
 
 
 def planned_passes(static: int) -> Iterator[PlannedKernel]:

@@ -212,7 +212,7 @@ def _run_queries(case: Case, world: World, engines: dict[str, Any], repeat: int)
 
 def _rows(case: Case) -> list[Row]:
     subject, rows = case.subject, []
-    unit = "step" if subject.windows else f"{Query.COUNT:,} questions"
+    unit = "step" if subject.windows else f"{Query.COUNT:,} queries"
     for window, by_engine in case.milliseconds.items():
         own = by_engine[CAROM]
         row = Row(
