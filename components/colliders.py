@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..framework.data.columns import REQUIRED, Column, column
+from ..framework.data.columns import REQUIRED, Column, column, on_demand
 from ..framework.data.component import Component
 from ..framework.vectors import item, replace, scale
 
@@ -36,12 +36,12 @@ class Collider(Component, abstract=True):
     stack: ClassVar[str] = "collider"
     stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask")
 
-    offset = column(0.0, item="vector")
-    restitution = column(0.0, minimum=0.0)
-    friction = column(None, optional=True, minimum=0.0)
-    sensor = column(False, dtype=bool)
-    layer = column(1, dtype=int)
-    mask = column(ALL_LAYERS, dtype=int)
+    offset = on_demand(column(0.0, item="vector"))
+    restitution = on_demand(column(0.0, minimum=0.0))
+    friction = on_demand(column(None, optional=True, minimum=0.0))
+    sensor = on_demand(column(False, dtype=bool))
+    layer = on_demand(column(1, dtype=int))
+    mask = on_demand(column(ALL_LAYERS, dtype=int))
 
     rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # dimensions of the worlds that support it

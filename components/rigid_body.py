@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..framework.data import esper_bridge
-from ..framework.data.columns import Column, column
+from ..framework.data.columns import Column, column, on_demand
 from ..framework.data.component import Component
 from ..framework.data.table import KINDS
 
@@ -53,15 +53,15 @@ class RigidBody(Component, flat=True):
 
     mass = column(1.0, positive=True)
     linear_velocity = column(0.0, item="vector")
-    constant_force = column(0.0, item="vector")
-    gravity_scale = column(1.0)
-    linear_damping = column(0.0, minimum=0.0)
+    constant_force = on_demand(column(0.0, item="vector"))
+    gravity_scale = on_demand(column(1.0))
+    linear_damping = on_demand(column(0.0, minimum=0.0))
     kind = dataclasses.replace(column("dynamic", choices=KINDS), on_write=_kind_written)
-    max_linear_speed = column(None, optional=True, minimum=0.0)
-    ccd = column(False, dtype=bool)
-    applied_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # until the frame ends
-    applied_frame = dataclasses.replace(column(-1, dtype=int), constructor=False, on_write=_force_applied)
-    step_force = dataclasses.replace(column(0.0, item="vector"), constructor=False)  # for one step
+    max_linear_speed = on_demand(column(None, optional=True, minimum=0.0))
+    ccd = on_demand(column(False, dtype=bool))
+    applied_force = dataclasses.replace(on_demand(column(0.0, item="vector")), constructor=False)  # till the frame ends
+    applied_frame = dataclasses.replace(on_demand(column(-1, dtype=int)), constructor=False, on_write=_force_applied)
+    step_force = dataclasses.replace(on_demand(column(0.0, item="vector")), constructor=False)  # for one step
 
     def __init__(
         self,
@@ -107,7 +107,7 @@ class RigidBody(Component, flat=True):
             return
         if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
             if hasattr(store, "in_step") and store.forces_are_summed():
-                store.arrays["force"][store.find(self._entity)] += force
+                store.make("force")[store.find(self._entity)] += force
             else:
                 self.step_force = self.step_force + force
             return

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.data.columns import column
+from ..framework.data.columns import column, on_demand
 from ..framework.data.component import Component
 
 
@@ -27,7 +27,7 @@ class Transform(Component, flat=True):
     __slots__ = ()
 
     position = dataclasses.replace(column(item="vector"), on_write=_teleport)
-    rotation = column(0.0, item="rotation")
+    rotation = on_demand(column(0.0, item="rotation"))
 
     def __init__(self, position: Any, rotation: Any = 0.0) -> None:
         if np.ndim(position) == 0:

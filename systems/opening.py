@@ -15,6 +15,8 @@ LARGEST = 1.7976931348623157e308  # of all finite numbers
 def any_rotation(state):
     """Whether any body is rotated: an angle that is not 0, in 3D a quaternion with a part beside the first."""
     rotation, rotated = state.bodies.rotation, False
+    if len(rotation) == 0:
+        return False
     if len(state.gravity[0]) == 2:
         for i in range(state.count):
             rotated |= rotation[i] != 0.0
@@ -28,7 +30,7 @@ def any_rotation(state):
 def any_ccd(state):
     """Whether any moving body is swept in a discrete world."""
     ccd, found = state.bodies.ccd, False
-    for i in range(state.moving):
+    for i in range(state.moving if len(ccd) > 0 else 0):
         found |= ccd[i]
     return found
 
@@ -59,9 +61,11 @@ def keep_state(state, dt):
 def read_bodies(state, dt):
     """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
     bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
+    limit = bodies.max_linear_speed
     for i in range(state.dynamic):
         inverse_mass[i] = 1.0 / mass[i]
-        limited |= bodies.max_linear_speed[i] == bodies.max_linear_speed[i]
+    for i in range(state.dynamic if len(limit) > 0 else 0):
+        limited |= limit[i] == limit[i]
     for i in range(state.dynamic, state.count):
         inverse_mass[i] = 0.0
     state.limits_speed = limited

@@ -45,7 +45,7 @@ def prepare(simulation: Simulation, world: World, components: tuple[type[Any], .
     simulation.scene.forget()
     colliders = sorted(prepared, key=lambda c: c.__name__)
     fine = [c for c in colliders if c is not SphereCollider and in_order(registry, (c, SphereCollider))[1] is c]
-    ccd = bool(table.arrays["ccd"][: table.stops[1]].any())
+    ccd = bool(table.column("ccd")[: table.stops[1]].any())
     with_levels = SphereCollider in colliders and bool(fine)
     for crowd, layered in ((0, False), (BRUTE_FORCE_MAX + 8, False), (0, True))[: 3 if with_levels else 2]:
         small = World(*world.plugins, settings=world.settings)
@@ -151,7 +151,9 @@ def _evaluate_forces(simulation: Simulation, world: World) -> None:
     They get columns in place if all bodies have what they require, else copies that cannot be written: to numba two
     types.
     """
-    dynamic, force = simulation.bodies.dynamic, simulation.table.arrays["force"].copy()
+    if not world.force_systems:
+        return
+    dynamic, force = simulation.bodies.dynamic, simulation.table.make("force").copy()
     try:
         for system in world.force_systems:
             has = np.ones(len(dynamic), bool)

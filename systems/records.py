@@ -1,14 +1,24 @@
 """The records of one world: all arrays and numbers that the compiled stages of a step read and write.
 
 ``State`` is what a stage gets; it holds the numbers of the step and the addresses of the other records. Units are SI; n
-rows of bodies are ordered dynamic, kinematic, static. A column that a scene does not need has no rows.
+rows of bodies are ordered dynamic, kinematic, static. A column that a scene does not need has no rows. Those with a
+default are on demand: kernels read the default while there are no rows, and ask for these (NEED_COLUMNS) to write.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
+from ..components import Collider, RigidBody
 from ..framework.jit.schema import Schema, flag, flags, floats, integer, ints, number, table, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
+
+
+def default_of(field: Any) -> Any:
+    """What rows of the table hold that have no value of their own, of a component's field; each number of a vector."""
+    return field.empty_value(2)
+
 
 BODIES = Schema(
     "Bodies",
@@ -17,17 +27,17 @@ BODIES = Schema(
     position=vectors(),
     previous_position=vectors(),
     linear_velocity=vectors(),
-    force=vectors(),
+    force=vectors(default=0.0),
     mass=floats(),
     inverse_mass=floats(),  # 0 for what cannot be moved
-    gravity_scale=floats(),
-    linear_damping=floats(),
-    max_linear_speed=floats(),  # nan: no limit
-    constant_force=vectors(),
-    applied_force=vectors(),
-    step_force=vectors(),
-    ccd=flags(),
-    rotation=floats(),  # one angle, in 3D four numbers per body
+    gravity_scale=floats(default=default_of(RigidBody.gravity_scale)),
+    linear_damping=floats(default=default_of(RigidBody.linear_damping)),
+    max_linear_speed=floats(default=default_of(RigidBody.max_linear_speed)),  # nan: no limit
+    constant_force=vectors(default=default_of(RigidBody.constant_force)),
+    applied_force=vectors(default=default_of(RigidBody.applied_force)),
+    step_force=vectors(default=default_of(RigidBody.step_force)),
+    ccd=flags(default=default_of(RigidBody.ccd)),
+    rotation=floats(),  # one angle, in 3D four numbers per body; without rows no body is rotated
     # the start of the step, for going back when it fails
     kept_previous=vectors(),
     kept_velocity=vectors(),
@@ -62,28 +72,28 @@ BODIES = Schema(
     search_lower=vectors(),  # where the centre may be while all neighbours are known
     search_upper=vectors(),
     # response
-    impact_count=ints(),
-    counted_impacts=ints(),  # those that the cap counts
+    impact_count=ints("int32"),
+    counted_impacts=ints("int32"),  # those that the cap counts
     last_impact=floats(),  # s since the start of the step
     cluster_root=ints("int32"),
     cluster_next=ints("int32"),
     cluster_tail=ints("int32"),
     cluster_inverse_mass=floats(),
-    supported=flags(),  # the resting prediction has changed its velocity
+    supported=flags(default=False),  # the resting prediction has changed its velocity
     support_change=vectors(),
-    held=flags(),  # a contact at rest has pushed it
-    place=ints("int32"),  # among the bodies of the solver; -1 between steps
+    held=flags(default=False),  # a contact at rest has pushed it
+    place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
 )
 
 # Fields that every collider has, by the slot of its type and the row.
 COLLIDERS = Schema(
     "Colliders",
-    offset=vectors(stacked=True),
-    restitution=floats(stacked=True),
-    friction=floats(stacked=True),
-    sensor=flags(stacked=True),
-    layer=ints(stacked=True),
-    mask=ints(stacked=True),
+    offset=vectors(stacked=True, default=default_of(Collider.offset)),
+    restitution=floats(stacked=True, default=default_of(Collider.restitution)),
+    friction=floats(stacked=True, default=default_of(Collider.friction)),
+    sensor=flags(stacked=True, default=default_of(Collider.sensor)),
+    layer=ints(stacked=True, default=default_of(Collider.layer)),
+    mask=ints(stacked=True, default=default_of(Collider.mask)),
 )
 
 # Linked functions and parameters of the scene's shapes, cheapest first; a pair is at first * count + second, where

@@ -39,7 +39,10 @@ EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = ("body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled")
 # What these stages need of the bodies before they do anything.
-COLUMNS_OF = {"end_flight": "kept_step_force", "predict_rest": "support_change"}
+COLUMNS_OF = {
+    "sum_forces": ("force",), "end_flight": ("kept_step_force",), "predict_rest": ("supported", "support_change"),
+    "gather": ("held", "place"),
+}  # fmt: skip
 SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
 
 
@@ -69,7 +72,7 @@ class Room:
             **{code: self._named(grow) for code, grow in growing.items()},
             NEED_CANDIDATES: self._named(lambda dt: self._search.grow(NEED_CANDIDATES)),
             NEED_CELLS: self._named(lambda dt: self._search.grow(NEED_CELLS)),
-            NEED_COLUMNS: lambda dt: self._scene.reserve(COLUMNS_OF[simulation.program.stages[self._state.stage].name]),
+            NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[self._state.stage].name]),
             NEED_SWEEPS: simulation.make_sweeps_ready,
             FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
             ROTATE: lambda dt: self._scene.refresh_rotation(),
@@ -133,7 +136,9 @@ class Room:
         ]
         if state.needed > len(solver.first):
             solver.reserve(_with_spare(state.needed), *per_contact)
-        solver.reserve(self._scene.table.capacity, *SOLVER_BODIES)
+        bodies = min(2 * state.needed, state.count)
+        if bodies > len(solver.body_row):
+            solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *SOLVER_BODIES)
 
     def _grow_warm_start(self, dt: float) -> None:
         memory = self._state.warm_start

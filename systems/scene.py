@@ -27,7 +27,7 @@ STACKED_COLUMNS = ("offset", "restitution", "friction", "sensor", "layer", "mask
 FLIGHT = ("start_velocity", "kept_previous", "kept_velocity")
 COLLISIONS = (
     "origin", "path_velocity", "min_extent", "force_speed_change", "lower", "upper", "rank", "collider_slot",
-    "impact_count", "counted_impacts", "supported", "held", "place",
+    "impact_count", "counted_impacts",
 )  # fmt: skip
 CURVES = ("path_second", "path_third")
 SWEEPS = (
@@ -36,7 +36,8 @@ SWEEPS = (
 )  # fmt: skip
 HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
-RARELY = ("kept_step_force", "support_change")  # made when the first stage asks for them
+# Made when the first stage asks for them; then they have a row for each of the table, like all others.
+ON_DEMAND = ("kept_step_force", "supported", "support_change", "held", "place")
 # Static bodies do not move: what stands in their rows of these stays 0.
 ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third")
 
@@ -63,6 +64,7 @@ class Scene:
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
         self.rotated_columns: dict[str, np.ndarray] = {}
         self._axes = np.empty((0, state.dimensions, state.dimensions))
+        table.on_make = self._bind_columns
 
     # -- structure --------------------------------------------------------------------------------
 
@@ -77,8 +79,11 @@ class Scene:
         bodies, count, moving = self.state.bodies, table.count, table.stops[1]
         table.arrays["linear_velocity"][moving:count] = 0.0
         present = self._present_colliders()
-        self._bind_table()
-        self.reserve(*FLIGHT)
+        self._bind_columns()
+        self.state.count, (self.state.dynamic, self.state.moving, _) = table.count, table.stops
+        self.state.version = table.version
+        self.state.slot_count = len(table.stacked_types(Collider.stack))
+        self.reserve(*FLIGHT, *(name for name in ON_DEMAND if len(getattr(bodies, name))))
         if present:
             self.reserve(*COLLISIONS)
             if len(bodies.static_position) < count - moving:
@@ -92,7 +97,6 @@ class Scene:
         self.parameters = ParameterRecords(self.linked) if self.linked else None
         if self.linked is not None:
             bodies.rank[np.argsort(table.arrays["entity"][:count], kind="stable")] = np.arange(count)
-            bodies.place[:] = -1
         self._bind_shapes()
         self.state.statics_stale = self.state.rotation_stale = True
         return True
@@ -107,30 +111,33 @@ class Scene:
         present = [c for c in known if c in self.prepared or table.has_mask(c)[: table.count].any()]
         return in_order(self.registry, present)
 
-    def _bind_table(self) -> None:
-        """The table's arrays, which are others after it has grown."""
-        state, table = self.state, self.table
-        bodies, arrays = state.bodies, table.arrays
+    def _bind_columns(self) -> None:
+        """The table's arrays, which are others after it has grown, and more when a column on demand is made."""
+        bodies, colliders, table = self.state.bodies, self.state.colliders, self.table
         for name in TABLE_COLUMNS:
-            setattr(bodies, name, arrays[name])
-        bodies.rotation = arrays["rotation"].reshape(-1)
+            if name in table.arrays:
+                setattr(bodies, name, table.arrays[name])
+        if "rotation" in table.arrays:
+            bodies.rotation = table.arrays["rotation"].reshape(-1)
         for name in STACKED_COLUMNS:
             stack = table.stacks.get(f"{Collider.stack}.{name}")
             if stack is not None:
-                setattr(state.colliders, name, stack)
-                state.slot_count = len(stack)
-        state.count, (state.dynamic, state.moving, _) = table.count, table.stops
-        state.version = table.version
+                setattr(colliders, name, stack)
+
+    def make(self, *names: str) -> None:
+        """Columns on demand that a stage asks for, of the table or of the records alone."""
+        for name in names:
+            if name in self.table.on_demand:
+                self.table.make(name)
+            else:
+                self.reserve(name)
 
     def reserve(self, *names: str) -> None:
         """Room for every row that the table can hold in these columns of the bodies."""
         bodies, capacity = self.state.bodies, self.table.capacity
         for name in names:
             if len(getattr(bodies, name)) != capacity:
-                field = bodies.schema.fields[name]
-                setattr(bodies, name, np.zeros((capacity, *field.item_shape(self.state.dimensions)), field.dtype))
-                if name == "place":
-                    bodies.place[:] = -1
+                setattr(bodies, name, bodies.schema.fields[name].full(capacity, self.state.dimensions))
 
     def _place_levels(self, present: list[type[Any]]) -> list[type[Any]]:
         """Which shapes each body has, cheapest first; returns the shapes that are tested."""
@@ -173,7 +180,7 @@ class Scene:
             return
         for number, shape in enumerate(self.linked.shapes):
             keys = {name: shape.component.columns[name].key for name in shape.columns}
-            columns = {name: self.table.arrays[key] for name, key in keys.items()}
+            columns = {name: self.table.make(key) for name, key in keys.items()}
             rotated = None
             if self.rotated and shape.turned is not None:
                 rotated = {name: self._rotated_column(key, columns[name]) for name, key in keys.items()}

@@ -233,7 +233,7 @@ class Simulation(PhysicsServices):
         state.moved, state.candidates_ready = before
 
     def _any_ccd(self) -> bool:
-        return bool(self.table.arrays["ccd"][: self.table.stops[1]].any())
+        return bool(self.table.column("ccd")[: self.table.stops[1]].any())
 
     def make_sweeps_ready(self, dt: float) -> None:
         """Some body is swept from now on."""
@@ -295,10 +295,11 @@ class Simulation(PhysicsServices):
 
     def end_window(self) -> None:
         table, words = self.table, self._words
-        if words[self._pushed] or words[self._others_write]:
+        if "applied_force" in table.arrays and (words[self._pushed] or words[self._others_write]):
             table.arrays["applied_force"][: table.stops[0]] = 0.0
         if table.frames_applied:
-            table.arrays["applied_frame"][: table.stops[0]] = -1  # else state_hash would tell frame rates apart
+            if "applied_frame" in table.arrays:
+                table.arrays["applied_frame"][: table.stops[0]] = -1  # else state_hash would tell frame rates apart
             table.frames_applied = False
 
     # -- snapshots --------------------------------------------------------------------------------
@@ -374,8 +375,8 @@ def _make_table(dimensions: int) -> Table:
     table = Table(dimensions)
     for component in (Transform, RigidBody):
         table.add_component_type(component)
-    for key in ("previous_position", "force"):
-        table.add_array(key, "vector")
+    table.add_array("previous_position", "vector")
+    table.add_array("force", "vector", on_demand=True)
     table.add_array("inverse_mass")
     return table
 

@@ -58,8 +58,8 @@ def near(world, *components):
 
 STEP = {"start_velocity", "levels", "kept_previous", "kept_velocity"}
 COLLISIONS = {"path_velocity", "origin", "min_extent", "collider_slot", "force_speed_change", "lower", "upper", "rank"}
-COLLISIONS |= {"level_offsets", "supported", "held", "place"}
-COLLISIONS |= {"impact_count", "counted_impacts"}
+COLLISIONS |= {"level_offsets", "impact_count", "counted_impacts"}
+RESTING = {"held", "place"}
 SOLVER = {"body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled"}
 CURVES = {"path_second", "path_third"}
 SWEPT = {"search_margin", "search_lower", "search_upper", "last_impact"}
@@ -76,8 +76,8 @@ COLUMNS = {
     "free flight": (lambda: many(make_world(), FREE), set()),
     "gravity and a curved path": (lambda: many(make_world(gravity=9.81, integrator="rk4"), FREE), set()),
     "spheres apart": (lambda: many(make_world(), FREE, BALLS), COLLISIONS),
-    "spheres that touch": (lambda: near(make_world(), FREE, BALLS), COLLISIONS | SOLVER),
-    "spheres that touch, 3D": (lambda: near(make_world(3), FREE, BALLS), COLLISIONS | SOLVER),
+    "spheres that touch": (lambda: near(make_world(), FREE, BALLS), COLLISIONS | RESTING),
+    "spheres that touch, 3D": (lambda: near(make_world(3), FREE, BALLS), COLLISIONS | RESTING),
     "curved paths": (lambda: many(make_world(integrator="rk4", gravity=9.81), FREE, BALLS), COLLISIONS | CURVES),
     "paths that may curve": (lambda: many(make_world(integrator="rk4"), FREE, BALLS), COLLISIONS | CURVES),
     "swept": (lambda: many(make_world(collision="continuous"), FREE, BALLS), COLLISIONS | SWEPT),
@@ -113,6 +113,18 @@ def test_the_columns_there_are_those_of_the_plan(name):
     present -= {column for column in present if column.startswith("copy of")}
     assert present == expected | STEP
     assert sum(column.bytes for column in columns) * COUNT == arrays_per_body(world)
+    at_rest = {column.column for column in plan.columns if column.of == "body at rest"}
+    assert at_rest == (SOLVER if expected >= RESTING else set())
+    world.close()
+
+
+def test_the_solver_has_room_for_the_bodies_at_rest():
+    world = near(make_world(), FREE, BALLS)
+    world.step()
+    assert 2 <= len(world.physics.state.solver.body_row) < COUNT // 2
+    world.bodies.position[:] = 0.1 * np.arange(COUNT)[:, None]  # now all of them touch others
+    world.step()
+    assert len(world.physics.state.solver.body_row) >= COUNT
     world.close()
 
 
@@ -121,8 +133,12 @@ def test_fields_at_their_defaults_are_distinguished_from_those_in_use():
     entity = world.create_entity(Transform((0.0, 0.0)), RigidBody())
     columns = {column.column: column.reason for column in world.plan().columns}
     assert columns["position"] == "what the game has set"
+    assert "defaults" in columns["mass"]
     for name in ("rotation", "constant_force", "linear_damping", "gravity_scale", "max_linear_speed"):
-        assert "defaults" in columns[name]
+        assert name not in columns  # nothing has asked for them
+    _ = world.bodies.gravity_scale
+    columns = {column.column: column.reason for column in world.plan().columns}
+    assert "defaults" in columns["gravity_scale"]
     world.component_for_entity(entity, Transform).rotation = 1.0
     world.component_for_entity(entity, RigidBody).max_linear_speed = 1.0
     columns = {column.column: column.reason for column in world.plan().columns}

@@ -216,7 +216,8 @@ class Adoption:
             if handle._store is table and handle._entity == entity:
                 handle._bind(store, None, index, store.version)
         for column in component.columns.values():
-            table.arrays[column.key][rows] = column.empty_value(table.dimensions)
+            if column.key in table.arrays:
+                table.arrays[column.key][rows] = column.empty_value(table.dimensions)
         table.has_mask(component)[rows] = False
         if component is table.kind_carrier:
             table.set_kinds(rows, np.full(len(rows), STATIC))
@@ -226,7 +227,7 @@ class Adoption:
         table = self.table
         rows = table.rows_of(np.fromiter(handles, np.int64, len(handles)))
         for column in component.columns.values():
-            table.arrays[column.key][rows] = sources.values(column, table.dimensions)
+            table.write(column.key, rows, sources.values(column, table.dimensions))
         if component is self.anchor and "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
         table.has_mask(component)[rows] = True

@@ -59,9 +59,8 @@ class Bodies:
         return rows.stop - rows.start
 
     def __getattr__(self, name: str) -> Any:
-        array = self._table.arrays.get(name)
-        if array is not None:
-            view = array[self.rows]
+        if self._table.has_column(name):
+            view = self._table.make(name)[self.rows]
             if self._kind == STATIC or name in ("entity", "kind"):
                 view.flags.writeable = False
             return view
@@ -77,7 +76,7 @@ class Bodies:
             _write(getattr(self, name), value, name)
 
     def column_names(self) -> list[str]:
-        return sorted(key for key in self._table.arrays if not key.startswith(("has:", "_")))
+        return sorted(key for key in self._table.column_keys() if not key.startswith(("has:", "_")))
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *{key.split(".")[0] for key in self.column_names()}]
@@ -112,15 +111,14 @@ class SelectedBodies:
     def __init__(self, table: Table, rows: np.ndarray) -> None:
         self._table = table
         self._rows = rows
-        self.force = table.arrays["force"][rows]
+        self.force = table.values("force", rows)
 
     def __len__(self) -> int:
         return len(self._rows)
 
     def __getattr__(self, name: str) -> Any:
-        array = self._table.arrays.get(name)
-        if array is not None:
-            copy = array[self._rows]
+        if self._table.has_column(name):
+            copy = self._table.values(name, self._rows)
             copy.flags.writeable = False
             return copy
         prefix = name + "."
@@ -129,7 +127,7 @@ class SelectedBodies:
         raise AttributeError(f"bodies have no column {name!r}")
 
     def scatter_force(self) -> None:
-        self._table.arrays["force"][self._rows] = self.force
+        self._table.make("force")[self._rows] = self.force
 
 
 def _write(view: Any, value: Any, name: str) -> None:

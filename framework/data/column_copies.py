@@ -52,6 +52,7 @@ class ColumnCopies:
         self._pairs: list[tuple[np.ndarray, np.ndarray]] = []  # copy and column
         self._buffers: dict[str, np.ndarray] = {}
         self._made_of: Any = None
+        self._unmade: list[str] = []  # columns on demand that had no memory
         self.kept = False
 
     def keep(self) -> None:
@@ -62,6 +63,7 @@ class ColumnCopies:
             self._made_of = made_of
             keys = [key for key in table.arrays if key != "entity" and not key.startswith("has:")]
             self._pairs = [(self._buffer(key), table.column(key)) for key in keys]
+            self._unmade = table.unmade()
             self._blocks.sources = np.array([column.ctypes.data for _, column in self._pairs], np.int64)
             self._blocks.targets = np.array([copy.ctypes.data for copy, _ in self._pairs], np.int64)
             self._blocks.sizes = np.array([column.nbytes for _, column in self._pairs], np.int64)
@@ -76,6 +78,7 @@ class ColumnCopies:
         """Write the copies into the columns."""
         for copy, column in self._pairs:
             column[...] = copy
+        self._table.reset(self._unmade)
 
     def sizes(self) -> list[tuple[str, np.ndarray]]:
         """The room for copies that there is, by column."""

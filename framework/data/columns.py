@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class Column:
     choices: tuple[str, ...] = ()  # stored as the index into it
     constructor: bool = True  # whether it is an argument of the constructor
     on_write: Callable[[Any, int], None] | None = None  # called with (table, row) after a handle has written
+    on_demand: bool = False  # no memory in a table while all rows hold the default and nothing can write in place
     name: str = ""
     owner: str = ""
     key: str = ""
@@ -204,7 +205,11 @@ class Column:
         if store is None:
             return self.shown(handle._values[self.name])
         row = handle._row if handle._version == store.version else handle._locate()
-        array = store.arrays[self.key]
+        array = store.arrays.get(self.key)
+        if array is None:
+            if not self.item_shape(store.dimensions):
+                return self.shown(self.empty_value(store.dimensions))
+            array = store.make(self.key)  # a view may be written to
         if array.ndim == 1:
             return self.shown(array.item(row))
         view = array[row]
@@ -220,8 +225,17 @@ class Column:
             return
         self.check_dimensions(value, store.dimensions, handle._entity)
         row = handle._row if handle._version == store.version else handle._locate()
-        store.arrays[self.key][row] = value
+        array = store.arrays.get(self.key)
+        (store.make(self.key) if array is None else array)[row] = value
         store.written(self, row)
+
+    def value_of(self, handle: Any) -> Any:
+        """The value for reading only: a column on demand stays without memory."""
+        store = handle._store
+        if store is None or self.key in store.arrays:
+            return self.__get__(handle)
+        shape, default = self.item_shape(store.dimensions), self.empty_value(store.dimensions)
+        return np.full(shape, default, self.dtype) if shape else self.shown(default)
 
     def unshared(self, value: Any) -> Any:
         """A value read from a handle, as an unbound handle stores it."""
@@ -249,6 +263,11 @@ def _lengths(array: np.ndarray) -> np.ndarray:
     """Of the last axis, kept; scaled first, because the square of a large or small number is inf or 0."""
     scale = np.abs(array).max(axis=-1, keepdims=True)
     return scale * np.sqrt(((array / scale) ** 2).sum(axis=-1, keepdims=True))
+
+
+def on_demand(field: Any) -> Any:
+    """The same field as a column on demand: most worlds leave it at its default in every row."""
+    return replace(field, on_demand=True)
 
 
 def column(

@@ -127,7 +127,7 @@ class Component:
         if hasattr(self, "__dict__"):
             vars(other).update(vars(self))  # what a class without __slots__ keeps besides its columns
         other._bind(None, None)
-        other._values = {name: column.unshared(getattr(self, name)) for name, column in self.columns.items()}
+        other._values = {name: column.unshared(column.value_of(self)) for name, column in self.columns.items()}
         return other
 
     def __copy__(self) -> Self:
@@ -137,7 +137,7 @@ class Component:
         return self.copy()
 
     def __repr__(self) -> str:
-        shown = ((n, getattr(self, n)) for n, c in self.columns.items() if c.constructor)
+        shown = ((n, c.value_of(self)) for n, c in self.columns.items() if c.constructor)
         fields = ", ".join(f"{n}={v.tolist() if isinstance(v, np.ndarray) else v!r}" for n, v in shown)
         return f"{type(self).__name__}({fields})"
 
@@ -187,6 +187,12 @@ class RowStore:
     def __init__(self, arrays: dict[str, np.ndarray], dimensions: int) -> None:
         self.arrays = arrays
         self.dimensions = dimensions
+
+    def values(self, key: str, rows: np.ndarray) -> np.ndarray:
+        return self.arrays[key][rows]
+
+    def make(self, key: str) -> np.ndarray:
+        return self.arrays[key]  # it has all columns
 
     def find(self, entity: int) -> int:
         raise KeyError(entity)  # handles into a store never lose their row

@@ -43,7 +43,7 @@ class Sources:
             values = [values[column.name] for values in self._values]
             result[self._loose] = values if result.ndim == 1 else _vectors(values, column, dimensions)
         for store, indices, rows in self._groups:
-            result[indices] = store.arrays[column.key][rows]
+            result[indices] = store.values(column.key, rows)
         return result
 
 

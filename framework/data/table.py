@@ -6,7 +6,7 @@ leads to the same rows, the same order of every sum, the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,11 @@ RESERVED = ("column_names", "dynamic", "has", "kinematic", "row_of", "rows", "st
 
 
 class Table:
-    """Columns of all bodies of one world. Arrays have room for ``capacity`` rows; the first ``count`` are in use."""
+    """Columns of all bodies of one world. Arrays have room for ``capacity`` rows; the first ``count`` are in use.
+
+    A column on demand has an array only once somebody has asked for it with :meth:`make`: to write, or because a view
+    of it is given away. Until then all rows hold its default. It never goes back.
+    """
 
     def __init__(self, dimensions: int) -> None:
         self.dimensions = dimensions
@@ -34,7 +38,9 @@ class Table:
         self.generation = 0  # counts esper.clear_database(): after it, ids mean other entities
         self.frame = 0  # counts the calls of step() and advance()
         self.kind_changed = False
-        self.arrays: dict[str, np.ndarray] = {}
+        self.arrays: dict[str, np.ndarray] = {}  # those there are
+        self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
+        self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
@@ -47,11 +53,21 @@ class Table:
 
     # -- columns ----------------------------------------------------------------------------------
 
-    def add_array(self, key: str, item: str = "scalar", dtype: Any = float, fill: Any = 0) -> None:
+    def add_array(self, key: str, item: str = "scalar", dtype: Any = float, fill: Any = 0, **options: Any) -> None:
         """A column that belongs to no component."""
-        spec = Column(item=item, dtype=dtype)
-        self.arrays[key] = np.full((self.capacity, *spec.item_shape(self.dimensions)), fill, dtype)
+        self._add(key, Column(item=item, dtype=dtype, **options), fill)
+
+    def _add(self, key: str, column: Column, fill: Any) -> None:
         self._fills[key] = fill
+        if column.on_demand:
+            self.on_demand[key] = column
+        else:
+            self.arrays[key] = self._filled(column, fill)
+
+    def _filled(self, column: Column, fill: Any) -> np.ndarray:
+        array = np.empty((self.capacity, *column.item_shape(self.dimensions)), column.dtype)
+        array[...] = fill
+        return array
 
     def add_component_type(self, component: type[Component]) -> None:
         """Columns for that type, and a mask ``has:<prefix>`` of the rows whose entity has it."""
@@ -60,15 +76,10 @@ class Table:
         stack = getattr(component, "stack", None)
         slot = len(self._stacked_types.setdefault(stack, [])) if stack else 0
         for name, column in component.columns.items():
-            fill = column.empty_value(self.dimensions)
-            shape = (self.capacity, *column.item_shape(self.dimensions))
-            self._fills[column.key] = fill
             if stack and name in component.stacked_columns:  # type: ignore[attr-defined]
-                self._grow_stack(f"{stack}.{name}", slot, shape, column, fill)
+                self._add_to_stack(f"{stack}.{name}", slot, column)
             else:
-                array = np.empty(shape, column.dtype)
-                array[...] = fill
-                self.arrays[column.key] = array
+                self._add(column.key, column, column.empty_value(self.dimensions))
         if stack:
             self._stacked_types[stack].append(component)
         if "kind" in component.columns and not component.prefix:
@@ -83,9 +94,9 @@ class Table:
         for other in self.component_types:
             if self.mask_name(other) == self.mask_name(component):
                 raise ValueError(f"two component types are named {component.__name__}: {other!r} and {component!r}")
-        taken = self.arrays.keys() & {column.key for column in component.columns.values()}
+        taken = self.column_keys() & {column.key for column in component.columns.values()}
         name = component.prefix.rstrip(".")
-        if taken or name in self.arrays or name in RESERVED:
+        if taken or self.has_column(name) or name in RESERVED:
             clash = ", ".join(sorted(taken)) or name
             raise ValueError(f"component {component.__name__}: bodies have {clash} already; give it another name")
 
@@ -105,23 +116,86 @@ class Table:
         """Full-capacity mask of the rows whose entity has that component."""
         return self.arrays[self.mask_name(component)]
 
-    def _grow_stack(self, stack: str, slot: int, shape: tuple[int, ...], column: Column, fill: Any) -> None:
-        fresh = np.empty((slot + 1, *shape), column.dtype)
-        if slot:
-            fresh[:slot] = self.stacks[stack]
-        fresh[slot] = fill
-        self.stacks[stack] = fresh
+    def _add_to_stack(self, stack: str, slot: int, column: Column) -> None:
+        """The field of one more type. The whole stack has an array or none."""
+        self._fills[column.key] = column.empty_value(self.dimensions)
         self._stack_rows[column.key] = (stack, slot)
+        if column.on_demand:
+            self.on_demand[column.key] = column
+        if stack in self.stacks or not column.on_demand:
+            self._make_stack(stack, column)
+
+    def _make_stack(self, stack: str, column: Column) -> None:
+        """An array for the field of all types, ``column`` of one of them; what there is stays."""
+        keys = [key for key, (name, _) in self._stack_rows.items() if name == stack]  # in order of their slots
+        made = [self.arrays.get(key) for key in keys]
+        fills = [self._fills[key] for key in keys]
+        stacked = [self._filled(column, fill) if own is None else own for own, fill in zip(made, fills, strict=True)]
+        self.stacks[stack] = np.stack(stacked)
         self._point_into_stacks()
 
     def _point_into_stacks(self) -> None:
         for key, (stack, slot) in self._stack_rows.items():
-            if slot < len(self.stacks[stack]):
+            if stack in self.stacks:
                 self.arrays[key] = self.stacks[stack][slot]
 
+    def column_keys(self) -> set[str]:
+        """The names of all columns."""
+        return self.arrays.keys() | self.on_demand.keys()
+
+    def has_column(self, key: str) -> bool:
+        return key in self.arrays or key in self.on_demand
+
     def column(self, key: str) -> np.ndarray:
-        """The rows in use of that column, a view."""
-        return self.arrays[key][: self.count]
+        """The rows in use of that column, for reading."""
+        array = self.arrays.get(key)
+        return self._defaults(key, (self.count,)) if array is None else array[: self.count]
+
+    def stack(self, name: str) -> np.ndarray:
+        """(types, capacity, ...): the same field of several component types, for reading."""
+        stack = self.stacks.get(name)
+        if stack is None:
+            keys = [key for key, (other, _) in self._stack_rows.items() if other == name]
+            stack = self._defaults(keys[0], (len(keys), self.capacity))
+        return stack
+
+    def _defaults(self, key: str, rows: tuple[int, ...]) -> np.ndarray:
+        """What rows of a column on demand hold that has no array."""
+        column = self.on_demand[key]
+        default = np.asarray(self._fills[key], column.dtype)
+        return np.broadcast_to(default, (*rows, *column.item_shape(self.dimensions)))
+
+    def values(self, key: str, rows: np.ndarray) -> np.ndarray:
+        """A copy of those rows of a column."""
+        return self.column(key)[rows]
+
+    def make(self, key: str) -> np.ndarray:
+        """The array of that column, for writing; one on demand has it from now on."""
+        array = self.arrays.get(key)
+        if array is None:
+            column = self.on_demand[key]
+            if key in self._stack_rows:
+                self._make_stack(self._stack_rows[key][0], column)
+            else:
+                self.arrays[key] = self._filled(column, self._fills[key])
+            array = self.arrays[key]
+            self.on_make()
+        return array
+
+    def write(self, key: str, rows: np.ndarray, values: np.ndarray) -> None:
+        """Values for those rows; defaults need no array."""
+        if key in self.arrays or values.tobytes() != self._defaults(key, (len(rows),)).tobytes():  # 0.0 is not -0.0
+            self.make(key)[rows] = values
+
+    def unmade(self) -> list[str]:
+        """Columns on demand that have no array."""
+        return [key for key in self.on_demand if key not in self.arrays]
+
+    def reset(self, keys: Iterable[str]) -> None:
+        """Default in all rows of these columns on demand."""
+        for key in keys:
+            if key in self.arrays:
+                self.arrays[key][...] = self._fills[key]
 
     # -- rows -------------------------------------------------------------------------------------
 
@@ -220,7 +294,7 @@ class Table:
 
     def take_out(self, component: type[Component], rows: np.ndarray) -> RowStore:
         """Copies of those rows of one component, for handles that outlive their rows."""
-        arrays = {column.key: self.arrays[column.key][rows] for column in component.columns.values()}
+        arrays = {column.key: self.values(column.key, rows) for column in component.columns.values()}
         return RowStore(arrays, self.dimensions)
 
     # -- written through handles ------------------------------------------------------------------
@@ -238,5 +312,5 @@ class Table:
     # -- copies -----------------------------------------------------------------------------------
 
     def copy_columns(self) -> dict[str, np.ndarray]:
-        """Copies of the rows in use, of all columns."""
+        """Copies of the rows in use, of all columns that have an array."""
         return {key: self.column(key).copy() for key in self.arrays}

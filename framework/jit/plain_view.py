@@ -63,12 +63,19 @@ class PlainColumn:
         return index
 
     def __getitem__(self, index: Any) -> Any:
+        if not len(self) and self._field.default is not None:
+            return self._default()
         item = self.array[self._checked(index)]
         if not isinstance(item, np.ndarray):
             return item
         if self._field.item == "axes":
             return tuple(tuple(item[:, j]) for j in range(len(item)))
         return tuple(item)
+
+    def _default(self) -> Any:
+        """What every row of a column on demand reads as while it has none."""
+        number = self.array.dtype.type(self._field.default)
+        return (number,) * self.array.shape[-1] if self._field.item == "vector" else number
 
     def __setitem__(self, index: Any, value: Any) -> None:
         self.array[self._checked(index)] = value

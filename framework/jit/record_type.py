@@ -3,8 +3,9 @@
 A kernel gets a record as a pointer to its memory, an {address, length} pair for each column and a word for each scalar.
 ``bodies.position[i]`` is a tuple of floats, assigning to it stores one; ``len(bodies.position)`` is the number of rows.
 Addresses and lengths are loaded as invariant: no column is replaced while a kernel runs, so a loop over ``s.x[i]`` is
-as fast as one over a local array. Indices are not checked and never count from the end, unless ``CAROM_CHECK=1`` is set
-when carom is imported: then an index outside the column raises IndexError with the record, the column and the index.
+as fast as one over a local array. A column on demand reads as its default while it has no rows. Indices are not
+checked and never count from the end, unless ``CAROM_CHECK=1`` is set when carom is imported: then an index outside the
+column raises IndexError with the record, the column and the index.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import operator
 from typing import Any
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -39,8 +41,6 @@ class ColumnType(types.Type):
     """A column of a record; ``field`` is its :class:`~.schema.Column`, ``label`` record and name in a checked build."""
 
     def __init__(self, field: Column, dimensions: int, label: str = "") -> None:
-        import numpy as np
-
         self.field, self.label = field, label
         self.dtype = from_dtype(np.dtype(field.dtype))
         shape = field.item_shape(dimensions)
@@ -264,22 +264,47 @@ def _same_column(context: Any, builder: Any, one: Any, other: Any, value: Any) -
     return value
 
 
+def _load_numbers(context: Any, builder: Any, sig: Any, values: Any) -> list[Any]:
+    """The numbers of one item, or the one of it that the index names."""
+    column = sig.args[0]
+    place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
+    count = 1 if one or column.item == column.number else column.width
+    return [_load_number(context, builder, column, place, k) for k in range(count)]
+
+
+def _load_or_default(context: Any, builder: Any, sig: Any, values: Any) -> list[Any]:
+    """The same of a column on demand. The branch is the same in every row: LLVM takes it out of loops."""
+    column = sig.args[0]
+    default = context.get_constant(column.number, np.dtype(column.field.dtype).type(column.field.default).item())
+    length = cgutils.create_struct_proxy(column)(context, builder, values[0]).length
+    before, found = builder.basic_block, []
+    with builder.if_then(builder.icmp_unsigned("!=", length, _WORD(0))):
+        loaded = _load_numbers(context, builder, sig, values)
+        after = builder.basic_block
+    for number in loaded:
+        phi = builder.phi(number.type)
+        phi.add_incoming(default, before)
+        phi.add_incoming(number, after)
+        found.append(phi)
+    return found
+
+
 @lower_builtin(operator.getitem, ColumnType, types.Any)
 def _load_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     column = sig.args[0]
-    place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
-    if one or column.item == column.number:
-        return _load_number(context, builder, column, place, 0)
+    load = _load_numbers if column.field.default is None else _load_or_default
+    numbers = load(context, builder, sig, values)
+    if sig.return_type == column.number:
+        return numbers[0]
     result = ir.Constant(context.get_value_type(column.item), ir.Undefined)
     if column.field.item == "vector":
-        for k in range(column.width):
-            result = builder.insert_value(result, _load_number(context, builder, column, place, k), k)
+        for k, number in enumerate(numbers):
+            result = builder.insert_value(result, number, k)
         return result
     count = column.item.count
     for j in range(count):  # axis j is column j of the matrix
         for k in range(count):
-            value = _load_number(context, builder, column, place, k * count + j)
-            result = builder.insert_value(result, value, [j, k])
+            result = builder.insert_value(result, numbers[k * count + j], [j, k])
     return result
 
 

@@ -40,6 +40,9 @@ class Column:
         of a table; a multiple of d if ``per_dimension``
     stacked
         several arrays of the same length behind each other, ``column[slot, row]``
+    default
+        of a column on demand: what kernels read in every row, each number of it, while the column has no rows; None:
+        it has to have rows
     """
 
     dtype: str = "float64"
@@ -47,6 +50,7 @@ class Column:
     width: int = 0
     per_dimension: bool = False
     stacked: bool = False
+    default: float | None = None
     words = 2
 
     def item_shape(self, dimensions: int) -> tuple[int, ...]:
@@ -62,6 +66,10 @@ class Column:
     def empty(self, rows: int, dimensions: int) -> np.ndarray:
         """An array for that many rows, not cleared."""
         return np.empty((rows, *self.item_shape(dimensions)), self.dtype)
+
+    def full(self, rows: int, dimensions: int) -> np.ndarray:
+        """An array for that many rows, which hold the default, without one 0."""
+        return np.full((rows, *self.item_shape(dimensions)), self.default or 0, self.dtype)
 
 
 class Schema:

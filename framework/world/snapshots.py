@@ -47,7 +47,8 @@ def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
             entity = int(state.entities[np.flatnonzero(mask != was)[0]])
             raise ValueError(f"entity {entity}: {component.__name__} was added or removed since this snapshot")
     for key, column in state.columns.items():
-        table.arrays[key][rows] = column
+        table.make(key)[rows] = column
+    table.reset(table.on_demand.keys() - state.columns.keys())
     table.set_kinds(rows, state.columns["kind"])
     table.static_version += 1
     table.frames_applied = True

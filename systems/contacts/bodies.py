@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.record_type import zero_of
 from ...framework.vectors import add, scale, sub
-from ..codes import NEED_SOLVER, OK
+from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED
 from .resting_prediction import drop_support
 
@@ -58,11 +58,13 @@ def gather(state, dt):
     Neighbours of one colour share no body that moves, so that the processor can work on several at once.
     """
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
-    for i in range(state.count):
+    for i in range(state.count if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
     if solver.contacts == 0:
         return OK
-    if solver.contacts > len(solver.first) or state.count > len(solver.body_row):
+    if len(bodies.held) == 0:
+        return NEED_COLUMNS
+    if solver.contacts > len(solver.first) or min(2 * solver.contacts, state.count) > len(solver.body_row):
         state.needed = solver.contacts
         return NEED_SOLVER
     colour_contacts(state)

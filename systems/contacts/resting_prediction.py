@@ -76,11 +76,11 @@ def predict_rest(state, dt):
     """
     bodies, memory = state.bodies, state.warm_start
     state.any_support = False
-    for i in range(state.count):
+    for i in range(state.count if len(bodies.supported) > 0 else 0):
         bodies.supported[i] = False
     if state.response_idle or memory.counts[memory.now] == 0:
         return OK
-    if len(bodies.support_change) < state.count:
+    if len(bodies.support_change) == 0:
         return NEED_COLUMNS
     scale_to(state, dt)
     find_rows(state)

@@ -73,10 +73,10 @@ class ForceAccumulation(StagedSystem):
 
     def nothing_acts(self) -> bool:
         """Whether there is no gravity, no force system and, at the moment, no force given to a dynamic body."""
-        arrays, dynamic = self._table.arrays, self._table.stops[0]
+        table, dynamic = self._table, self._table.stops[0]
         if self.world.force_systems or self._state.gravity.any():
             return False
-        return not any(arrays[key][:dynamic].any() for key in ("constant_force", "applied_force", "step_force"))
+        return not any(table.column(key)[:dynamic].any() for key in ("constant_force", "applied_force", "step_force"))
 
     def kernels(self) -> Iterator[PlannedKernel]:
         yield from super().kernels()

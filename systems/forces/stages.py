@@ -7,6 +7,7 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.record_type import zero_of
 from ...framework.vectors import add, item, replace, scale
+from ..codes import NEED_COLUMNS
 
 
 @part
@@ -50,38 +51,34 @@ def is_zero(vector):
 
 
 @part
-def any_force(bodies, dynamic):
-    """(whether a force is given to a dynamic body, whether ``force`` still holds one)."""
-    force, constant = bodies.force, bodies.constant_force
-    applied, for_step = bodies.applied_force, bodies.step_force
-    given, held = False, False
-    for i in range(dynamic):
-        given |= not (is_zero(constant[i]) & is_zero(applied[i]) & is_zero(for_step[i]))
-        held |= not is_zero(force[i])
-    return given, held
+def any_nonzero(vectors, count):
+    """Whether some vector of a column on demand is not 0, of the first ``count``."""
+    found = False
+    for i in range(count if len(vectors) > 0 else 0):
+        found |= not is_zero(vectors[i])
+    return found
 
 
 def sum_forces(state, dt):
     """force = m g s + the constant force + what was applied; nothing is summed where nothing acts."""
     bodies, dynamic, gravity = state.bodies, state.dynamic, state.gravity[0]
-    force = bodies.force
+    force, applied, for_step = bodies.force, bodies.applied_force, bodies.step_force
     state.forces_summed = True
     if dynamic == 0:
         return 0
-    if not state.has_force_systems and is_zero(gravity):
-        given, held = any_force(bodies, dynamic)
-        if not given:
-            for i in range(dynamic if held else 0):
-                force[i] = zero_of(state)
-            state.unforced, state.pushed = True, False
-            return 0
+    pushed = any_nonzero(applied, dynamic) or any_nonzero(for_step, dynamic)
+    given = pushed or state.has_force_systems or not is_zero(gravity) or any_nonzero(bodies.constant_force, dynamic)
+    if not given:
+        for i in range(dynamic if any_nonzero(force, dynamic) else 0):
+            force[i] = zero_of(state)
+        state.unforced, state.pushed = True, False
+        return 0
+    if len(force) == 0:
+        return NEED_COLUMNS
     state.force_evaluations += 1
     mass, gravity_scale, constant = bodies.mass, bodies.gravity_scale, bodies.constant_force
-    applied, for_step = bodies.applied_force, bodies.step_force
-    pushed = False
     for i in range(dynamic):
         force[i] = add(scale(gravity, mass[i] * gravity_scale[i]), constant[i])
-        pushed |= not (is_zero(applied[i]) & is_zero(for_step[i]))
     for i in range(dynamic if pushed else 0):
         force[i] = add(add(force[i], applied[i]), for_step[i])
     state.pushed = pushed

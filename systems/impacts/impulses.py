@@ -16,8 +16,8 @@ from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
 
 # Added to a body's impacts: the solver for contacts at rest leaves it alone in this step; it moves no more in it.
-EXCLUDED_FROM_REST, STOPPED = 1 << 40, 1 << 41
-STUCK = 1 << 30  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
+EXCLUDED_FROM_REST, STOPPED = 1 << 29, 1 << 30
+STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
 
 # Kinds of events: an impact, one that no cap counts, two beyond the cap, a crossing of what does not push.
 BOUNCE, FREE, STICK, STOP, CROSS = range(5)

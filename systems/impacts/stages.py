@@ -20,7 +20,7 @@ HITS, ALL, NONE, MEMBERS = -1, -2, -3, -4
 def any_restitution(state):
     """Whether a collider of the scene bounces."""
     restitution, bounces = state.colliders.restitution, False
-    for slot in range(state.slot_count):
+    for slot in range(state.slot_count if len(restitution) > 0 else 0):
         for i in range(state.count):
             bounces |= restitution[slot, i] != 0.0
     return bounces

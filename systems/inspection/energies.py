@@ -30,8 +30,9 @@ def potential_energy(table: Table, bodies: Bodies, gravity: np.ndarray, force_sy
     dynamic = bodies.dynamic
     if not len(dynamic):
         return 0.0
-    weight = (dynamic.mass * dynamic.gravity_scale)[:, None] * gravity
-    total = -float(((weight + dynamic.constant_force) * dynamic.position).sum())
+    scale, constant = (table.column(key)[dynamic.rows] for key in ("gravity_scale", "constant_force"))
+    weight = (dynamic.mass * scale)[:, None] * gravity
+    total = -float(((weight + constant) * dynamic.position).sum())
     for system in force_systems:
         concerned = required_bodies(table, bodies, system) if hasattr(system, "potential_energy") else None
         if concerned is not None:

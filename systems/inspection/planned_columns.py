@@ -27,7 +27,7 @@ MASKS = "which components it has"
 GROUPS = (
     ("the step", ("start_velocity",), "velocity at the start of the step, for the path"),
     ("collisions", COLLISIONS, "some body has a collider: boxes, extents, the path in the step, the response"),
-    ("collisions", ("support_change",), "contacts have rested"),
+    ("collisions", ("supported", "support_change", "held", "place"), "contacts have rested"),
     ("curved paths", CURVES, "the integrator's paths are curved"),
     ("swept bodies", SWEEPS, "bodies are swept along their paths: how far impacts may send them"),
     (
@@ -52,8 +52,7 @@ RECORDS = (
     ("static_grid", "body", "broad phase, static grid", "more static bodies than are tested pair by pair"),
 )  # fmt: skip
 
-# Columns of these records with one row per body, and those whose rows are something else.
-PER_BODY_ELSEWHERE = {"solver": SOLVER_BODIES}
+# Columns of these records whose rows are something else.
 NO_ROWS = {
     "candidates": ("bucket_starts",), "solver": ("starts",),
     **dict.fromkeys(("grid", "static_grid"), ("frame", "directory", "notes", "longest", "outside")),
@@ -72,7 +71,7 @@ def planned_columns(state: Record, table: Table, scene: Scene, copies: ColumnCop
         for key, array in record.columns().items():
             rows = array.shape[1] if record.schema.fields[key].stacked else len(array)
             if rows > 2 and key not in NO_ROWS.get(name, ()):  # fewer: numbers of the whole record
-                kind = "body" if key in PER_BODY_ELSEWHERE.get(name, ()) else of
+                kind = "body at rest" if name == "solver" and key in SOLVER_BODIES else of
                 yield from _column(key, kind, group, array, rows, reason)
 
 
@@ -89,6 +88,8 @@ def _fields(table: Table) -> Iterator[PlannedColumn]:
             same = table.column(column.key) == column.empty_value(table.dimensions)
             default = same | (table.column(column.key) != table.column(column.key))  # nan is None
             has = table.has_mask(component)[: table.count]
+            if column.key not in table.arrays:  # a column on demand that nothing has asked for
+                continue
             (used if column.default is REQUIRED or not default[has].all() else unused).append(column)
         for columns, reason in ((used, FIELDS), (unused, DEFAULTS)):
             for column in columns:
@@ -98,6 +99,8 @@ def _fields(table: Table) -> Iterator[PlannedColumn]:
 
 def _table(table: Table) -> Iterator[PlannedColumn]:
     for key, reason in TABLE.items():
+        if key not in table.arrays:
+            continue
         yield from _column(key, "body", "the table", table.arrays[key], table.capacity, reason)
     for component in table.component_types:
         yield from _column(

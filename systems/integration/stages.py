@@ -71,7 +71,7 @@ def keep_start(state, dt):
 def any_damping(bodies, dynamic):
     """Whether any dynamic body is damped."""
     damping, damped = bodies.linear_damping, False
-    for i in range(dynamic):
+    for i in range(dynamic if len(damping) > 0 else 0):
         damped |= damping[i] != 0.0
     return damped
 
@@ -246,8 +246,9 @@ def end_flight(state, dt):
     """Limits of speed, kinematic bodies, and the forces of this step, which have done their work."""
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity = bodies.position, bodies.linear_velocity
-    state.step_force_kept = state.pushed and not state.others_write  # else every column is kept
-    if state.step_force_kept and len(bodies.kept_step_force) < state.count:
+    pushed = (state.pushed or state.others_write) and len(bodies.step_force) > 0
+    state.step_force_kept = pushed and not state.others_write  # else every column is kept
+    if state.step_force_kept and len(bodies.kept_step_force) == 0:
         return NEED_COLUMNS
     if state.limits_speed:
         for i in range(dynamic):
@@ -258,7 +259,7 @@ def end_flight(state, dt):
         position[i] = add_scaled(position[i], velocity[i], dt)
     for i in range(dynamic if state.step_force_kept else 0):
         bodies.kept_step_force[i] = bodies.step_force[i]
-    for i in range(dynamic if state.pushed or state.others_write else 0):
+    for i in range(dynamic if pushed else 0):
         bodies.step_force[i] = zero_of(state)
     state.forces_summed, state.moved = False, True
     state.motion_version += 1

@@ -160,7 +160,9 @@ class Integration(StagedSystem):
 
     def _take_views(self) -> None:
         """The arrays are the same until the structure changes."""
-        bodies, dynamic = self._state.bodies, self._state.dynamic
+        bodies, dynamic, table = self._state.bodies, self._state.dynamic, self._scene.table
+        table.make("force")
+        table.make("linear_damping")
         names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping")
         names += ("previous_position", "start_velocity")
         self._motion = Motion(*(getattr(bodies, name)[:dynamic] for name in names), None, self._program)

@@ -54,7 +54,7 @@ def all_layers_meet(state):
     """Whether no layer or mask keeps any two bodies apart (usual, and then no pair need be asked)."""
     layer, mask = state.colliders.layer, state.colliders.mask
     apart = False
-    for slot in range(state.slot_count):
+    for slot in range(state.slot_count if len(layer) > 0 or len(mask) > 0 else 0):
         for i in range(state.count):
             apart |= mask[slot, i] != -1 or layer[slot, i] == 0
     return not apart

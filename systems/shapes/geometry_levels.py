@@ -130,7 +130,7 @@ class LevelCheck:
             if sources is not None:
                 values[name][new] = sources.values(column, self._table.dimensions)
             if len(rows):
-                values[name][~new] = self._table.arrays[column.key][rows]
+                values[name][~new] = self._table.values(column.key, rows)
         return values
 
     def _sticking_out(
@@ -165,7 +165,7 @@ def check_sensors(linked: LinkedShapes, levels: np.ndarray, slots: np.ndarray, t
 
     levels (levels, n): shapes of each body; slots: of the shapes in the stacks of the table.
     """
-    sensors = table.stacks[f"{Collider.stack}.sensor"]
+    sensors = table.stack(f"{Collider.stack}.sensor")
     rows = np.flatnonzero(levels[0, : table.count] != levels[-1, : table.count])
     decides = sensors[slots[levels[-1, rows]], rows]
     for level in levels[:-1]:

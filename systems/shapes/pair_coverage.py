@@ -47,6 +47,6 @@ def _alike(
     """(layer, mask, whether it moves, the first two rows) of each kind of body with that shape."""
     rows = np.flatnonzero(level[: table.count] == shape)
     slots = collider_slot[rows]
-    layer, mask = (table.stacks[f"{Collider.stack}.{name}"][slots, rows] for name in ("layer", "mask"))
+    layer, mask = (table.stack(f"{Collider.stack}.{name}")[slots, rows] for name in ("layer", "mask"))
     kinds, which = np.unique(np.stack((layer, mask, rows < table.stops[1])), axis=1, return_inverse=True)
     return [(*kind, rows[which.ravel() == index][:2]) for index, kind in enumerate(kinds.T.tolist())]
