@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...components import Collider
 from ...framework import CaromError, NoPhysicsError, World
 from ...systems import Integrator
 from .stability import growth_of_system, stability_limits
@@ -280,10 +281,11 @@ def _sizes(services: Any) -> tuple[Any, Any, Any]:
     with unmeasured(services.state):
         services.search.partitions()  # makes the boxes
     services.queries.forget()
-    bodies, colliders, rows = services.state.bodies, services.state.colliders, np.arange(count)
+    bodies, rows = services.state.bodies, np.arange(count)
     slot = bodies.collider_slot[:count]
+    sensor, layer, mask = (table.stack(f"{Collider.stack}.{name}")[slot, rows] for name in ("sensor", "layer", "mask"))
     endless = np.isinf(bodies.upper[:count] - bodies.lower[:count]).all(axis=1)
     size = np.where(endless, np.inf, bodies.min_extent[:count])
-    solid = (services.scene.levels[0, :count] >= 0) & ~colliders.sensor[slot, rows]
-    group = np.column_stack((colliders.layer[slot, rows], colliders.mask[slot, rows]))
+    solid = (services.scene.levels[0, :count] >= 0) & ~sensor
+    group = np.column_stack((layer, mask))
     return size, solid, group
