@@ -207,8 +207,8 @@ class Column:
         row = handle._row if handle._version == store.version else handle._locate()
         array = store.arrays.get(self.key)
         if array is None:
-            if not self.item_shape(store.dimensions):
-                return self.shown(self.empty_value(store.dimensions))
+            if self.item == "scalar" or not self.item_shape(store.dimensions):
+                return self.shown(store.default_of(self.key))
             array = store.make(self.key)  # a view may be written to
         if array.ndim == 1:
             return self.shown(array.item(row))

@@ -165,6 +165,10 @@ class Table:
         default = np.asarray(self._fills[key], column.dtype)
         return np.broadcast_to(default, (*rows, *column.item_shape(self.dimensions)))
 
+    def default_of(self, key: str) -> Any:
+        """What rows of that column hold that have no value of their own."""
+        return self._fills[key]
+
     def values(self, key: str, rows: np.ndarray) -> np.ndarray:
         """A copy of those rows of a column."""
         return self.column(key)[rows]
