@@ -125,6 +125,28 @@ def negative(a):
     return tuple(-x for x in a)
 
 
+def _magnitude(builder: Any, x: Any) -> Any:
+    return builder.call(builder.module.declare_intrinsic("llvm.fabs", [x.type]), [x])
+
+
+@_emitted(*_elementwise(_magnitude, 1, 0))
+def absolute(a):
+    """The magnitude of each component."""
+    return tuple(abs(x) for x in a)
+
+
+def _clamp(builder: Any, x: Any, limit: Any) -> Any:
+    below = builder.select(builder.fcmp_ordered("<", x, limit), x, limit)
+    least = builder.fneg(limit)
+    return builder.select(builder.fcmp_ordered(">", below, least), below, least)
+
+
+@_emitted(*_elementwise(_clamp, 2, 0))
+def clamped(a, limits):
+    """Each component of a, from minus to plus that of the limits."""
+    return tuple(max(-limit, min(limit, x)) for x, limit in zip(a, limits, strict=True))
+
+
 def _emit_dot(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
     products = [
         builder.fmul(builder.extract_value(values[0], k), builder.extract_value(values[1], k))

@@ -1,7 +1,7 @@
 """A capsule: all points within a radius of a segment along the body's y axis; in 2D a stadium.
 
-It meets every convex shape through its support function. Pairs with spheres and other capsules are in closed form: two
-capsules are two segments, and their distance is that of the segments less both radii.
+It meets every convex shape through its support function. Pairs with spheres, boxes and other capsules are in closed
+form: two capsules are two segments, and their distance is that of the segments less both radii.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..components import ALL_LAYERS, Collider, SphereCollider
+from ..components import ALL_LAYERS, AABBCollider, Collider, SphereCollider
 from ..framework import Plugin, column
-from ..framework.vectors import add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from ..framework.vectors import absolute, add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
+from .segment_box import box_gap, box_overlap, place_along
 from .standard_sweeps import LATER, ball, down_at
 
 plugin = Plugin("capsule", version="1.0")
@@ -220,3 +221,20 @@ def capsule_capsule(a, b, d):
             point = scale(u, max(-a.half_height, min(a.half_height, lines)))
     depth = a.radius + b.radius - distance
     return depth >= 0.0, depth, normal, add_scaled(point, normal, a.radius - 0.5 * (depth + min(distance, 0.0)))
+
+
+@plugin.pair(CapsuleCollider, AABBCollider)
+def capsule_box(a, b, d):
+    """The overlap of segment and box, or their distance if they are apart, with the radius."""
+    u, half, box = a.axes[1], a.half_height, b.half_extents
+    depth, normal, axis = box_overlap(d, u, half, box)
+    normal = towards(normal, axis, d)
+    if depth < 0.0:
+        way = box_gap(d, u, half, box)
+        depth = -length(way)
+        if -depth > TOUCHING * (half + dot(absolute(normal), add(absolute(d), box))):
+            normal = divided(way, -depth)
+    depth += a.radius
+    t, rise = place_along(normal, d, u, half, box), dot(normal, u)
+    inwards = a.radius - 0.5 * depth + (half * abs(rise) - t * rise)  # from there to the middle of the overlap
+    return depth >= 0.0, depth, normal, add_scaled(scale(u, t), normal, inwards)
