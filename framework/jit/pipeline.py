@@ -5,7 +5,7 @@ reports, optimises each function alone and again inside of each caller, and make
 are written without closures, their helpers are only ever compiled into them, and many are alike in what they ask of
 type inference. Leaving that out takes a third of the time and changes no bit of a result.
 
-numba's internals are touched here and nowhere else. They are known to be as expected from version 0.61 to 0.68; with
+numba's internals are touched here and nowhere else. They are known to be as expected from version 0.62 to 0.68; with
 any other, kernels compile as numba does by itself, and take longer.
 """
 
@@ -26,7 +26,7 @@ from numba.core.environment import lookup_environment
 from numba.core.transforms import canonicalize_cfg
 from numba.core.typing.templates import Signature
 
-TRIED = (0, 61), (0, 68)  # the versions whose internals are as expected here
+TRIED = (0, 62), (0, 68)  # the versions whose internals are as expected here
 
 _REPORTS = {typed_passes.AnnotateTypes, typed_passes.DumpParforDiagnostics}
 _CLOSURES = {untyped_passes.InlineClosureLikes, untyped_passes.MakeFunctionToJitFunction}
@@ -79,6 +79,8 @@ class _PartLibrary(JITCodeLibrary):
 class _KernelLibrary(JITCodeLibrary):
     """Takes in the parts that a kernel calls, directly or through others."""
 
+    counts_references = False
+
     def finalize(self) -> None:
         # The linker skips what nothing has asked for so far: callers come before what they call.
         self._linking_libraries = list(reversed(_with_needed(self._linking_libraries, {})))
@@ -89,7 +91,11 @@ class _KernelLibrary(JITCodeLibrary):
         for function in self._final_module.functions:
             if function.linkage == Linkage.linkonce_odr:
                 function.linkage = Linkage.internal
-        super()._optimize_final_module()
+        if self.counts_references:
+            super()._optimize_final_module()
+        else:  # numba optimises twice, to drop counts in between
+            passes, builder = self._codegen._module_pass_manager()
+            passes.run(self._final_module, builder)
 
 
 def _with_needed(libraries: list[Any], found: dict[Any, None]) -> dict[Any, None]:
@@ -111,6 +117,7 @@ class _KernelLowering(_LOWERING):
     def run_pass(self, state: Any) -> bool:
         codegen = state.targetctx.codegen()
         state.library = _KernelLibrary(codegen, state.func_id.func_qualname)
+        state.library.counts_references = state.flags.nrt
         state.library.enable_object_caching()
         super().run_pass(state)
         for variable in state.library._final_module.global_variables:
