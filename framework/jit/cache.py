@@ -16,8 +16,9 @@ import logging
 import operator
 import os
 import pickle
+import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,8 @@ from numba.core import compiler
 from numba.core.caching import _Cache
 from numba.core.serialize import dumps
 
-from .hash import deep_hash
+from . import prebuilt
+from .hash import deep_hash, type_names
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
 KERNELS, UNFINISHED = "*.kernel", "*.unfinished"
@@ -33,7 +35,7 @@ KERNELS, UNFINISHED = "*.kernel", "*.unfinished"
 logger = logging.getLogger("carom")
 machine_code = operator.attrgetter("library")  # of numba's compile result
 _checksum = hashlib.sha256
-_reported: set[Path] = set()  # folders that could not be written, told once
+_reported: set[Path] = set()  # folders that could not be used or written, told once
 
 
 def cache_folder() -> Path | None:
@@ -74,13 +76,49 @@ def _files(pattern: str) -> list[Path]:
 
 
 def _usable(folder: Path) -> bool:
-    """Whether ``folder`` exists or can be made, is writable and is ours: machine code is loaded from it."""
+    """Whether ``folder`` exists or can be made, is writable, and only for us: machine code is loaded from it."""
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        owner = getattr(os, "getuid", None)
-        return os.access(folder, os.W_OK) and (owner is None or folder.stat().st_uid == owner())
-    except OSError:
+        found = folder.stat()
+    except OSError as error:
+        _report(folder, error.strerror or str(error), wanted=os.environ.get(CACHE_FOLDER_VARIABLE) == str(folder))
         return False
+    if os.name == "posix":
+        if found.st_uid != os.getuid():
+            _report(folder, "it belongs to another user, who could put other code there")
+            return False
+        if stat.S_IMODE(found.st_mode) & (stat.S_IWGRP | stat.S_IWOTH):
+            _report(folder, f"others may write to it and could put other code there (chmod go-w {folder} mends that)")
+            return False
+    return os.access(folder, os.W_OK)
+
+
+def _report(folder: Path, reason: str, wanted: bool = True) -> None:
+    """Say once that a folder is not used; of those that nobody has asked for only at level DEBUG."""
+    if folder not in _reported:
+        _reported.add(folder)
+        level = logging.WARNING if wanted else logging.DEBUG
+        logger.log(level, "carom: compiled kernels are not kept in %s: %s", folder, reason)
+
+
+def _read(path: Path) -> Any:
+    """What a file holds; None if there is none. A damaged or unreadable one is a miss, too: it will be replaced."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        logger.debug("carom: %s cannot be read: %s", path, error.strerror or error)
+        return None
+    size = _checksum().digest_size
+    if _checksum(data[:-size]).digest() != data[-size:]:
+        logger.info("carom: %s is damaged, the kernel is compiled anew", path)
+        return None
+    try:
+        return pickle.loads(data)
+    except (EOFError, pickle.UnpicklingError, AttributeError, ImportError, TypeError, ValueError) as error:
+        logger.info("carom: %s is of no use here, the kernel is compiled anew: %s", path, error)
+        return None
 
 
 class KernelCache(_Cache):
@@ -108,16 +146,21 @@ class KernelCache(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
-        path = self._path(sig, target_context.codegen())
-        if self._enabled and path is not None and path.exists():
-            # A damaged or unreadable file is a miss: the kernel is compiled again and the file replaced.
-            with contextlib.suppress(OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):
-                data = path.read_bytes()
-                size = _checksum().digest_size
-                if _checksum(data[:-size]).digest() == data[-size:]:
-                    return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+        if self._enabled:
+            for path in self._places(sig, target_context.codegen()):
+                found = _read(path)
+                if found is not None:
+                    return compiler.CompileResult._rebuild(target_context, *found)
         self._missing(self._dispatcher)
         return None
+
+    def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
+        """Where that kernel may stand: shipped for any processor of the platform, or compiled here for this one."""
+        for shipped in prebuilt.folders():
+            yield shipped.path / self._name(sig, (codegen.magic_tuple()[0], *shipped.processor))
+        path = self._path(sig, codegen)
+        if path is not None:
+            yield path
 
     def save_overload(self, sig: Any, data: Any) -> None:
         path = self._path(sig, data.codegen)
@@ -148,7 +191,9 @@ class KernelCache(_Cache):
 
     def _path(self, sig: Any, codegen: Any) -> Path | None:
         folder = cache_folder()
-        if folder is None:
-            return None
-        key = hashlib.sha256(repr((sig, codegen.magic_tuple())).encode()).hexdigest()
-        return folder / f"{self._stem()}-{key[:24]}.kernel"
+        return folder / self._name(sig, codegen.magic_tuple()) if folder is not None else None
+
+    def _name(self, sig: Any, target: Any) -> str:
+        """The file's name, for a kind of processor: (platform, name, features)."""
+        key = hashlib.sha256(f"{type_names(sig)} {target!r}".encode()).hexdigest()
+        return f"{self._stem()}-{key[:24]}.kernel"

@@ -2,25 +2,52 @@
 
 numba's own cache looks at the file a function stands in and at its closure; it does not see that a function which it
 calls, in another file, was edited. Here byte code, constants, options, captured values and, recursively, every
-function called go into the hash.
+function called go into the hash; of modules and enumerations whatever the code names.
 """
 
 from __future__ import annotations
 
+import enum
 import hashlib
+import sys
 import types
+from collections.abc import Iterator
 from typing import Any
 
+import llvmlite
 import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+# What numba makes other code for: its switches, by their names in the environment less NUMBA_.
+SWITCHES = (
+    "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX",
+)  # fmt: skip
+
+
+def toolchain() -> dict[str, str]:
+    """The versions that machine code depends on, by name."""
+    return {
+        "python": f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}",
+        "numba": numba.__version__, "llvmlite": llvmlite.__version__, "numpy": np.__version__,
+    }  # fmt: skip
+
 
 def deep_hash(function: Any) -> str:
-    """The hash, as hexadecimal digits; numba's and numpy's versions are part of it."""
-    digest = hashlib.sha256(repr((numba.__version__, np.__version__)).encode())
+    """The hash, as hexadecimal digits; versions and numba's switches are part of it."""
+    switches = [(name, getattr(numba.config, name, None)) for name in SWITCHES]
+    digest = hashlib.sha256(repr((toolchain(), switches)).encode())
     _feed(function, digest, set())
     return digest.hexdigest()
+
+
+def type_names(kind: Any) -> str:
+    """A numba type or signature in words; numba's own leave out the fields of named tuples, and which comes first."""
+    fields = f" {kind.fields}" if hasattr(kind, "fields") else ""
+    inner = getattr(kind, "args", None) or getattr(kind, "types", None) or ()
+    if isinstance(kind, (tuple, list)):
+        inner = kind
+    return f"{kind}{fields}({', '.join(type_names(part) for part in inner)})" if inner else f"{kind}{fields}"
 
 
 def _feed(value: Any, digest: Any, seen: set[int]) -> None:
@@ -48,10 +75,16 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
             _feed(item, digest, seen)
     elif isinstance(value, type):
         digest.update(f"{value.__module__}.{value.__qualname__}{getattr(value, '_fields', '')}".encode())
+        if issubclass(value, enum.Enum):
+            digest.update(repr([(member.name, member.value) for member in value]).encode())
+    elif isinstance(value, enum.Enum):
+        digest.update(f"{type(value).__qualname__}.{value.name}={value.value!r}".encode())
     elif isinstance(value, np.ndarray):
         digest.update(repr((value.dtype.str, value.shape)).encode() + value.tobytes())
     elif isinstance(value, types.ModuleType):
         digest.update(value.__name__.encode())
+    elif isinstance(value, numba.types.Type):
+        digest.update(type_names(value).encode())
     else:
         digest.update(f"{type(value).__qualname__}{value!r}".encode() if _is_plain(value) else b"")
         digest.update(type(value).__qualname__.encode())
@@ -59,7 +92,7 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
 
 def _is_plain(value: Any) -> bool:
     """Values whose repr is the same in every process (no addresses)."""
-    return isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic))
+    return isinstance(value, (bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype))
 
 
 def _feed_code(code: types.CodeType, digest: Any) -> None:
@@ -69,21 +102,26 @@ def _feed_code(code: types.CodeType, digest: Any) -> None:
         if isinstance(constant, types.CodeType):
             _feed_code(constant, digest)
         else:
-            digest.update(repr(constant).encode())
+            plain = sorted(constant, key=repr) if isinstance(constant, frozenset) else constant
+            digest.update(repr(plain).encode())
 
 
-def _referenced_globals(function: types.FunctionType) -> list[tuple[str, Any]]:
-    """The globals the function names; through a module, the attributes that its code names too."""
+def _referenced_globals(function: types.FunctionType) -> Iterator[tuple[str, Any]]:
+    """The globals the function names; through modules, the attributes that its code names too."""
     names = set(_all_names(function.__code__))
-    found: list[tuple[str, Any]] = []
     for name in sorted(names & function.__globals__.keys()):
-        item = function.__globals__[name]
-        found.append((name, item))
-        if isinstance(item, types.ModuleType):
-            attributes = sorted(names & vars(item).keys())
-            members = ((attribute, getattr(item, attribute)) for attribute in attributes)
-            found += [(f"{name}.{a}", m) for a, m in members if isinstance(m, (Dispatcher, int, float, tuple))]
-    return found
+        yield from _reached(name, function.__globals__[name], names, set())
+
+
+def _reached(path: str, value: Any, names: set[str], seen: set[str]) -> Iterator[tuple[str, Any]]:
+    yield path, value
+    if isinstance(value, types.ModuleType) and value.__name__ not in seen:
+        seen.add(value.__name__)
+        for name in sorted(names & vars(value).keys()):
+            member = vars(value)[name]
+            # Plain functions of a module cannot be called from compiled code: what numba has for them is its own.
+            if not isinstance(member, types.FunctionType) or hasattr(member, "carom_depends_on"):
+                yield from _reached(f"{path}.{name}", member, names, seen)
 
 
 def _all_names(code: types.CodeType) -> list[str]:
