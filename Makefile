@@ -1,6 +1,7 @@
 # carom: every target works on a fresh clone with python3 (3.11 or newer), pip and make.
 #   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
 #   make test    the tests, without the slow ones
+#   make wheel   a wheel that carries compiled kernels, into dist/
 #   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
 #   make figures measure again what the tables and charts of docs/accuracy.md, limits.md, settings.md and levels.md show
 
@@ -19,7 +20,7 @@ BENCH := .venv/bench-$(HERE)
 TEST := .venv/test-$(HERE)
 DEV := .venv/dev-$(HERE)
 
-.PHONY: run test test-slow bench figures ide typecheck lint clean
+.PHONY: run wheel test test-slow bench figures ide typecheck lint clean
 
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -29,6 +30,13 @@ test: $(TEST)
 
 test-slow: $(TEST)
 	$(BIN)/pytest -n 2 --dist loadfile -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
+
+# A wheel for this platform and Python version that carries the compiled kernels: dist/carom-*.whl.
+wheel: $(RUN)
+	rm -rf framework/prebuilt build/lib build/bdist*
+	$(BIN)/carom warm-up --portable framework/prebuilt
+	$(BIN)/python -m pip --disable-pip-version-check wheel --quiet --no-deps --wheel-dir dist .; \
+	  status=$$?; rm -rf framework/prebuilt build/lib build/bdist*; exit $$status
 
 bench: $(BENCH)
 	$(BIN)/carom bench $(ARGS)

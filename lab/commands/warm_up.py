@@ -22,6 +22,7 @@ from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_
 from ...plugins import Physics
 from ..reporting.progress import CompileStatus
 from .loading import Loaded, load, stdout_kept_clean
+from .portable import compile_portable
 from .usage_errors import Problem
 
 STEPS = 10  # of a scene, to compile what its own systems call
@@ -46,19 +47,28 @@ class Row:
 @click.argument("targets", metavar="[SCENE|FILE.py]...", nargs=-1)
 @click.option("--all", "everything", is_flag=True, help="The built-in shapes and every scene of the library.")
 @click.option("--dimensions", type=click.Choice(["2", "3"]), help="Only worlds of so many dimensions.")
+@click.option(
+    "--portable", type=click.Path(path_type=Path), metavar="FOLDER",
+    help="Compile into this folder, for any processor of this platform: to ship with a game or a plugin.",
+)
 @click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
 @click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
 def warm_up_command(
-    targets: tuple[str, ...], everything: bool, dimensions: str | None, clear: bool, as_json: bool, traceback: bool
+    targets: tuple[str, ...], everything: bool, dimensions: str | None, portable: Path | None, clear: bool,
+    as_json: bool, traceback: bool,
 ) -> None:
     """Compile what the scenes or files need; without any: what worlds of spheres and boxes need."""
     del traceback  # seen by Commands.main
-    if clear and (targets or everything or dimensions):
+    if clear and (targets or everything or dimensions or portable):
         raise Problem("--clear goes alone: it compiles nothing")
     if targets and (everything or dimensions):
         option = "--all" if everything else "--dimensions"
         raise Problem(f"{option} and scenes exclude each other: name scenes, or choose with --all and --dimensions")
+    if portable is not None:
+        chosen = [*targets, *(["--all"] if everything else []), *(["--dimensions", dimensions] if dimensions else [])]
+        compile_portable(portable, chosen)
+        return
     folder = cache_folder()
     if folder is None:
         raise Problem(f"no folder can be written to keep kernels in; {CACHE_FOLDER_VARIABLE} names one")

@@ -1,0 +1,130 @@
+"""Kernels that came compiled: loaded where they fit, left alone with one line where they do not."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from carom.framework.jit.prebuilt import INDEX, PORTABLE, made_with
+
+MAIN = """
+import logging, sys
+logging.basicConfig(format="%(message)s", stream=sys.stderr)
+from carom.framework.compilation import kernel, log
+from carom.framework.jit.prebuilt import use_kernels, write_index
+
+@kernel
+def shifted(x):
+    return x * {factor} + 1.0
+
+for folder in sys.argv[1:]:
+    use_kernels(folder)
+print(shifted(2.0), len(log.compiled), log.loaded)
+"""
+WRITE = "import pathlib; write_index(pathlib.Path({folder!r}), {processor!r})"
+
+
+class Game:
+    """A program with one kernel, and the folder that it ships."""
+
+    def __init__(self, folder):
+        self.folder, self.shipped = folder, folder / "kernels"
+        self.shipped.mkdir()
+        environment = {
+            "CAROM_CACHE_DIR": str(self.shipped), "NUMBA_CPU_NAME": PORTABLE[0], "NUMBA_CPU_FEATURES": PORTABLE[1],
+        }  # fmt: skip
+        write = WRITE.format(folder=str(self.shipped), processor=PORTABLE)
+        assert self.run(code=f"{MAIN}{write}\n", shipped=[], **environment)[:3] == (5.0, 1, 0)
+        self.shipped.chmod(0o755)
+
+    def run(self, code=MAIN, factor=2.0, shipped=None, **environment):
+        """(result, compiled, loaded, lines of stderr) in a process with an empty cache of its own."""
+        cache = self.folder / "cache"
+        shutil.rmtree(cache, ignore_errors=True)
+        command = [sys.executable, "-c", code.format(factor=factor), *(shipped or [])]
+        if shipped is None:
+            command.append(str(self.shipped))
+        everything = {**os.environ, "CAROM_CACHE_DIR": str(cache), **environment}
+        done = subprocess.run(command, env=everything, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        result, compiled, loaded = done.stdout.split()
+        return float(result), int(compiled), int(loaded), done.stderr.splitlines()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    return Game(tmp_path_factory.mktemp("game"))
+
+
+@pytest.fixture
+def game(made, tmp_path):
+    """A copy, to break."""
+    copied = object.__new__(Game)
+    copied.folder, copied.shipped = tmp_path, tmp_path / "kernels"
+    shutil.copytree(made.shipped, copied.shipped)
+    return copied
+
+
+def test_a_process_of_any_processor_loads_what_was_shipped(game):
+    assert game.run() == (5.0, 0, 1, [])
+
+
+def test_a_kernel_that_was_edited_since_compiles(game):
+    assert game.run(factor=3.0)[:3] == (7.0, 1, 0)
+
+
+def test_a_missing_or_damaged_kernel_compiles(game):
+    (file,) = game.shipped.glob("*.kernel")
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    assert game.run()[:3] == (5.0, 1, 0)
+    file.unlink()
+    assert game.run()[:3] == (5.0, 1, 0)
+
+
+@pytest.mark.parametrize("name", made_with())
+def test_kernels_made_with_another_version_are_left_alone_and_told_in_one_line(game, name):
+    index = json.loads((game.shipped / INDEX).read_text())
+    here = index["made_with"][name]
+    index["made_with"][name] = "another"
+    (game.shipped / INDEX).write_text(json.dumps(index))
+    result, compiled, loaded, lines = game.run()
+    assert (result, compiled, loaded) == (5.0, 1, 0)
+    reason = f"they were made with {name} another, here {here}"
+    assert lines[0] == f"carom: the kernels in {game.shipped} are not used, {reason}"
+    assert len([line for line in lines if str(game.shipped) in line]) == 1
+
+
+@pytest.mark.parametrize("text", [None, "", "{", "[]", '{"made_with": {}}'])
+def test_a_damaged_index_is_told_in_one_line(game, text):
+    if text is None:
+        (game.shipped / INDEX).unlink()
+    else:
+        (game.shipped / INDEX).write_text(text)
+    result, compiled, loaded, lines = game.run()
+    assert (result, compiled, loaded) == (5.0, 1, 0)
+    told = [line for line in lines if str(game.shipped) in line]
+    assert len(told) == 1
+    assert "index.json is missing or damaged" in told[0]
+
+
+def test_they_can_be_switched_off(game):
+    assert game.run(CAROM_PREBUILT="0")[:3] == (5.0, 1, 0)
+
+
+def carom(*arguments, **environment):
+    command = [sys.executable, "-m", "carom", *map(str, arguments)]
+    return subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True, check=False)
+
+
+def test_the_command_refuses_a_folder_that_holds_other_things(tmp_path):
+    (tmp_path / "letter.txt").write_text("keep me")
+    done = carom("warm-up", "--portable", tmp_path)
+    assert done.returncode == 2
+    assert "holds other things" in done.stderr
+    assert (tmp_path / "letter.txt").exists()
