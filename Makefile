@@ -69,7 +69,7 @@ lint: $(DEV)
 	$(BIN)/ruff check
 
 clean:
-	rm -rf .venv build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .kernels build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
 
 $(VENV):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

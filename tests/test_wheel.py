@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "build", "dist", "out", "tests", "docs", "examples", "*.egg-info")
+LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist", "out", "tests", "docs")
 
 PLAY = """
 import sys, time
@@ -66,10 +66,8 @@ print("kernels", [kernel for kernel, _ in log.compiled])
 
 
 def run(*command, cwd=None, **environment):
-    done = subprocess.run(
-        [sys.executable, *map(str, command)], env={**os.environ, **environment}, cwd=cwd, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
+    command, environment = [sys.executable, *map(str, command)], {**os.environ, **environment}
+    done = subprocess.run(command, env=environment, cwd=cwd, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done
 

@@ -1,0 +1,24 @@
+"""The tests have a kernel cache of their own, never the user's: made once, shared by all workers, kept between runs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+CACHE = Path(__file__).resolve().parent.parent / ".kernels"
+
+os.environ["CAROM_CACHE_DIR"] = str(CACHE)  # before anything imports carom, and for all processes that tests start
+
+
+def pytest_sessionstart(session):
+    """With several workers: compile what nearly all tests need before they start, or each would do it."""
+    config = session.config
+    is_worker, several = hasattr(config, "workerinput"), (getattr(config.option, "numprocesses", None) or 1) > 1
+    if is_worker or not several or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        return
+    commands = [[sys.executable, "-m", "carom", "warm-up", "--dimensions", d] for d in "23"]
+    started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for command in commands]
+    for process in started:
+        process.wait()
