@@ -13,6 +13,7 @@ from .errors import (
     StepError,
     UnhandledPairError,
 )
+from .jit.prebuilt import use_kernels
 from .plugins.plugin import Convex, Plugin
 from .schedule.phases import ForceSystem, Phase, System
 from .schedule.plan import Plan
@@ -52,4 +53,5 @@ __all__ = [
     "World",
     "array_column",
     "column",
+    "use_kernels",
 ]

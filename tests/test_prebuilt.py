@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -128,3 +129,17 @@ def test_the_command_refuses_a_folder_that_holds_other_things(tmp_path):
     assert done.returncode == 2
     assert "holds other things" in done.stderr
     assert (tmp_path / "letter.txt").exists()
+
+
+def test_the_game_of_the_manual_runs_as_written(tmp_path):
+    """docs/ship-your-game.md, without a display: 120 frames, and it says what it has compiled."""
+    pytest.importorskip("pygame")
+    page = (Path(__file__).resolve().parent.parent / "docs" / "ship-your-game.md").read_text(encoding="utf-8")
+    (tmp_path / "bricks.py").write_text(page.partition("```python no-run\n")[2].partition("```")[0])
+    environment = {**os.environ, "SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
+    command = [sys.executable, "bricks.py", "120"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    frames, bricks = done.stdout.splitlines()[-1].split(", ")[:2]
+    assert frames == "120 frames"
+    assert 0 < int(bricks.split()[0]) < 36
