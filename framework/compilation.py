@@ -164,6 +164,10 @@ class KeptDispatcher(CPUDispatcher):
             log.compiled.append((self.py_func.__qualname__, wait.own))
         return entry_point
 
+    def is_kept(self, sig: Any) -> bool:
+        """Whether it is kept on disk for that signature, and has only to be loaded."""
+        return self._cache.holds(sig, self.targetctx)
+
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
         """What numba calls for arguments of new types: looks at them, then compiles."""
         with Wait():

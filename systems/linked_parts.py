@@ -72,9 +72,9 @@ call_watch_bounds = call_in_dimension(SIGNATURES[WATCH_BOUNDS])
 _linked: dict[tuple[Any, int], Linked] = {}
 
 
-def address_of(place: int, function: Callable[..., Any], dimensions: int) -> int:
-    """The address of the function that belongs to a place in ``state.links``; compiles or loads it."""
+def linked_part(place: int, function: Callable[..., Any], dimensions: int) -> Linked:
+    """The function that belongs to a place in ``state.links``, one for the process."""
     key = (function, dimensions)
     if key not in _linked:
         _linked[key] = Linked(function, SIGNATURES[place](dimensions))
-    return _linked[key].address
+    return _linked[key]

@@ -32,10 +32,10 @@ from .inspection.energies import kinetic_energy, momentum, potential_energy
 from .inspection.planned_columns import planned_columns
 from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
-from .linked_parts import BOX_ROWS, address_of
+from .linked_parts import BOX_ROWS, linked_part
 from .linked_parts import COUNT as LINKED_PART_COUNT
 from .narrow_phase.system import NarrowPhase
-from .preparation import prepare
+from .preparation import kind_of, load_kept, prepare
 from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
 from .records import STATE
@@ -88,6 +88,7 @@ class Simulation(PhysicsServices):
         self.parts_version = 0
         self._linked_version = self._linked_forces = -1  # of the scene, and how many force systems there were
         self._shapes_key: Any = None
+        self._kept_key: Any = None
         self._must_check = False  # in every step: sensors among levels, pairs that no plugin has
         self._copies = ColumnCopies(self.table)
         self._words = self.state.words
@@ -96,7 +97,6 @@ class Simulation(PhysicsServices):
         self._found_current = self.state.word_of("found_current")
         self._contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
-        self.preparing = False  # a small world in which all shapes are together, see preparation
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -168,11 +168,11 @@ class Simulation(PhysicsServices):
             return
         if state.several_levels:
             check_sensors(linked, scene.levels, state.shapes.slots, self.table)
-        if linked.unhandled and not self.preparing:
+        if linked.unhandled:
             check_pairs(linked, scene.levels, state.bodies.collider_slot, self.table, self._world.registry)
 
     def _link(self) -> None:
-        """Compile or load what the scene can need: nothing is left for the middle of a game."""
+        """Compile or load what the step needs, and load what later steps and queries may need of what is kept."""
         self.integration.prepare()
         self.parts_version += 1
         state = self.state
@@ -195,18 +195,26 @@ class Simulation(PhysicsServices):
             self._link_shapes(sweeps)
             self._link_parts(sweeps)
             self.program.link(lambda stage: conditions.get(stage.needed, False))
+            self._load_kept()
         except Exception as error:
             self._linked_version = -1
             self._attribution.describe(error)
             raise
         self._linked_version = self.scene.version
 
+    def _load_kept(self) -> None:
+        """What is kept on disk of all that this world can need, when that may be more than before."""
+        key = (self.scene.linked, self._world.registry.version, self.integration.stages_possible)
+        if key != self._kept_key:
+            load_kept(*kind_of(self))
+            self._kept_key = key
+
     def _link_parts(self, sweeps: bool) -> None:
         """The parts of stages that are called by address; those of swept bodies only where there are any."""
         links = self.state.links
         for place, function in LINKED_PARTS.items():
             if not links[place] and (sweeps or place == BOX_ROWS) and self.state.collides:
-                links[place] = address_of(place, function, self.dimensions)
+                links[place] = linked_part(place, function, self.dimensions).address
 
     def _link_shapes(self, sweeps: bool) -> None:
         key = (self.scene.version, sweeps)
@@ -226,7 +234,7 @@ class Simulation(PhysicsServices):
         state = self.state
         before = state.moved, state.candidates_ready
         if not state.links[BOX_ROWS]:
-            state.links[BOX_ROWS] = address_of(BOX_ROWS, box_rows, self.dimensions)
+            state.links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self.dimensions).address
         state.moved = False
         self.program.run_one("box_statics", 0.0)
         self.program.run_one("box_motions", 0.0)
@@ -363,6 +371,10 @@ class Simulation(PhysicsServices):
     def prepare(self, components: tuple[type[Any], ...]) -> None:
         """See :mod:`preparation`."""
         prepare(self, self._world, components)
+
+    def attribute_errors(self) -> Any:
+        """A context in which errors get notes about the plugin that they come from."""
+        return self._attribution()
 
     def _running_step(self) -> int | None:
         return self._world.step_count if self.table.in_step else None

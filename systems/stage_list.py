@@ -44,10 +44,8 @@ ON_DEMAND = (
     *Integration.ON_DEMAND,
 )
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
-CONDITIONS = (
-    "", "dynamic bodies", "colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies",
-    "standard", "on demand",
-)  # fmt: skip
+WITH_COLLIDERS = frozenset(("colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies"))
+CONDITIONS = ("", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "on demand")
 # Columns of the table that a failed step puts back, and those that every step makes again.
 PUT_BACK = ("position", "linear_velocity", "previous_position", "step_force", "force", "inverse_mass")
 

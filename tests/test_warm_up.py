@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import esper
 import numpy as np
@@ -14,10 +15,13 @@ from click.testing import CliRunner
 
 from carom import scenes
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, ForceSystem, System, UnhandledPairError, column
+from carom.framework import CaromError, ForceSystem, Plugin, System, UnhandledPairError, World, column
+from carom.framework.compilation import log
 from carom.framework.jit.cache import cache_folder
 from carom.lab.cli import cli
 from carom.lab.commands import warm_up
+from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins.springs import Springs
 
 from .worlds import ball, floor, make_world, run
 
@@ -85,6 +89,9 @@ def play(integrator):
     world.create_entity(Transform(at(30, 1)), RigidBody(), SphereCollider(0.5, sensor=True))
     limited = RigidBody(max_linear_speed=2.0, linear_damping=0.1, linear_velocity=at(3))
     world.create_entity(Transform(at(40, 3)), limited, SphereCollider(1.0), AABBCollider(half))  # two levels
+    bullet = RigidBody(linear_velocity=at(300), ccd=True)
+    world.create_entity(Transform(at(50, 3)), bullet, SphereCollider(0.1, restitution=0.5))
+    world.create_entity(Transform(at(60, 3)), AABBCollider(half))
     told = []
     for event in ("contact_begin", "contact_stay", "contact_end", "impact"):
         world.on(event, told.append)
@@ -149,6 +156,115 @@ def test_after_prepare_nothing_compiles_and_nothing_loads(d):
     assert result.returncode == 0, result.stderr[-3000:]
 
 
+# Two processes: the first prepares, and the second plays without; both with the same world.
+LATER = """
+import sys
+import numpy as np
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import System, World
+from carom.framework.compilation import log
+from carom.plugins import Physics
+
+d = int(sys.argv[1])
+
+
+def at(x, y=0.0):
+    return (x, y, 0.0)[:d]
+
+
+world = World(Physics(dimensions=d, gravity=at(0.0, -9.81)))
+world.create_entity(Transform(at(0, -1)), AABBCollider(tuple(1.0 if k == 1 else 1e3 for k in range(d))))
+world.create_entity(Transform(at(0, 3)), RigidBody(), SphereCollider(0.5, restitution=0.5))
+if sys.argv[2] == "prepare":
+    world.prepare()
+    sys.exit()
+world.step()
+ready = list(log.compiled), log.loaded
+assert not log.compiled, log.compiled
+
+
+def check(after):
+    assert (log.compiled, log.loaded) == ready, (after, log.compiled, log.loaded, ready)
+
+
+for _ in range(200):
+    world.step()
+    check("bounce and rest")
+
+
+class Idle(System):
+    def process(self, dt):
+        pass
+
+
+world.add_system(Idle())
+world.on("contact_begin", lambda contact: None)
+half = (0.4,) * d
+for k in range(200):
+    size, velocity = 0.02 * 1.03**k, at(0, -4.0 ** (k % 6))
+    world.create_entity(Transform(at(20 * k, 30)), RigidBody(linear_velocity=velocity), SphereCollider(size))
+world.create_entity(Transform(at(-20, 30)), RigidBody(), SphereCollider(1.0), AABBCollider(half, friction=0.5))
+for _ in range(100):
+    world.step()
+    check("the 193rd body, levels")
+for k in range(250):
+    world.create_entity(Transform(at(-10 - 3 * k, 50)), AABBCollider(half))
+world.create_entity(
+    Transform(at(-5, 2)), RigidBody(linear_velocity=at(400, -50), ccd=True), SphereCollider(0.1, restitution=1)
+)
+origin, ahead, points = at(0, 2), at(0, -1), np.array([at(0, 2), at(9, 9)])
+for step in range(300):
+    world.step()
+    check("a swept body")
+    if step % 100 == 5:
+        world.ray_cast(origin, ahead), world.ray_cast(origin, ahead, only_nearest=True)
+        check("rays")
+        for shape in (SphereCollider(1.0), AABBCollider(half)):
+            world.shape_cast(shape, origin, ahead), world.shape_casts(shape, points, ahead)
+        check("moving shapes")
+        world.query_sphere(origin, 3), world.query_aabb(origin, points[1]), world.query_point(origin)
+        world.query_spheres(points, 3.0), world.query_nearest(origin), world.neighbours(2.0)
+        check("queries")
+assert world.physics.state.sweeps_ready
+"""
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_all_that_is_kept_is_there_before_the_first_step(d):
+    """What another process has prepared: later steps and queries of a world that has not compile and load nothing."""
+    for what in ("prepare", "play"):
+        result = subprocess.run([sys.executable, "-c", LATER, str(d), what], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr[-3000:]
+
+
+README_LOOP = """
+import re
+import sys
+from carom.framework import World
+from carom.framework.compilation import log
+
+code = next(block for block in re.findall("```python\\n(.*?)```", open(sys.argv[1]).read(), re.S) if "advance" in block)
+counts, advance = [], World.advance
+
+
+def counted(world, seconds):
+    advance(world, seconds)
+    if world.step_count:
+        counts.append((len(log.compiled), log.loaded))
+
+
+World.advance = counted
+exec(code)
+assert len(counts) > 500 and len(set(counts)) == 1, sorted(set(counts))
+"""
+
+
+def test_the_game_of_the_readme_waits_for_nothing_after_its_first_frame():
+    readme = Path(__file__).parents[1] / "README.md"
+    result = subprocess.run([sys.executable, "-c", README_LOOP, str(readme)], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr[-3000:]
+
+
 # -- other guarantees of prepare --------------------------------------------------------------------------------------
 
 
@@ -169,6 +285,33 @@ def test_prepare_changes_nothing_that_can_be_seen():
         run(world, 60)
     assert worlds[0].state_hash() == worlds[1].state_hash()
     assert worlds[0].stats().counters == worlds[1].stats().counters
+
+
+def test_worlds_with_every_plugin_can_be_prepared_and_no_system_is_made_or_run():
+    """Springs are an object of one world, and so are systems of the game: prepare makes no second ones."""
+    made, updates = [], []
+
+    class Counting(System):
+        def __init__(self):
+            made.append(self)
+
+        def process(self, dt):
+            updates.append(dt)
+
+    game = Plugin("game")
+    game.system(Counting)
+    springs = Springs()
+    shapes = [module.plugin for module in (capsule, convex_polygon, half_space, one_way_segment, tile_grid)]
+    world = World(Physics(dimensions=2), game, springs, *shapes)
+    world.add_system(Counting())
+    springs.connect(ball(world, (0, 0)), ball(world, (3, 0)), stiffness=10.0)
+    world.create_entity(Transform((0.0, -5.0)), half_space.HalfSpaceCollider(normal=(0.0, 1.0)))
+    world.prepare()
+    assert (len(made), updates) == (2, [])
+    ready = list(log.compiled), log.loaded
+    world.step()
+    assert (log.compiled, log.loaded) == ready
+    assert len(updates) == 2
 
 
 def test_one_may_prepare_more_and_more():
@@ -289,6 +432,7 @@ def names_of_work(monkeypatch, *arguments):
     """The command's pieces of work, in order."""
     done = []
     monkeypatch.setattr(warm_up, "prepare_built_in", lambda d: done.append(d))
+    monkeypatch.setattr(warm_up, "prepare_shipped_plugins", lambda d: done.append(f"plugins {d}"))
     monkeypatch.setattr(warm_up, "_prepare_scene", lambda loaded: done.append(loaded.name))
     result = CliRunner().invoke(cli, ["warm-up", *arguments])
     assert result.exit_code == 0, result.stderr
@@ -296,12 +440,12 @@ def names_of_work(monkeypatch, *arguments):
 
 
 def test_what_is_to_be_compiled_can_be_chosen(monkeypatch):
-    assert names_of_work(monkeypatch) == [2, 3]
-    assert names_of_work(monkeypatch, "--dimensions", "3") == [3]
+    assert names_of_work(monkeypatch) == [2, "plugins 2", 3, "plugins 3"]
+    assert names_of_work(monkeypatch, "--dimensions", "3") == [3, "plugins 3"]
     assert names_of_work(monkeypatch, "jump", "gas2d") == ["jump", "gas2d"]
     flat = [name for name in scenes.names() if scenes.get(name).dimensions == 2]
-    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [2, *flat]
-    assert names_of_work(monkeypatch, "--all") == [2, 3, *scenes.names()]
+    assert names_of_work(monkeypatch, "--all", "--dimensions", "2") == [2, "plugins 2", *flat]
+    assert names_of_work(monkeypatch, "--all") == [2, "plugins 2", 3, "plugins 3", *scenes.names()]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from numba.core import cgutils
 from numba.core.extending import intrinsic
 
 from ..compilation import kernel
+from ..jit.linking import Called
 from ..jit.record import make_record
 from ..jit.record_type import record_at, record_type
 from ..jit.schema import Schema, ints
@@ -41,6 +42,9 @@ def copy_blocks(address):
     blocks = _blocks_at(address)
     for k in range(len(blocks.sizes)):
         _copy_bytes(blocks.targets[k], blocks.sources[k], blocks.sizes[k])
+
+
+COPY_BLOCKS = Called(copy_blocks, int)
 
 
 class ColumnCopies:

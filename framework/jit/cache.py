@@ -154,6 +154,10 @@ class KernelCache(_Cache):
         self._missing(self._dispatcher)
         return None
 
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        """Whether there is a file for that signature, so that most likely nothing has to compile."""
+        return self._enabled and any(path.exists() for path in self._places(sig, target_context.codegen()))
+
     def _places(self, sig: Any, codegen: Any) -> Iterator[Path]:
         """Where that kernel may stand: shipped for any processor of the platform, or compiled here for this one."""
         for shipped in prebuilt.folders():

@@ -55,6 +55,15 @@ class Linked:
         """Whether it has been compiled or loaded."""
         return self._address != 0
 
+    @property
+    def at_hand(self) -> bool:
+        """Whether linking it compiles nothing."""
+        return self.ready or not JIT or self._dispatcher.is_kept(self.signature)
+
+    def link(self) -> None:
+        """Compile or load it now."""
+        self.address  # noqa: B018 - asking for it links
+
     def _find(self) -> int:
         if not JIT:
             _plain.append(self.function)
@@ -62,6 +71,28 @@ class Linked:
         self._dispatcher.compile(self.signature)
         machine_code, description = attrgetter("library", "fndesc")(self._dispatcher.overloads[self.signature.args])
         return machine_code.get_pointer_to_function(description.llvm_func_name)
+
+
+class Called:
+    """A kernel that Python calls with numbers of these types, to be linked ahead of its first call."""
+
+    def __init__(self, kernel: Any, *arguments: type[int] | type[float]) -> None:
+        self._kernel, self._arguments, self._linked = kernel, arguments, not JIT
+
+    @property
+    def _types(self) -> tuple[Any, ...]:
+        return tuple(numba.types.int64 if kind is int else numba.types.float64 for kind in self._arguments)
+
+    @property
+    def at_hand(self) -> bool:
+        """Whether linking it compiles nothing."""
+        return self._linked or self._kernel.is_kept(self._types)
+
+    def link(self) -> None:
+        """Compile or load it now."""
+        if not self._linked:
+            self._kernel.compile(self._types)
+            self._linked = True
 
 
 def linked_call(signature: Any) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 
 from ..compilation import log, untimed_kernel
-from ..jit.linking import Linked, linked_call
+from ..jit.linking import Called, Linked, linked_call
 from ..jit.record import Record
 from ..jit.record_type import record_at, record_type
 from ..jit.schema import Schema, integer, ints
@@ -52,6 +52,9 @@ def run_stages(address, start, stop, dt):
             if code != 0:
                 return code
     return 0
+
+
+RUN_STAGES = Called(run_stages, int, int, int, float)
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,10 @@ class Program:
     def link(self, wanted: Callable[[Stage], bool]) -> None:
         """Compile or load the stages that are wanted; the others are skipped from now on."""
         for k, stage in enumerate(self.stages):
-            self._addresses[k] = linked_stage(stage, self.state).address if wanted(stage) else 0
+            self._addresses[k] = self._linked(stage).address if wanted(stage) else 0
+
+    def _linked(self, stage: Stage) -> Linked:
+        return linked_stage(stage, self.state.schema, self.state.dimensions)
 
     def is_linked(self, name: str) -> bool:
         """Whether that stage runs."""
@@ -170,7 +176,7 @@ class Program:
         """Run one stage, linked or not."""
         k = self.index[name]
         if not self._addresses[k]:
-            self._addresses[k] = linked_stage(self.stages[k], self.state).address
+            self._addresses[k] = self._linked(self.stages[k]).address
         self.run_inside(k, k + 1, dt)
 
     def counts(self) -> np.ndarray:
@@ -185,9 +191,9 @@ class Program:
 _linked: dict[tuple[Any, Any], Linked] = {}
 
 
-def linked_stage(stage: Stage, state: Record) -> Linked:
+def linked_stage(stage: Stage, schema: Schema, dimensions: int) -> Linked:
     """The stage's compiled function for states of that kind, one for the process."""
-    kind = record_type(state.schema, state.dimensions)
+    kind = record_type(schema, dimensions)
     key = (stage.function, kind)
     if key not in _linked:
         _linked[key] = Linked(stage.function, types.int64(kind, types.float64))

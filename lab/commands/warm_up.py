@@ -1,4 +1,4 @@
-"""``carom warm-up``: compile in advance the kernels that scenes, or worlds of the built-in shapes, need."""
+"""``carom warm-up``: compile in advance the kernels that scenes, or worlds of the shapes that ship, need."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ from ...components import AABBCollider, SphereCollider
 from ...framework import Settings, World
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
-from ...plugins import Physics
+from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from ..reporting.progress import CompileStatus
 from .loading import Loaded, load, stdout_kept_clean
 from .portable import compile_portable
 from .usage_errors import Problem
 
+# The plugins that ship and bring shapes.
+SHIPPED = tuple(module.plugin for module in (capsule, convex_polygon, half_space, one_way_segment, tile_grid))
 STEPS = 10  # of a scene, to compile what its own systems call
 
 Work = tuple[str, Callable[[], None]]
@@ -58,7 +60,7 @@ def warm_up_command(
     targets: tuple[str, ...], everything: bool, dimensions: str | None, portable: Path | None, clear: bool,
     as_json: bool, traceback: bool,
 ) -> None:
-    """Compile what the scenes or files need; without any: what worlds of spheres and boxes need."""
+    """Compile what the scenes or files need; without any: what worlds of the shapes that ship need."""
     del traceback  # seen by Commands.main
     if clear and (targets or everything or dimensions or portable):
         raise Problem("--clear goes alone: it compiles nothing")
@@ -104,18 +106,26 @@ def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> I
     if not targets:
         for d in sorted(dimensions):
             yield f"spheres and boxes, {d}D", lambda d=d: prepare_built_in(d)
+            yield f"shapes of the plugins, {d}D", lambda d=d: prepare_shipped_plugins(d)
     names = [name for name in scenes.names() if scenes.get(name).dimensions in dimensions] if everything else targets
     for loaded in [load(name) for name in names]:  # report missing scenes before anything compiles
         yield loaded.name, lambda loaded=loaded: _prepare_scene(loaded)
 
 
 def prepare_built_in(dimensions: int) -> None:
-    """Build a world of spheres and boxes, and one for every integrator of the standard physics."""
-    with closing(World(Physics(dimensions=dimensions))) as world:
-        world.prepare(SphereCollider, AABBCollider)
-    for name in sorted(Physics(dimensions=dimensions).integrators):
-        with closing(World(Physics(dimensions=dimensions), settings=Settings(integrator=name))) as world:
-            world.prepare()
+    """What worlds of spheres and boxes need, with every standard integrator and in every mode of collision."""
+    integrators = [Settings(integrator=name) for name in sorted(Physics(dimensions=dimensions).integrators)]
+    for settings in (*integrators, Settings(collision="event_driven")):
+        with closing(World(Physics(dimensions=dimensions), settings=settings)) as world:
+            world.prepare(SphereCollider, AABBCollider)
+
+
+def prepare_shipped_plugins(dimensions: int) -> None:
+    """What worlds need in which the shapes of all plugins that ship are together."""
+    plugins = [plugin for plugin in SHIPPED if any(dimensions in shape.dimensions for shape in plugin.shapes)]
+    shapes = [shape for plugin in plugins for shape in plugin.shapes if dimensions in shape.dimensions]
+    with closing(World(Physics(dimensions=dimensions), *plugins)) as world:
+        world.prepare(SphereCollider, AABBCollider, *shapes)
 
 
 def _prepare_scene(loaded: Loaded) -> None:

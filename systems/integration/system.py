@@ -114,6 +114,14 @@ class Integration(StagedSystem):
         return ("standard",) if self.in_python else ("standard", *integrator.STAGES)
 
     @property
+    def stages_possible(self) -> tuple[str, ...]:
+        """The same, and those that it calls from Python where forces change within the step."""
+        integrator = self.integrator
+        if type(integrator) not in STANDARD:
+            return ()
+        return tuple(dict.fromkeys(("standard", *integrator.STAGES, *integrator.kernels(True))))
+
+    @property
     def in_python(self) -> bool:
         """Whether the integrator is called from Python: it is a plugin's, or forces change within the step."""
         return type(self.integrator) not in STANDARD or bool(self.world.force_systems)

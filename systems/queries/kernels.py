@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
 from numba import types
 
 from ...framework.compilation import kernel
-from ...framework.jit.linking import Linked, linked_call
+from ...framework.jit.linking import Called, Linked, linked_call
 from ...framework.jit.record_type import record_at, record_type
 from ..broad_phase.records import TREE
 from ..records import STATE
@@ -44,6 +45,13 @@ class QueryKernels:
         self.nearest = Linked(find_nearest, signature)
         self.hits = Linked(find_hits, signature)
         self.neighbours = Linked(find_neighbours, signature)
+
+    def of_world(self, has_shapes: bool) -> Iterator[Linked | Called]:
+        """What queries of a world may call; without shapes that is the search for neighbours alone."""
+        yield Called(self.run, *[int] * 8)
+        yield self.neighbours
+        if has_shapes:
+            yield from (self.overlaps, self.nearest, self.hits)
 
 
 @cache

@@ -7,6 +7,7 @@ seen from the query: the normal leads away from its shape, the point is relative
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from ...framework.compilation import inlined
 from ...framework.data.component import Component
+from ...framework.jit.linking import Linked
 from ...framework.jit.record import Record
 from ...framework.jit.schema import Schema, flags, integer, ints
 from ...framework.plugins.registry import Registry, Shape
@@ -98,6 +100,17 @@ class LinkedQuery:
             self.pairs.append(linked_pair(first, second, pair, linked.dimensions))
             by_address = convex_sides(first, second, pair)
             self._supported.update(side for side, taken in zip((one, two), by_address, strict=True) if taken)
+
+    def all_functions(self) -> Iterator[Linked]:
+        """Everything that queries with this shape may call, casts included."""
+        yield from self._functions.all_functions(by_address=None in self._supported)
+        for number in self._supported - {None}:
+            yield from linked_shape(self._linked.shapes[number], self._linked.dimensions).all_functions(by_address=True)
+        for pair in self.pairs:
+            if pair is not None:
+                yield pair.evaluate
+                if pair.sweep is not None:
+                    yield pair.sweep
 
     def fill(self, query: Record, parameters: Record, bodies: ParameterRecords, sweeps: bool = False) -> None:
         """Write the functions into a record of ``QUERY``.

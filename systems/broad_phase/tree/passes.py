@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from typing import Any
 
 from numba import types
 
 from ....framework.compilation import kernel
-from ....framework.jit.linking import Linked, linked_call
+from ....framework.jit.linking import Called, Linked, linked_call
 from ....framework.jit.record_type import record_at, record_type
 from ..records import TREE
 from . import build, pairs, queries
 
-FUNCTIONS: tuple[Callable[..., Any], ...] = (
+BUILDING: tuple[Callable[..., Any], ...] = (
     build.build_one_cell, build.build_tree, build.assign_again, build.finish_tree,
-    pairs.find_ranges_within, pairs.find_ranges_between, pairs.test_within, pairs.test_between,
-    queries.query_boxes,
 )  # fmt: skip
+PAIRS: tuple[Callable[..., Any], ...] = (
+    pairs.find_ranges_within, pairs.find_ranges_between, pairs.test_within, pairs.test_between,
+)  # fmt: skip
+FUNCTIONS = (*BUILDING, *PAIRS, queries.query_boxes)
 
 
 class TreePasses:
@@ -39,6 +41,12 @@ class TreePasses:
             return call(function, at(tree), at(other))
 
         return run_tree_pass
+
+    def of_world(self, has_shapes: bool) -> Iterator[Linked | Called]:
+        """The passes that a world may run; without shapes there are no pairs, only trees for queries."""
+        yield Called(self._call, int, int, int)
+        for function in (*BUILDING, *(PAIRS if has_shapes else ())):
+            yield self.linked[function.__name__]
 
     def run(self, name: str, tree: Any, other: Any = None) -> int:
         """Run a pass over the records of a tree, or of two."""

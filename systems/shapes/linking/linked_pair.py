@@ -6,6 +6,7 @@ All take the two shapes in the order in which the pair is registered; callers tu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any
@@ -97,6 +98,11 @@ class LinkedPair:
             return None
         touches = self._registered("touches", self.pair.corner, "d, slop", helpers=False)
         return Linked(named(make_corner(touches, *self._records)), corner_signature(self.dimensions))
+
+    def all_functions(self) -> Iterator[Linked]:
+        """Those that there are."""
+        yield from (self.evaluate, self.batch)
+        yield from (linked for linked in (self.sweep, self.corner) if linked is not None)
 
     @cached_property
     def _contact(self) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache, cached_property, lru_cache
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from ....framework.compilation import kernel
 from ....framework.data.array_columns import ArrayColumn
-from ....framework.jit.linking import Linked
+from ....framework.jit.linking import Called, Linked
 from ....framework.jit.record import make_record
 from ....framework.jit.record_type import record_at, record_type, rows_of
 from ....framework.jit.schema import Schema, vectors
@@ -94,6 +94,14 @@ class LinkedShape:
         made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
         return Linked(made.rounding, ROUNDING_SIGNATURE)
 
+    def all_functions(self, by_address: bool) -> Iterator[Linked]:
+        """by_address: whether some pair takes the shape by the addresses of support and rounding."""
+        yield self.bounds
+        if self.rotated is not None:
+            yield self.rotated
+        if by_address:
+            yield from (self.support, self.rounding)
+
     def _parameters(self, address: str) -> str:
         return parameters_source(self.shape, f"at({address})", "i", "Parameters")
 
@@ -129,6 +137,11 @@ def _half_extents_kernel(dimensions: int) -> Any:
             result.half[i] = call_bounds(address, state, parameters, i)
 
     return half_extents
+
+
+def half_extents_call(dimensions: int) -> Called:
+    """What :func:`half_extents_of` calls beside the shape's bounds, where an entity gets several colliders."""
+    return Called(_half_extents_kernel(dimensions), int, int, int, int)
 
 
 @lru_cache(maxsize=2)

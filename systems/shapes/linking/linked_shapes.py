@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ....framework.data.component import Component
+from ....framework.jit.linking import Linked
 from ....framework.jit.record import Record
 from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
@@ -95,6 +96,15 @@ class LinkedShapes:
         shapes.evaluate, shapes.batch, shapes.corner = self._evaluate, self._batch, self._corner
         shapes.flipped = self._flipped
         shapes.sweep = self._sweep if sweeps else np.zeros(len(self.shapes) ** 2, np.int64)
+
+    def all_functions(self) -> Iterator[Linked]:
+        """Everything that a step may call for these shapes, swept bodies included."""
+        for number, function in enumerate(self.functions):
+            yield from function.all_functions(by_address=number in self.supported)
+        yield from (linked_rule(rule) for rule in self._rules)
+        for pair in self.pairs.values():
+            if pair is not None:
+                yield from pair.all_functions()
 
     @cached_property
     def _bounds(self) -> np.ndarray:
