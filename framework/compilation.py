@@ -8,22 +8,15 @@ DEBUG for each that is loaded.
 
 from __future__ import annotations
 
-import gc
+import functools
 import logging
 import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
-from numba import config
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import CPUDispatcher
-from numba.core.types import unliteral
-
-from .jit.cache import CACHE_FOLDER_VARIABLE, KernelCache, cache_folder
-from .jit.hash import deep_hash as deep_hash
-from .jit.pipeline import kernel_compiler, part_compiler
+from .jit.late import JIT, Late
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -66,7 +59,12 @@ def kernel(function: Function) -> Function:
 
 def untimed_kernel(function: Function) -> Function:
     """Like :func:`kernel`, for what is called so often that :func:`time_calls` must add nothing to the call."""
-    return _kept(KeptDispatcher, function, _nrt=CHECKED)
+    return _kept(Compiled, function, _nrt=CHECKED)
+
+
+def entry_point(kernel: Function) -> Function:
+    """What to call in place of a kernel of :func:`untimed_kernel`, without a detour."""
+    return getattr(kernel, "made", kernel)
 
 
 def allocating_kernel(function: Function) -> Function:
@@ -91,118 +89,76 @@ def pasted(function: Function) -> Function:
 
 def allocating_part(function: Any) -> Any:
     """The same part with its options, but it may make arrays and raise exceptions with values."""
-    return Part(function.py_func, targetoptions={**function.targetoptions, "_nrt": True}, pipeline_class=part_compiler)
+    return Part(function.py_func, {**function.targetoptions, "_nrt": True})
 
 
 def linked_dispatcher(function: Any, allocates: bool) -> Any:
     """For functions that are called through their address alone, see :mod:`~carom.framework.jit.linking`."""
     plain = getattr(function, "py_func", function)
-    return _kept(KeptDispatcher, plain, no_cpython_wrapper=True, _nrt=allocates or CHECKED)
+    return Compiled(plain, {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": allocates or CHECKED}).made
 
 
-def _kept(kind: type[KeptDispatcher], function: Any, **options: Any) -> Any:
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return function
-    return kind(function, targetoptions={**_OPTIONS, **options}, pipeline_class=kernel_compiler)
+def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:
+    return kind(function, {**_OPTIONS, **options}) if JIT else function
 
 
 def _part(function: Any, **options: Any) -> Any:
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return function
     options = {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED, **options}
-    return Part(function, targetoptions=options, pipeline_class=part_compiler)
+    return Part(function, options) if JIT else function
 
 
-class Wait:
-    """A context manager around compiling and loading: notes the time, and keeps other threads out.
+class Compiled(Late):
+    """A function for numba to compile; its dispatcher, :attr:`made`, is made when first called or needed by a kernel.
 
-    own: seconds without those of waits inside it, once it is over.
+    targetoptions, py_func: numba's names, by which it recognises what it has to inline.
     """
 
-    _running: ClassVar[list[Wait]] = []
+    def __init__(self, function: Any, options: dict[str, Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.plain = self.py_func = function
+        self.targetoptions = options
 
-    def __enter__(self) -> Wait:
-        global_compiler_lock.acquire()
-        self.own = 0.0
-        self._collecting = gc.isenabled()
-        gc.disable()  # the compiler makes millions of objects that live on; looking through them takes a twentieth
-        self._running.append(self)
-        self._started = time.perf_counter()
-        return self
+    def _make(self) -> Any:
+        from .jit.dispatchers import KeptDispatcher
 
-    def __exit__(self, *_: object) -> None:
-        self._running.pop()
-        if self._collecting:
-            gc.collect(0)  # once now, instead of at some moment soon, which would be taken for run time
-            gc.enable()
-        seconds = time.perf_counter() - self._started
-        self.own += seconds
-        if self._running:
-            self._running[-1].own -= seconds
-        else:
-            log.waited += seconds
-        global_compiler_lock.release()
+        return KeptDispatcher(self.py_func, self.targetoptions)
+
+    def __call__(self, *args: Any) -> Any:
+        return self.made(*args)
+
+    @property
+    def carom_depends_on(self) -> Any:
+        return repr(sorted(self.targetoptions.items())), self.py_func
+
+    @staticmethod
+    def _type_of(made: Any) -> Any:
+        return made._numba_type_
 
 
-class KeptDispatcher(CPUDispatcher):
-    """numba's dispatcher, with machine code kept on disk, and the cost of compiling and loading noted."""
-
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self._cache = KernelCache(self, _announce)
-
-    def compile(self, sig: Any) -> Any:
-        with Wait() as wait:
-            known, loaded = len(self.overloads), self._cache_hits[sig]
-            entry_point = super().compile(sig)
-            was_loaded = self._cache_hits[sig] > loaded
-            was_compiled = len(self.overloads) > known and not was_loaded
-        if was_loaded:
-            log.loaded += 1
-            logger.debug("loaded %s for %s", self.py_func.__name__, sig)
-        elif was_compiled:
-            log.compiled.append((self.py_func.__qualname__, wait.own))
-        return entry_point
-
-    def is_kept(self, sig: Any) -> bool:
-        """Whether it is kept on disk for that signature, and has only to be loaded."""
-        return self._cache.holds(sig, self.targetctx)
-
-    def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
-        """What numba calls for arguments of new types: looks at them, then compiles."""
-        with Wait():
-            return super()._compile_for_args(*args, **kws)
-
-    def typeof_pyval(self, val: Any) -> Any:
-        """Called once per new type of argument; the first time loads a good part of numba."""
-        with Wait():
-            return super().typeof_pyval(val)
-
-
-class Kernel(KeptDispatcher):
+class Kernel(Compiled):
     """One whose calls from Python can be timed."""
 
     def __call__(self, *args: Any) -> Any:
         if _timing is None:
-            return super().__call__(*args)
+            return self.made(*args)
         waited = log.waited
         started = time.perf_counter_ns()
-        result = super().__call__(*args)
+        result = self.made(*args)
         elapsed = time.perf_counter_ns() - started
         if _timing is not None:
             _timing(self.py_func.__name__, elapsed, log.waited != waited)
         return result
 
 
-class Part(CPUDispatcher):
+class Part(Compiled):
     """A function that kernels call. Python runs it as written, so that it can be tried before anything compiles."""
 
-    def __call__(self, *args: Any) -> Any:
-        return self.py_func(*args)
+    __call__ = Late.__call__
 
-    def get_call_template(self, args: Any, kws: Any) -> Any:
-        """What numba asks for at a call; constants are compiled for as any number of their type is."""
-        return super().get_call_template([unliteral(kind) for kind in args], kws)
+    def _make(self) -> Any:
+        from .jit.dispatchers import PartDispatcher
+
+        return PartDispatcher(self.py_func, self.targetoptions)
 
 
 _timing: Callable[[str, int, bool], None] | None = None
@@ -222,8 +178,10 @@ def timing() -> bool:
     return _timing is not None
 
 
-def _announce(dispatcher: Any) -> None:
+def announce(dispatcher: Any) -> None:
     """Say that a kernel is about to compile."""
+    from .jit.cache import CACHE_FOLDER_VARIABLE, cache_folder
+
     for listener in log.listeners:
         listener(dispatcher.py_func.__qualname__)
     if not log.announced and not log.listeners:

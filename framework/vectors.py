@@ -12,53 +12,28 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numba
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.extending import _Intrinsic
-
 from .compilation import inlined
-
-_INDEX = ir.IntType(32)
-
-
-class _Emitted(_Intrinsic):  # pyright: ignore[reportGeneralTypeIssues]  # final for type checkers only
-    """Python runs the plain function."""
-
-    plain: Callable[..., Any]
-
-    def __call__(self, *args: Any) -> Any:
-        return self.plain(*args)
+from .jit.late import JIT, Late, cgutils, operation, types
 
 
 def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callable[[Any], Any]:
     """Replace a plain function by code that ``emit(context, builder, argument types, values)`` writes."""
 
+    def typing(typing_context: Any, *arguments: Any) -> Any:
+        made = signature(*arguments)
+        if made is None:
+            return None
+
+        def codegen(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            return emit(context, builder, sig.args, values)
+
+        return made, codegen
+
     def decorate(function: Any) -> Any:
-        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        if not JIT:
             return function
-        count = function.__code__.co_argcount
-
-        def typing(typing_context: Any, *arguments: Any) -> Any:
-            made = signature(*arguments)
-            if made is None:
-                return None
-
-            def codegen(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-                return emit(context, builder, sig.args, values)
-
-            return made, codegen
-
-        names = ", ".join(f"a{i}" for i in range(count))
-        scope = {"typing": typing}
-        exec(f"def {function.__name__}(context, {names}): return typing(context, {names})", scope)
-        made = _Emitted(function.__name__, scope[function.__name__])
-        made._register()
-        made.plain = function
-        made.__doc__ = function.__doc__
-        made.carom_depends_on = (function, emit, signature)
-        return made
+        name, count = function.__name__, function.__code__.co_argcount
+        return Late(lambda: operation(name, count, typing, (function, emit, signature)), function)
 
     return decorate
 

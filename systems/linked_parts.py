@@ -9,8 +9,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from numba import types
-
+from ..framework.jit.late import types
 from ..framework.jit.linking import Linked
 from ..framework.jit.record_type import record_type
 from .records import STATE
@@ -20,7 +19,21 @@ from .shapes.linking.signatures import call_in_dimension, vector_type
 BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS = range(7)
 COUNT = 7
 
-_INT, _FLOAT, _BOOL = types.int64, types.float64, types.boolean
+
+def _int(dimensions: int) -> Any:
+    return types.int64
+
+
+def _float(dimensions: int) -> Any:
+    return types.float64
+
+
+def _bool(dimensions: int) -> Any:
+    return types.boolean
+
+
+def _three_floats(dimensions: int) -> Any:
+    return types.UniTuple(types.float64, 3)
 
 
 def path_type(dimensions: int) -> Any:
@@ -31,34 +44,32 @@ def path_type(dimensions: int) -> Any:
 def touch_type(dimensions: int) -> Any:
     """(time, normal, point, from a's centre to b's)."""
     vector = vector_type(dimensions)
-    return types.Tuple((_FLOAT, vector, vector, vector))
+    return types.Tuple((types.float64, vector, vector, vector))
 
 
-def _signature(result: Any, *arguments: Any) -> Callable[[int], Any]:
-    """Of (state, *arguments); functions among the types are called with the dimension."""
+def _signature(result: Callable[[int], Any], *arguments: Callable[[int], Any]) -> Callable[[int], Any]:
+    """Of (state, *arguments); each gives its type for a dimension."""
 
     @cache
     def signature_of(dimensions: int) -> Any:
-        made = [kind(dimensions) if callable(kind) and not isinstance(kind, types.Type) else kind for kind in arguments]
-        answer = result(dimensions) if callable(result) and not isinstance(result, types.Type) else result
-        return answer(record_type(STATE, dimensions), *made)
+        return result(dimensions)(record_type(STATE, dimensions), *(kind(dimensions) for kind in arguments))
 
     return signature_of
 
 
 def _first_touch(dimensions: int) -> Any:
     vector = vector_type(dimensions)
-    return types.Tuple((_INT, _FLOAT, vector, vector, vector))
+    return types.Tuple((types.int64, types.float64, vector, vector, vector))
 
 
 SIGNATURES = {
-    BOX_ROWS: _signature(_INT, _INT, _INT, _INT),
-    BOUND_SEARCHES: _signature(_INT, _FLOAT, _FLOAT),
-    FIRST_TOUCH: _signature(_first_touch, _INT, _INT, path_type, _BOOL, _FLOAT, _FLOAT, types.UniTuple(_FLOAT, 3)),
-    HELD_BY_EDGE: _signature(_BOOL, _INT, _INT, path_type, touch_type, _FLOAT, _FLOAT),
-    KIND_BEYOND_CAP: _signature(_INT, _INT, _INT, path_type, _FLOAT, _FLOAT, _FLOAT, _FLOAT),
-    TAKE_SWEPT: _signature(_INT, _INT, _FLOAT),
-    WATCH_BOUNDS: _signature(_INT, _INT, _FLOAT),
+    BOX_ROWS: _signature(_int, _int, _int, _int),
+    BOUND_SEARCHES: _signature(_int, _float, _float),
+    FIRST_TOUCH: _signature(_first_touch, _int, _int, path_type, _bool, _float, _float, _three_floats),
+    HELD_BY_EDGE: _signature(_bool, _int, _int, path_type, touch_type, _float, _float),
+    KIND_BEYOND_CAP: _signature(_int, _int, _int, path_type, _float, _float, _float, _float),
+    TAKE_SWEPT: _signature(_int, _int, _float),
+    WATCH_BOUNDS: _signature(_int, _int, _float),
 }
 
 call_box_rows = call_in_dimension(SIGNATURES[BOX_ROWS])

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..components import AABBCollider, Collider, SphereCollider
-from ..framework.compilation import Wait
 from ..framework.data.bodies import SelectedBodies
 from ..framework.data.column_copies import COPY_BLOCKS
 from ..framework.data.component import Component
+from ..framework.jit.late import dispatchers
 from ..framework.jit.linking import Called, Linked
 from ..framework.schedule.stages import RUN_STAGES, linked_stage
 from ..framework.world.world import World
@@ -77,7 +77,7 @@ def needed_functions(
 @lru_cache(maxsize=128)  # once in a process for worlds alike
 def load_kept(*kind: Any) -> None:
     """Load what is kept on disk of all that such a world may call."""
-    with Wait():
+    with dispatchers.Wait():
         for function in needed_functions(*kind):
             if function.at_hand:
                 function.link()

@@ -14,9 +14,10 @@ import pytest
 from numba.core.errors import TypingError
 
 from carom.framework import compilation
-from carom.framework.compilation import deep_hash, inlined, kernel, part
+from carom.framework.compilation import inlined, kernel, part
 from carom.framework.jit import cache as kernel_cache
-from carom.framework.jit.cache import cache_contents, clear_cache
+from carom.framework.jit.cache import cache_contents, cache_folder, clear_cache
+from carom.framework.jit.hash import deep_hash
 
 HELPERS = """
 from carom.framework.compilation import part
@@ -35,7 +36,8 @@ MAIN = """
 import sys
 sys.path.insert(0, {folder!r})
 import numpy as np
-from carom.framework.compilation import deep_hash, kernel, log
+from carom.framework.compilation import kernel, log
+from carom.framework.jit.hash import deep_hash
 from helpers import helper
 
 def make(shift):
@@ -278,9 +280,9 @@ def test_a_folder_that_cannot_be_written_is_passed_over(monkeypatch, tmp_path):
     blocked.write_text("")
     monkeypatch.setenv("CAROM_CACHE_DIR", str(blocked / "sub"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert compilation.cache_folder() == tmp_path / "home" / "carom"
+    assert cache_folder() == tmp_path / "home" / "carom"
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path / "chosen"))
-    assert compilation.cache_folder() == tmp_path / "chosen"
+    assert cache_folder() == tmp_path / "chosen"
     assert (tmp_path / "chosen").is_dir()
 
 
@@ -471,5 +473,5 @@ def test_the_log_counts_and_tells_listeners(monkeypatch, tmp_path):
     assert "thrice" in told[0]
     assert len(compilation.log.compiled) == before + 1
     assert compilation.log.seconds > 0
-    thrice._cache.flush()
+    thrice.made._cache.flush()
     assert not list(tmp_path.glob("*.kernel"))

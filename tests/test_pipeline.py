@@ -10,8 +10,9 @@ import pytest
 from llvmlite.binding import Linkage
 from numba.core.compiler import Compiler
 
-from carom.framework.compilation import KeptDispatcher, Kernel, Part, allocating_kernel, kernel, part
+from carom.framework.compilation import Kernel, Part, allocating_kernel, kernel, part
 from carom.framework.jit import pipeline
+from carom.framework.jit.dispatchers import KeptDispatcher
 
 jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing compiles")
 tried = pytest.mark.skipif(pipeline.kernel_compiler is Compiler, reason="numba compiles in its own way")
@@ -83,7 +84,7 @@ def test_parts_raise_through_kernels():
 @tried
 def test_parts_have_no_machine_code():
     compiled(rooted_kernel)(1.0)
-    (result,) = rooted.overloads.values()
+    (result,) = rooted.made.overloads.values()
     assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
 
 
@@ -107,7 +108,7 @@ def test_constants_share_the_code_of_numbers():
         return twice(3) + twice(4) + twice(count)
 
     assert compiled(doubles)(5) == 24
-    assert len(twice.overloads) == 1
+    assert len(twice.made.overloads) == 1
 
 
 @jit

@@ -209,13 +209,13 @@ import gc
 import sys
 sys.path.insert(0, sys.argv[2])
 from tests import helpers_plan
-from carom.framework import compilation
+from carom.framework.jit.dispatchers import KeptDispatcher
 from carom.systems import simulation
 simulation.load_kept = lambda *_: None  # what later steps may need, if it is kept
 world = helpers_plan.LADDER[sys.argv[1]][0]()
 for _ in range(helpers_plan.STEPS):
     world.step()
-made = [thing for thing in gc.get_objects() if isinstance(thing, compilation.KeptDispatcher)]
+made = [thing for thing in gc.get_objects() if isinstance(thing, KeptDispatcher)]
 compiled = [k for k in made if k.overloads]
 print("compiled", *(k.py_func.__name__ for k in compiled))
 print("planned", *(k.kernel for k in world.plan().kernels))

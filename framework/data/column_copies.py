@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.extending import intrinsic
 
 from ..compilation import kernel
+from ..jit.late import JIT, cgutils, intrinsic, ir, types
 from ..jit.linking import Called
 from ..jit.record import make_record
-from ..jit.record_type import record_at, record_type
+from ..jit.record_type import record_at
 from ..jit.schema import Schema, ints
 
 if TYPE_CHECKING:
@@ -22,7 +18,7 @@ if TYPE_CHECKING:
 
 BLOCKS = Schema("Blocks", sources=ints(), targets=ints(), sizes=ints())  # addresses, bytes
 
-_blocks_at = record_at(record_type(BLOCKS, 2))
+_blocks_at = record_at(BLOCKS, 2)
 
 
 @intrinsic
@@ -71,11 +67,11 @@ class ColumnCopies:
             self._blocks.sources = np.array([column.ctypes.data for _, column in self._pairs], np.int64)
             self._blocks.targets = np.array([copy.ctypes.data for copy, _ in self._pairs], np.int64)
             self._blocks.sizes = np.array([column.nbytes for _, column in self._pairs], np.int64)
-        if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        if JIT:
+            copy_blocks(self._blocks.address)
+        else:
             for copy, column in self._pairs:
                 copy[...] = column
-        else:
-            copy_blocks(self._blocks.address)
         self.kept = True
 
     def put_back(self) -> None:

@@ -13,13 +13,8 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import Any
 
-import numba
-from numba.core import cgutils
-from numba.core.extending import intrinsic
-
 from ..compilation import linked_dispatcher
-
-JIT = not numba.config.DISABLE_JIT  # type: ignore[attr-defined]
+from .late import JIT, Late, cgutils, operation, types
 
 # With the JIT off an address is a place in this list.
 _plain: list[Callable[..., Any]] = [lambda *_: None]
@@ -81,22 +76,28 @@ class Called:
 
     @property
     def _types(self) -> tuple[Any, ...]:
-        return tuple(numba.types.int64 if kind is int else numba.types.float64 for kind in self._arguments)
+        return tuple(types.int64 if kind is int else types.float64 for kind in self._arguments)
 
     @property
     def at_hand(self) -> bool:
         """Whether linking it compiles nothing."""
-        return self._linked or self._kernel.is_kept(self._types)
+        return self._linked or self._kernel.made.is_kept(self._types)
 
     def link(self) -> None:
         """Compile or load it now."""
         if not self._linked:
-            self._kernel.compile(self._types)
+            self._kernel.made.compile(self._types)
             self._linked = True
 
 
-def linked_call(signature: Any) -> Any:
+def linked_call(signature_of: Callable[[], Any]) -> Any:
     """The function call(address, *arguments) that calls what stands at an address, of that signature."""
+    if not JIT:
+        return lambda address, *values: _plain[address](*values)
+    return Late(lambda: _compiled_call(signature_of()))
+
+
+def _compiled_call(signature: Any) -> Any:
     result, arguments = signature.return_type, signature.args
 
     def typing(typing_context: Any, *given: Any) -> Any:
@@ -113,13 +114,6 @@ def linked_call(signature: Any) -> Any:
                 convention.return_status_propagate(builder, status)
             return context.get_returned_value(builder, result, builder.load(answer))
 
-        return result(numba.types.int64, *arguments), emit
+        return result(types.int64, *arguments), emit
 
-    if not JIT:
-        return lambda address, *values: _plain[address](*values)
-    names = ", ".join(f"a{k}" for k in range(len(arguments)))
-    scope = {"typing": typing}
-    exec(f"def call(context, address, {names}): return typing(context, address, {names})", scope)
-    call = intrinsic(scope["call"])
-    call.carom_depends_on = (str(result), *map(str, arguments), typing)
-    return call
+    return operation("call", 1 + len(arguments), typing, (str(result), *map(str, arguments), typing))

@@ -5,10 +5,7 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-import numba
 import numpy as np
-
-DISABLED: bool = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
 
 _records: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()  # by address
 

@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from .hash import toolchain
-
 INDEX = "index.json"
 PORTABLE = ("generic", "")  # name and features of a processor whose code runs on all of a platform
 OFF = "CAROM_PREBUILT"  # 0 in the environment: compile everything here
@@ -34,6 +32,8 @@ class Prebuilt:
 
 def made_with() -> dict[str, str]:
     """What an index must say for its code to run here."""
+    from .hash import toolchain  # loads numba
+
     return {**toolchain(), "platform": sysconfig.get_platform()}
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plain_view import DISABLED, remember
+from .late import JIT
+from .plain_view import remember
 from .schema import WORD, Column, Schema
 
 
@@ -31,7 +32,7 @@ class Record:
         self._words = np.zeros(max(self.schema.size // WORD, 1), np.int64)
         self._floats = self._words.view(np.float64)
         self.address: int = self._words.ctypes.data
-        if DISABLED:
+        if not JIT:
             remember(self.address, self)
         self._arrays: dict[str, np.ndarray] = {}
         self._records: dict[str, Record] = {}

@@ -1,356 +1,39 @@
-"""Records inside compiled code: one pointer, whatever the number of columns.
-
-A kernel gets a record as a pointer to its memory, an {address, length} pair for each column and a word for each scalar.
-``bodies.position[i]`` is a tuple of floats, assigning to it stores one; ``len(bodies.position)`` is the number of rows.
-Addresses and lengths are loaded as invariant: no column is replaced while a kernel runs, so a loop over ``s.x[i]`` is
-as fast as one over a local array. A column on demand reads as its default while it has no rows. Indices are not
-checked and never count from the end, unless ``CAROM_CHECK=1`` is set when carom is imported: then an index outside the
-column raises IndexError with the record, the column and the index.
-"""
+"""Records as modules of kernels name them; what compiled code makes of them is in :mod:`record_code`."""
 
 from __future__ import annotations
 
-import operator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numba
-import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.datamodel import models
-from numba.core.extending import intrinsic, lower_builtin, lower_cast, register_model
-from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
-from numba.core.typeconv.castgraph import Conversion
-from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
-from numba.np.arrayobj import populate_array
-from numba.np.numpy_support import from_dtype
-
-from ..compilation import CHECKED
+from .late import JIT, Late
 from .plain_view import plain_view_at
-from .schema import WORD, Column, Schema
+from .schema import Schema
 
-_BYTE_POINTER = ir.IntType(8).as_pointer()
-_WORD = ir.IntType(64)
-
-
-_SCALARS = {"float64": types.float64, "int64": types.int64, "bool": types.boolean}
-
-
-class ColumnType(types.Type):
-    """A column of a record; ``field`` is its :class:`~.schema.Column`, ``label`` record and name in a checked build."""
-
-    def __init__(self, field: Column, dimensions: int, label: str = "") -> None:
-        self.field, self.label = field, label
-        self.dtype = from_dtype(np.dtype(field.dtype))
-        shape = field.item_shape(dimensions)
-        narrow = isinstance(self.dtype, types.Integer) and self.dtype.signed
-        self.number: Any = types.int64 if narrow else self.dtype  # kernels see integers of one width
-        self.item: Any = self.number
-        for count in reversed(shape if field.item != "table" else ()):
-            self.item = types.UniTuple(self.item, count)
-        self.width = 1
-        for count in shape:
-            self.width *= count
-        self.dimensions = dimensions
-        super().__init__(name=f"column({field!r},{dimensions},{label})")
-
-    # In a checked build two columns of one kind are two types; a variable may hold either of them.
-
-    def can_convert_to(self, typingctx: Any, other: Any) -> Any:
-        return Conversion.safe if self._is_like(other) else None
-
-    def unify(self, typingctx: Any, other: Any) -> Any:
-        if not self._is_like(other):
-            return None
-        labels = {*self.label.split(" or "), *other.label.split(" or ")}
-        return ColumnType(self.field, self.dimensions, " or ".join(sorted(labels)))
-
-    def _is_like(self, other: Any) -> bool:
-        return isinstance(other, ColumnType) and (self.field, self.dimensions) == (other.field, other.dimensions)
-
-
-class RecordType(types.Type):
-    """A record of a schema in a world of that many dimensions; made by :func:`record_type`, one object per layout."""
-
-    def __init__(self, schema: Schema, dimensions: int) -> None:
-        self.schema, self.dimensions = schema, dimensions
-        self.members: dict[str, Any] = {}
-        for name, field in schema.fields.items():
-            if isinstance(field, Schema):
-                self.members[name] = record_type(field, dimensions)
-            elif isinstance(field, Column):
-                self.members[name] = ColumnType(field, dimensions, f"{schema.name}.{name}" if CHECKED else "")
-            else:
-                self.members[name] = _SCALARS[field.dtype]
-        super().__init__(name=_name_of(schema, dimensions))
-
-    def __reduce__(self) -> Any:
-        return _known_type, (self.name,)  # cached kernels hold the name, which tells the layout
-
-
-_known: dict[str, RecordType] = {}
-
-
-def _name_of(schema: Schema, dimensions: int) -> str:
-    return f"{schema.name}{dimensions}D({schema.digest}{',checked' if CHECKED else ''})"
+if TYPE_CHECKING:
+    from .record_code import RecordType
 
 
 def record_type(schema: Schema, dimensions: int) -> RecordType:
     """The type of that record in compiled code."""
-    name = _name_of(schema, dimensions)
-    if name not in _known:
-        _known[name] = RecordType(schema, dimensions)
-    return _known[name]
+    from .record_code import record_type
+
+    return record_type(schema, dimensions)
 
 
-def _known_type(name: str) -> RecordType:
-    if name not in _known:
-        raise AttributeError(f"no record {name}")  # the cache takes it as a miss
-    return _known[name]
+def record_at(schema: Schema, dimensions: int) -> Any:
+    """The function (address) -> record of that schema in worlds of that many dimensions."""
+
+    def make() -> Any:
+        from .record_code import record_at
+
+        return record_at(record_type(schema, dimensions))
+
+    return Late(make) if JIT else plain_view_at
 
 
-@register_model(ColumnType)
-class _ColumnModel(models.StructModel):
-    def __init__(self, manager: Any, column: ColumnType) -> None:
-        super().__init__(manager, column, [("data", types.CPointer(column.dtype)), ("length", types.int64)])
+def _make_rows() -> Any:
+    from .record_code import compiled_rows
 
-
-register_model(RecordType)(models.OpaqueModel)
-
-
-# -- fields ---------------------------------------------------------------------------------------
-
-
-@infer_getattr
-class _FieldOf(AttributeTemplate):
-    key = RecordType
-
-    def generic_resolve(self, record: RecordType, name: str) -> Any:
-        return record.members.get(name)
-
-
-def _place(builder: Any, record: Any, offset: int, kind: Any) -> Any:
-    """Where a field stands, as a pointer to ``kind``."""
-    return builder.bitcast(builder.gep(record, [_WORD(offset)], inbounds=True), kind.as_pointer())
-
-
-def _invariant(builder: Any, place: Any) -> Any:
-    value = builder.load(place)
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return value
-
-
-@lower_getattr_generic(RecordType)
-def _load_field(context: Any, builder: Any, record: RecordType, value: Any, name: str) -> Any:
-    kind, offset = record.members[name], record.schema.layout[name]
-    if isinstance(kind, ColumnType):
-        column = cgutils.create_struct_proxy(kind)(context, builder)
-        pointer = context.get_data_type(kind.dtype).as_pointer()
-        column.data = _invariant(builder, _place(builder, value, offset, pointer))
-        column.length = _invariant(builder, _place(builder, value, offset + WORD, _WORD))
-        return column._getvalue()
-    if isinstance(kind, RecordType):
-        return _invariant(builder, _place(builder, value, offset, _BYTE_POINTER))
-    if kind == types.boolean:
-        return builder.icmp_signed("!=", builder.load(_place(builder, value, offset, _WORD)), _WORD(0))
-    return builder.load(_place(builder, value, offset, context.get_value_type(kind)))
-
-
-@lower_setattr_generic(RecordType)
-def _store_field(context: Any, builder: Any, sig: Any, values: Any, name: str) -> None:
-    record, given = sig.args
-    kind, offset = record.members[name], record.schema.layout[name]
-    if isinstance(kind, (ColumnType, RecordType)):
-        raise TypeError(f"{record.schema.name}.{name} cannot be replaced inside a kernel")
-    value = context.cast(builder, values[1], given, kind)
-    if kind == types.boolean:
-        value = builder.zext(value, _WORD)
-    builder.store(value, _place(builder, values[0], offset, value.type))
-
-
-# -- items of columns -----------------------------------------------------------------------------
-
-
-@infer_global(len)  # pyright: ignore[reportOptionalCall]
-class _LengthOf(AbstractTemplate):
-    def generic(self, arguments: Any, keywords: Any) -> Any:
-        if len(arguments) == 1 and isinstance(arguments[0], ColumnType):
-            return signature(types.intp, arguments[0])
-        return None
-
-
-@lower_builtin(len, ColumnType)
-def _column_length(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    return cgutils.create_struct_proxy(sig.args[0])(context, builder, values[0]).length
-
-
-def _index_type(column: ColumnType, index: Any) -> Any:
-    """The type the index is cast to, and what is found there; None if the column has no such index."""
-    paired = column.field.stacked or column.field.item == "table"
-    if isinstance(index, types.Integer) and not paired:
-        return (types.intp if index.signed else types.uintp), column.item
-    if isinstance(index, types.BaseTuple) and len(index) == 2 and all(isinstance(i, types.Integer) for i in index):  # pyright: ignore[reportGeneralTypeIssues]
-        if column.field.stacked:
-            return types.UniTuple(types.intp, 2), column.item
-        if column.field.item in ("table", "vector"):
-            return types.UniTuple(types.intp, 2), column.number
-    return None
-
-
-@infer_global(operator.getitem)  # pyright: ignore[reportOptionalCall]
-class _ItemOf(AbstractTemplate):
-    def generic(self, arguments: Any, keywords: Any) -> Any:
-        if len(arguments) == 2 and isinstance(arguments[0], ColumnType):
-            found = _index_type(*arguments)
-            if found is not None:
-                return signature(found[1], arguments[0], found[0])
-        return None
-
-
-@infer_global(operator.setitem)  # pyright: ignore[reportOptionalCall]
-class _StoreItem(AbstractTemplate):
-    def generic(self, arguments: Any, keywords: Any) -> Any:
-        if len(arguments) == 3 and isinstance(arguments[0], ColumnType):
-            found = _index_type(*arguments[:2])
-            if found is not None:
-                return signature(types.none, arguments[0], found[0], found[1])
-        return None
-
-
-def _check(context: Any, builder: Any, column: ColumnType, index: Any, limit: Any) -> None:
-    """In a checked build: IndexError unless 0 <= index < limit."""
-    outside = builder.icmp_unsigned(">=", index, limit)
-    with builder.if_then(outside, likely=False):
-        context.call_conv.return_dynamic_user_exc(
-            builder, IndexError, (f"{column.label}: index outside of the column (index, length)", index, limit),
-            (types.intp, types.intp),
-        )  # fmt: skip
-
-
-def _item_place(context: Any, builder: Any, column: ColumnType, value: Any, index_type: Any, index: Any) -> Any:
-    """Pointer to the first number of an item, or to one number of it; and whether it is one."""
-    made = cgutils.create_struct_proxy(column)(context, builder, value)
-    one = False
-    if isinstance(index_type, types.BaseTuple):
-        first, second = (builder.extract_value(index, k) for k in range(2))
-        if column.field.stacked:  # the length is that of one of the arrays
-            if CHECKED:
-                _check(context, builder, column, second, made.length)
-            row = builder.add(builder.mul(first, made.length, flags=("nsw",)), second, flags=("nsw",))
-            number = builder.mul(row, _WORD(column.width), flags=("nsw",))
-        else:
-            if CHECKED:
-                _check(context, builder, column, first, made.length)
-                _check(context, builder, column, second, _WORD(column.width))
-            one = True
-            number = builder.add(builder.mul(first, _WORD(column.width), flags=("nsw",)), second, flags=("nsw",))
-    else:
-        if CHECKED:
-            _check(context, builder, column, index, made.length)
-        number = index if column.width == 1 else builder.mul(index, _WORD(column.width), flags=("nsw",))
-    return builder.gep(made.data, [number], inbounds=True), one
-
-
-def _load_number(context: Any, builder: Any, column: ColumnType, place: Any, k: int) -> Any:
-    if k:
-        place = builder.gep(place, [_WORD(k)], inbounds=True)
-    value = context.data_model_manager[column.dtype].from_data(builder, builder.load(place))
-    return context.cast(builder, value, column.dtype, column.number)
-
-
-@lower_cast(ColumnType, ColumnType)
-def _same_column(context: Any, builder: Any, one: Any, other: Any, value: Any) -> Any:
-    return value
-
-
-def _load_numbers(context: Any, builder: Any, sig: Any, values: Any) -> list[Any]:
-    """The numbers of one item, or the one of it that the index names."""
-    column = sig.args[0]
-    place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
-    count = 1 if one or column.item == column.number else column.width
-    return [_load_number(context, builder, column, place, k) for k in range(count)]
-
-
-def _load_or_default(context: Any, builder: Any, sig: Any, values: Any) -> list[Any]:
-    """The same of a column on demand. The branch is the same in every row: LLVM takes it out of loops."""
-    column = sig.args[0]
-    default = context.get_constant(column.number, np.dtype(column.field.dtype).type(column.field.default).item())
-    length = cgutils.create_struct_proxy(column)(context, builder, values[0]).length
-    before, found = builder.basic_block, []
-    with builder.if_then(builder.icmp_unsigned("!=", length, _WORD(0))):
-        loaded = _load_numbers(context, builder, sig, values)
-        after = builder.basic_block
-    for number in loaded:
-        phi = builder.phi(number.type)
-        phi.add_incoming(default, before)
-        phi.add_incoming(number, after)
-        found.append(phi)
-    return found
-
-
-@lower_builtin(operator.getitem, ColumnType, types.Any)
-def _load_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    column = sig.args[0]
-    load = _load_numbers if column.field.default is None else _load_or_default
-    numbers = load(context, builder, sig, values)
-    if sig.return_type == column.number:
-        return numbers[0]
-    result = ir.Constant(context.get_value_type(column.item), ir.Undefined)
-    if column.field.item == "vector":
-        for k, number in enumerate(numbers):
-            result = builder.insert_value(result, number, k)
-        return result
-    count = column.item.count
-    for j in range(count):  # axis j is column j of the matrix
-        for k in range(count):
-            result = builder.insert_value(result, numbers[k * count + j], [j, k])
-    return result
-
-
-@lower_builtin(operator.setitem, ColumnType, types.Any, types.Any)
-def _set_item(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    column = sig.args[0]
-    place, one = _item_place(context, builder, column, values[0], sig.args[1], values[1])
-    model = context.data_model_manager[column.dtype]
-    if one or column.item == column.number:
-        value = context.cast(builder, values[2], column.number, column.dtype)
-        builder.store(model.as_data(builder, value), place)
-    elif column.field.item == "vector":
-        for k in range(column.width):
-            target = builder.gep(place, [_WORD(k)], inbounds=True) if k else place
-            builder.store(builder.extract_value(values[2], k), target)
-    else:
-        raise TypeError(f"{column.label or column}: axes are read-only")
-    return context.get_dummy_value()
-
-
-# -- whole columns, and records by address --------------------------------------------------------
-
-
-@intrinsic
-def _compiled_rows(typing_context: Any, column: Any, start: Any, stop: Any) -> Any:
-    if not isinstance(column, ColumnType) or column.field.stacked:
-        return None
-    dimensions = 1 if column.width == 1 and column.field.item != "table" else 2
-    kind = types.Array(column.dtype, dimensions, "C", readonly=True)
-
-    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        made = cgutils.create_struct_proxy(column)(context, builder, values[0])
-        size = context.get_abi_sizeof(context.get_data_type(column.dtype))
-        count = builder.sub(values[2], values[1])
-        first = builder.mul(values[1], _WORD(column.width))
-        shape, strides = [count], [_WORD(size)]
-        if dimensions == 2:
-            shape, strides = [count, _WORD(column.width)], [_WORD(size * column.width), _WORD(size)]
-        array = context.make_array(kind)(context, builder)
-        populate_array(
-            array, data=builder.gep(made.data, [first]), shape=cgutils.pack_array(builder, shape, _WORD),
-            strides=cgutils.pack_array(builder, strides, _WORD), itemsize=_WORD(size), meminfo=None,
-        )  # fmt: skip
-        return array._getvalue()
-
-    return kind(column, types.intp, types.intp), emit
+    return compiled_rows.made
 
 
 def _plain_rows(column: Any, start: int, stop: int) -> Any:
@@ -358,35 +41,13 @@ def _plain_rows(column: Any, start: int, stop: int) -> Any:
 
 
 # rows_of(column, start, stop): those rows as a numpy array that shares the column's memory.
-rows_of: Any = _plain_rows if numba.config.DISABLE_JIT else _compiled_rows  # type: ignore[attr-defined]
+rows_of: Any = Late(_make_rows, _plain_rows) if JIT else _plain_rows
 
 
-def record_at(kind: RecordType) -> Any:
-    """The function (address) -> record of that type."""
-    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return plain_view_at
+def _make_zero() -> Any:
+    from .record_code import compiled_zero
 
-    @intrinsic
-    def at(typing_context: Any, address: Any) -> Any:
-        def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-            return builder.inttoptr(values[0], _BYTE_POINTER)
-
-        return kind(types.int64), emit
-
-    at.carom_depends_on = (kind.name,)
-    return at
-
-
-@intrinsic
-def _compiled_zero(typing_context: Any, record: Any) -> Any:
-    if not isinstance(record, RecordType):
-        return None
-    kind = types.UniTuple(types.float64, record.dimensions)
-
-    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        return cgutils.get_null_value(context.get_value_type(kind))
-
-    return kind(record), emit
+    return compiled_zero.made
 
 
 def _plain_zero(record: Any) -> tuple[float, ...]:
@@ -394,4 +55,4 @@ def _plain_zero(record: Any) -> tuple[float, ...]:
 
 
 # The zero vector of the world that a record belongs to: a tuple of 2 or 3 floats.
-zero_of: Any = _plain_zero if numba.config.DISABLE_JIT else _compiled_zero  # type: ignore[attr-defined]
+zero_of: Any = Late(_make_zero, _plain_zero) if JIT else _plain_zero

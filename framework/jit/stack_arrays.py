@@ -9,12 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.np.arrayobj import populate_array
 
 from ..vectors import _emitted
+from .late import arrayobj, cgutils, ir, types
 
 
 def _sign_stack_array(count: Any, like: Any) -> Any:
@@ -33,7 +30,7 @@ def _emit_stack_array(context: Any, builder: Any, arguments: Any, values: Any) -
     memory = cgutils.alloca_once(builder, ir.ArrayType(item_type, int(np.prod(shape))))
     strides = [item_size * shape[1], item_size] if kind.ndim == 2 else [item_size]
     made = context.make_array(kind)(context, builder)
-    populate_array(
+    arrayobj.populate_array(
         made,
         data=builder.bitcast(memory, item_type.as_pointer()),
         shape=[context.get_constant(types.intp, n) for n in shape],

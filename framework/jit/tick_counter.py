@@ -6,32 +6,28 @@ import platform
 import time
 from typing import Any
 
-import numba
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.core.extending import intrinsic
-
 from ..compilation import untimed_kernel
+from .late import JIT, cgutils, intrinsic, ir, types
 
-_WORD = ir.IntType(64)
 _HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")  # elsewhere reading it may be forbidden
 _MONOTONIC = 1
 
 
 def _emit_cycles(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(_WORD, []), "llvm.readcyclecounter")
+    kind = ir.FunctionType(ir.IntType(64), [])
+    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.readcyclecounter")
     return builder.call(function, [])
 
 
 def _emit_clock(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    pair = ir.LiteralStructType((_WORD, _WORD))
+    word = ir.IntType(64)
+    pair = ir.LiteralStructType((word, word))
     kind = ir.FunctionType(ir.IntType(32), [ir.IntType(32), pair.as_pointer()])
     function = cgutils.get_or_insert_function(builder.module, kind, "clock_gettime")
     moment = cgutils.alloca_once(builder, pair)
     builder.call(function, [ir.IntType(32)(_MONOTONIC), moment])
     seconds, rest = (builder.load(cgutils.gep_inbounds(builder, moment, 0, k)) for k in range(2))
-    return builder.add(builder.mul(seconds, _WORD(1_000_000_000)), rest)
+    return builder.add(builder.mul(seconds, word(1_000_000_000)), rest)
 
 
 @intrinsic
@@ -40,7 +36,7 @@ def _compiled_ticks(typing_context: Any) -> Any:
 
 
 # The counter: cycles of the processor's clock, else nanoseconds.
-read_ticks: Any = time.perf_counter_ns if numba.config.DISABLE_JIT else _compiled_ticks  # type: ignore[attr-defined]
+read_ticks: Any = _compiled_ticks if JIT else time.perf_counter_ns
 
 
 @untimed_kernel

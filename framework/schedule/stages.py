@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import types
 
-from ..compilation import log, untimed_kernel
+from ..compilation import entry_point, log, untimed_kernel
+from ..jit.late import types
 from ..jit.linking import Called, Linked, linked_call
 from ..jit.record import Record
 from ..jit.record_type import record_at, record_type
@@ -27,9 +27,8 @@ from ..jit.tick_counter import TickClock, read_ticks
 PROGRAM_FIELDS: dict[str, Any] = {"program": ints(), "ticks": ints(), "calls": ints(), "stage": integer()}
 PROGRAM = Schema("Program", **PROGRAM_FIELDS)
 
-_program_type = record_type(PROGRAM, 2)
-_program_at = record_at(_program_type)
-_call_stage = linked_call(types.int64(_program_type, types.float64))
+_program_at = record_at(PROGRAM, 2)
+_call_stage = linked_call(lambda: types.int64(record_type(PROGRAM, 2), types.float64))
 
 
 @untimed_kernel
@@ -116,6 +115,7 @@ class Program:
         self._addresses = np.zeros(len(stages), np.int64)
         state.program = self._addresses
         state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
+        self._run_stages = entry_point(run_stages)
         self._clock = TickClock()
         self._python_seconds = np.zeros(len(stages))  # of what Python has done for each stage
         self.inside = 0.0  # s of stages that Python has run within a step: not to be counted twice
@@ -140,7 +140,7 @@ class Program:
         address = self.state.address
         while start < stop:
             try:
-                code = run_stages(address, start, stop, dt)
+                code = self._run_stages(address, start, stop, dt)
             except Exception as error:
                 self.describe_error(error)
                 raise

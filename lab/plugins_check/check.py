@@ -8,10 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, Settings, World
+from ...framework.jit.late import errors
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..commands.usage_errors import one_line
@@ -74,7 +74,7 @@ def _attempt(subject: Subject, progress: Callable[[str], None], check: Callable[
     progress(where)
     try:
         check(subject)
-    except NumbaError as error:
+    except errors.NumbaError as error:
         subject.findings.append(
             Finding(f"it does not compile: {compiler_message(error)}", "every input",
                     "use what numba compiles: numbers and tuples, math, carom.framework.vectors, helpers marked "

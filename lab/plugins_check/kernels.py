@@ -13,7 +13,7 @@ import numpy as np
 from ...framework.compilation import kernel
 from ...framework.jit.linking import Linked
 from ...framework.jit.record import Record, make_record
-from ...framework.jit.record_type import record_at, record_type
+from ...framework.jit.record_type import record_at
 from ...framework.jit.schema import Schema, flags, floats, vectors
 from ...framework.plugins.registry import Pair, Shape
 from ...systems.records import STATE
@@ -172,8 +172,8 @@ def _run(which: int, d: np.ndarray, function: int, one: Record, two: Record, v: 
 @lru_cache(maxsize=2)
 def _kernels(dimensions: int) -> tuple[Any, Any, Any]:
     """Loops over contacts, sweeps and supports; they compile once, whatever the plugin."""
-    state_at, calls_at = record_at(record_type(STATE, dimensions)), record_at(record_type(CALLS, dimensions))
-    header_at = record_at(record_type(HEADER, dimensions))
+    state_at, calls_at = record_at(STATE, dimensions), record_at(CALLS, dimensions)
+    header_at = record_at(HEADER, dimensions)
 
     @kernel
     def check_contacts(state_address, address, function, pa, pb):

@@ -7,41 +7,37 @@ from __future__ import annotations
 
 from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-
 from ...framework.compilation import CHECKED
-from ...framework.jit.record_type import ColumnType, _check
+from ...framework.jit.late import cgutils, ir, record_code, types
 from ...framework.vectors import _emitted
-
-_BITS = ir.IntType(64)
-_INDEX = ir.IntType(32)
 
 
 def _compared(width: int) -> tuple[Any, Any]:
     """(emit, signature) of a comparison with ``width`` codes."""
-    lanes = ir.VectorType(_BITS, width)
 
     def splat(builder: Any, value: Any) -> Any:
-        first = builder.insert_element(ir.Constant(lanes, ir.Undefined), value, ir.Constant(_INDEX, 0))
-        everywhere = ir.Constant(ir.VectorType(_INDEX, width), [0] * width)
-        return builder.shuffle_vector(first, ir.Constant(lanes, ir.Undefined), everywhere)
+        undefined, index = ir.Constant(ir.VectorType(value.type, width), ir.Undefined), ir.IntType(32)
+        first = builder.insert_element(undefined, value, index(0))
+        return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(index, width), [0] * width))
 
     def emit(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
+        bits = ir.IntType(64)
+        lanes = ir.VectorType(bits, width)
         codes = cgutils.create_struct_proxy(arguments[0])(context, builder, values[0])
         if CHECKED:
-            last = builder.add(values[1], _BITS(width - 1))
-            _check(context, builder, arguments[0], last, codes.length)
+            last = builder.add(values[1], bits(width - 1))
+            record_code.check(context, builder, arguments[0], last, codes.length)
         place = builder.gep(codes.data, [values[1]], inbounds=True)
         members = builder.load(builder.bitcast(place, lanes.as_pointer()), align=8)
         guards = splat(builder, values[3])
         left = builder.and_(builder.sub(splat(builder, values[2]), members), guards)
         hits = builder.bitcast(builder.icmp_signed("==", left, guards), ir.IntType(width))
-        return builder.zext(hits, _BITS)
+        return builder.zext(hits, bits)
 
     def signature(codes: Any, at: Any, code: Any, guards: Any) -> Any:
-        return types.int64(codes, types.intp, types.int64, types.int64) if isinstance(codes, ColumnType) else None
+        if not isinstance(codes, record_code.ColumnType):
+            return None
+        return types.int64(codes, types.intp, types.int64, types.int64)
 
     return emit, signature
 

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from numba import types
-
 from ...framework.compilation import kernel
+from ...framework.jit.late import types
 from ...framework.jit.linking import Called, Linked, linked_call
 from ...framework.jit.record_type import record_at, record_type
 from ..broad_phase.records import TREE
@@ -32,7 +31,8 @@ class QueryKernels:
     def __init__(self, dimensions: int) -> None:
         state, batch, tree = (record_type(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
         signature = types.int64(state, batch, tree, tree, types.int64, types.int64)
-        state_at, batch_at, tree_at, call = record_at(state), record_at(batch), record_at(tree), linked_call(signature)
+        state_at, batch_at, tree_at = (record_at(schema, dimensions) for schema in (STATE, QUERY_BATCH, TREE))
+        call = linked_call(lambda: signature)
 
         def run_queries(function, state, batch, moving, static, mask, first, stop):
             known, queries = state_at(state), batch_at(batch)

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numba.core.errors import NumbaError
 
 from ...framework.data.component import Component
 from ...framework.errors import PluginError
+from ...framework.jit.late import errors
 from ...framework.jit.record import Record
 from ...framework.plugins.registry import Registry, Shape
 from .linking.signatures import ALONE, OUT_OF_TIME
@@ -47,7 +47,7 @@ class ErrorAttribution:
     def describe(self, error: BaseException, query: type[Component] | None = None) -> None:
         """Add to an error which plugin's function it comes from."""
         state = self._state
-        uncompiled = isinstance(error, NumbaError) or state.row_a == NOTHING_TESTED
+        uncompiled = isinstance(error, errors.NumbaError) or state.row_a == NOTHING_TESTED
         about = self._uncompiled(error) if uncompiled else self._describe(state.row_a, state.row_b, query)
         if about and about not in getattr(error, "__notes__", ()):  # numba raises the same object once more
             error.add_note(about)

@@ -26,7 +26,7 @@ from ....components import Collider, RigidBody, SphereCollider, Transform
 from ....framework import Phase, Plugin, World, column
 from ....framework.compilation import inlined, kernel
 from ....framework.jit.record import Record, make_record
-from ....framework.jit.record_type import record_at, record_type
+from ....framework.jit.record_type import record_at
 from ....framework.jit.schema import Schema, floats
 from ....framework.vectors import add, divided, length, scale, sub
 from ....plugins import Physics
@@ -149,7 +149,7 @@ def by_hand(scene: str, check: Callable[..., bool]) -> Callable[..., bool]:
 def narrow_kernel(evaluate: Callable[..., bool], dimensions: int) -> Callable[..., Any]:
     """The narrow phase with that loop over the pairs; the kernel returns how many touch or nearly do, a sum over these,
     and whether all contacts are sound."""
-    state_at, radii_at = record_at(record_type(STATE, dimensions)), record_at(record_type(RADII, dimensions))
+    state_at, radii_at = record_at(STATE, dimensions), record_at(RADII, dimensions)
 
     @kernel
     def find_contacts(address, radii, dt):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from ....framework.compilation import CACHE_FOLDER_VARIABLE
+from ....framework.jit.cache import CACHE_FOLDER_VARIABLE
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread
 from ...reporting.progress_bar import NO_PROGRESS, Progress

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from typing import Any
 
-from numba import types
-
 from ....framework.compilation import kernel
+from ....framework.jit.late import types
 from ....framework.jit.linking import Called, Linked, linked_call
 from ....framework.jit.record_type import record_at, record_type
 from ..records import TREE
@@ -29,12 +28,12 @@ class TreePasses:
     def __init__(self, dimensions: int) -> None:
         kind = record_type(TREE, dimensions)
         self._signature = types.int64(kind, kind)
-        self._at = record_at(kind)
+        self._at = record_at(TREE, dimensions)
         self.linked = {function.__name__: Linked(function, self._signature) for function in FUNCTIONS}
 
     @cached_property
     def _call(self) -> Callable[[int, int, int], int]:
-        at, call = self._at, linked_call(self._signature)
+        at, call = self._at, linked_call(lambda: self._signature)
 
         @kernel
         def run_tree_pass(function, tree, other):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from ....framework.compilation import inlined
-from ....framework.jit.record_type import record_at, record_type
+from ....framework.jit.record_type import record_at
 from .parameters import HEADER
 from .signatures import call_rounding, call_support
 from .user_functions import as_argument
 
 # The header has no vectors, so it is the same in 2D and 3D.
-_header_at = record_at(record_type(HEADER, 2))
+_header_at = record_at(HEADER, 2)
 
 
 @inlined

@@ -13,7 +13,7 @@ from typing import Any
 
 from ....framework.compilation import inlined
 from ....framework.jit.linking import Linked
-from ....framework.jit.record_type import record_at, record_type
+from ....framework.jit.record_type import record_at
 from ....framework.plugins.registry import Convex, Pair, Shape
 from .batches import batch_by_address, checked, in_given_order, in_order_of_shapes, make_batch
 from .convex_by_address import convex_at, rounding_argument, support_argument
@@ -111,7 +111,7 @@ class LinkedPair:
     @property
     def _records(self) -> tuple[Any, Any]:
         one, two = (
-            as_address if shape is None else record_at(record_type(parameter_schema(shape), self.dimensions))
+            as_address if shape is None else record_at(parameter_schema(shape), self.dimensions)
             for shape in (self.first, self.second)
         )
         return one, two

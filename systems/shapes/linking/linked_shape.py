@@ -12,7 +12,7 @@ from ....framework.compilation import kernel
 from ....framework.data.array_columns import ArrayColumn
 from ....framework.jit.linking import Called, Linked
 from ....framework.jit.record import make_record
-from ....framework.jit.record_type import record_at, record_type, rows_of
+from ....framework.jit.record_type import record_at, rows_of
 from ....framework.jit.schema import Schema, vectors
 from ....framework.plugins.registry import Shape
 from ...records import STATE
@@ -27,10 +27,10 @@ from .parameters import (
 from .signatures import (
     ALONE,
     NOT_FINITE,
-    ROUNDING_SIGNATURE,
     bounds_signature,
     call_bounds,
     rotated_signature,
+    rounding_signature,
     support_signature,
 )
 from .source import source_module
@@ -92,7 +92,7 @@ class LinkedShape:
     def rounding(self) -> Linked:
         source = f"return function({self._parameters('p')})"
         made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
-        return Linked(made.rounding, ROUNDING_SIGNATURE)
+        return Linked(made.rounding, rounding_signature())
 
     def all_functions(self, by_address: bool) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding."""
@@ -108,7 +108,7 @@ class LinkedShape:
     def _function(self, header: str, *lines: str, function: Any) -> Any:
         scope = {
             "function": user_function(function), "Parameters": parameter_tuple(self.shape), "array_of": array_of,
-            "at": record_at(record_type(parameter_schema(self.shape), self.dimensions)), "rows_of": rows_of,
+            "at": record_at(parameter_schema(self.shape), self.dimensions), "rows_of": rows_of,
             "ALONE": ALONE, "NOT_FINITE": NOT_FINITE,
         }  # fmt: skip
         title = f'"""{self.shape.component.__name__}, {self.dimensions}D."""\n\n'
@@ -128,7 +128,7 @@ _HALF_EXTENTS = Schema("HalfExtents", half=vectors())
 
 @lru_cache(maxsize=2)
 def _half_extents_kernel(dimensions: int) -> Any:
-    state_at, result_at = record_at(record_type(STATE, dimensions)), record_at(record_type(_HALF_EXTENTS, dimensions))
+    state_at, result_at = record_at(STATE, dimensions), record_at(_HALF_EXTENTS, dimensions)
 
     @kernel
     def half_extents(state_address, address, parameters, result_address):

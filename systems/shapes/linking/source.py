@@ -8,11 +8,11 @@ import sys
 import types
 from typing import Any
 
-from ....framework.compilation import deep_hash
-
 
 def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:
     """A module of that source over the names in ``scope``; its name tells both."""
+    from ....framework.jit.hash import deep_hash  # loads numba
+
     parts = [source, *(f"{name} {deep_hash(value)}" for name, value in sorted(scope.items()))]
     name = f"carom_shapes_{hashlib.sha256(' '.join(parts).encode()).hexdigest()[:24]}"
     module = types.ModuleType(name)

@@ -5,12 +5,8 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-from numba import types
-from numba.core.dispatcher import Dispatcher
-from numba.core.extending import intrinsic
-from numba.core.typing.templates import signature
-
 from ....framework.compilation import allocating_part
+from ....framework.jit.late import Late, operation, types
 from ....framework.plugins.plugin import checked_support
 
 _compiled: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
@@ -19,7 +15,7 @@ _arguments: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
 
 def user_function(function: Any) -> Any:
     """The same function with allocation allowed; one for all callers, so that they share its compiled code."""
-    if not isinstance(function, Dispatcher):  # with the JIT off
+    if not _is_compiled(function):  # with the JIT off
         return function
     if function not in _compiled:
         author = getattr(function, "author", None)
@@ -36,34 +32,35 @@ def as_argument(function: Any) -> Any:
     numba hands on a dispatcher by its address in this process, and a kernel in which that address survives cannot be
     cached: as when a function that is not inlined gets it.
     """
-    if not isinstance(function, Dispatcher):
+    if not _is_compiled(function):
         return function
     if function not in _arguments:
         _arguments[function] = _without_address(function)
     return _arguments[function]
 
 
+def _is_compiled(function: Any) -> bool:
+    """Whether numba compiles it, ours or made by numba's own decorators."""
+    return hasattr(function, "py_func")
+
+
 def _without_address(function: Any) -> Any:
     def typing(context: Any, *arguments: Any) -> Any:
-        kind = types.Dispatcher(function)
+        kind = types.Dispatcher(function.made)
         found = kind.get_call_type(context, arguments, {})
 
         def emit(target: Any, builder: Any, sig: Any, values: Any) -> Any:
             return target.get_function(kind, found)(builder, values)
 
-        return signature(found.return_type, *found.args), emit
+        return found.return_type(*found.args), emit
 
-    names = ", ".join(f"a{k}" for k in range(function.py_func.__code__.co_argcount))
-    scope = {"typing": typing}
-    exec(f"def {function.py_func.__name__}(context, {names}): return typing(context, {names})", scope)
-    made: Any = intrinsic(scope[function.py_func.__name__])
-    made.carom_depends_on = function
-    return made
+    plain = function.py_func
+    return Late(lambda: operation(plain.__name__, plain.__code__.co_argcount, typing, function), plain)
 
 
 def is_long(function: Any) -> bool:
     """Whether the function, or one that it calls, asks to stay out of its callers (``part`` instead of ``inlined``)."""
-    return isinstance(function, Dispatcher) and _reaches_part(function, set())
+    return _is_compiled(function) and _reaches_part(function, set())
 
 
 def _reaches_part(function: Any, seen: set[Any]) -> bool:
@@ -73,5 +70,5 @@ def _reaches_part(function: Any, seen: set[Any]) -> bool:
     seen.add(function)
     captured = [cell.cell_contents for cell in plain.__closure__ or ()]
     named = [plain.__globals__.get(name) for name in plain.__code__.co_names]
-    called = [value for value in (*captured, *named) if isinstance(value, Dispatcher) and value not in seen]
+    called = [value for value in (*captured, *named) if _is_compiled(value) and value not in seen]
     return any(_reaches_part(value, seen) for value in called)

@@ -1,0 +1,98 @@
+"""numba's dispatchers, with machine code kept on disk; this and what it imports load numba.
+
+:mod:`~carom.framework.compilation` makes one when a kernel is first needed.
+"""
+
+from __future__ import annotations
+
+import gc
+import logging
+import time
+from typing import Any, ClassVar
+
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
+from numba.core.types import unliteral
+
+from ..compilation import announce, log
+from .cache import KernelCache
+from .pipeline import kernel_compiler, part_compiler
+
+logger = logging.getLogger("carom")
+
+
+class Wait:
+    """A context manager around compiling and loading: notes the time, and keeps other threads out.
+
+    own: seconds without those of waits inside it, once it is over.
+    """
+
+    _running: ClassVar[list[Wait]] = []
+
+    def __enter__(self) -> Wait:
+        global_compiler_lock.acquire()
+        self.own = 0.0
+        self._collecting = gc.isenabled()
+        gc.disable()  # the compiler makes millions of objects that live on; looking through them takes a twentieth
+        self._running.append(self)
+        self._started = time.perf_counter()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running.pop()
+        if self._collecting:
+            gc.collect(0)  # once now, instead of at some moment soon, which would be taken for run time
+            gc.enable()
+        seconds = time.perf_counter() - self._started
+        self.own += seconds
+        if self._running:
+            self._running[-1].own -= seconds
+        else:
+            log.waited += seconds
+        global_compiler_lock.release()
+
+
+class KeptDispatcher(CPUDispatcher):
+    """numba's dispatcher, with machine code kept on disk, and the cost of compiling and loading noted."""
+
+    def __init__(self, function: Any, targetoptions: dict[str, Any], pipeline_class: Any = kernel_compiler) -> None:
+        super().__init__(function, targetoptions=targetoptions, pipeline_class=pipeline_class)
+        self._cache = KernelCache(self, announce)
+
+    def compile(self, sig: Any) -> Any:
+        with Wait() as wait:
+            known, loaded = len(self.overloads), self._cache_hits[sig]
+            entry_point = super().compile(sig)
+            was_loaded = self._cache_hits[sig] > loaded
+            was_compiled = len(self.overloads) > known and not was_loaded
+        if was_loaded:
+            log.loaded += 1
+            logger.debug("loaded %s for %s", self.py_func.__name__, sig)
+        elif was_compiled:
+            log.compiled.append((self.py_func.__qualname__, wait.own))
+        return entry_point
+
+    def is_kept(self, sig: Any) -> bool:
+        """Whether it is kept on disk for that signature, and has only to be loaded."""
+        return self._cache.holds(sig, self.targetctx)
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
+        """What numba calls for arguments of new types: looks at them, then compiles."""
+        with Wait():
+            return super()._compile_for_args(*args, **kws)
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Called once per new type of argument; the first time loads a good part of numba."""
+        with Wait():
+            return super().typeof_pyval(val)
+
+
+class PartDispatcher(CPUDispatcher):
+    """A function that only kernels call."""
+
+    def __init__(self, function: Any, targetoptions: dict[str, Any]) -> None:
+        super().__init__(function, targetoptions=targetoptions, pipeline_class=part_compiler)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What numba asks for at a call; constants are compiled for as any number of their type is."""
+        return super().get_call_template([unliteral(kind) for kind in args], kws)
