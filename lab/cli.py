@@ -1,44 +1,42 @@
-"""The ``carom`` command: run a scene, list the scenes; other commands are added by the other modules."""
+"""The ``carom`` command: each of its commands is in a module of its own, imported when it is called."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
-import math
-import os
-from pathlib import Path
-from typing import Any
-
 import click
-from rich.console import Console
-from rich.table import Table
 
-from .. import __version__, scenes
-from .bench.command import bench_command
-from .commands.choices import parse_assignments, parse_view, preset
-from .commands.group import Commands
-from .commands.loading import Loaded, load, stdout_kept_clean
-from .commands.options import plugin_option, seed_number, seed_option, set_option, settings_option
-from .commands.plan import plan_command
-from .commands.stages import stages_command
-from .commands.usage_errors import Problem
-from .commands.warm_up import warm_up_command
-from .geometry.command import geometry_command
-from .limits_study.command import limits_command
-from .measure.run import Run, run
-from .plugins_check.command import plugins_command
-from .plugins_check.installed import plugin_named
-from .reporting.progress import StepProgress
-from .reporting.run_report import print_report
-from .settings_study.command import settings_command
-from .trading.command import trade_command
-from .tuning.command import tune_command
+from .. import __version__
+from .commands.group import LateCommand, LateCommands
 
-DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
+# By name: where it is, and its line in the help.
+COMMANDS = {
+    "bench": LateCommand("bench.command:bench_command", "Time carom on this machine."),
+    "geometry": LateCommand(
+        "geometry.command:geometry_command", "False positives and cost of levels of collision geometry."
+    ),
+    "limits": LateCommand("limits_study.command:limits_command", "Where carom fails; how long a scene's step may be."),
+    "plan": LateCommand("commands.plan:plan_command", "Show what a step of a scene runs, and why."),
+    "plugins": LateCommand("plugins_check.command:plugins_command", "List plugins, or check one."),
+    "run": LateCommand("commands.run:run_command", "Run a scene or a file and show what happened."),
+    "scenes": LateCommand("commands.scenes:scenes_command", "List the scenes of the library."),
+    "settings": LateCommand(
+        "settings_study.command:settings_command",
+        "What each field of Settings costs and buys; settings for kinds of games.",
+    ),
+    "stages": LateCommand(
+        "commands.stages:stages_command",
+        "List the stages of a step: what each reads and writes, where its code is.",
+    ),
+    "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, measured."),
+    "tune": LateCommand("tuning.command:tune_command", "The cheapest settings that keep an error."),
+    "warm-up": LateCommand("commands.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
+}
 
 
 @click.group(
-    cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, invoke_without_command=True
+    cls=LateCommands,
+    late=COMMANDS,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    invoke_without_command=True,
 )
 @click.version_option(__version__, prog_name="carom")
 @click.pass_context
@@ -46,145 +44,6 @@ def cli(context: click.Context) -> None:
     """carom: a physics framework for games, from the command line."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
-
-
-@cli.command("run", short_help="Run a scene or a file and show what happened.")
-@click.argument("target", metavar="SCENE|FILE.py")
-@click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
-@click.option("--seconds", type=float, help="How long to simulate (default: what the scene recommends).")
-@settings_option
-@set_option
-@seed_option
-@plugin_option
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("out"),
-    show_default=True,
-    help="The folder where pictures go, or a file for that of the paths: NAME.png.",
-)
-@click.option("--view", "view_text", metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
-@click.option(
-    "--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."
-)
-@click.option("--no-pictures", is_flag=True, help="Draw nothing.")
-@click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
-def run_command(
-    target: str,
-    steps: int | None,
-    seconds: float | None,
-    preset_name: str | None,
-    assignments: tuple[str, ...],
-    seed: str,
-    plugins: tuple[str, ...],
-    out: Path,
-    view_text: str | None,
-    as_json: bool,
-    no_pictures: bool,
-    profile: bool,
-    traceback: bool,
-) -> None:
-    """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
-    del traceback  # seen by Commands.main
-    settings = preset(preset_name) if preset_name is not None else None
-    changes = parse_assignments(assignments)
-    if steps is not None and seconds is not None:
-        raise Problem("--steps and --seconds exclude each other")
-    if seconds is not None and not (math.isfinite(seconds) and seconds >= 0):
-        raise Problem(f"--seconds takes a number of at least 0, not {seconds:g}")
-    number = seed_number(seed)
-    added = [plugin_named(name) for name in plugins]
-    loaded = load(target)
-    if view_text is not None:
-        loaded = dataclasses.replace(loaded, view=parse_view(view_text))
-    draw = _drawing(no_pictures, out)
-    screen = Console(stderr=True)
-
-    world = loaded.build(settings, changes, number, added)
-    if loaded.view is not None and len(loaded.view[0]) != world.dimensions:
-        raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
-    if steps is None:
-        steps = _steps_for(loaded, seconds, world.settings.dt)
-    finished = _run_with_progress(loaded, world, steps, number, screen, profile)
-    if draw is not None:
-        with screen.status("drawing ..."):
-            finished.report.pictures = _pictures(draw, finished, out, loaded)
-
-    if as_json:
-        click.echo(json.dumps(finished.report.as_dict(), indent=2, allow_nan=False))
-        return
-    console = Console()
-    print_report(finished.report, console)
-    for picture in finished.report.pictures:
-        console.print(f"picture: {picture}", highlight=False, soft_wrap=True)
-
-
-@cli.command("scenes")
-def scenes_command() -> None:
-    """List the scenes of the library."""
-    table = Table(box=None, pad_edge=False)
-    table.add_column("scene", style="bold")
-    table.add_column("", justify="right")
-    table.add_column("seconds", justify="right")
-    table.add_column("what it is")
-    for name in scenes.names():
-        scene = scenes.get(name)
-        table.add_row(name, f"{scene.dimensions}D", f"{scene.seconds:g}", scene.description)
-    Console().print(table)
-
-
-cli.add_command(plan_command)
-cli.add_command(stages_command)
-cli.add_command(plugins_command)
-cli.add_command(bench_command)
-cli.add_command(trade_command)
-cli.add_command(tune_command)
-cli.add_command(limits_command)
-cli.add_command(geometry_command)
-cli.add_command(settings_command)
-cli.add_command(warm_up_command)
-
-
-def _drawing(no_pictures: bool, out: Path) -> Any:
-    """The drawing function, or None; missing packages and permissions are reported before a long run."""
-    if no_pictures:
-        return None
-    try:
-        from .pictures.run_pictures import draw_run, is_file
-    except ImportError:
-        click.echo(
-            "carom: no pictures, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'",
-            err=True,
-        )
-        return None
-    folder = out.parent if is_file(out) else out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Problem(f"--out {out}: {error.strerror or error}") from error
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise Problem(f"--out {out}: no permission to write there")
-    return draw_run
-
-
-def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:
-    try:
-        return [str(path) for path in draw(finished, out, loaded.view)]
-    except OSError as error:
-        raise Problem(f"--out {out}: {error.strerror or error}") from error
-
-
-def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
-    wanted = seconds if seconds is not None else (loaded.seconds or DEFAULT_SECONDS)
-    return max(0, round(wanted / dt))
-
-
-def _run_with_progress(
-    loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool
-) -> Run:
-    with StepProgress(screen, loaded.name, steps) as progress, loaded.attribute_errors(), stdout_kept_clean():
-        return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done, profile=profile)
 
 
 def main() -> None:

@@ -179,10 +179,10 @@ def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_p
 
 
 def test_the_scene_file_page_has_every_option():
-    from carom.lab.cli import cli
+    from carom.lab.commands.run import run_command
 
     text = (ROOT / "docs" / "scene-files.md").read_text(encoding="utf-8")
-    parameters = cli.commands["run"].params
+    parameters = run_command.params
     options = {option for parameter in parameters for option in parameter.opts if option.startswith("--")}
     assert set(re.findall(r"^\| `(--[a-z-]+)", text, re.MULTILINE)) == options - {"--help"}
 

@@ -88,6 +88,8 @@ class Stage:
 
 def _may_return_nothing(function: Callable[..., Any]) -> bool:
     """Whether the function ends without a return statement on some path, or says ``return None``."""
+    if None not in function.__code__.co_consts:
+        return False
     before: Any = None
     for instruction in dis.get_instructions(function):
         value = {"RETURN_CONST": instruction, "RETURN_VALUE": before}.get(instruction.opname)

@@ -1,8 +1,10 @@
-"""The click group of the ``carom`` command and its subcommands: one-line errors with suggestions."""
+"""The click groups of the ``carom`` command and its subcommands: one-line errors with suggestions."""
 
 from __future__ import annotations
 
+import importlib
 import sys
+from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -37,3 +39,36 @@ class Commands(click.Group):
             click.echo(f"carom: {' '.join(error.format_message().split())}", err=True)
             sys.exit(2)
         sys.exit(result if isinstance(result, int) else 0)
+
+
+@dataclass(frozen=True)
+class LateCommand:
+    """A command by its place in this package, ``module:name``, and its line in the help of the group."""
+
+    place: str
+    short_help: str
+
+    def load(self) -> click.Command:
+        """The command itself."""
+        module, _, name = self.place.partition(":")
+        return getattr(importlib.import_module(f"..{module}", __package__), name)
+
+
+class LateCommands(Commands):
+    """Commands that are imported when they are called: help and errors of the group need none of them."""
+
+    def __init__(self, *args: Any, late: dict[str, LateCommand], **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.late = late
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(self.late)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name in self.late and cmd_name not in self.commands:
+            self.add_command(self.late[cmd_name].load(), cmd_name)
+        return super().get_command(ctx, cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, self.late[name].short_help) for name in self.list_commands(ctx)])

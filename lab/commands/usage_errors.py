@@ -7,8 +7,6 @@ from collections.abc import Iterable
 
 import click
 
-from ...framework import CaromError
-
 LONGEST = 400  # characters of an error message
 
 
@@ -30,6 +28,8 @@ def did_you_mean(wrong: str, known: Iterable[str]) -> str:
 
 def one_line(error: BaseException) -> str:
     """The error's message in one line, with its type if the message alone is unclear."""
+    from ...framework import CaromError  # only here: the command's help needs nothing of the framework
+
     text = _shortened(" ".join(str(error).split()))
     if isinstance(error, KeyError) and len(error.args) == 1 and isinstance(error.args[0], str):
         text = " ".join(error.args[0].split())
