@@ -10,7 +10,7 @@ import collections
 import inspect
 import math
 import numbers
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -164,9 +164,9 @@ def _try_poses(where: str, function: Any, first: Shape, second: Shape, dimension
 
 def check_contact(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...]) -> Any:
     """Call a pair function and look at what it returns; PluginError if that is no contact."""
-    at = f"a = {shown(a)}, b = {shown(b)}, d = {plain(d)}"
-    result = _call(f"{where}: {at}", function, (a, b, d), a)
-    said = f"{where}: for {at} it returned {plain(result)!r}"
+    at = _Text(lambda: f"a = {shown(a)}, b = {shown(b)}, d = {plain(d)}")
+    result = _call(_Text(lambda: f"{where}: {at}"), function, (a, b, d), a)
+    said = _Text(lambda: f"{where}: for {at} it returned {plain(result)!r}")
     if not (isinstance(result, tuple) and len(result) == 4):
         raise PluginError(f"{said}: return (hit, depth, normal, point)")
     hit, depth, normal, point = result
@@ -351,7 +351,17 @@ def parameters_of(shape: Shape, dimensions: int, scale: float) -> Any:
     return collections.namedtuple(component.__name__, values)(**values)
 
 
-def _call(where: str, function: Any, arguments: tuple[Any, ...], sample: Any) -> Any:
+class _Text:
+    """Words that are put together when they are shown: nearly all checks have nothing to say."""
+
+    def __init__(self, words: Callable[[], str]) -> None:
+        self._words = words
+
+    def __str__(self) -> str:
+        return self._words()
+
+
+def _call(where: str | _Text, function: Any, arguments: tuple[Any, ...], sample: Any) -> Any:
     try:
         with np.errstate(all="ignore"):
             return function(*arguments)
