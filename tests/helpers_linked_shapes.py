@@ -10,7 +10,7 @@ from carom.components import AABBCollider, Collider, SphereCollider
 from carom.framework.compilation import kernel
 from carom.framework.data.columns import column
 from carom.framework.jit.record import make_record
-from carom.framework.jit.record_type import record_at, record_type
+from carom.framework.jit.record_type import record_at
 from carom.framework.jit.schema import Schema, flags, floats, ints, vectors
 from carom.framework.plugins.plugin import Plugin
 from carom.framework.plugins.registry import Registry
@@ -54,8 +54,8 @@ CASES = Schema(
 
 
 def kernels_of(dimensions):
-    state_at, cases_at = record_at(record_type(STATE, dimensions)), record_at(record_type(CASES, dimensions))
-    query_at = record_at(record_type(query.QUERY, dimensions))
+    state_at, cases_at = record_at(STATE, dimensions), record_at(CASES, dimensions)
+    query_at = record_at(query.QUERY, dimensions)
 
     @kernel
     def evaluate_all(state_address, address):

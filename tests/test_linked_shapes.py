@@ -39,6 +39,7 @@ from carom.plugins.standard_shapes import standard_shapes
 from carom.plugins.tile_grid import TileGridCollider
 from carom.systems.records import STATE
 from carom.systems.shapes.attribution import ErrorAttribution
+from carom.systems.shapes.linking import source
 from carom.systems.shapes.linking.linked_shape import half_extents_of
 from carom.systems.shapes.linking.linked_shapes import linked_shapes
 
@@ -231,3 +232,11 @@ def test_the_same_holds_without_the_compiler():
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", *files]
     run = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert run.returncode == 0, run.stdout[-3000:]
+
+
+def test_a_process_remembers_a_bounded_number_of_generated_modules(monkeypatch):
+    monkeypatch.setattr(source, "MODULES", len(source._made) + 3)
+    names = [source.source_module(f"value = {k}", {}).__name__ for k in range(5)]
+    assert [name in sys.modules for name in names][-3:] == [True] * 3
+    assert len(source._made) == source.MODULES
+    assert sum(name.startswith("carom_shapes_") for name in sys.modules) <= source.MODULES

@@ -84,7 +84,7 @@ from carom.framework.jit.record_type import record_at, record_type
 from carom.framework.jit.schema import Schema, floats
 
 SCHEMA = Schema("Shelf", weight=floats())
-shelf_at = record_at(record_type(SCHEMA, 2))
+shelf_at = record_at(SCHEMA, 2)
 
 @kernel
 def weight_of(address, i):

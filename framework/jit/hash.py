@@ -17,6 +17,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
+from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
 # What numba makes other code for: its switches, by their names in the environment less NUMBA_.
@@ -35,7 +36,7 @@ def toolchain() -> dict[str, str]:
 
 def deep_hash(function: Any) -> str:
     """The hash, as hexadecimal digits; versions and numba's switches are part of it."""
-    switches = [(name, getattr(numba.config, name, None)) for name in SWITCHES]
+    switches = [(name, getattr(config, name, None)) for name in SWITCHES]
     digest = hashlib.sha256(repr((toolchain(), switches)).encode())
     _feed(function, digest, set())
     return digest.hexdigest()

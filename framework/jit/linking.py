@@ -16,6 +16,9 @@ from typing import Any
 from ..compilation import linked_dispatcher
 from .late import JIT, Late, cgutils, operation, types
 
+# So many generated functions of each kind are kept at hand for worlds to come; worlds hold those that they use.
+KEPT = 1024
+
 # With the JIT off an address is a place in this list.
 _plain: list[Callable[..., Any]] = [lambda *_: None]
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from ...framework.compilation import inlined
 from ...framework.data.component import Component
-from ...framework.jit.linking import Linked
+from ...framework.jit.linking import KEPT, Linked
 from ...framework.jit.record import Record
 from ...framework.jit.schema import Schema, flags, integer, ints
 from ...framework.plugins.registry import Registry, Shape
@@ -67,19 +67,13 @@ def query_half_extents(state, query, q):
     return call_bounds(query.bounds, state, query.parameters, q)
 
 
-_made: dict[tuple[Any, ...], LinkedQuery] = {}
-
-
 def linked_query(registry: Registry, linked: LinkedShapes, component: type[Component]) -> LinkedQuery:
     """The functions to ask with ``component`` for the shapes of a scene; ValueError if it is no registered shape."""
     if component not in registry.shapes:
         raise ValueError(f"no plugin has registered {component.__name__} as a shape, which this query needs")
     asking = registry.shapes[component]
     pairs = tuple(registry.pair(component, shape.component) for shape in linked.shapes)
-    key = (asking, linked, pairs)
-    if key not in _made:
-        _made[key] = LinkedQuery(asking, linked, pairs)
-    return _made[key]
+    return _made(asking, linked, pairs)
 
 
 class LinkedQuery:
@@ -139,3 +133,8 @@ class LinkedQuery:
     def _sweep(self) -> np.ndarray:
         found = (None if pair is None else pair.sweep for pair in self.pairs)
         return np.array([0 if linked is None else linked.address for linked in found], np.int64)
+
+
+@lru_cache(maxsize=KEPT)
+def _made(asking: Shape, linked: LinkedShapes, pairs: tuple[Any, ...]) -> LinkedQuery:
+    return LinkedQuery(asking, linked, pairs)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from ....framework.compilation import kernel
 from ....framework.data.array_columns import ArrayColumn
-from ....framework.jit.linking import Called, Linked
+from ....framework.jit.linking import KEPT, Called, Linked
 from ....framework.jit.record import make_record
 from ....framework.jit.record_type import record_at, rows_of
 from ....framework.jit.schema import Schema, vectors
@@ -115,7 +115,7 @@ class LinkedShape:
         return source_module(title + "\n    ".join([header, *lines]) + "\n", scope)
 
 
-@cache
+@lru_cache(maxsize=KEPT)
 def linked_shape(shape: Shape, dimensions: int) -> LinkedShape:
     """The functions of that shape, the same ones for all worlds of this process."""
     return LinkedShape(shape, dimensions)

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from ....framework.data.component import Component
-from ....framework.jit.linking import Linked
+from ....framework.jit.linking import KEPT, Linked
 from ....framework.jit.record import Record
 from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
 from .linked_shape import LinkedShape, linked_shape
 from .mixing import linked_rule
 from .parameters import bind, make_parameter_record
-
-_made: dict[tuple[Any, ...], LinkedShapes] = {}
 
 
 def linked_shapes(registry: Registry, components: list[type[Component]], dimensions: int) -> LinkedShapes:
@@ -27,10 +25,7 @@ def linked_shapes(registry: Registry, components: list[type[Component]], dimensi
         (i, j): registry.pair(components[i], components[j]) for i in range(len(shapes)) for j in range(i, len(shapes))
     }
     rules = tuple(registry.mixing_rules.values())
-    key = (dimensions, shapes, tuple(pairs.values()), rules)
-    if key not in _made:
-        _made[key] = LinkedShapes(shapes, pairs, rules, dimensions)
-    return _made[key]
+    return _made(shapes, tuple(pairs.items()), rules, dimensions)
 
 
 class LinkedShapes:
@@ -62,7 +57,7 @@ class LinkedShapes:
             self._flipped[i * len(shapes) + j] = flipped
             sides = convex_sides(shapes[first], shapes[second], pair)
             self.supported.update(number for number, side in zip((first, second), sides, strict=True) if side)
-        self._rules = rules
+        self._rules = tuple(linked_rule(rule) for rule in rules)
 
     @property
     def unhandled(self) -> tuple[tuple[int, int], ...]:
@@ -101,7 +96,7 @@ class LinkedShapes:
         """Everything that a step may call for these shapes, swept bodies included."""
         for number, function in enumerate(self.functions):
             yield from function.all_functions(by_address=number in self.supported)
-        yield from (linked_rule(rule) for rule in self._rules)
+        yield from self._rules
         for pair in self.pairs.values():
             if pair is not None:
                 yield from pair.all_functions()
@@ -116,7 +111,7 @@ class LinkedShapes:
 
     @cached_property
     def _mixing(self) -> np.ndarray:
-        return _addresses(linked_rule(rule) for rule in self._rules)
+        return _addresses(self._rules)
 
     @cached_property
     def _evaluate(self) -> np.ndarray:
@@ -142,6 +137,11 @@ class LinkedShapes:
             linked = None if pair is None else getattr(pair, name)
             table[i * count + j] = 0 if linked is None else linked.address
         return table
+
+
+@lru_cache(maxsize=KEPT)
+def _made(shapes: tuple[Shape, ...], pairs: tuple[Any, ...], rules: tuple[Any, ...], dimensions: int) -> LinkedShapes:
+    return LinkedShapes(shapes, dict(pairs), rules, dimensions)
 
 
 def _addresses(functions: Any) -> np.ndarray:

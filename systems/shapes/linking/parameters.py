@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import collections
 from collections.abc import Mapping
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from ....framework.compilation import pasted
 from ....framework.data.array_columns import ArrayColumn
+from ....framework.jit.linking import KEPT
 from ....framework.jit.record import Record, make_record
 from ....framework.jit.record_type import rows_of
 from ....framework.jit.schema import Column, Schema, axes, floats, integer, table, vectors
@@ -33,7 +34,7 @@ def array_of(numbers, data, starts, i):
     return rows_of(data, starts[number], starts[number + 1])
 
 
-@cache
+@lru_cache(maxsize=KEPT)
 def parameter_schema(shape: Shape) -> Schema:
     """The schema of the shape's parameter record."""
     fields: dict[str, Any] = dict(HEADER_FIELDS)
@@ -58,7 +59,7 @@ def _field(column: Any) -> Column:
     return floats() if np.dtype(column.dtype) == np.float64 else Column(np.dtype(column.dtype).name)
 
 
-@cache
+@lru_cache(maxsize=KEPT)
 def parameter_tuple(shape: Shape) -> Any:
     """The named tuple that the shape's functions get."""
     return collections.namedtuple(shape.component.__name__, shape.parameters)

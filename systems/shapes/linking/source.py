@@ -8,6 +8,10 @@ import sys
 import types
 from typing import Any
 
+MODULES = 4096  # that a process remembers for tracebacks, the youngest
+
+_made: dict[str, None] = {}
+
 
 def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:
     """A module of that source over the names in ``scope``; its name tells both."""
@@ -21,4 +25,9 @@ def source_module(source: str, scope: dict[str, Any]) -> types.ModuleType:
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     exec(compile(source, filename, "exec"), vars(module))
     sys.modules[name] = module
+    _made[name] = _made.pop(name, None)  # now the last
+    if len(_made) > MODULES:
+        oldest = next(iter(_made))
+        for place, key in ((_made, oldest), (sys.modules, oldest), (linecache.cache, f"<{oldest}>")):
+            place.pop(key, None)
     return module
