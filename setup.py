@@ -2,16 +2,14 @@
 
 from pathlib import Path
 
-from setuptools import setup
-from setuptools.command.bdist_wheel import bdist_wheel
+from setuptools import Distribution, setup
 
 PREBUILT = Path(__file__).parent / "framework" / "prebuilt" / "index.json"
 
 
-class Wheel(bdist_wheel):
-    def finalize_options(self):
-        super().finalize_options()
-        self.root_is_pure = not PREBUILT.exists()
+class MaybeCompiled(Distribution):
+    def has_ext_modules(self):
+        return PREBUILT.exists()
 
 
-setup(cmdclass={"bdist_wheel": Wheel})
+setup(distclass=MaybeCompiled)
