@@ -32,6 +32,8 @@ class CompilationLog:
     waited: float = 0.0  # s, for kernels to be compiled or loaded
     listeners: list[Callable[[str], None]] = field(default_factory=list)  # told the kernel that begins to compile
     announced: bool = False
+    left: int = 0  # functions to compile before a step can go on, that which compiles now included; 0: not known
+    processes: int = 1  # that may compile at once, see link_all
 
     @property
     def seconds(self) -> float:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+
 import click
 
 from .. import __version__
+from ..framework.compilation import log
 from .commands.group import LateCommand, LateCommands
 
 # By name: where it is, and its line in the help.
@@ -48,4 +51,5 @@ def cli(context: click.Context) -> None:
 
 def main() -> None:
     """The entry point of the ``carom`` script and of ``python -m carom``."""
+    log.processes = os.cpu_count() or 1
     cli()

@@ -18,14 +18,17 @@ from ..components import AABBCollider, Collider, SphereCollider
 from ..framework.data.bodies import SelectedBodies
 from ..framework.data.column_copies import COPY_BLOCKS
 from ..framework.data.component import Component
-from ..framework.jit.late import dispatchers
+from ..framework.jit.link_all import link_all
 from ..framework.jit.linking import Called, Linked
+from ..framework.jit.tick_counter import TICKS_NOW
 from ..framework.schedule.stages import RUN_STAGES, linked_stage
 from ..framework.world.world import World
 from .broad_phase.tree.passes import tree_passes
+from .integration.system import Integration
 from .linked_parts import linked_part
 from .queries.kernels import query_kernels
 from .records import STATE
+from .scene import Scene
 from .shapes.geometry_levels import in_order
 from .shapes.linking.linked_shape import half_extents_call
 from .shapes.linking.linked_shapes import LinkedShapes
@@ -41,16 +44,15 @@ QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside c
 Kind = tuple[int, frozenset[str], LinkedShapes | None, tuple[LinkedQuery, ...]]
 
 
-def kind_of(simulation: Simulation) -> Kind:
+def kind_of(scene: Scene, integration: Integration) -> Kind:
     """What can be needed depends on this alone; the same for all worlds alike."""
-    scene, registry = simulation.scene, simulation.scene.registry
-    conditions = frozenset(("", "dynamic bodies", *simulation.integration.stages_possible))
-    linked = scene.linked
+    linked, registry, dimensions = scene.linked, scene.registry, scene.state.dimensions
+    conditions = frozenset(("", "dynamic bodies", *integration.stages_possible))
     if linked is None:
-        return simulation.dimensions, conditions, None, ()
+        return dimensions, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
     queries = tuple(linked_query(registry, linked, component) for component in asking if component in registry.shapes)
-    return simulation.dimensions, conditions | WITH_COLLIDERS, linked, queries
+    return dimensions, conditions | WITH_COLLIDERS, linked, queries
 
 
 def needed_functions(
@@ -58,7 +60,7 @@ def needed_functions(
 ) -> Iterator[Linked | Called]:
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
-    yield from (RUN_STAGES, COPY_BLOCKS)
+    yield from (RUN_STAGES, TICKS_NOW, COPY_BLOCKS)
     for stage in STAGES:
         if stage.needed in conditions or stage.name in conditions:
             yield linked_stage(stage, STATE, dimensions)
@@ -68,7 +70,7 @@ def needed_functions(
         return
     for place, function in LINKED_PARTS.items():
         yield linked_part(place, function, dimensions)
-    yield from linked.all_functions()
+    yield from linked.all_functions(sweeps=True)
     yield half_extents_call(dimensions)
     for query in queries:
         yield from query.all_functions()
@@ -77,10 +79,7 @@ def needed_functions(
 @lru_cache(maxsize=128)  # once in a process for worlds alike
 def load_kept(*kind: Any) -> None:
     """Load what is kept on disk of all that such a world may call."""
-    with dispatchers.Wait():
-        for function in needed_functions(*kind):
-            if function.at_hand:
-                function.link()
+    link_all(function for function in needed_functions(*kind) if function.at_hand)
 
 
 def prepare(simulation: Simulation, world: World, components: tuple[type[Any], ...]) -> None:
@@ -102,8 +101,7 @@ def prepare(simulation: Simulation, world: World, components: tuple[type[Any], .
     scene.forget()
     with simulation.attribute_errors():
         simulation.refresh_for_queries()
-        for function in needed_functions(*kind_of(simulation)):
-            function.link()
+        link_all(needed_functions(*kind_of(scene, simulation.integration)))
     _evaluate_forces(simulation, world)
 
 

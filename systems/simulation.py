@@ -19,10 +19,8 @@ from ..framework.schedule.plan import PlannedColumn, PlannedKernel
 from ..framework.schedule.stages import Program, Segment
 from ..framework.world.contacts import Contacts, EntityLookup
 from ..framework.world.services import PhysicsServices
-from .broad_phase.boxes import box_rows
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .ccd.search_bounds import DISCRETE
 from .codes import AFTERWARDS
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
@@ -32,20 +30,19 @@ from .inspection.energies import kinetic_energy, momentum, potential_energy
 from .inspection.planned_columns import planned_columns
 from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
-from .linked_parts import BOX_ROWS, linked_part
-from .linked_parts import COUNT as LINKED_PART_COUNT
 from .narrow_phase.system import NarrowPhase
-from .preparation import kind_of, load_kept, prepare
+from .preparation import prepare
 from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
 from .records import STATE
 from .room import Room
-from .scene import SWEEPS, Scene
+from .scene import Scene
 from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
-from .stage_list import CLOSING, LINKED_PARTS, OPENING, STAGES, SYSTEM_OF_STAGE
+from .stage_list import CLOSING, OPENING, STAGES, SYSTEM_OF_STAGE
+from .step_links import StepLinks
 
 if TYPE_CHECKING:
     from ..framework.world.world import World
@@ -68,7 +65,6 @@ class Simulation(PhysicsServices):
         self.contacts = Contacts(dimensions, lookup, self._running_step, source)
         self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
         self._room = Room(self.state, self.scene, self.search)
-        self.state.links = np.zeros(LINKED_PART_COUNT, np.int64)
         self.program = Program(self.state, STAGES, self._room.handlers(self), AFTERWARDS)
         self._attribution = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
@@ -86,9 +82,7 @@ class Simulation(PhysicsServices):
         self.response = Response(self.program, self.contacts, lambda: world.settings)
         self.contact_events = ContactEvents(self.program, source, self.contacts, lookup, lambda: world.settings)
         self.parts_version = 0
-        self._linked_version = self._linked_forces = -1  # of the scene, and how many force systems there were
-        self._shapes_key: Any = None
-        self._kept_key: Any = None
+        self.links = StepLinks(self.scene, self.program, self.integration, self.search)
         self._must_check = False  # in every step: sensors among levels, pairs that no plugin has
         self._copies = ColumnCopies(self.table)
         self._words = self.state.words
@@ -114,7 +108,7 @@ class Simulation(PhysicsServices):
         write_settings(self.state, settings, self._world.registry)
         self.search.read_settings()
         self.scene.forget()
-        self._linked_version = -1
+        self.links.forget()
 
     def set_gravity(self, gravity: Any) -> None:
         self.gravity = gravity_vector(gravity, self.dimensions)
@@ -131,10 +125,8 @@ class Simulation(PhysicsServices):
             self._refresh()
         if self._must_check:
             self._check()
-        force_systems = len(self._world.force_systems)
-        if scene.version != self._linked_version or force_systems != self._linked_forces:
+        if not self.links.follows(len(self._world.force_systems)):
             self._link()
-            self._linked_forces = force_systems
         if others_write or words[self._others_write]:
             self._take_care(others_write)
 
@@ -172,76 +164,30 @@ class Simulation(PhysicsServices):
             check_pairs(linked, scene.levels, state.bodies.collider_slot, self.table, self._world.registry)
 
     def _link(self) -> None:
-        """Compile or load what the step needs, and load what later steps and queries may need of what is kept."""
-        self.integration.prepare()
+        """Compile or load what the step needs."""
         self.parts_version += 1
-        state = self.state
-        collides, sweeps = state.collides, state.collides and (state.mode != DISCRETE or self._any_ccd())
-        state.sweeps_ready = sweeps
-        if sweeps:
-            self.scene.reserve(*SWEEPS)
-        conditions = {
-            "": True,
-            "dynamic bodies": state.dynamic > 0,
-            "colliders": collides,
-            "contacts": collides or bool(state.contacts.counts.any()),
-            "one level": collides and not state.several_levels,
-            "several levels": collides and state.several_levels,
-            "many bodies": collides and self.search.needs_grids(),
-            "swept bodies": sweeps,
-            **dict.fromkeys(self.integration.stages_needed, state.dynamic > 0),
-        }
         try:
-            self._link_shapes(sweeps)
-            self._link_parts(sweeps)
-            self.program.link(lambda stage: conditions.get(stage.needed, False))
-            self._load_kept()
+            self.links.link(len(self._world.force_systems))
         except Exception as error:
-            self._linked_version = -1
             self._attribution.describe(error)
             raise
-        self._linked_version = self.scene.version
-
-    def _load_kept(self) -> None:
-        """What is kept on disk of all that this world can need, when that may be more than before."""
-        key = (self.scene.linked, self._world.registry.version, self.integration.stages_possible)
-        if key != self._kept_key:
-            load_kept(*kind_of(self))
-            self._kept_key = key
-
-    def _link_parts(self, sweeps: bool) -> None:
-        """The parts of stages that are called by address; those of swept bodies only where there are any."""
-        links = self.state.links
-        for place, function in LINKED_PARTS.items():
-            if not links[place] and (sweeps or place == BOX_ROWS) and self.state.collides:
-                links[place] = linked_part(place, function, self.dimensions).address
-
-    def _link_shapes(self, sweeps: bool) -> None:
-        key = (self.scene.version, sweeps)
-        if key != self._shapes_key:
-            self.scene.link_shapes(sweeps)
-            self._shapes_key = key
 
     def refresh_for_queries(self) -> None:
         """Between two steps: shapes, rows and columns up to date."""
         if self.table.in_step:
             return
         self._refresh()
-        self._link_shapes(self.state.sweeps_ready)
+        self.links.link_shapes()
 
     def _box_now(self) -> None:
         """Boxes around the bodies where they are at this moment."""
         state = self.state
         before = state.moved, state.candidates_ready
-        if not state.links[BOX_ROWS]:
-            state.links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self.dimensions).address
+        self.links.link_boxes()
         state.moved = False
         self.program.run_one("box_statics", 0.0)
         self.program.run_one("box_motions", 0.0)
         state.moved, state.candidates_ready = before
-
-    def _any_ccd(self) -> bool:
-        return bool(self.table.column("ccd")[: self.table.stops[1]].any())
 
     def make_sweeps_ready(self, dt: float) -> None:
         """Some body is swept from now on."""
@@ -343,7 +289,7 @@ class Simulation(PhysicsServices):
         self._copies.kept = False
         self.scene.refresh_rotation()
         state = self.state
-        state.sweeping = state.collides and (state.mode != DISCRETE or self._any_ccd())
+        state.sweeping = self.links.needs_sweeps()
 
     def planned_kernels(self) -> Iterable[PlannedKernel]:
         return planned_kernels(self.state)

@@ -18,7 +18,4 @@ def pytest_sessionstart(session):
     is_worker, several = hasattr(config, "workerinput"), (getattr(config.option, "numprocesses", None) or 1) > 1
     if is_worker or not several or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return
-    commands = [[sys.executable, "-m", "carom", "warm-up", "--dimensions", d] for d in "23"]
-    started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for command in commands]
-    for process in started:
-        process.wait()
+    subprocess.run([sys.executable, "-m", "carom", "warm-up"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -82,9 +82,14 @@ class Called:
         return tuple(types.int64 if kind is int else types.float64 for kind in self._arguments)
 
     @property
+    def ready(self) -> bool:
+        """Whether it has been linked."""
+        return self._linked
+
+    @property
     def at_hand(self) -> bool:
         """Whether linking it compiles nothing."""
-        return self._linked or self._kernel.made.is_kept(self._types)
+        return self.ready or self._kernel.made.is_kept(self._types)
 
     def link(self) -> None:
         """Compile or load it now."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..compilation import untimed_kernel
 from .late import JIT, cgutils, intrinsic, ir, types
+from .linking import Called
 
 _HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")  # elsewhere reading it may be forbidden
 _MONOTONIC = 1
@@ -43,6 +44,9 @@ read_ticks: Any = _compiled_ticks if JIT else time.perf_counter_ns
 def ticks_now() -> int:
     """The counter, for Python."""
     return read_ticks()
+
+
+TICKS_NOW = Called(ticks_now)
 
 
 class TickClock:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dis
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..jit.linking import Called, Linked, linked_call
 from ..jit.record import Record
 from ..jit.record_type import record_at, record_type
 from ..jit.schema import Schema, integer, ints
-from ..jit.tick_counter import TickClock, read_ticks
+from ..jit.tick_counter import TICKS_NOW, TickClock, read_ticks
 
 # What every state begins with: addresses of the stages (0: not needed), the time that each has taken in ticks of the
 # processor's clock, how often it ran, and the one that runs now.
@@ -118,15 +118,21 @@ class Program:
         state.program = self._addresses
         state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
         self._run_stages = entry_point(run_stages)
-        self._clock = TickClock()
+        self._clock: TickClock | None = None  # from the first link on
         self._python_seconds = np.zeros(len(stages))  # of what Python has done for each stage
         self.inside = 0.0  # s of stages that Python has run within a step: not to be counted twice
         self.describe_error: Callable[[BaseException], None] = lambda error: None  # adds notes to it
         self.alarm = 0  # the word of the state that is not 0 when a stage has noted something wrong
         self.on_alarm: Callable[[], None] = lambda: None
 
+    def functions(self, wanted: Callable[[Stage], bool]) -> Iterator[Linked | Called]:
+        """What :meth:`link` and :meth:`run` call."""
+        yield from (RUN_STAGES, TICKS_NOW)
+        yield from (self._linked(stage) for stage in self.stages if wanted(stage))
+
     def link(self, wanted: Callable[[Stage], bool]) -> None:
         """Compile or load the stages that are wanted; the others are skipped from now on."""
+        self._clock = self._clock or TickClock()
         for k, stage in enumerate(self.stages):
             self._addresses[k] = self._linked(stage).address if wanted(stage) else 0
 
@@ -187,7 +193,7 @@ class Program:
 
     def seconds_of(self, counts: np.ndarray) -> np.ndarray:
         """The seconds of each stage, from a difference of :meth:`counts`."""
-        return counts[1] * self._clock.seconds_per_tick + counts[2]
+        return counts[1] * (self._clock.seconds_per_tick if self._clock else 0.0) + counts[2]
 
 
 _linked: dict[tuple[Any, Any], Linked] = {}

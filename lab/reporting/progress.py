@@ -25,8 +25,10 @@ class Compiling:
     def words(self, kernel: str) -> str:
         """The text for ``kernel``, named as in the log."""
         count, seconds = len(log.compiled) - self._before[0], log.seconds - self._before[1]
-        so_far = f" ({count} so far, {seconds:.1f} s)" if count else ""
-        return f"compiling {kernel.rpartition('.')[2]}{so_far} ..."
+        so_far = f"{count} so far, {seconds:.1f} s" if count else ""
+        left = f"{log.left} left" if log.left else ""
+        numbers = ", ".join(filter(None, (left, so_far)))
+        return f"compiling {kernel.rpartition('.')[2]}{f' ({numbers})' if numbers else ''} ..."
 
     def show_cache_folder(self, console: Console) -> None:
         """Print where the kernels are kept; at the first call only."""

@@ -99,10 +99,10 @@ class LinkedPair:
         touches = self._registered("touches", self.pair.corner, "d, slop", helpers=False)
         return Linked(named(make_corner(touches, *self._records)), corner_signature(self.dimensions))
 
-    def all_functions(self) -> Iterator[Linked]:
-        """Those that there are."""
+    def functions(self, sweeps: bool) -> Iterator[Linked]:
+        """Those that there are; sweeps: also that of swept bodies and casts."""
         yield from (self.evaluate, self.batch)
-        yield from (linked for linked in (self.sweep, self.corner) if linked is not None)
+        yield from (linked for linked in (self.corner, self.sweep if sweeps else None) if linked is not None)
 
     @cached_property
     def _contact(self) -> Any:

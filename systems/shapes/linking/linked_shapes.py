@@ -92,14 +92,14 @@ class LinkedShapes:
         shapes.flipped = self._flipped
         shapes.sweep = self._sweep if sweeps else np.zeros(len(self.shapes) ** 2, np.int64)
 
-    def all_functions(self) -> Iterator[Linked]:
-        """Everything that a step may call for these shapes, swept bodies included."""
+    def all_functions(self, sweeps: bool) -> Iterator[Linked]:
+        """Everything that a step may call for these shapes; sweeps: where there are swept bodies."""
         for number, function in enumerate(self.functions):
             yield from function.all_functions(by_address=number in self.supported)
         yield from self._rules
         for pair in self.pairs.values():
             if pair is not None:
-                yield from pair.all_functions()
+                yield from pair.functions(sweeps)
 
     @cached_property
     def _bounds(self) -> np.ndarray:

@@ -1,0 +1,118 @@
+"""What the steps of one world call: compiled or loaded before a step, its address written into the world's records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..framework.jit.link_all import link_all
+from ..framework.jit.linking import Called, Linked
+from ..framework.schedule.stages import Program, Stage
+from .broad_phase.boxes import box_rows
+from .broad_phase.search import CandidateSearch
+from .ccd.search_bounds import DISCRETE
+from .integration.system import Integration
+from .linked_parts import BOX_ROWS, COUNT, linked_part
+from .preparation import kind_of, load_kept
+from .scene import SWEEPS, Scene
+from .stage_list import LINKED_PARTS
+
+NEVER = -1
+
+
+class StepLinks:
+    """Follows the scene: which stages, parts of stages and functions of shapes its steps need."""
+
+    def __init__(self, scene: Scene, program: Program, integration: Integration, search: CandidateSearch) -> None:
+        self._scene, self._state, self._program = scene, scene.state, program
+        self._integration, self._search = integration, search
+        self._state.links = np.zeros(COUNT, np.int64)
+        self._version = self._forces = NEVER  # of the scene, and how many force systems there were
+        self._shapes_key: Any = None
+        self._kept_key: Any = None
+
+    def follows(self, force_systems: int) -> bool:
+        """Whether nothing has changed since the last time that makes other functions necessary."""
+        return self._scene.version == self._version and force_systems == self._forces
+
+    def needs_sweeps(self) -> bool:
+        """Whether some body is swept: all of them in the mode, or those whose ccd is set."""
+        state, table = self._state, self._scene.table
+        return state.collides and (state.mode != DISCRETE or bool(table.column("ccd")[: table.stops[1]].any()))
+
+    def forget(self) -> None:
+        """Other settings: link again before the next step."""
+        self._version = NEVER
+
+    def link(self, force_systems: int) -> None:
+        """Compile or load what the step needs, and load what later steps and queries may need of what is kept."""
+        self.forget()  # until it is done
+        self._integration.prepare()
+        state = self._state
+        state.sweeps_ready = self.needs_sweeps()
+        if state.sweeps_ready:
+            self._scene.reserve(*SWEEPS)
+        conditions = self._conditions()
+
+        def wanted(stage: Stage) -> bool:
+            return conditions.get(stage.needed, False)
+
+        parts = self._parts()
+        link_all((*self._functions_of_shapes(), *parts.values(), *self._program.functions(wanted)))
+        self.link_shapes()
+        for place, part in parts.items():
+            state.links[place] = part.address
+        self._program.link(wanted)
+        self._load_kept()
+        self._version, self._forces = self._scene.version, force_systems
+
+    def _conditions(self) -> dict[str, bool]:
+        """What is true of the scene now, as in ``stage_list.CONDITIONS``."""
+        state = self._state
+        moves, collides = state.dynamic > 0, state.collides
+        return {
+            "": True,
+            "dynamic bodies": moves,
+            "colliders": collides,
+            "contacts": collides or bool(state.contacts.counts.any()),
+            "one level": collides and not state.several_levels,
+            "several levels": collides and state.several_levels,
+            "many bodies": collides and self._search.needs_grids(),
+            "swept bodies": state.sweeps_ready,
+            **dict.fromkeys(self._integration.stages_needed, moves),
+        }
+
+    def _functions_of_shapes(self) -> Iterator[Linked | Called]:
+        linked = self._scene.linked
+        if linked is not None:
+            yield from linked.all_functions(self._state.sweeps_ready)
+
+    def _parts(self) -> dict[int, Linked]:
+        """The parts of stages that are called by address; those of swept bodies only where there are any."""
+        if not self._state.collides:
+            return {}
+        places = LINKED_PARTS if self._state.sweeps_ready else (BOX_ROWS,)
+        return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
+
+    def link_shapes(self) -> None:
+        """The functions of the shapes alone, where they are not linked yet."""
+        key = (self._scene.version, self._state.sweeps_ready)
+        if key != self._shapes_key:
+            link_all(self._functions_of_shapes())
+            self._scene.link_shapes(self._state.sweeps_ready)
+            self._shapes_key = key
+
+    def link_boxes(self) -> None:
+        """What boxes around bodies need, where no step has been taken yet."""
+        links = self._state.links
+        if not links[BOX_ROWS]:
+            links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self._state.dimensions).address
+
+    def _load_kept(self) -> None:
+        """What is kept on disk of all that this world can need, when that may be more than before."""
+        key = (self._scene.linked, self._scene.registry.version, self._integration.stages_possible)
+        if key != self._kept_key:
+            load_kept(*kind_of(self._scene, self._integration))
+            self._kept_key = key
