@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import sys
 
 import helpers_cli
@@ -203,26 +204,34 @@ def test_scaling_grows_from_the_first_size():
 
 
 def test_startup_times_processes_with_caches_of_their_own(monkeypatch):
-    """The order matters: each repeat fills an empty cache first."""
-    caches = []
+    """The order matters: each repeat fills an empty cache, then uses it; with shipped kernels it is empty again."""
+    started, shipped = [], []
 
-    def seconds(code, cache):
-        caches.append((cache, "step()" in code))
-        return float(len(caches))
+    def start(scene, cache, portable):
+        started.append((cache, portable != ""))
+        number = float(len(started))
+        return {"seconds": number, "imports": 0.5, "first": number / 8, "worst": 0.002, "compiled": 4 - number}
 
-    monkeypatch.setattr(bench_startup, "_seconds", seconds)
-    found = bench_startup.startup(repeats=2)
-    assert [steps for _, steps in caches] == [True, True, False] * 2
-    assert len({cache for cache, _ in caches}) == 2
-    assert found.seconds["empty cache"].values == (1.0, 4.0)
-    assert found.seconds["warm cache"].values == (2.0, 5.0)
+    monkeypatch.setattr(bench_startup, "_ship", lambda scene, folder: shipped.append(scene))
+    monkeypatch.setattr(bench_startup, "_start", start)
+    found = bench_startup.startup(["jump"], repeats=2)
+    caches = [cache for cache, _ in started]
+    assert shipped == ["jump"]
+    assert [portable for _, portable in started] == [False, False, True] * 2
+    assert [caches[0] == caches[1], len(set(caches))] == [True, 4]
+    empty, kept, with_shipped = found.starts
+    assert (empty.seconds.values, kept.seconds.values) == ((1.0, 4.0), (2.0, 5.0))
+    assert (with_shipped.kernels, with_shipped.first_step, with_shipped.worst_step) == ("shipped", 4.5 / 8, 0.002)
     assert bench_startup.Startup.from_dict(json.loads(json.dumps(found.as_dict()))) == found
 
 
-def test_a_process_that_fails_is_no_measurement(tmp_path):
-    assert bench_startup._seconds("pass", tmp_path) > 0
-    with pytest.raises(Problem, match="no luck"):
-        bench_startup._seconds("raise RuntimeError('no luck')", tmp_path)
+def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
+    told = bench_startup._start("jump", os.environ["CAROM_CACHE_DIR"], "")
+    assert 0 < told["imports"] < told["seconds"]
+    assert 0 < told["worst"] < told["seconds"]
+    assert told["compiled"] >= 0
+    with pytest.raises(Problem, match="nothing"):
+        bench_startup._start("nothing", str(tmp_path), "")
 
 
 # -- the command ------------------------------------------------------------------------------------------------
@@ -297,9 +306,12 @@ def test_the_ladder_by_command(carom, tmp_path):
 
 
 def test_startup_by_command(carom, monkeypatch):
-    monkeypatch.setattr(bench_startup, "_seconds", lambda code, cache: 0.5)
-    done = carom("bench", "startup", "--repeats", "1", "--markdown")
-    assert "| empty cache | 0.500 | 0.500 .. 0.500 | 5 |" in done.stdout
+    told = {"seconds": 0.5, "imports": 0.25, "first": 0.125, "worst": 0.002, "compiled": 3}
+    monkeypatch.setattr(bench_startup, "_ship", lambda scene, folder: None)
+    monkeypatch.setattr(bench_startup, "_start", lambda scene, cache, shipped: told)
+    done = carom("bench", "startup", "--scenes", "jump", "--repeats", "1", "--markdown")
+    assert "| jump | shipped | 3 | 0.500 | 0.500 .. 0.500 | 0.250 | 0.125 | 2.00 |" in done.stdout
+    assert "no scene" in carom("bench", "startup", "--scenes", "nothing").stderr
 
 
 def test_without_pymunk_it_times_carom_and_says_what_is_missing(carom, tiny, no_pymunk):

@@ -8,6 +8,7 @@ import click
 from rich.console import Console
 
 from ..commands.group import Commands
+from ..commands.loading import load
 from ..commands.options import out_option, repeats_option, shown_options
 from ..commands.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
@@ -115,13 +116,15 @@ def scaling_command(
 
 
 @bench_command.command("startup", short_help="The time to the first step of a new process.")
+@click.option("--scenes", "names", default="asteroids", metavar="NAME,NAME", help="Scenes of the library.")
 @repeats_option(3, RUNS)
 @shown_options
-def startup_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
-    """Time new processes up to their first step: with an empty cache of compiled kernels, then with a filled one."""
+def startup_command(names: str, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time new processes up to their first step: nothing compiled, kernels kept on disk, and kernels shipped."""
     output = Output.checked("carom bench startup", as_json, as_markdown, into, None)
+    wanted = [load(name.strip()).name for name in names.split(",")]
     with Bar(Console(stderr=True)) as bar:
-        result = bench_startup.startup(repeats=repeats, progress=bar)
+        result = bench_startup.startup(wanted, repeats, bar)
     output.show(result, [bench_startup.table(result)], [])
 
 

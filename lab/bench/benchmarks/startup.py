@@ -1,15 +1,17 @@
-"""Time from the start of a new process to the end of its first step, with an empty and with a filled kernel cache."""
+"""Starting a game: the time to its first step and its longest later step, by what is compiled already."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 
 from ....framework.jit.cache import CACHE_FOLDER_VARIABLE
@@ -20,18 +22,50 @@ from ...reporting.text_tables import TextTable
 from ..report import digits, span
 from ..results import machine
 
-PROGRAM = "from carom import scenes; scenes.get({scene!r}).build().step(); import os; os._exit(0)"
-IMPORT_ALONE = "import carom.scenes, os; os._exit(0)"
-TARGETS = {"empty cache": 5.0, "warm cache": 1.0}  # s
+STEPS = 600  # after the first
+EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
+PROGRAM = f"""
+import json, sys, time
+import carom.framework.jit.dispatchers  # numba, as the first kernel imports it
+from carom import scenes
+from carom.framework import use_kernels
+from carom.framework.compilation import log
+name, shipped = sys.argv[1:]
+if shipped:
+    use_kernels(shipped)
+imported = time.process_time()
+world = scenes.get(name).build()
+world.step()
+first, at = time.process_time(), time.time()
+worst = 0.0
+for _ in range({STEPS}):
+    started = time.perf_counter()
+    world.step()
+    worst = max(worst, time.perf_counter() - started)
+told = {{"at": at, "imports": imported, "first": first - imported, "worst": worst, "compiled": len(log.compiled)}}
+print(json.dumps(told))
+"""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One scene and what was compiled before; ``seconds`` by the wall clock, from starting the process."""
+
+    scene: str
+    kernels: str
+    seconds: Spread  # to the end of the first step
+    imports: float  # CPU s, of Python, numpy, numba and carom
+    first_step: float  # CPU s, of building the world and the first step
+    worst_step: float  # s, the longest of the steps after it
+    compiled: int
 
 
 @dataclass
 class Startup:
-    """Wall-clock seconds from starting the process, by state of the cache; "import alone" takes no step."""
+    """All starts that were measured; medians of the repeats."""
 
-    scene: str
     machine: dict[str, str]
-    seconds: dict[str, Spread]
+    starts: list[Start]
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -40,39 +74,69 @@ class Startup:
     @classmethod
     def from_dict(cls, plain: dict[str, Any]) -> Self:
         """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "seconds": {name: Spread.from_dict(s) for name, s in plain["seconds"].items()}})
+        starts = [Start(**{**start, "seconds": Spread.from_dict(start["seconds"])}) for start in plain["starts"]]
+        return cls(**{**plain, "starts": starts})
 
 
-def startup(scene: str = "gas2d", repeats: int = 3, progress: Progress = NO_PROGRESS) -> Startup:
-    """Start processes that build ``scene`` and take one step; each repeat starts with an empty cache folder."""
-    program = PROGRAM.format(scene=scene)
-    found: dict[str, list[float]] = {"empty cache": [], "warm cache": [], "import alone": []}
-    progress.begin(repeats)
-    for repeat in range(repeats):
-        progress.say(f"{scene}, repeat {repeat + 1} of {repeats}")
-        with tempfile.TemporaryDirectory() as folder:
-            for name, code in zip(found, (program, program, IMPORT_ALONE), strict=True):
-                found[name].append(_seconds(code, Path(folder)))
-        progress.advance(1)
-    return Startup(scene, machine(), {name: Spread.of(values) for name, values in found.items()})
+def startup(scenes: Sequence[str] = ("asteroids",), repeats: int = 3, progress: Progress = NO_PROGRESS) -> Startup:
+    """Start processes that build a scene and step it; the first of each repeat has an empty cache folder."""
+    starts = []
+    progress.begin(len(scenes) * (repeats + 1))
+    for scene in scenes:
+        found: dict[str, list[dict[str, float]]] = {EMPTY: [], KEPT: [], SHIPPED: []}
+        with tempfile.TemporaryDirectory() as portable:
+            progress.say(f"{scene}: compiling kernels to ship")
+            _ship(scene, portable)
+            progress.advance(1)
+            for repeat in range(repeats):
+                progress.say(f"{scene}, repeat {repeat + 1} of {repeats}")
+                with tempfile.TemporaryDirectory() as cache, tempfile.TemporaryDirectory() as nothing:
+                    for kernels, folder in ((EMPTY, cache), (KEPT, cache), (SHIPPED, nothing)):
+                        found[kernels].append(_start(scene, folder, portable if kernels == SHIPPED else ""))
+                progress.advance(1)
+        starts += [_of(scene, kernels, runs) for kernels, runs in found.items()]
+    return Startup(machine(), starts)
 
 
-def _seconds(code: str, cache: Path) -> float:
-    environment = {**os.environ, CACHE_FOLDER_VARIABLE: str(cache)}
-    started = time.perf_counter()
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
-    seconds = time.perf_counter() - started
+def _of(scene: str, kernels: str, runs: list[dict[str, float]]) -> Start:
+    def median(name: str) -> float:
+        return statistics.median(run[name] for run in runs)
+
+    seconds = Spread.of([run["seconds"] for run in runs])
+    return Start(scene, kernels, seconds, median("imports"), median("first"), median("worst"), int(median("compiled")))
+
+
+def _ship(scene: str, folder: str) -> None:
+    _run([sys.executable, "-m", "carom", "warm-up", scene, "--portable", folder], {})
+
+
+def _start(scene: str, cache: str, shipped: str) -> dict[str, float]:
+    """Of one process, by name, and the seconds that have passed until the end of its first step."""
+    started = time.time()
+    told = json.loads(_run([sys.executable, "-c", PROGRAM, scene, shipped], {CACHE_FOLDER_VARIABLE: cache}))
+    return {**told, "seconds": told["at"] - started}
+
+
+def _run(command: list[str], environment: dict[str, str]) -> str:
+    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
     if done.returncode:
         raise Problem(f"the process that was timed failed: {(done.stderr.splitlines() or ['no message'])[-1]}")
-    return seconds
+    return done.stdout
 
 
 def table(result: Startup) -> TextTable:
     """The times as a table."""
     cells = [
-        (name, digits(spread.median), span(spread), f"{TARGETS[name]:g}" if name in TARGETS else "-")
-        for name, spread in result.seconds.items()
-    ]
-    repeats = len(result.seconds["empty cache"].values)
-    title = f"{result.scene}: seconds from starting the process to the end of the first step, medians of {repeats}"
-    return TextTable(title, ("cache", "s", "from .. to", "target"), cells)
+        (
+            start.scene, start.kernels, str(start.compiled), digits(start.seconds.median), span(start.seconds),
+            digits(start.imports), digits(start.first_step), digits(start.worst_step * 1e3),
+        )
+        for start in result.starts
+    ]  # fmt: skip
+    repeats = len(result.starts[0].seconds.values)
+    columns = (
+        "scene", "kernels", "compiled", "first step after s", "from .. to", "imports CPU s", "first step CPU s",
+        f"worst of {STEPS} ms",
+    )  # fmt: skip
+    title = f"from starting a process to the end of its first step, and the longest step after it, medians of {repeats}"
+    return TextTable(title, columns, cells)
