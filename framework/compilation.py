@@ -34,6 +34,7 @@ class CompilationLog:
     announced: bool = False
     left: int = 0  # functions to compile before a step can go on, that which compiles now included; 0: not known
     processes: int = 1  # that may compile at once, see link_all
+    background: bool = os.environ.get("CAROM_BACKGROUND", "") != "0"  # whether a thread compiles ahead, see background
 
     @property
     def seconds(self) -> float:

@@ -51,5 +51,5 @@ def cli(context: click.Context) -> None:
 
 def main() -> None:
     """The entry point of the ``carom`` script and of ``python -m carom``."""
-    log.processes = os.cpu_count() or 1
+    log.processes, log.background = os.cpu_count() or 1, False
     cli()

@@ -2,8 +2,8 @@
 
 Everything compiled that a step or a query calls has a fixed signature, so it can be compiled or loaded without a body
 that uses it. What a step needs now is linked before it in any case (see ``Simulation``). Of the rest, what is kept on
-disk is loaded then too, so that it does not make a later step wait; what is not is compiled when it is first called,
-or by ``world.prepare()``.
+disk is loaded then too, so that it does not make a later step wait; what is not compiles in the background, unless it
+is called before: then it compiles at that call, or in ``world.prepare()``.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ..components import AABBCollider, Collider, SphereCollider
 from ..framework.data.bodies import SelectedBodies
 from ..framework.data.column_copies import COPY_BLOCKS
 from ..framework.data.component import Component
+from ..framework.jit.background import link_in_background
 from ..framework.jit.link_all import link_all
 from ..framework.jit.linking import Called, Linked
 from ..framework.jit.tick_counter import TICKS_NOW
@@ -77,9 +78,11 @@ def needed_functions(
 
 
 @lru_cache(maxsize=128)  # once in a process for worlds alike
-def load_kept(*kind: Any) -> None:
-    """Load what is kept on disk of all that such a world may call."""
-    link_all(function for function in needed_functions(*kind) if function.at_hand)
+def link_possible(*kind: Any) -> None:
+    """Load what is kept on disk of all that such a world may call, and compile the rest while it runs."""
+    functions = list(dict.fromkeys(needed_functions(*kind)))
+    link_all(function for function in functions if function.at_hand)
+    link_in_background(functions)
 
 
 def prepare(simulation: Simulation, world: World, components: tuple[type[Any], ...]) -> None:

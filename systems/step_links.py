@@ -15,7 +15,7 @@ from .broad_phase.search import CandidateSearch
 from .ccd.search_bounds import DISCRETE
 from .integration.system import Integration
 from .linked_parts import BOX_ROWS, COUNT, linked_part
-from .preparation import kind_of, load_kept
+from .preparation import kind_of, link_possible
 from .scene import SWEEPS, Scene
 from .stage_list import LINKED_PARTS
 
@@ -47,7 +47,7 @@ class StepLinks:
         self._version = NEVER
 
     def link(self, force_systems: int) -> None:
-        """Compile or load what the step needs, and load what later steps and queries may need of what is kept."""
+        """Compile or load what the step needs, and see to what later steps and queries may need."""
         self.forget()  # until it is done
         self._integration.prepare()
         state = self._state
@@ -65,7 +65,7 @@ class StepLinks:
         for place, part in parts.items():
             state.links[place] = part.address
         self._program.link(wanted)
-        self._load_kept()
+        self._link_possible()
         self._version, self._forces = self._scene.version, force_systems
 
     def _conditions(self) -> dict[str, bool]:
@@ -110,9 +110,9 @@ class StepLinks:
         if not links[BOX_ROWS]:
             links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self._state.dimensions).address
 
-    def _load_kept(self) -> None:
-        """What is kept on disk of all that this world can need, when that may be more than before."""
+    def _link_possible(self) -> None:
+        """All that this world can need, when that may be more than before."""
         key = (self._scene.linked, self._scene.registry.version, self._integration.stages_possible)
         if key != self._kept_key:
-            load_kept(*kind_of(self._scene, self._integration))
+            link_possible(*kind_of(self._scene, self._integration))
             self._kept_key = key

@@ -9,6 +9,7 @@ from pathlib import Path
 
 CACHE = Path(__file__).resolve().parent.parent / ".kernels"
 
+os.environ["CAROM_BACKGROUND"] = "0"  # what compiles, and when, depends on no thread
 os.environ["CAROM_CACHE_DIR"] = str(CACHE)  # before anything imports carom, and for all processes that tests start
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import threading
 import time
 from typing import Any, ClassVar
 
@@ -19,6 +20,7 @@ from .cache import KernelCache
 from .pipeline import kernel_compiler, part_compiler
 
 logger = logging.getLogger("carom")
+background = threading.local()  # active: this thread compiles ahead, nobody waits for it
 
 
 class Wait:
@@ -32,8 +34,10 @@ class Wait:
     def __enter__(self) -> Wait:
         global_compiler_lock.acquire()
         self.own = 0.0
-        self._collecting = gc.isenabled()
-        gc.disable()  # the compiler makes millions of objects that live on; looking through them takes a twentieth
+        self._blocks = not getattr(background, "active", False)  # else the game goes on meanwhile
+        self._collecting = self._blocks and gc.isenabled()
+        if self._collecting:
+            gc.disable()  # the compiler makes millions of objects that live on; looking through them costs a twentieth
         self._running.append(self)
         self._started = time.perf_counter()
         return self
@@ -47,7 +51,7 @@ class Wait:
         self.own += seconds
         if self._running:
             self._running[-1].own -= seconds
-        else:
+        elif self._blocks:
             log.waited += seconds
         global_compiler_lock.release()
 
