@@ -1,0 +1,94 @@
+"""Compiling while the game runs: nobody waits for it, nothing depends on it, and it ends with the program."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+FUNCTIONS = """
+import time
+from numba import types
+from carom.framework.compilation import log
+from carom.framework.jit.background import link_in_background, wait
+from carom.framework.jit.linking import Linked
+
+signature = types.float64(types.float64)
+
+
+def adding(number):
+    def add(x):
+        return x + number
+
+    return Linked(add, signature)
+
+
+def wrong(x):
+    return x.nothing
+"""
+ONE_AFTER_THE_OTHER = """
+functions = [adding(1.0), Linked(wrong, signature), adding(2.0)]
+link_in_background(functions)
+wait()
+print([function.ready for function in functions], len(log.compiled), log.waited)
+link_in_background([adding(3.0)])  # a thread that has ended is followed by another
+wait()
+print(len(log.compiled))
+try:
+    functions[1].link()
+except Exception as error:
+    print(type(error).__name__)
+"""
+THE_END = """
+link_in_background([adding(float(k)) for k in range(400)])
+"""
+WORLD = """
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import World
+from carom.framework.compilation import log
+from carom.framework.jit.background import wait
+from carom.plugins import Physics
+
+world = World(Physics(dimensions=2, gravity=(0.0, -9.81)))
+world.create_entity(Transform((0.0, -1.0)), AABBCollider((9.0, 1.0)))
+world.create_entity(Transform((0.0, 3.0)), RigidBody(), SphereCollider(0.5, restitution=0.5))
+world.step()
+seconds = world.stats().compile_seconds
+wait()
+world.step()
+print([name for name, _ in log.compiled], world.stats().compile_seconds == seconds)
+before = log.loaded
+print(len(world.ray_cast((0.0, 5.0), (0.0, -1.0))), log.loaded == before, len(log.compiled))
+"""
+
+
+def run(code, cache, background="1"):
+    environment = {**os.environ, "CAROM_CACHE_DIR": str(cache), "CAROM_BACKGROUND": background}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def test_one_function_after_the_other_and_nobody_waits(tmp_path):
+    lines = run(FUNCTIONS + ONE_AFTER_THE_OTHER, tmp_path)
+    assert lines == ["[True, False, True] 2 0.0", "3", "TypingError"]
+
+
+def test_it_ends_with_the_program(tmp_path):
+    run(FUNCTIONS + THE_END, tmp_path)
+    assert len(list(tmp_path.glob("*.kernel"))) < 400
+    assert not list(tmp_path.glob("*.unfinished"))
+
+
+@pytest.mark.slow
+def test_what_queries_need_is_compiled_while_the_game_runs(tmp_path):
+    kept = os.environ["CAROM_CACHE_DIR"]
+    run(WORLD + "world.prepare()\n", kept)
+    shutil.copytree(kept, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns("find_hits-*"))
+    assert run(WORLD, tmp_path) == ["['find_hits'] True", "2 True 1"]
+    for path in tmp_path.glob("find_hits-*"):
+        path.unlink()
+    assert run(WORLD, tmp_path, background="0") == ["[] True", "2 True 1"]  # at the call
