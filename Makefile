@@ -1,6 +1,6 @@
 # carom: every target works on a fresh clone with python3 (3.11 or newer), pip and make.
 #   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
-#   make test    the tests, without the slow ones
+#   make test    the tests, without the slow ones; make test-slow: those; make coverage: which lines they run
 #   make wheel   a wheel that carries compiled kernels, into dist/
 #   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
 #   make figures measure again what the tables and charts of docs/accuracy.md, limits.md, settings.md and levels.md show
@@ -20,7 +20,7 @@ BENCH := .venv/bench-$(HERE)
 TEST := .venv/test-$(HERE)
 DEV := .venv/dev-$(HERE)
 
-.PHONY: run wheel test test-slow bench figures ide typecheck lint clean
+.PHONY: run wheel test test-slow coverage bench figures ide typecheck lint clean
 
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -30,6 +30,14 @@ test: $(TEST)
 
 test-slow: $(TEST)
 	$(BIN)/pytest -n 2 --dist loadfile -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
+
+# Kernels as plain Python: the same bits as compiled, and which lines of the engine tests have run.
+PLAIN := plain_python components_* systems_* world_* contacts_rows filters_enabled filters_sensors forces_kinds forces_systems \
+  plugins_* plugin_checks adoption undo vectors profile
+
+coverage: $(TEST)
+	NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 --dist loadfile -m "not slow and not compiled" --cov --cov-report=term $(ARGS) \
+	  $(foreach name,$(PLAIN),$(wildcard tests/test_$(name).py))
 
 # A wheel for this platform and Python version that carries the compiled kernels: dist/carom-*.whl.
 wheel: $(RUN)
@@ -69,7 +77,7 @@ lint: $(DEV)
 	$(BIN)/ruff check
 
 clean:
-	rm -rf .venv .kernels build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .kernels .coverage build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
 
 $(VENV):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -129,6 +129,7 @@ def test_assigning_a_position_is_a_teleport():
 # -- handles last --------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 def test_handles_stay_valid_through_growth_and_the_deletion_of_others():
     world = make_world()
     rng = np.random.default_rng(1)

@@ -68,6 +68,7 @@ def test_canonical_order_whatever_the_history():
     assert pairs == sorted([*ids(world.contacts.begin), *ids(world.contacts.stay)])
 
 
+@pytest.mark.compiled
 def test_normal_impulse_is_the_momentum_exchanged():
     """Impact: m1 (1 + e) w / 2 for equal masses; at rest: m g dt in every step, of a pile the load above included."""
     world = make_world()

@@ -93,6 +93,7 @@ def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
     assert [contact.entity_b for contact in world.contacts.of(body)] == [ground]
 
 
+@pytest.mark.compiled
 def test_a_stack_on_a_disabled_contact_falls_together():
     """Three boxes; the contact below the lowest is disabled: all fall freely, in contact without impulse."""
     world = make_world(gravity=10.0)
@@ -106,6 +107,7 @@ def test_a_stack_on_a_disabled_contact_falls_together():
         assert velocity(world, body)[1] == pytest.approx(speed - 10 * 30 * DT, abs=1e-3)
 
 
+@pytest.mark.compiled
 @both_dimensions
 def test_a_pair_disabled_from_the_start_never_begins(d):
     """Forty boxes fall onto a floor that is disabled for them, each a little higher: for any gap at the end of a step,

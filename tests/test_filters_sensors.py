@@ -109,6 +109,7 @@ def test_sensors_meet_sensors_and_kinematic_bodies_and_are_found_by_queries():
     assert world.query_aabb((-3.0, -3.0), (3.0, 3.0)) == [one, two, three]
 
 
+@pytest.mark.compiled
 def test_a_body_may_become_a_sensor_and_back_between_steps():
     """At rest on the floor; a sensor for ten steps: it falls freely and stays in contact; then solid, it is pushed out
     upwards without gaining speed."""
@@ -154,6 +155,7 @@ def test_one_mask_that_refuses_is_enough(d, refuses):
     assert world.query_point(up(d, -0.1), mask=2) == []
 
 
+@pytest.mark.compiled
 def test_layers_changed_between_steps_let_go_and_catch_again():
     """A body at rest whose floor is excluded by its mask falls freely in that very step, without support."""
     world = make_world(gravity=10.0)

@@ -217,6 +217,7 @@ def test_total_energy_of_a_throw_is_constant(method):
         assert abs(world.kinetic_energy() + world.potential_energy() - start) < 10 * 300 * EPS * scale
 
 
+@pytest.mark.compiled
 def test_total_energy_of_springs_includes_their_potential():
     """B2 through the world's own sums: VV keeps KE + PE within 1 - z^2/4 of the start's amplitude energy."""
     omega = np.array([1.0, 2.0, 3.0])

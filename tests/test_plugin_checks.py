@@ -236,6 +236,7 @@ def test_a_late_registration_that_clashes_changes_nothing():
     world.close()
 
 
+@pytest.mark.compiled
 def test_what_cannot_be_compiled_is_named():
     """Python can do more than compiled code; errors found only by the compiler name plugin, shape and function too."""
     plugin, disc = registered(bounds=lambda shape, dimensions: (shape.reach,) * dimensions)

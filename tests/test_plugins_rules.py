@@ -106,6 +106,7 @@ class AllPairs:
         return first[first < moving], second[first < moving]
 
 
+@pytest.mark.compiled
 def test_a_broad_phase_of_a_plugin_finds_the_same():
     """The same bits as with carom's own."""
     plugin = Plugin("plain")

@@ -44,6 +44,7 @@ def kernel_calls(world):
     return {(row.system, row.kernel): row.calls for row in world.stats().kernels}
 
 
+@pytest.mark.compiled
 def test_a_profile_counts_the_calls_of_each_stage_and_kernel_by_system():
     world = bouncing(integrator="rk4")
     world.add_system(Pull())
@@ -149,6 +150,7 @@ def test_systems_of_a_game_have_their_phase_s_units():
     assert world.stats().nanoseconds["Judge"].keys() == {"body", "candidate"}
 
 
+@pytest.mark.compiled
 def test_compiling_is_kept_apart(monkeypatch, tmp_path):
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
     world = make_world()
@@ -190,6 +192,7 @@ def test_a_profile_leaves_everything_as_it_was():
     assert plain.state_hash() == profiled.state_hash()
 
 
+@pytest.mark.compiled
 def test_kernels_made_inside_a_profile_are_timed_too():
     world = bouncing()
     with world.profile():

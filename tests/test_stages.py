@@ -67,10 +67,6 @@ def hash_under(**variables):
     return result.stdout
 
 
-def test_plain_python_gives_the_same_bits():
-    assert hash_under(NUMBA_DISABLE_JIT="1") == hash_under()
-
-
 @pytest.mark.slow
 def test_the_checked_build_gives_the_same_bits():
     assert hash_under(CAROM_CHECK="1") == hash_under()

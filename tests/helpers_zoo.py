@@ -1,0 +1,251 @@
+"""Small worlds that together run every kernel: modes, methods, shapes, levels, grids and trees, queries, refusals.
+
+``python -m tests.helpers_zoo`` prints a hash per scenario of all that can be seen of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
+from carom.framework import ForceSystem, Plugin, Settings, World, column
+from carom.framework.vectors import item, replace, scale
+from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins.springs import Springs
+
+MODES = ("discrete", "continuous", "event_driven")
+METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
+STEPS = 25
+
+gems = Plugin("gems")
+
+
+@gems.shape(cost=2)
+class Gem(Collider):
+    """|x| + |y| + |z| <= radius; meets other shapes through its support alone."""
+
+    radius = column(positive=True)
+
+    def bounds(shape, dimensions):
+        if dimensions == 2:
+            return shape.radius, shape.radius
+        return shape.radius, shape.radius, shape.radius
+
+    def support(shape, direction):
+        best = 0
+        for k in range(len(direction)):
+            if abs(item(direction, k)) > abs(item(direction, best)):
+                best = k
+        return replace(scale(direction, 0.0), best, math.copysign(shape.radius, item(direction, best)))
+
+
+def seen(world: World) -> str:
+    """The state and everything that is told of contacts and faults."""
+    digest = hashlib.sha256(world.state_hash().encode())
+    contacts = world.contacts
+    for rows in (contacts, contacts.begin, contacts.end, contacts.impacts):
+        for name in ("entity_a", "entity_b", "point", "normal", "depth", "normal_impulse"):
+            digest.update(getattr(rows, name).tobytes())
+    digest.update(repr([str(fault) for fault in world.faults]).encode())
+    return digest.hexdigest()[:16]
+
+
+def play(world: World, steps: int = STEPS) -> list[str]:
+    """What is seen after each step."""
+    found = []
+    for _ in range(steps):
+        world.step()
+        found.append(seen(world))
+    return found
+
+
+def at(d: int, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> tuple[float, ...]:
+    return (x, y, z)[:d]
+
+
+def mixed(d: int, mode: str, count: int = 14, **settings) -> World:
+    """Bodies of all convex shapes fall into a box; every third is a bullet, some are rotated, some kinematic."""
+    random = np.random.default_rng(d)
+    plugins = [capsule.plugin, half_space.plugin, *([convex_polygon.plugin] if d == 2 else [])]
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), *plugins, settings=Settings(collision=mode, **settings))
+    world.create_entity(Transform(at(d)), half_space.HalfSpaceCollider(at(d, 0.0, 1.0), friction=0.5, restitution=0.3))
+    for side, axis in itertools.product((-1, 1), (0, 2) if d == 3 else (0,)):
+        place, half = [0.0, 2.0, 0.0][:d], [3.0, 3.0, 3.0][:d]
+        place[axis], half[axis] = 2.0 * side, 0.2
+        world.create_entity(Transform(tuple(place)), AABBCollider(tuple(half), restitution=0.5))
+    for k in range(count):
+        look = {"restitution": random.uniform(), "friction": random.uniform()}
+        shapes = [
+            SphereCollider(random.uniform(0.2, 0.3), **look),
+            AABBCollider(tuple(random.uniform(0.1, 0.3, d)), **look),
+            capsule.CapsuleCollider(0.15, 0.2, **look),
+        ]
+        if d == 2:
+            shapes.append(convex_polygon.ConvexPolygonCollider([(-0.2, -0.2), (0.3, -0.2), (0.0, 0.3)], **look))
+        place = (*random.uniform(-1.5, 1.5, 1), 0.4 + 0.2 * k, *random.uniform(-1.5, 1.5, d - 2))
+        turned = 0.3 * k if d == 2 else tuple(random.normal(size=4))
+        body = RigidBody(
+            mass=random.uniform(0.5, 3.0), linear_velocity=tuple(random.uniform(-8, 8, d)), ccd=k % 3 == 0,
+            max_linear_speed=6.0 if k == 5 else None, linear_damping=0.2 if k == 6 else 0.0,
+            kind="kinematic" if k == 7 else "dynamic",
+        )  # fmt: skip
+        world.create_entity(Transform(place, rotation=turned), body, shapes[k % len(shapes)])
+    return world
+
+
+def platformer(mode: str) -> World:
+    plugins = (capsule.plugin, one_way_segment.plugin, tile_grid.plugin, convex_polygon.plugin)
+    world = World(Physics(2, gravity=(0.0, -9.81)), *plugins, settings=Settings(collision=mode))
+    world.create_entity(Transform((0.0, 0.0)), tile_grid.TileGridCollider(["#....#", "#.#..#", "######"], 1.0))
+    world.create_entity(Transform((0.0, 1.0)), one_way_segment.OneWaySegmentCollider((-1.0, 0.0), (1.0, 0.0)))
+    for k, collider in enumerate((capsule.CapsuleCollider(0.2, 0.3), SphereCollider(0.2), AABBCollider((0.2, 0.2)))):
+        body = RigidBody(linear_velocity=(2.0 - k, -6.0 * k))
+        world.create_entity(Transform((-0.8 + 0.7 * k, 1.6 + 0.3 * k)), body, collider)
+    corners = convex_polygon.ConvexPolygonCollider([(-0.2, -0.2), (0.2, -0.2), (0.0, 0.2)])
+    world.create_entity(Transform((0.5, 0.8)), RigidBody(linear_velocity=(3.0, 1.0)), corners)
+    return world
+
+
+def levels(d: int, mode: str) -> World:
+    """Entities with several colliders, sensors among them, and layers."""
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), settings=Settings(collision=mode))
+    world.create_entity(Transform(at(d, 0.0, -1.0)), AABBCollider(tuple(1.0 if k == 1 else 9.0 for k in range(d))))
+    for k in range(6):
+        body = RigidBody(linear_velocity=at(d, 1.0 - k, -4.0), ccd=k == 2)
+        look = {"sensor": True} if k == 4 else {"restitution": 0.5, "layer": 1 + k % 2}
+        half = tuple(0.25 if k == 0 else 0.2 for k in range(d))
+        place = Transform(at(d, 0.7 * k - 2.0, 0.4 + 0.1 * k))
+        if k % 2:
+            world.create_entity(place, body, SphereCollider(0.3, **look))
+        else:
+            world.create_entity(place, body, SphereCollider(0.4, **look), AABBCollider(half, **look))
+    return world
+
+
+def crowd(d: int, mode: str, sizes: float, moving: int = 200) -> World:
+    """Among 200 that do not move so many do that candidates come from grids; of very different sizes, from trees."""
+    random = np.random.default_rng(5)
+    world = World(Physics(d), settings=Settings(collision=mode))
+    side = 40.0 if d == 2 else 16.0
+    for k in range(200 + moving):
+        place, radius = tuple(random.uniform(-side, side, d)), 0.2 * np.exp(sizes * random.uniform() ** 16)
+        if k < 200:
+            world.create_entity(Transform(place), AABBCollider((radius,) * d))
+        else:
+            body = RigidBody(linear_velocity=tuple(random.uniform(-30.0, 30.0, d)))
+            world.create_entity(Transform(place), body, SphereCollider(radius, restitution=1.0))
+    return world
+
+
+def buried(d: int) -> World:
+    """Convex shapes deep in each other, and gems that meet all others by their supports alone."""
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), gems, capsule.plugin)
+    world.create_entity(Transform(at(d, 0.0, -1.0)), AABBCollider((1.0,) * d, friction=0.4))
+    half = (0.3, 0.2, 0.25)[:d]
+    for k, collider in enumerate((Gem(0.4), capsule.CapsuleCollider(0.2, 0.2), AABBCollider(half), Gem(0.3))):
+        turned = 0.7 * k if d == 2 else (math.cos(0.4 * k), math.sin(0.4 * k), 0.0, 0.0)
+        place = at(d, 0.05 * k, 0.1 + 0.02 * k, 0.01 * k)
+        world.create_entity(Transform(place, rotation=turned), RigidBody(), collider)
+    return world
+
+
+def heavy_on_light(d: int) -> World:
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)))
+    world.create_entity(Transform(at(d, 0.0, -1.0)), AABBCollider((1.0,) * d))
+    for k, mass in enumerate((1.0, 1.0, 1e4)):
+        world.create_entity(Transform(at(d, 0.0, 0.5 + k)), RigidBody(mass=mass), SphereCollider(0.5))
+    return world
+
+
+def bullets(d: int, mode: str) -> World:
+    """Fast bodies, each caught between others: many impacts in a step, on paths that are bent by gravity."""
+    world = World(Physics(d, gravity=at(d, 0.0, -300.0)), settings=Settings(collision=mode, dt=1 / 30))
+    for x in (-1.0, 1.0):
+        world.create_entity(Transform(at(d, x)), AABBCollider((0.1,) * d, restitution=1.0))
+    for k in range(3):
+        body = RigidBody(linear_velocity=at(d, 90.0, 10.0 * k), ccd=True)
+        world.create_entity(Transform(at(d, 0.4 * k - 0.4, 0.01 * k)), body, SphereCollider(0.05, restitution=0.9))
+    world.create_entity(Transform(at(d, 0.0, -1.0)), AABBCollider(tuple(1.0 if k != 1 else 0.1 for k in range(d))))
+    return world
+
+
+class Pull(ForceSystem):
+    """A force of the game, by position and velocity."""
+
+    def add_forces(self, bodies, time):
+        bodies.force -= 3.0 * bodies.position + 0.1 * bodies.linear_velocity
+
+
+def swinging(d: int, method: str) -> World:
+    springs = Springs()
+    world = World(Physics(d, gravity=at(d, 0.0, -1.0)), springs, settings=Settings(integrator=method))
+    world.add_system(Pull())
+    masses = [
+        world.create_entity(Transform(at(d, 1.0 * k)), RigidBody(mass=1.0 + k), SphereCollider(0.1)) for k in range(3)
+    ]
+    springs.connect(masses[0], masses[1], stiffness=10.0, damping=0.1)
+    springs.connect(masses[1], masses[2], stiffness=20.0)
+    return world
+
+
+def told(answer: object) -> str:
+    """Every number of an answer."""
+    columns = getattr(answer, "__dict__", {}) or {0: answer}
+    return " ".join(str(value.tobytes() if isinstance(value, np.ndarray) else value) for value in columns.values())
+
+
+def asked(d: int) -> list[str]:
+    """Queries of every kind, few bodies and many."""
+    found = []
+    worlds = [mixed(d, "discrete", 8), crowd(d, "discrete", 4.0, 20), buried(d)]
+    for world in [*worlds, *([platformer("discrete")] if d == 2 else [])]:
+        world.step()
+        for k in range(3):
+            point, way = at(d, 0.3 * k, 0.5 * k, 0.1), at(d, 1.0, -0.5 * k, 0.2)
+            points = np.array([point, at(d, 1.0, 1.0, 1.0)])
+            found += [
+                told(answer)
+                for answer in (
+                    world.query_point(point), world.query_sphere(point, 1.0), world.query_aabb(point, points[1] + 1.0),
+                    world.query_nearest(point), world.query_nearests(points), world.neighbours(0.5),
+                    world.query_spheres(points, 1.0), world.query_aabbs(points, points + 1.0),
+                    world.ray_cast(point, way), world.ray_cast(point, way, only_nearest=True),
+                    world.ray_casts(points, np.array([way, way])),
+                    world.shape_cast(SphereCollider(0.2), point, way),
+                    world.shape_cast(AABBCollider((0.2,) * d), point, way, only_nearest=True),
+                    world.shape_casts(SphereCollider(0.2), points, np.array([way, way])),
+                )
+            ]  # fmt: skip
+    return [hashlib.sha256(text.encode()).hexdigest()[:16] for text in found]
+
+
+def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
+    """By name; calling one plays it."""
+    for d, mode in itertools.product((2, 3), MODES):
+        yield f"mixed {d}D {mode}", lambda d=d, mode=mode: play(mixed(d, mode))
+        yield f"levels {d}D {mode}", lambda d=d, mode=mode: play(levels(d, mode))
+        yield f"bullets {d}D {mode}", lambda d=d, mode=mode: play(bullets(d, mode), 8)
+    for mode in MODES:
+        yield f"platformer {mode}", lambda mode=mode: play(platformer(mode))
+    for d, mode, sizes, moving in (
+        (2, MODES[0], 0.5, 200), (3, MODES[1], 0.5, 20), (3, MODES[0], 6.0, 200), (2, MODES[2], 0.5, 20),
+    ):  # fmt: skip
+        name = f"crowd {d}D {mode} {sizes} {moving}"
+        yield name, lambda d=d, mode=mode, sizes=sizes, moving=moving: play(crowd(d, mode, sizes, moving), 1)
+    for k, method in enumerate(METHODS):
+        yield f"swinging {method}", lambda k=k, method=method: play(swinging(2 + k % 2, method))
+        yield f"thrown {method}", lambda k=k, method=method: play(mixed(3 - k % 2, "discrete", 4, integrator=method), 5)
+    for d in (2, 3):
+        yield f"buried {d}D", lambda d=d: play(buried(d), 5)
+        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 60)
+        yield f"asked {d}D", lambda d=d: asked(d)
+
+
+if __name__ == "__main__":
+    for name, run in scenarios():
+        print(name, *run(), sep=",", flush=True)
