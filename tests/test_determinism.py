@@ -129,15 +129,16 @@ print(world.state_hash(), len(log.compiled), log.loaded)
 
 
 def in_a_process(cache: Path, seed: str) -> tuple[str, int, int]:
-    environment = {**os.environ, "CAROM_CACHE_DIR": str(cache), "PYTHONHASHSEED": seed}
+    environment = {**os.environ, "CAROM_CACHE_DIR": str(cache), "PYTHONHASHSEED": seed, "CAROM_CHECK": "1"}
     command = [sys.executable, "-c", SCRIPT, str(Path(__file__).parent)]
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     digest, compiled, loaded = result.stdout.split()
     return digest, int(compiled), int(loaded)
 
 
-@pytest.mark.slow  # compiles everything twice
+@pytest.mark.slow  # compiles everything
 def test_other_processes_with_a_cold_and_a_warm_cache_get_the_same_bits(tmp_path):
+    """And with checked indices (CAROM_CHECK=1), other than this process."""
     cold, warm = in_a_process(tmp_path, "1"), in_a_process(tmp_path, "2")
     assert cold[1] > 5
     assert warm[1] == 0  # every kernel came from the disk

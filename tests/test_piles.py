@@ -48,7 +48,7 @@ def test_a_pile_of_a_thousand_spheres(e):
 @pytest.mark.slow
 def test_a_pile_of_ten_thousand_comes_to_rest():
     """Kinetic energy per body below 1e-4 m g d, mean overlap below 2 % of a diameter, none escaped."""
-    energy, overlap, escaped = fall(2, 10_000, 0.0, 25)
+    energy, overlap, escaped = fall(2, 10_000, 0.0, 20)
     assert energy < 1e-4
     assert overlap.mean() < 0.02
     assert escaped == 0

@@ -29,23 +29,6 @@ OUTER = Schema(
     "TestOuter", count=integer(), place=vectors(), hit=flags(), order=ints("int32", stacked=True), inner=INNER
 )
 
-BOUNCING = """
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import World
-from carom.plugins import Physics
-
-world = World(Physics(dimensions=2, gravity=(0.0, -9.81)))
-for k in range(6):
-    restitution = 0.5 if k % 2 else 0.0
-    world.create_entity(
-        Transform((0.9 * k, 2.0 + k)), RigidBody(), SphereCollider(0.5, restitution=restitution, friction=0.3))
-world.create_entity(Transform((0.0, 0.0)), AABBCollider((50.0, 0.5)))
-for _ in range(80):
-    world.step()
-assert len(world.contacts) > 3
-print(world.state_hash())
-"""
-
 
 def test_the_page_shows_the_stages_that_run():
     """``carom stages --into docs/architecture.md`` writes what the page has to hold."""
@@ -58,18 +41,6 @@ def test_every_stage_is_described_and_its_file_is_there():
         for stage in stages:
             assert stage["what"]
             assert f"def {stage['stage']}(state, " in (ROOT / str(stage["file"])).read_text(encoding="utf-8")
-
-
-def hash_under(**variables):
-    command = [sys.executable, "-W", "ignore", "-c", BOUNCING]
-    result = subprocess.run(command, env={**os.environ, **variables}, capture_output=True, text=True)
-    assert result.returncode == 0, result.stderr
-    return result.stdout
-
-
-@pytest.mark.slow
-def test_the_checked_build_gives_the_same_bits():
-    assert hash_under(CAROM_CHECK="1") == hash_under()
 
 
 def test_the_checked_build_names_the_column_and_the_index(tmp_path):

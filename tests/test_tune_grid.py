@@ -19,7 +19,9 @@ from carom.components import AABBCollider, RigidBody, Transform
 from carom.framework import ForceSystem, Settings, World
 from carom.lab.engines.cost import WEIGHTS
 from carom.lab.jobs.result_store import Store
-from carom.lab.trading.trade import trade
+from carom.lab.jobs.runs import Runs
+from carom.lab.trading.records import Cell, Point
+from carom.lab.trading.trade import Only, measure
 from carom.lab.tuning.check import check
 from carom.lab.tuning.search import Tuning, search
 from carom.plugins import Physics
@@ -29,8 +31,9 @@ pytestmark = pytest.mark.slow
 
 DEARER = 1.3  # limit of the choice's cost over that of the grid's cheapest
 BROKEN = 2.0  # limit of the error on other scenes over the promise
-PERIODS = 10
+PERIODS = 5
 LEAST_STEP = WEIGHTS["steps"] + WEIGHTS["force_evaluations"]  # the work of an otherwise empty step
+ALIKE = 1.1  # ratio of the work of one repeat to that of another, at most
 
 
 @dataclass(frozen=True)
@@ -43,14 +46,15 @@ class Wanted:
 
 
 WANTED = {
-    "jump": Wanted(0.1, "apex", {"absolute": True}),  # pixels
+    # Pixels. 16 phases: the worst is known to (1/16)^2 of g dt^2 / 8.
+    "jump": Wanted(0.1, "apex", {"absolute": True, "repeats": 16}),
     "spring": Wanted(1e-3, "position"),
     "orbit": Wanted(1e-4, "energy", {"seconds": PERIODS * orbit.PERIOD}),
-    "thermal_gas": Wanted(0.01, "pressure", {"seconds": 40.0}),
+    "thermal_gas": Wanted(0.01, "pressure", {"seconds": 20.0}),
     "stack": Wanted(1e-3, "overlap"),
     # The break itself, to 2 mm where balls have moved by 2 m: 1 s includes the rack's impacts and the first cushions,
-    # and nearby starts stay near, so there is a right result. 32 phases keep the test short.
-    "billiards": Wanted(1e-3, "position", {"seconds": 1.0, "repeats": 32}),
+    # and nearby starts stay near, so there is a right result. 16 phases keep the test short.
+    "billiards": Wanted(1e-3, "position", {"seconds": 1.0, "repeats": 16}),
 }
 
 
@@ -115,7 +119,7 @@ def spring_error(settings: Settings) -> float:
 
 
 def orbit_error(settings: Settings) -> float:
-    """|E - E0| / |E0|, the worst in ten periods."""
+    """|E - E0| / |E0|, the worst in these periods."""
     world = orbit.build(settings)
 
     def energy() -> float:
@@ -195,24 +199,38 @@ def test_the_choice_meets_its_target_in_runs_of_the_test(laboratory, name):
 # -- against the whole grid ---------------------------------------------------------------------------------------
 
 
+def measured(tuning: Tuning, store: Store, only: Only, steps: list[float], repeats: int) -> list[Point]:
+    """The part of the grid with these methods and steps."""
+    case = tuning.case.replace(steps=tuple(steps), repeats=repeats)
+    return [point for curve in measure(case, only, False, False, Runs(store=store)).curves for point in curve.points]
+
+
+def alone(cell: Cell) -> Only:
+    return Only((cell.integrator,), (cell.collision,), (cell.substeps,), (cell.geometry,))
+
+
 @pytest.mark.parametrize("name", WANTED)
 def test_the_choice_costs_little_more_than_the_cheapest_of_the_grid(laboratory, name):
-    """Over the same ladder of steps; cells whose number of steps alone costs more than the choice are skipped."""
+    """Over the same ladder of steps; cells whose number of steps alone costs more than the choice are skipped. The
+    others run once, and those that may hold at much less work in all repeats. (If the error is no noisy statistic, one
+    run that misses the target is enough: the worst of all repeats counts.)"""
     tuning = laboratory.tuned(name)
     assert tuning.choice is not None
     ladder = tuning.case.steps
     steps = [dt for dt in ladder if LEAST_STEP / dt * DEARER < tuning.choice.work] or [ladder[0]]
     assert tuning.choice.cell.dt <= ladder[0]
-    options = {key: value for key, value in WANTED[name].options.items() if key != "absolute"}
-    options["repeats"] = tuning.repeats
-    [grid] = trade(
-        name, norms=(tuning.norm,), steps=steps, timing=False, store=laboratory.store, **options
-    ).cases
-    assert sum(len(curve.points) for curve in grid.curves) == tuning.methods * len(steps)
-    holding = [
-        point.work for curve in grid.curves for point in curve.points if point.meets(tuning.norm, tuning.target)
-    ]
-    assert tuning.choice.work <= DEARER * min(holding, default=math.inf)
+    grid = measured(tuning, laboratory.store, Only(), steps, 1)
+    assert len(grid) == tuning.methods * len(steps)
+    noisy = tuning.norm in tuning.reference.spread
+    much_cheaper = [point for point in grid if DEARER * point.work < ALIKE * tuning.choice.work]
+    for first in much_cheaper:
+        if not (noisy or first.meets(tuning.norm, tuning.target)):
+            continue
+        cell = first.cell
+        (point,) = measured(tuning, laboratory.store, alone(cell), [cell.dt], tuning.repeats)
+        assert point.cell == cell
+        holds = point.meets(tuning.norm, tuning.target)
+        assert not holds or tuning.choice.work <= DEARER * point.work, cell
 
 
 # -- on scenes that were not tuned on -----------------------------------------------------------------------------
@@ -255,28 +273,20 @@ def other_break(settings: Settings | None, seed: int = 0, *, speed: float, aside
 
 
 HELD_OUT: dict[str, tuple[str, Any, dict[str, Any]]] = {
-    "a human's jump in metres": ("jump", hero, {"options": {"speed": 5.0, "gravity": 10.0}}),
     "a quick jump in metres": ("jump", hero, {"options": {"speed": 12.0, "gravity": 30.0}}),
-    "a jump of 100 pixels": ("jump", hero, {"options": {"speed": 300.0, "gravity": 450.0}, "absolute": True}),
     "a jump of 36 pixels": ("jump", hero, {"options": {"speed": 180.0, "gravity": 450.0}, "absolute": True}),
     "a spring on an ellipse": (
         "spring", swinging, {"options": {"start": (0.3, -0.8), "velocity": (2.0, 1.0)}}),
-    "a spring from the middle": ("spring", swinging, {"options": {"start": (0.0, 0.0), "velocity": (0.0, 9.0)}}),
-    "a slower spring": (
-        "spring", swinging, {"options": {"start": (1.0, 0.0), "velocity": (0.0, 0.0), "faster": 0.8}}),
     "a faster spring": (
         "spring", swinging, {"options": {"start": (1.0, 0.0), "velocity": (0.0, 0.0), "faster": 1.1}}),
     "a rounder orbit": ("orbit", "orbit", {"options": {"eccentricity": 0.5}}),
-    "a nearly circular orbit": ("orbit", "orbit", {"options": {"eccentricity": 0.2}}),
     "fewer discs": ("thermal_gas", "thermal_gas", {"options": {"n": 225}}),
     "8 boxes": ("stack", "stack", {"options": {"n": 8}}),
     "12 boxes": ("stack", "stack", {"options": {"n": 12}}),
     "ten balls": ("stack", "stack", {"options": {"balls": True}}),
     "the top box twice as heavy": ("stack", "stack", {"options": {"top_mass": 2.0}}),
-    "another rack": ("billiards", "billiards", {"seed": 1}),
-    "a third rack": ("billiards", "billiards", {"seed": 2}),
-    "a softer break": ("billiards", other_break, {"options": {"speed": 6.0, "aside": 0.004}}),
-    "a break from aside": ("billiards", other_break, {"options": {"speed": 8.0, "aside": -0.01}}),
+    "another rack": ("billiards", "billiards", {"seed": 2}),
+    "a softer break": ("billiards", other_break, {"options": {"speed": 6.0, "aside": 0.004}, "seconds": 0.6}),
 }  # fmt: skip
 
 
