@@ -5,12 +5,12 @@ from __future__ import annotations
 import gc
 import logging
 import os
-import subprocess
-import sys
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers_processes import start_python
 from numba.core.errors import TypingError
 
 from carom.framework import compilation
@@ -64,25 +64,20 @@ class Program:
         self.stderr = ""  # of the last run
         self.main = MAIN.format(folder=str(folder))
 
-    def start(self, seed="0", **environment) -> subprocess.Popen:
+    def start(self, **more):
         (self.folder / "helpers.py").write_text(self.helpers)
-        everything = {
-            **os.environ, "CAROM_CACHE_DIR": str(self.cache), "PYTHONHASHSEED": seed, "PYTHONDONTWRITEBYTECODE": "1",
-            **environment,
-        }  # fmt: skip
-        return subprocess.Popen(
-            [sys.executable, "-c", self.main], env=everything, cwd=self.folder, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
+        environment = {"CAROM_CACHE_DIR": str(self.cache), "PYTHONDONTWRITEBYTECODE": "1", **more}
+        return start_python(self.main, cwd=self.folder, **environment)
 
-    def run(self, seed="0", **environment) -> tuple[float, float, int, int, str]:
+    def run(self, **more) -> tuple[float, float, int, int, str]:
         """Results of both kernels, numbers of compiled and loaded kernels, and the hash of the first."""
-        return self.result(self.start(seed, **environment))
+        return self.result(self.start(**more))
 
-    def result(self, process: subprocess.Popen) -> tuple[float, float, int, int, str]:
-        output, self.stderr = process.communicate()
-        assert process.returncode == 0, self.stderr
-        first, second, compiled, loaded, digest = output.split()
+    def result(self, process) -> tuple[float, float, int, int, str]:
+        done = process.finish()
+        self.stderr = done.stderr
+        assert done.returncode == 0, self.stderr
+        first, second, compiled, loaded, digest = done.stdout.split()
         return float(first), float(second), int(compiled), int(loaded), digest
 
     def files(self) -> list[Path]:
@@ -94,30 +89,43 @@ def program(tmp_path):
     return Program(tmp_path)
 
 
+@pytest.fixture(scope="module")
+def first_run(tmp_path_factory):
+    program = Program(tmp_path_factory.mktemp("program"))
+    assert program.run()[:4] == (9.0, 109.0, 2, 0)
+    return program
+
+
+@pytest.fixture
+def compiled(first_run, program):
+    """A program that has run once."""
+    shutil.copytree(first_run.cache, program.cache)
+    return program
+
+
 def test_a_second_process_loads_what_the_first_has_compiled(program):
     """Kernels made by a factory, closures over each other: numba's own cache never finds these again."""
-    first = program.run(seed="1")
+    first = program.run(anew=True, PYTHONHASHSEED="1")
     assert first[:4] == (9.0, 109.0, 2, 0)
     assert len(program.files()) == 2
-    second = program.run(seed="2")
+    second = program.run(anew=True, PYTHONHASHSEED="2")
     assert second[:4] == (9.0, 109.0, 0, 2)
     assert second[4] == first[4]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected"),
-    [
-        ("FACTOR * x", "FACTOR * x * x", 13.0),  # two calls deep, in another file
-        ("FACTOR = 2.0", "FACTOR = 3.0", 12.0),  # a constant there
-        ("+ 1.0", "+ 2.0", 12.0),
-    ],
-)
-def test_an_edit_in_a_function_of_another_file_is_noticed(program, old, new, expected):
-    program.run()
-    program.helpers = program.helpers.replace(old, new)
-    assert program.run()[:3] == (expected, expected + 100.0, 2)
-    program.helpers = HELPERS
-    assert program.run()[:3] == (9.0, 109.0, 0)  # undoing the edit finds the old one
+EDITS = [
+    ("FACTOR * x", "FACTOR * x * x", 13.0),  # two calls deep, in another file
+    ("FACTOR = 2.0", "FACTOR = 3.0", 12.0),  # a constant there
+    ("+ 1.0", "+ 2.0", 12.0),
+]
+
+
+def test_an_edit_in_a_function_of_another_file_is_noticed(compiled):
+    for old, new, expected in EDITS:
+        compiled.helpers = HELPERS.replace(old, new)
+        assert compiled.run()[:3] == (expected, expected + 100.0, 2)
+    compiled.helpers = HELPERS
+    assert compiled.run()[:3] == (9.0, 109.0, 0)  # undoing the edit finds the old one
 
 
 NAMED = """
@@ -149,24 +157,28 @@ print(read(1.0), 0.0, len(log.compiled), log.loaded, "-")
 """
 
 
-@pytest.mark.parametrize(
-    ("file", "old", "new", "expected"),
-    [
-        ("helpers.py", "[1.0,", "[100.0,", 110.0),  # an array of a module
-        ("helpers.py", "TOP = 7", "TOP = 9", 13.0),  # an enumeration
-        ("deeper.py", "FACTOR = 3.0", "FACTOR = 4.0", 12.0),  # a module of a module
-    ],
-)
-def test_an_edit_of_what_a_kernel_reads_from_a_module_is_noticed(program, file, old, new, expected):
+READ_EDITS = [
+    ("helpers.py", "[1.0,", "[100.0,", 110.0),  # an array of a module
+    ("helpers.py", "TOP = 7", "TOP = 9", 13.0),  # an enumeration
+    ("deeper.py", "FACTOR = 3.0", "FACTOR = 4.0", 12.0),  # a module of a module
+]
+
+
+def test_an_edit_of_what_a_kernel_reads_from_a_module_is_noticed(program):
     """The reproduction: an edited array helpers.TABLE was not noticed, and the next process ran the former code."""
-    program.helpers, program.main = NAMED, READS.format(folder=str(program.folder))
+    program.main = READS.format(folder=str(program.folder))
     deeper = program.folder / "deeper.py"
-    deeper.write_text("FACTOR = 3.0\n")
-    assert program.run()[:3] == (11.0, 0.0, 1)
-    assert program.run()[:4] == (11.0, 0.0, 0, 1)
-    program.helpers = program.helpers.replace(old, new) if file == "helpers.py" else program.helpers
-    deeper.write_text(deeper.read_text().replace(old, new) if file == "deeper.py" else deeper.read_text())
-    assert program.run()[:3] == (expected, 0.0, 1)
+
+    def run_with(file="", old="", new=""):
+        program.helpers = NAMED.replace(old, new) if file == "helpers.py" else NAMED
+        text = "FACTOR = 3.0\n"
+        deeper.write_text(text.replace(old, new) if file == "deeper.py" else text)
+        return program.run()[:4]
+
+    assert run_with() == (11.0, 0.0, 1, 0)
+    assert run_with() == (11.0, 0.0, 0, 1)
+    for file, old, new, expected in READ_EDITS:
+        assert run_with(file, old, new) == (expected, 0.0, 1, 0)
 
 
 FIELDS = """
@@ -194,25 +206,22 @@ def test_named_tuples_of_one_name_with_swapped_fields_are_two_types(program):
     assert program.run()[:3] == (2.0, 21.0, 2)
 
 
-@pytest.mark.parametrize("switch", ["NUMBA_BOUNDSCHECK=1", "NUMBA_DEBUGINFO=1", "NUMBA_OPT=1"])
-def test_switches_of_numba_make_other_files(program, switch):
-    name, value = switch.split("=")
-    program.run()
-    assert program.run(**{name: value})[:4] == (9.0, 109.0, 2, 0)
-    assert program.run()[:4] == (9.0, 109.0, 0, 2)
+def test_switches_of_numba_make_other_files(compiled):
+    for switch in ({"NUMBA_BOUNDSCHECK": "1"}, {"NUMBA_DEBUGINFO": "1"}, {"NUMBA_OPT": "1"}):
+        assert compiled.run(**switch)[:4] == (9.0, 109.0, 2, 0)
+    assert compiled.run()[:4] == (9.0, 109.0, 0, 2)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions of files")
-@pytest.mark.parametrize("mode", [0o770, 0o707])
-def test_a_folder_that_others_may_write_to_is_refused_before_it_is_read(program, mode):
-    program.run()
-    program.cache.chmod(mode)
-    home = {"HOME": str(program.folder / "home"), "XDG_CACHE_HOME": ""}
-    assert program.run(**home)[:4] == (9.0, 109.0, 2, 0)
-    assert "others may write to it" in program.stderr
-    assert f"chmod go-w {program.cache}" in program.stderr
-    program.cache.chmod(0o700)
-    assert program.run(**home)[2:4] == (0, 2)
+def test_a_folder_that_others_may_write_to_is_refused_before_it_is_read(compiled):
+    for mode in (0o770, 0o707):
+        compiled.cache.chmod(mode)
+        home = {"HOME": str(compiled.folder / f"home {mode}"), "XDG_CACHE_HOME": ""}
+        assert compiled.run(**home)[:4] == (9.0, 109.0, 2, 0)
+        assert "others may write to it" in compiled.stderr
+        assert f"chmod go-w {compiled.cache}" in compiled.stderr
+    compiled.cache.chmod(0o700)
+    assert compiled.run(**home)[2:4] == (0, 2)
 
 
 def test_a_variable_that_names_a_file_is_told_in_one_line(program):
@@ -222,10 +231,9 @@ def test_a_variable_that_names_a_file_is_told_in_one_line(program):
     assert program.stderr.splitlines()[0].startswith(f"carom: compiled kernels are not kept in {program.cache}: ")
 
 
-def test_an_edit_of_a_comment_compiles_nothing(program):
-    program.run()
-    program.helpers = "# a remark\n" + program.helpers
-    assert program.run()[2] == 0
+def test_an_edit_of_a_comment_compiles_nothing(compiled):
+    compiled.helpers = "# a remark\n" + compiled.helpers
+    assert compiled.run()[2] == 0
 
 
 def flipped(content: bytes) -> bytes:
@@ -235,16 +243,15 @@ def flipped(content: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "damage",
-    [lambda _: b"", lambda _: b"garbage" * 20, lambda content: content[: len(content) // 2], flipped],
-    ids=["empty", "garbage", "cut short", "one bit"],
+    "damages",
+    [(lambda _: b"", lambda _: b"garbage" * 20), (lambda content: content[: len(content) // 2], flipped)],
+    ids=["empty, garbage", "cut short, one bit"],
 )
-def test_a_damaged_file_is_compiled_again_and_replaced(program, damage):
-    program.run()
-    for path in program.files():
+def test_a_damaged_file_is_compiled_again_and_replaced(compiled, damages):
+    for path, damage in zip(compiled.files(), damages, strict=True):
         path.write_bytes(damage(path.read_bytes()))
-    assert program.run()[:4] == (9.0, 109.0, 2, 0)
-    assert program.run()[2:4] == (0, 2)
+    assert compiled.run()[:4] == (9.0, 109.0, 2, 0)
+    assert compiled.run()[2:4] == (0, 2)
 
 
 def test_without_any_folder_to_write_to_everything_works_and_nothing_is_kept(program):

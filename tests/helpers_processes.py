@@ -1,0 +1,104 @@
+"""Python programs in processes of their own, forked from one that has loaded numba and numpy, but nothing of carom.
+
+That saves half a second per process. Every process gets its environment, folder, arguments and output as a new one
+does; only PYTHONHASHSEED and NUMBA_DISABLE_JIT count where numba is loaded, so with these a new Python has to start.
+"""
+
+from __future__ import annotations
+
+import atexit
+import io
+import multiprocessing
+import os
+import subprocess
+import sys
+import tempfile
+import types
+from pathlib import Path
+from unittest import mock
+
+# numba itself, and what it imports when it compiles for the first time.
+PRELOAD = [
+    "esper", "numpy.ma", "numba", "numba.core.inline_closurecall", "numba.cpython.heapq", "numba.cpython.printimpl",
+    "numba.cpython.randomimpl", "numba.experimental.jitclass.base", "numba.misc.cffiimpl", "numba.np.linalg",
+    "numba.np.npyimpl", "numba.np.polynomial", "numba.np.random.generator_methods", "numba.typed.dictimpl",
+    "numba.typed.listobject", "numba.typed.setobject",
+]  # fmt: skip
+FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+RUN_CAROM = "import runpy; runpy.run_module('carom', run_name='__main__')"
+
+
+class Started:
+    """A program that runs; ``finish`` waits for its end."""
+
+    def __init__(self, code: str, arguments: tuple, cwd: Path | None, environment: dict[str, str]) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="carom-process-")
+        self._arguments = [str(argument) for argument in arguments]
+        everything = {**os.environ, **environment}
+        files = [os.path.join(self._folder.name, name) for name in ("stdout", "stderr")]
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(PRELOAD)
+        self._process = context.Process(
+            target=_execute, args=(code, self._arguments, str(cwd or Path.cwd()), everything, files)
+        )
+        with mock.patch.dict(sys.modules, {"__main__": types.ModuleType("__main__")}):  # or it would import pytest
+            self._process.start()
+
+    def finish(self) -> subprocess.CompletedProcess[str]:
+        self._process.join()
+        output = [Path(self._folder.name, name).read_text(encoding="utf-8") for name in ("stdout", "stderr")]
+        self._folder.cleanup()
+        return subprocess.CompletedProcess(self._arguments, self._process.exitcode, *output)
+
+
+class StartedAnew:
+    """The same in a new Python."""
+
+    def __init__(self, code: str, arguments: tuple, cwd: Path | None, environment: dict[str, str]) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", code, *map(str, arguments)], cwd=cwd, env={**os.environ, **environment}, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+
+    def finish(self) -> subprocess.CompletedProcess[str]:
+        output = self._process.communicate()
+        return subprocess.CompletedProcess(self._process.args, self._process.returncode, *output)
+
+
+def start_python(code: str, *arguments, cwd: Path | None = None, anew: bool = False, **environment: str):
+    """Start ``code`` as ``python -c`` does; ``anew``: without fork; environment: variables besides those of here."""
+    return (StartedAnew if anew or not FORKED else Started)(code, arguments, cwd, environment)
+
+
+def run_python(code: str, *arguments, **more) -> subprocess.CompletedProcess[str]:
+    """The same, and wait for its end."""
+    return start_python(code, *arguments, **more).finish()
+
+
+def run_carom(*arguments, **more) -> subprocess.CompletedProcess[str]:
+    """The command ``carom`` with these arguments."""
+    return run_python(RUN_CAROM, *arguments, **more)
+
+
+def _execute(code: str, arguments: list[str], cwd: str, environment: dict[str, str], files: list[str]) -> None:
+    """In the new process: become ``python -c code``."""
+    os.environ.clear()
+    os.environ.update(environment)
+    os.chdir(cwd)
+    for number, file in enumerate(files, 1):
+        opened = os.open(file, os.O_WRONLY | os.O_CREAT)
+        os.dup2(opened, number)
+        os.close(opened)
+    sys.stdout = io.TextIOWrapper(open(1, "wb", closefd=False), encoding="utf-8")  # noqa: SIM115
+    sys.stderr = io.TextIOWrapper(open(2, "wb", closefd=False), encoding="utf-8", line_buffering=True)  # noqa: SIM115
+    from numba.core import config
+
+    config.reload_config()
+    sys.dont_write_bytecode = bool(environment.get("PYTHONDONTWRITEBYTECODE"))
+    sys.argv, sys.path[:0] = ["-c", *arguments], [""]
+    sys.modules["__main__"] = main = types.ModuleType("__main__")
+    try:
+        exec(compile(code, "<string>", "exec", dont_inherit=True), vars(main))
+    finally:
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
