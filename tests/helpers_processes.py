@@ -10,6 +10,7 @@ import atexit
 import io
 import multiprocessing
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -78,6 +79,13 @@ def run_python(code: str, *arguments, **more) -> subprocess.CompletedProcess[str
 def run_carom(*arguments, **more) -> subprocess.CompletedProcess[str]:
     """The command ``carom`` with these arguments."""
     return run_python(RUN_CAROM, *arguments, **more)
+
+
+def copied_cache(folder: Path, *without: str) -> dict[str, str]:
+    """A copy of the tests' kernel cache without the kernels of these names: the environment of processes to use it."""
+    names = [f"{name}-*.kernel" for name in without]
+    shutil.copytree(os.environ["CAROM_CACHE_DIR"], folder, ignore=shutil.ignore_patterns("*.unfinished", *names))
+    return {"CAROM_CACHE_DIR": str(folder)}
 
 
 def _execute(code: str, arguments: list[str], cwd: str, environment: dict[str, str], files: list[str]) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import helpers_cli
 import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
+from helpers_processes import run_python
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -91,8 +90,7 @@ def test_3d_is_drawn_too(carom, tmp_path, ball):
 
 def test_without_matplotlib_the_run_goes_on_and_says_what_is_missing(tmp_path):
     code = "import sys; sys.modules['matplotlib'] = None; import carom.lab.cli as c; c.main()"
-    command = [sys.executable, "-c", code, "run", "jump", "--steps", "2", "--json"]
-    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    result = run_python(code, "run", "jump", "--steps", "2", "--json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "carom[plot]" in result.stderr
     assert json.loads(result.stdout)["pictures"] == []

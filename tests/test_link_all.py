@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-
 import pytest
+from helpers_processes import run_python
 
 from carom.framework.jit.link_all import CAN_FORK
 
@@ -54,10 +51,7 @@ print(len(log.compiled), log.left)
 
 def run_program(folder, processes):
     folder.mkdir()
-    environment = {**os.environ, "CAROM_CACHE_DIR": str(folder)}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(processes)], env=environment, capture_output=True, text=True, timeout=120
-    )
+    done = run_python(PROGRAM, processes, CAROM_CACHE_DIR=str(folder))
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines(), sorted(path.name for path in folder.glob("*.kernel"))
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers_processes import run_python
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Plugin, Settings, System, World
@@ -232,8 +231,8 @@ SHAPES = {"box_rows", "bounds", "evaluate", "batch", "rotated", "corner"}  # wha
 @pytest.mark.parametrize("name", ["drifting", "gravity", "spheres", "restitution", "spheres, 3D"])
 def test_the_kernels_that_are_compiled_are_those_of_the_plan(name):
     """Compiled, or loaded from the cache: in a process of its own."""
-    command = [sys.executable, "-c", COMPILED, name, str(Path(__file__).parents[1])]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+    done = run_python(COMPILED, name, Path(__file__).parents[1])
+    assert done.returncode == 0, done.stderr
     answers = {line.split()[0]: line.split()[1:] for line in done.stdout.splitlines()}
     assert set(answers["planned"]) == LADDER[name][1]
     others = set(answers["compiled"]) - set(answers["planned"])

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers_processes import run_carom, run_python
 
 from carom.framework.jit.prebuilt import INDEX, PORTABLE, made_with
 
@@ -43,15 +44,13 @@ class Game:
         assert self.run(code=f"{MAIN}{write}\n", shipped=[], **environment)[:3] == (5.0, 1, 0)
         self.shipped.chmod(0o755)
 
-    def run(self, code=MAIN, factor=2.0, shipped=None, **environment):
+    def run(self, code=MAIN, factor=2.0, shipped=None, anew=False, **environment):
         """(result, compiled, loaded, lines of stderr) in a process with an empty cache of its own."""
         cache = self.folder / "cache"
         shutil.rmtree(cache, ignore_errors=True)
-        command = [sys.executable, "-c", code.format(factor=factor), *(shipped or [])]
-        if shipped is None:
-            command.append(str(self.shipped))
-        everything = {**os.environ, "CAROM_CACHE_DIR": str(cache), **environment}
-        done = subprocess.run(command, env=everything, capture_output=True, text=True, check=False)
+        folders = [self.shipped] if shipped is None else shipped
+        environment = {"CAROM_CACHE_DIR": str(cache), **environment}
+        done = run_python(code.format(factor=factor), *folders, anew=anew, **environment)
         assert done.returncode == 0, done.stderr
         result, compiled, loaded = done.stdout.split()
         return float(result), int(compiled), int(loaded), done.stderr.splitlines()
@@ -72,7 +71,7 @@ def game(made, tmp_path):
 
 
 def test_a_process_of_any_processor_loads_what_was_shipped(game):
-    assert game.run() == (5.0, 0, 1, [])
+    assert game.run(anew=True) == (5.0, 0, 1, [])
 
 
 def test_a_kernel_that_was_edited_since_compiles(game):
@@ -88,44 +87,48 @@ def test_a_missing_or_damaged_kernel_compiles(game):
     assert game.run()[:3] == (5.0, 1, 0)
 
 
-@pytest.mark.parametrize("name", made_with())
-def test_kernels_made_with_another_version_are_left_alone_and_told_in_one_line(game, name):
-    index = json.loads((game.shipped / INDEX).read_text())
-    here = index["made_with"][name]
-    index["made_with"][name] = "another"
-    (game.shipped / INDEX).write_text(json.dumps(index))
-    result, compiled, loaded, lines = game.run()
-    assert (result, compiled, loaded) == (5.0, 1, 0)
-    reason = f"they were made with {name} another, here {here}"
-    assert lines[0] == f"carom: the kernels in {game.shipped} are not used, {reason}"
-    assert len([line for line in lines if str(game.shipped) in line]) == 1
+def with_index(game, name, text):
+    """A copy of the shipped folder whose index is this text; None: without an index."""
+    folder = game.folder / name
+    shutil.copytree(game.shipped, folder)
+    (folder / INDEX).unlink()
+    if text is not None:
+        (folder / INDEX).write_text(text)
+    return folder
 
 
-@pytest.mark.parametrize("text", [None, "", "{", "[]", '{"made_with": {}}'])
-def test_a_damaged_index_is_told_in_one_line(game, text):
-    if text is None:
-        (game.shipped / INDEX).unlink()
-    else:
-        (game.shipped / INDEX).write_text(text)
-    result, compiled, loaded, lines = game.run()
+def test_kernels_made_with_another_version_are_left_alone_and_told_in_one_line(game):
+    folders, reasons = [], []
+    for name in made_with():
+        index = json.loads((game.shipped / INDEX).read_text())
+        reasons.append(f"they were made with {name} another, here {index['made_with'][name]}")
+        index["made_with"][name] = "another"
+        folders.append(with_index(game, f"other {name}", json.dumps(index)))
+    result, compiled, loaded, lines = game.run(shipped=folders)
     assert (result, compiled, loaded) == (5.0, 1, 0)
-    told = [line for line in lines if str(game.shipped) in line]
-    assert len(told) == 1
-    assert "index.json is missing or damaged" in told[0]
+    told = [f"carom: the kernels in {folder} are not used, {why}" for folder, why in zip(folders, reasons, strict=True)]
+    assert len(told) == len(made_with()) > 3
+    assert lines[: len(told)] == told
+    assert not [line for line in lines[len(told) :] if "are not used" in line]
+
+
+def test_a_damaged_index_is_told_in_one_line(game):
+    texts = [None, "", "{", "[]", '{"made_with": {}}']
+    folders = [with_index(game, f"damaged {k}", text) for k, text in enumerate(texts)]
+    result, compiled, loaded, lines = game.run(shipped=folders)
+    assert (result, compiled, loaded) == (5.0, 1, 0)
+    for folder in folders:
+        (told,) = [line for line in lines if str(folder) in line]
+        assert "index.json is missing or damaged" in told
 
 
 def test_they_can_be_switched_off(game):
     assert game.run(CAROM_PREBUILT="0")[:3] == (5.0, 1, 0)
 
 
-def carom(*arguments, **environment):
-    command = [sys.executable, "-m", "carom", *map(str, arguments)]
-    return subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True, check=False)
-
-
 def test_the_command_refuses_a_folder_that_holds_other_things(tmp_path):
     (tmp_path / "letter.txt").write_text("keep me")
-    done = carom("warm-up", "--portable", tmp_path)
+    done = run_carom("warm-up", "--portable", tmp_path)
     assert done.returncode == 2
     assert "holds other things" in done.stderr
     assert (tmp_path / "letter.txt").exists()

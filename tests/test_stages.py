@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers_processes import run_python
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
@@ -43,7 +41,7 @@ def test_every_stage_is_described_and_its_file_is_there():
             assert f"def {stage['stage']}(state, " in (ROOT / str(stage["file"])).read_text(encoding="utf-8")
 
 
-def test_the_checked_build_names_the_column_and_the_index(tmp_path):
+def test_the_checked_build_names_the_column_and_the_index():
     source = """
 from carom.framework.compilation import kernel
 from carom.framework.jit.record import make_record
@@ -65,11 +63,7 @@ for i in (3, -1):
     except IndexError as error:
         print(error)
 """
-    path = tmp_path / "shelf.py"
-    path.write_text(source, encoding="utf-8")
-    result = subprocess.run(
-        [sys.executable, str(path)], env={**os.environ, "CAROM_CHECK": "1"}, capture_output=True, text=True
-    )
+    result = run_python(source, CAROM_CHECK="1")
     said = result.stdout.splitlines()
     assert len(said) == 2, result.stderr
     assert "Shelf.weight" in said[0]
