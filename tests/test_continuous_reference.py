@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import bullet, each_sweep, mode_world, positions, rows_of, strikes, velocities
-from worlds import ball, both_dimensions
+from helpers_modes import SWEPT, bullet, mode_world, positions, rows_of, strikes, velocities
+from helpers_pairwise import pairwise
+from worlds import ball
 
 DT = 1 / 60
 INFINITE = math.inf
@@ -87,9 +88,7 @@ def scattered(rng, d, apart):
     return x, v, sizes, masses, kinds, width
 
 
-@both_dimensions
-@each_sweep
-@pytest.mark.parametrize("shape", ["balls", "boxes"])
+@pytest.mark.parametrize(("mode", "d", "shape"), pairwise(SWEPT, (2, 3), ("balls", "boxes")))
 def test_as_the_reference(mode, d, shape):
     """40 scenes in three steps of 1.7, 17 or 83 ms: the same impacts, times to 1e-9 of the path, states to 1e-8.
 
@@ -125,9 +124,7 @@ def test_as_the_reference(mode, d, shape):
     assert compared > 20
 
 
-@both_dimensions
-@pytest.mark.parametrize("cap", [1, 2])
-@pytest.mark.parametrize("pillar", [False, True])
+@pytest.mark.parametrize(("d", "cap", "pillar"), pairwise((2, 3), (1, 2), (False, True)))
 def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
     """50 separate clusters of three to eight elastic bullets, with one or two impacts each in a step: stopped bodies
     keep their velocity, so momentum (without a pillar among them) and energy of every cluster are conserved to

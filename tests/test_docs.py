@@ -114,8 +114,10 @@ def namespace(monkeypatch, tmp_path):
         esper.delete_world(left)
 
 
-# Each compiles for a quarter of a minute or more where the cache is empty.
-SLOW = ("write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md")
+# Each compiles for a quarter of a minute or more where the cache is empty, or is a study of many runs.
+SLOW = (
+    "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md", "trade.md", "tune.md",
+)  # fmt: skip
 RUN = [
     pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())
     for page in PAGES if python_blocks(page)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_boxes import UNIFORM_GRID_ALONE, Boxes, overlapping, pair_set
+from helpers_pairwise import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
@@ -21,9 +22,7 @@ def check(lower, upper, inside, grid=None):
     return len(found[0])
 
 
-@both_dimensions
-@pytest.mark.parametrize("filling", [0.01, 0.3, 1.0, 2.5])
-@pytest.mark.parametrize("offset", [0.0, -1e7])
+@pytest.mark.parametrize(("d", "filling", "offset"), pairwise((2, 3), (0.01, 0.3, 1.0, 2.5), (0.0, -1e7)))
 def test_even_boxes_and_some_of_any_size(d, filling, offset):
     rng = np.random.default_rng(1)
     centre = rng.random((900, d)) * (900 / filling) ** (1 / d) + offset
@@ -41,7 +40,7 @@ def test_even_boxes_and_some_of_any_size(d, filling, offset):
 
 
 @both_dimensions
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_lattices_lines_and_touching(d, data):
     """Edges on multiples of the cell, extents of zero, touching and one ulp apart."""

@@ -159,6 +159,7 @@ def test_pymunk_gets_forces_of_its_own_time():
     assert engine.position[0, 0] == pytest.approx((1 - math.cos(6)) / 36, abs=1 / 240)
 
 
+@pytest.mark.slow
 def test_a_reference_of_a_spring_against_a_wall_knows_how_good_it_is():
     """x = -cos until it meets the wall in the middle, where it is reflected at full speed: |cos| from then on. The two
     methods and twice the step must not agree much better than the first of them is right."""
@@ -183,6 +184,7 @@ def test_a_reference_of_a_spring_against_a_wall_knows_how_good_it_is():
     assert true < 20 * reference.agreement["position"]
 
 
+@pytest.mark.slow
 def test_a_search_walks_back_where_it_has_jumped_too_far():
     """A damped spring: theory gives no order. Its choice costs at most 1.3 times the cheapest step that holds,
     found here among the halvings of the ladder."""

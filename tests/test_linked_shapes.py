@@ -225,6 +225,7 @@ def test_a_function_that_cannot_be_compiled_is_named():
     assert "plugin failing: pair uncompiled of BlobCollider and BlobCollider cannot be" in caught.value.__notes__[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="is this run")
 def test_the_same_holds_without_the_compiler():
     files = [__file__, str(Path(__file__).with_name("test_linked_queries.py"))]

@@ -68,7 +68,7 @@ def contacts_of(bodies):
 @both_dimensions
 @pytest.mark.parametrize("first", ["sphere", "box"])
 @pytest.mark.parametrize("second", ["sphere", "box"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_any_pair_equals_the_oracle(d, first, second, data):
     """hit, depth, unit normal from the smaller entity id to the larger, point. Tolerance: 100 eps of the sizes (< 20);
@@ -97,7 +97,7 @@ def radius_of(a, b):
 
 
 @both_dimensions
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(data=st.data())
 def test_both_orders_give_the_same_contact(d, data):
     """Created the other way round, a pair has the opposite normal and the same depth and point."""
@@ -116,15 +116,15 @@ def test_both_orders_give_the_same_contact(d, data):
 
 @both_dimensions
 def test_crowd_equals_the_oracle_pair_by_pair(d):
-    """All pairs of 120 mixed bodies; never two static ones."""
+    """All pairs of 70 mixed bodies; never two static ones."""
     rng = np.random.default_rng(4)
     world = make_world(d)
     crowd = []
-    for k in range(120):
+    for k in range(70):
         shape = "sphere" if k % 2 else "box"
         rotation = rng.uniform(-3, 3) if d == 2 else rng.normal(size=4)
         size = rng.uniform(0, 0.8) if shape == "sphere" else rng.uniform(0, 0.8, d)
-        body = shape, rng.uniform(-3, 3, d), rng.uniform(-0.5, 0.5, d), rotation, size
+        body = shape, rng.uniform(-1.5, 1.5, d), rng.uniform(-0.5, 0.5, d), rotation, size
         parts = components(body)
         if k % 5 == 0:
             parts = parts[0], parts[2]  # a collider without RigidBody is static

@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 from helpers_modes import MODES, each_mode, strikes
+from helpers_pairwise import pairwise
 
 from carom.components import AABBCollider
 from carom.framework import Settings
@@ -47,14 +48,14 @@ def test_spring_swings_as_velocity_verlet_does_to_rounding():
     ("stiffness", "damping"), [(OMEGA**2, 0.0), (OMEGA**2, 0.5), (OMEGA**2, 5.0), (10.0, 0.1), (0.0, 2.0)]
 )
 def test_spring_with_any_stiffness_and_damping_follows_its_formula(stiffness, damping):
-    """RK4: phase error omega t (omega dt)^4 / 120 = 4e-10 at 1/1000 s; twice that, for damping adds to it."""
+    """RK4: phase error omega t (omega dt)^4 / 120 = 1.6e-10 at 1/1000 s; twice that, for damping adds to it."""
     settings = Settings(dt=1 / 1000, integrator="rk4")
     with spring.build(settings, stiffness=stiffness, damping=damping) as world:
-        run(world, 5.0)
+        run(world, 2.0)
         t, half = world.time, damping / 2
         root = np.emath.sqrt(stiffness - half**2)
         expected = math.exp(-half * t) * (np.cos(root * t) + half * np.sin(root * t) / root).real
-        assert world.bodies.position[0, 0] == pytest.approx(expected, abs=8e-10)
+        assert world.bodies.position[0, 0] == pytest.approx(expected, abs=3.2e-10)
 
 
 def test_spring_has_the_energy_of_its_amplitude():
@@ -103,8 +104,9 @@ def test_orbit_keeps_its_energy_with_its_own_settings():
     with orbit.build() as world:
         worst = 0.0
         assert world.settings.dt * 10_000 == pytest.approx(orbit.SCENE.seconds, rel=1e-15)
-        for _ in range(10_000):
-            world.step()
+        for _ in range(1000):
+            for _ in range(10):
+                world.step()
             worst = max(worst, abs(energy(world) / -0.5 - 1))
         assert worst < 1e-3
         assert abs(energy(world) / -0.5 - 1) < 0.1 * worst
@@ -222,9 +224,7 @@ def test_thermal_gas_keeps_energy_and_bodies(mode):
 # -- drops -----------------------------------------------------------------------------------------
 
 
-@each_mode
-@pytest.mark.parametrize("dt", [1 / 240, 1 / 60])
-@pytest.mark.parametrize("restitution", [0.8, 0.9, 1.0])
+@pytest.mark.parametrize(("mode", "dt", "restitution"), pairwise(MODES, (1 / 240, 1 / 60), (0.8, 0.9, 1.0)))
 def test_drops_strike_when_they_must(mode, dt, restitution):
     """B11: impact n at T (1 + 2 e (1 - e^(n-1)) / (1 - e)), and the energy of the apex 4.9 e^(2n) after it."""
     settings = Settings(dt=dt, integrator="velocity_verlet", collision=mode)

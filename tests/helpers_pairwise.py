@@ -1,0 +1,21 @@
+"""Fewer cases than all combinations of parameters: every two values of two parameters still meet."""
+
+from __future__ import annotations
+
+import itertools
+
+
+def pairwise(*values) -> list[tuple]:
+    """Combinations of one value of each list, in which all pairs of values of two lists occur. Always the same ones."""
+    pairs = list(itertools.combinations(range(len(values)), 2))
+    every = list(itertools.product(*map(range, map(len, values))))
+
+    def covered(case):
+        return {(i, case[i], j, case[j]) for i, j in pairs}
+
+    missing, chosen = set().union(*map(covered, every)), []
+    while missing:
+        best = max(every, key=lambda case: len(covered(case) & missing))
+        missing -= covered(best)
+        chosen.append(best)
+    return [tuple(of[k] for of, k in zip(values, case, strict=True)) for case in sorted(chosen)]
