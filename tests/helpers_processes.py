@@ -7,6 +7,7 @@ does; only PYTHONHASHSEED and NUMBA_DISABLE_JIT count where numba is loaded, so 
 from __future__ import annotations
 
 import atexit
+import functools
 import io
 import multiprocessing
 import os
@@ -40,7 +41,7 @@ class Started:
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(PRELOAD)
         self._process = context.Process(
-            target=_execute, args=(code, self._arguments, str(cwd or Path.cwd()), everything, files)
+            target=_execute, args=(code, self._arguments, str(cwd or Path.cwd()), everything, files, _byte_code().name)
         )
         with mock.patch.dict(sys.modules, {"__main__": types.ModuleType("__main__")}):  # or it would import pytest
             self._process.start()
@@ -66,6 +67,12 @@ class StartedAnew:
         return subprocess.CompletedProcess(self._process.args, self._process.returncode, *output)
 
 
+@functools.cache
+def _byte_code() -> tempfile.TemporaryDirectory:
+    """Where processes keep what they have read of carom's sources, whatever PYTHONDONTWRITEBYTECODE says."""
+    return tempfile.TemporaryDirectory(prefix="carom-byte-code-")
+
+
 def start_python(code: str, *arguments, cwd: Path | None = None, anew: bool = False, **environment: str):
     """Start ``code`` as ``python -c`` does; ``anew``: without fork; environment: variables besides those of here."""
     return (StartedAnew if anew or not FORKED else Started)(code, arguments, cwd, environment)
@@ -88,7 +95,9 @@ def copied_cache(folder: Path, *without: str) -> dict[str, str]:
     return {"CAROM_CACHE_DIR": str(folder)}
 
 
-def _execute(code: str, arguments: list[str], cwd: str, environment: dict[str, str], files: list[str]) -> None:
+def _execute(
+    code: str, arguments: list[str], cwd: str, environment: dict[str, str], files: list[str], byte_code: str
+) -> None:
     """In the new process: become ``python -c code``."""
     os.environ.clear()
     os.environ.update(environment)
@@ -102,7 +111,7 @@ def _execute(code: str, arguments: list[str], cwd: str, environment: dict[str, s
     from numba.core import config
 
     config.reload_config()
-    sys.dont_write_bytecode = bool(environment.get("PYTHONDONTWRITEBYTECODE"))
+    sys.pycache_prefix, sys.dont_write_bytecode = byte_code, False
     sys.argv, sys.path[:0] = ["-c", *arguments], [""]
     sys.modules["__main__"] = main = types.ModuleType("__main__")
     try:

@@ -38,6 +38,7 @@ sys.path.insert(0, {folder!r})
 import numpy as np
 from carom.framework.compilation import kernel, log
 from carom.framework.jit.hash import deep_hash
+sys.dont_write_bytecode = True  # of a file that is edited within its second
 from helpers import helper
 
 def make(shift):
@@ -66,8 +67,7 @@ class Program:
 
     def start(self, **more):
         (self.folder / "helpers.py").write_text(self.helpers)
-        environment = {"CAROM_CACHE_DIR": str(self.cache), "PYTHONDONTWRITEBYTECODE": "1", **more}
-        return start_python(self.main, cwd=self.folder, **environment)
+        return start_python(self.main, cwd=self.folder, **{"CAROM_CACHE_DIR": str(self.cache), **more})
 
     def run(self, **more) -> tuple[float, float, int, int, str]:
         """Results of both kernels, numbers of compiled and loaded kernels, and the hash of the first."""
@@ -146,8 +146,9 @@ class Level(enum.IntEnum):
 READS = """
 import sys
 sys.path.insert(0, {folder!r})
-import helpers
 from carom.framework.compilation import kernel, log
+sys.dont_write_bytecode = True
+import helpers
 
 @kernel
 def read(x):
