@@ -128,7 +128,7 @@ def rotations(rng, n, d):
 class Scene:
     """Some bodies of each shape, in a record without a world."""
 
-    def __init__(self, dimensions, components, plugins=None, makers=MAKERS, each=5, seed=7, rotated=True):
+    def __init__(self, dimensions, components, plugins=None, makers=MAKERS, each=4, seed=7, rotated=True):
         rng = np.random.default_rng(seed)
         plugins = plugins or (*PLUGINS, *(PLUGINS_2D if dimensions == 2 else ()))
         self.registry = registry_of(*plugins)

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from helpers_modes import (
+    SWEPT,
     Impacts,
     along,
     bullet,
@@ -18,6 +19,7 @@ from helpers_modes import (
     strikes,
     velocities,
 )  # fmt: skip
+from helpers_pairwise import pairwise
 from worlds import ball, both_dimensions, box, make_world, position, run, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -41,10 +43,9 @@ SWEEPS = [
 ]
 
 
-@each_sweep
-@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e4])
-@pytest.mark.parametrize("drift", [0.0, 0.75])
-@pytest.mark.parametrize("case", range(len(SWEEPS)))
+@pytest.mark.parametrize(
+    ("mode", "unit", "drift", "case"), pairwise(SWEPT, (1.0, 1e-3, 1e4), (0.0, 0.75), range(len(SWEEPS)))
+)
 def test_b13_sphere_against_box(mode, unit, drift, case):
     """All within one step of 3 s: |dt| <= 1e-12 |p| / |v|, the reflected velocity, the rest of the path. Also with a
     common velocity added, so that the box moves too; and in 2D where the case is flat."""

@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import along, bullet, each_mode, mode_world, positions, strikes, velocities
+from helpers_modes import MODES, along, bullet, each_mode, mode_world, positions, strikes, velocities
+from helpers_pairwise import pairwise
 from worlds import Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
 from carom.components import RigidBody, Transform
@@ -22,11 +23,10 @@ makers = pytest.mark.parametrize("maker", [ball, box])
 # -- B16: Newton's cradle --------------------------------------------------------------------------
 
 
-@each_mode
-@makers
-@pytest.mark.parametrize("speed", [1.0, 120.0])
-@pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
-@pytest.mark.parametrize("arriving", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    ("mode", "maker", "speed", "gap", "arriving"),
+    pairwise(MODES, (ball, box), (1.0, 120.0), (0.0, 1e-6, 0.01), (1, 2, 3, 4)),
+)
 def test_b16_cradle(mode, maker, speed, gap, arriving):
     """k arrive, k leave, one impact after the other at any gap; also at 2 m per step, when all is over within one.
 

@@ -199,7 +199,7 @@ def test_impact_time_on_the_path_of_the_integrator(d, integrator):
 # -- B11: bouncing ball, e < 1 -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("integrator", "maker"), zip(INTEGRATORS, (ball, box, ball, box, ball), strict=True))
+@pytest.mark.parametrize(("integrator", "maker"), list(zip(INTEGRATORS, (ball, box, ball, box, ball), strict=True)))
 def test_bouncing_ball_comes_to_rest(maker, integrator):
     """Impacts end at T0 (1+e)/(1-e) (Zeno), from any height; then the ball is at rest: no sinking, v = 0.
 

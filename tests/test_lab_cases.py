@@ -58,12 +58,13 @@ def test_the_kind_of_a_scene(name, seconds, kind):
     assert survey(subject_of(name), seconds).kind == kind
 
 
+@pytest.mark.slow
 def test_a_gas_is_chaotic():
     """A nudge grows as e^(3 t) in this gas (30 discs per collision time), so by more than 1e7 in 8 time units."""
     assert survey(subject_of("thermal_gas", {"n": 100}), 8.0).kind == CHAOTIC
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e9])
+@pytest.mark.parametrize("scale", [pytest.param(1.0, marks=pytest.mark.slow), 1e9])
 def test_chaos_without_contacts_is_refused_whatever_the_unit(scale):
     with pytest.raises(Problem, match="chaotic: nothing touches anything"):
         case_of(stars(scale), seconds=20.0)
@@ -224,7 +225,7 @@ def trap(settings, seed=0):
     return world
 
 
-@pytest.mark.parametrize("norm", ["pressure", "apex"])
+@pytest.mark.parametrize("norm", ["pressure", pytest.param("apex", marks=pytest.mark.slow)])
 def test_what_is_0_throughout_is_no_error_of_0(norm):
     """Without walls there is no pressure, without gravity no height: every setting would meet every target."""
     with pytest.raises(Problem, match=rf"trap: {norm} is 0 throughout.* position, energy, impact_time, count"):

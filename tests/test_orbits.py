@@ -81,7 +81,7 @@ def check_orbit(method, periods):
 @all_methods
 def test_circular_orbit_of_a_few_periods(method):
     """B4 shortened."""
-    check_orbit(method, 3)
+    check_orbit(method, 2)
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers_pairwise import pairwise
 from helpers_queries import directions, scene
 from worlds import ball, both_dimensions, make_world
 
@@ -13,9 +14,7 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System
 
 
-@both_dimensions
-@pytest.mark.parametrize("sizes", ["even", "power", "clusters"])
-@pytest.mark.parametrize("n", [60, 2500])
+@pytest.mark.parametrize(("d", "n", "sizes"), pairwise((2, 3), (60, 2500), ("even", "power", "clusters")))
 def test_nearest_of_many_bodies(d, n, sizes):
     world, bodies, side = scene(d, n, seed=n, sizes=sizes)
     rng = np.random.default_rng(3)

@@ -43,7 +43,7 @@ def check(lower, upper, moving):
 
 
 @both_dimensions
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_any_boxes_look_into_even_ones(d, data):
     """Boxes of all sizes, touching, infinite and without shape; the largest of what does not move stay outside."""

@@ -330,7 +330,7 @@ def test_oracle_of_a_platform_that_carries(d):
     together(world, 40)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=6, deadline=None, derandomize=True)
 @given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.integers(2, 8))
 def test_oracle_of_small_heaps(d, seed, count):
     """Each step from the world's own state, because heaps are chaotic. A step decided by a number of the size of
