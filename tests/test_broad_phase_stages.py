@@ -51,7 +51,7 @@ def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
 
 
 @both_dimensions
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(data=st.data())
 def test_any_boxes(d, data):
     """Sizes, crowds, nan, infinities, touching boxes, in one world that changes: always the set of brute force."""

@@ -111,16 +111,16 @@ def test_b13_tangent_point_and_overlap(mode, d):
 @both_dimensions
 @each_sweep
 def test_c5_thin_wall(mode, d):
-    """R = 0.1, wall 0.1 thick, 1 to 1e6 m/s, e = 1 and 0, eight phases of the step: all bounce or stop, where and when
+    """R = 0.1, wall 0.1 thick, 1 to 1e6 m/s, e = 1 and 0, four phases of the step: all bounce or stop, where and when
     they should (eps of the way, which is up to 2e4 m a step)."""
     world = mode_world(mode, d)
     box(world, 0.05, half=along(d, 0.05, 1e3, 1e3), kind="static")
     shots = []
     for k, (v, e, phase) in enumerate(
-        (v, e, phase) for v in (1, 5, 10, 20, 50, 100, 1e3, 1e6) for e in (1.0, 0.0) for phase in range(8)
+        (v, e, phase) for v in (1, 5, 10, 20, 50, 100, 1e3, 1e6) for e in (1.0, 0.0) for phase in (0, 2, 4, 7)
     ):
         gap = (phase / 4 + 0.1) * v * DT
-        shots.append((bullet(world, along(d, -0.1 - gap, 2.0 * k - 128), v, restitution=e), v, e, gap / v))
+        shots.append((bullet(world, along(d, -0.1 - gap, 2.0 * k - 64), v, restitution=e), v, e, gap / v))
     run(world, 3)
     assert velocity(world, shots[0][0])[0] == -1
     for entity, v, e, toi in shots:

@@ -117,6 +117,7 @@ def namespace(monkeypatch, tmp_path):
 # Each compiles for a quarter of a minute or more where the cache is empty, or is a study of many runs.
 SLOW = (
     "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md", "trade.md", "tune.md",
+    "integrators.md", "limits.md", "which-collision.md",
 )  # fmt: skip
 RUN = [
     pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())
@@ -162,6 +163,7 @@ def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
     assert json.loads(result.stdout)["steps"] == 4 * 120
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_path):
     from carom.lab.cli import cli
 

@@ -68,7 +68,7 @@ def contacts_of(bodies):
 @both_dimensions
 @pytest.mark.parametrize("first", ["sphere", "box"])
 @pytest.mark.parametrize("second", ["sphere", "box"])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(data=st.data())
 def test_any_pair_equals_the_oracle(d, first, second, data):
     """hit, depth, unit normal from the smaller entity id to the larger, point. Tolerance: 100 eps of the sizes (< 20);
@@ -97,7 +97,7 @@ def radius_of(a, b):
 
 
 @both_dimensions
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(data=st.data())
 def test_both_orders_give_the_same_contact(d, data):
     """Created the other way round, a pair has the opposite normal and the same depth and point."""

@@ -147,7 +147,7 @@ coordinate = st.one_of(
 
 
 @both_dimensions
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_any_boxes_at_all(d, data):
     """NaN, infinities, empty boxes, one ulp apart: exactly the result of brute force."""
@@ -161,7 +161,7 @@ def test_any_boxes_at_all(d, data):
 
 
 @both_dimensions
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), exponent=st.integers(-300, 300), n=st.integers(25, 300))
 def test_any_scale_and_any_spread(d, seed, exponent, n):
     """Positions and sizes over many magnitudes, in units from 1e-300 to 1e300."""
