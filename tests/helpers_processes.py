@@ -26,7 +26,8 @@ PRELOAD = [
     "numba.np.npyimpl", "numba.np.polynomial", "numba.np.random.generator_methods", "numba.typed.dictimpl",
     "numba.typed.listobject", "numba.typed.setobject",
 ]  # fmt: skip
-FORKED = "forkserver" in multiprocessing.get_all_start_methods()
+FORKED = sys.platform.startswith("linux")  # elsewhere system libraries do not survive it
+PATIENCE = 300  # seconds: what takes longer hangs
 RUN_CAROM = "import runpy; runpy.run_module('carom', run_name='__main__')"
 
 
@@ -47,6 +48,8 @@ class Started:
             self._process.start()
 
     def finish(self) -> subprocess.CompletedProcess[str]:
+        self._process.join(PATIENCE)
+        self._process.kill()
         self._process.join()
         output = [Path(self._folder.name, name).read_text(encoding="utf-8") for name in ("stdout", "stderr")]
         self._folder.cleanup()
@@ -63,7 +66,7 @@ class StartedAnew:
         )  # fmt: skip
 
     def finish(self) -> subprocess.CompletedProcess[str]:
-        output = self._process.communicate()
+        output = self._process.communicate(timeout=PATIENCE)
         return subprocess.CompletedProcess(self._process.args, self._process.returncode, *output)
 
 
@@ -91,6 +94,7 @@ def run_carom(*arguments, **more) -> subprocess.CompletedProcess[str]:
 def copied_cache(folder: Path, *without: str) -> dict[str, str]:
     """A copy of the tests' kernel cache without the kernels of these names: the environment of processes to use it."""
     names = [f"{name}-*.kernel" for name in without]
+    os.makedirs(os.environ["CAROM_CACHE_DIR"], 0o700, exist_ok=True)
     shutil.copytree(os.environ["CAROM_CACHE_DIR"], folder, ignore=shutil.ignore_patterns("*.unfinished", *names))
     return {"CAROM_CACHE_DIR": str(folder)}
 

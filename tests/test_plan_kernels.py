@@ -228,7 +228,7 @@ RUN = {"run_stages", "ticks_now"}  # what calls the stages, and their clock
 SHAPES = {"box_rows", "bounds", "evaluate", "batch", "rotated", "corner"}  # what stages call by address
 
 
-@pytest.mark.parametrize("name", ["drifting", "gravity", "spheres", "restitution", "spheres, 3D"])
+@pytest.mark.parametrize("name", ["drifting", "spheres", "restitution", "spheres, 3D"])
 def test_the_kernels_that_are_compiled_are_those_of_the_plan(name):
     """Compiled, or loaded from the cache: in a process of its own."""
     done = run_python(COMPILED, name, Path(__file__).parents[1])
@@ -237,9 +237,9 @@ def test_the_kernels_that_are_compiled_are_those_of_the_plan(name):
     assert set(answers["planned"]) == LADDER[name][1]
     others = set(answers["compiled"]) - set(answers["planned"])
     assert set(answers["planned"]) <= set(answers["compiled"])
-    if name in ("drifting", "gravity"):
+    if name == "drifting":
         assert others == RUN
     else:
         assert RUN | {"bounds", "batch"} <= others <= RUN | SHAPES
     assert answers["3D"] == [str("3D" in name)]
-    assert answers["boxes"] == [str(name not in ("drifting", "gravity", "spheres"))]
+    assert answers["boxes"] == [str(name not in ("drifting", "spheres"))]

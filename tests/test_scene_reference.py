@@ -83,7 +83,7 @@ def test_orbit_closes_with_the_order_of_the_method(method, order):
     assert math.log2(coarse / fine) == pytest.approx(order, abs=0.3)
 
 
-@pytest.mark.parametrize("eccentricity", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("eccentricity", [0.0, 0.6])
 def test_orbit_closes(eccentricity):
     """RK4, 4,000 steps: the angle per step at the perihelion is at most 5 dt = 0.008, its fourth power 4e-9, multiplied
     by the number of steps there."""

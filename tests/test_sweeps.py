@@ -306,7 +306,7 @@ def test_they_touch_then_and_not_before(pair, d):
     end = code(cases.a, cases.b, cases.d + time[:, None] * v)
     assert (np.abs(end.depth[later]) <= slack[later]).all(), np.abs(end.depth / scale)[later].max()
     until = np.where(hit, time, 1.0)
-    for part in np.linspace(0.0, 1.0, 12, endpoint=False)[1:]:
+    for part in np.linspace(0.0, 1.0, 9, endpoint=False)[1:]:
         on_way = code(cases.a, cases.b, cases.d + (part * until)[:, None] * v).depth
         assert (on_way[~start.hit] <= slack[~start.hit]).all(), np.max((on_way / scale)[~start.hit])
     missed = ~hit
