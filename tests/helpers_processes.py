@@ -1,7 +1,7 @@
 """Python programs in processes of their own, forked from one that has loaded numba and numpy, but nothing of carom.
 
 That saves half a second per process. Every process gets its environment, folder, arguments and output as a new one
-does; only PYTHONHASHSEED and NUMBA_DISABLE_JIT count where numba is loaded, so with these a new Python has to start.
+does; the variables that count where numba is loaded make a new Python start.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ PRELOAD = [
     "esper", "numpy.ma", "numba", "numba.core.inline_closurecall", "numba.cpython.heapq", "numba.cpython.printimpl",
     "numba.cpython.randomimpl", "numba.experimental.jitclass.base", "numba.misc.cffiimpl", "numba.np.linalg",
     "numba.np.npyimpl", "numba.np.polynomial", "numba.np.random.generator_methods", "numba.typed.dictimpl",
-    "numba.typed.listobject", "numba.typed.setobject",
+    "numba.typed.listobject", "numba.typed.setobject", "helpers_numba_loaded",
 ]  # fmt: skip
+AT_LOADING = {"PYTHONHASHSEED", "NUMBA_DISABLE_JIT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"}
 FORKED = sys.platform.startswith("linux")  # elsewhere system libraries do not survive it
 PATIENCE = 300  # seconds: what takes longer hangs
 RUN_CAROM = "import runpy; runpy.run_module('carom', run_name='__main__')"
@@ -44,7 +45,8 @@ class Started:
         self._process = context.Process(
             target=_execute, args=(code, self._arguments, str(cwd or Path.cwd()), everything, files, _byte_code().name)
         )
-        with mock.patch.dict(sys.modules, {"__main__": types.ModuleType("__main__")}):  # or it would import pytest
+        nothing = {"__main__": types.ModuleType("__main__")}  # or it would import pytest
+        with mock.patch.dict(sys.modules, nothing), mock.patch.dict(os.environ, PYTHONPATH=os.path.dirname(__file__)):
             self._process.start()
 
     def finish(self) -> subprocess.CompletedProcess[str]:
@@ -78,7 +80,8 @@ def _byte_code() -> tempfile.TemporaryDirectory:
 
 def start_python(code: str, *arguments, cwd: Path | None = None, anew: bool = False, **environment: str):
     """Start ``code`` as ``python -c`` does; ``anew``: without fork; environment: variables besides those of here."""
-    return (StartedAnew if anew or not FORKED else Started)(code, arguments, cwd, environment)
+    anew = anew or not FORKED or not AT_LOADING.isdisjoint(environment)
+    return (StartedAnew if anew else Started)(code, arguments, cwd, environment)
 
 
 def run_python(code: str, *arguments, **more) -> subprocess.CompletedProcess[str]:
