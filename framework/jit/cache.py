@@ -27,7 +27,7 @@ from numba.core.caching import _Cache
 from numba.core.serialize import dumps
 
 from . import prebuilt
-from .hash import deep_hash, type_names
+from .hash import hash_and_reach, type_names
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
 KERNELS, UNFINISHED = "*.kernel", "*.unfinished"
@@ -128,7 +128,7 @@ class KernelCache(_Cache):
         self._dispatcher = dispatcher
         self._missing = missing
         self._enabled = True
-        self._hash: str | None = None
+        self._hash_and_reach: tuple[str, int] | None = None
 
     @property
     def cache_path(self) -> str:
@@ -188,10 +188,18 @@ class KernelCache(_Cache):
                     path.parent, error.strerror or error,
                 )  # fmt: skip
 
+    @property
+    def reach(self) -> int:
+        """Of how many functions the kernel is made."""
+        return self._hashed()[1]
+
+    def _hashed(self) -> tuple[str, int]:
+        if self._hash_and_reach is None:
+            self._hash_and_reach = hash_and_reach(self._dispatcher)
+        return self._hash_and_reach
+
     def _stem(self) -> str:
-        if self._hash is None:
-            self._hash = deep_hash(self._dispatcher)
-        return f"{self._dispatcher.py_func.__name__}-{self._hash[:32]}"
+        return f"{self._dispatcher.py_func.__name__}-{self._hashed()[0][:32]}"
 
     def _path(self, sig: Any, codegen: Any) -> Path | None:
         folder = cache_folder()

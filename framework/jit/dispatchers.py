@@ -76,6 +76,11 @@ class KeptDispatcher(CPUDispatcher):
             log.compiled.append((self.py_func.__qualname__, wait.own))
         return entry_point
 
+    @property
+    def reach(self) -> int:
+        """Of how many functions it is made: the more, the longer it takes to compile."""
+        return self._cache.reach
+
     def is_kept(self, sig: Any) -> bool:
         """Whether it is kept on disk for that signature, and has only to be loaded."""
         return self._cache.holds(sig, self.targetctx)

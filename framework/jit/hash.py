@@ -36,10 +36,16 @@ def toolchain() -> dict[str, str]:
 
 def deep_hash(function: Any) -> str:
     """The hash, as hexadecimal digits; versions and numba's switches are part of it."""
+    return hash_and_reach(function)[0]
+
+
+def hash_and_reach(function: Any) -> tuple[str, int]:
+    """The hash, and of how many functions the code is made: how long it takes to compile, roughly."""
     switches = [(name, getattr(config, name, None)) for name in SWITCHES]
     digest = hashlib.sha256(repr((toolchain(), switches)).encode())
-    _feed(function, digest, set())
-    return digest.hexdigest()
+    seen: set[int] = set()
+    _feed(function, digest, seen)
+    return digest.hexdigest(), len(seen)
 
 
 def type_names(kind: Any) -> str:

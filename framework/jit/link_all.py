@@ -48,7 +48,8 @@ def _compile(functions: Sequence[Linkable], numbers: Iterable[int]) -> None:
 
 
 def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
-    """This process and others each take the next function until none is left."""
+    """This process and others each take the next function until none is left; those that take longest come first."""
+    functions = sorted(functions, key=lambda function: -function.reach)
     context: Any = multiprocessing.get_context("fork")
     following, compiled = context.Value("i", 0), context.SimpleQueue()
     started = [

@@ -58,6 +58,11 @@ class Linked:
         """Whether linking it compiles nothing."""
         return self.ready or not JIT or self._dispatcher.is_kept(self.signature)
 
+    @property
+    def reach(self) -> int:
+        """Of how many functions it is made: the more, the longer it takes to compile."""
+        return self._dispatcher.reach
+
     def link(self) -> None:
         """Compile or load it now."""
         self.address  # noqa: B018 - asking for it links
@@ -90,6 +95,11 @@ class Called:
     def at_hand(self) -> bool:
         """Whether linking it compiles nothing."""
         return self.ready or self._kernel.made.is_kept(self._types)
+
+    @property
+    def reach(self) -> int:
+        """Of how many functions it is made."""
+        return self._kernel.made.reach
 
     def link(self) -> None:
         """Compile or load it now."""
