@@ -212,7 +212,8 @@ class _Worker:
 def _interrupts_held_back() -> Iterator[None]:
     """Ctrl-C reaches every process of a terminal; a process that is starting must not print a traceback.
 
-    A blocked signal stays blocked in processes started meanwhile; this process receives it afterwards.
+    A blocked signal stays blocked in processes started meanwhile; this process receives it afterwards. Python notices
+    it nevertheless if a thread of some library takes it, so it gets another handler meanwhile.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -220,11 +221,18 @@ def _interrupts_held_back() -> Iterator[None]:
     from multiprocessing import resource_tracker
 
     resource_tracker.ensure_running()  # starting it later would unblock the signal
+    noted: list[int] = []
+    in_main = threading.current_thread() is threading.main_thread()  # only there Python handles signals
+    handler = signal.signal(signal.SIGINT, lambda number, _: noted.append(number)) if in_main else None
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
+        if in_main:
+            signal.signal(signal.SIGINT, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if noted:
+            signal.raise_signal(signal.SIGINT)
 
 
 @contextmanager
