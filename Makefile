@@ -25,18 +25,20 @@ DEV := .venv/dev-$(HERE)
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
 
+TOGETHER := -n 2 --dist loadfile --no-loadscope-reorder
+
 test: $(TEST)
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow" $(ARGS)
+	$(BIN)/pytest $(TOGETHER) -m "not slow" $(ARGS)
 
 test-slow: $(TEST)
-	$(BIN)/pytest -n 2 --dist loadfile -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
+	$(BIN)/pytest $(TOGETHER) -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
 
 # Kernels as plain Python: the same bits as compiled, and which lines of the engine tests have run.
 PLAIN := plain_python components_* systems_* world_* contacts_rows filters_enabled filters_sensors forces_kinds forces_systems \
   plugins_* plugin_checks adoption undo vectors profile
 
 coverage: $(TEST)
-	NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 --dist loadfile -m "not slow and not compiled" --cov --cov-report=term $(ARGS) \
+	NUMBA_DISABLE_JIT=1 $(BIN)/pytest $(TOGETHER) -m "not slow and not compiled" --cov --cov-report=term $(ARGS) \
 	  $(foreach name,$(PLAIN),$(wildcard tests/test_$(name).py))
 
 # A wheel for this platform and Python version that carries the compiled kernels: dist/carom-*.whl.

@@ -13,6 +13,18 @@ os.environ["CAROM_BACKGROUND"] = "0"  # what compiles, and when, depends on no t
 os.environ["CAROM_CACHE_DIR"] = str(CACHE)  # before anything imports carom, and for all processes that tests start
 
 
+# Files that take long begin first, so that no worker is left with one at the end.
+LONG = (
+    "test_tune_grid", "test_wheel", "test_trade", "test_oracle_modes", "test_piles", "test_determinism",
+    "test_trade_resume", "test_tune", "test_settings_study", "test_plain_python",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    """All workers collect in the same order."""
+    items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
+
+
 def pytest_sessionstart(session):
     """With several workers: compile what nearly all tests need before they start, or each would do it."""
     config = session.config
