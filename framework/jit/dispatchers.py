@@ -35,7 +35,7 @@ class Wait:
         global_compiler_lock.acquire()
         self.own = 0.0
         self._blocks = not getattr(background, "active", False)  # else the game goes on meanwhile
-        self._collecting = self._blocks and gc.isenabled()
+        self._collecting = gc.isenabled()
         if self._collecting:
             gc.disable()  # the compiler makes millions of objects that live on; looking through them costs a twentieth
         self._running.append(self)
@@ -45,7 +45,8 @@ class Wait:
     def __exit__(self, *_: object) -> None:
         self._running.pop()
         if self._collecting:
-            gc.collect(0)  # once now, instead of at some moment soon, which would be taken for run time
+            if self._blocks:
+                gc.collect(0)  # once now, instead of at some moment soon, which would be taken for run time
             gc.enable()
         seconds = time.perf_counter() - self._started
         self.own += seconds
