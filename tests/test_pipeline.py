@@ -12,6 +12,7 @@ from numba.core.compiler import Compiler
 
 from carom.framework.compilation import Kernel, Part, allocating_kernel, kernel, part
 from carom.framework.jit import pipeline
+from carom.framework.jit.cache import machine_code
 from carom.framework.jit.dispatchers import KeptDispatcher
 
 jit = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing compiles")
@@ -85,7 +86,7 @@ def test_parts_raise_through_kernels():
 def test_parts_have_no_machine_code():
     compiled(rooted_kernel)(1.0)
     (result,) = rooted.made.overloads.values()
-    assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
+    assert machine_code(result).get_pointer_to_function(result.fndesc.llvm_func_name) == 0
 
 
 @jit
@@ -95,7 +96,7 @@ def test_parts_are_private_to_their_kernel():
     made = compiled(long_kernel)
     made(2.0)
     (result,) = made.overloads.values()
-    names = {function.name: function.linkage for function in result.library._final_module.functions}
+    names = {function.name: function.linkage for function in machine_code(result)._final_module.functions}
     shared = [name for name, linkage in names.items() if linkage == Linkage.linkonce_odr]
     assert not shared
     assert any("recursive" in name and linkage == Linkage.internal for name, linkage in names.items())

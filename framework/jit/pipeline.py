@@ -116,11 +116,11 @@ class _KernelLowering(_LOWERING):
 
     def run_pass(self, state: Any) -> bool:
         codegen = state.targetctx.codegen()
-        state.library = _KernelLibrary(codegen, state.func_id.func_qualname)
-        state.library.counts_references = state.flags.nrt
-        state.library.enable_object_caching()
+        library = state["library"] = _KernelLibrary(codegen, state.func_id.func_qualname)
+        library.counts_references = state.flags.nrt
+        library.enable_object_caching()
         super().run_pass(state)
-        for variable in state.library._final_module.global_variables:
+        for variable in library._final_module.global_variables:
             environment = lookup_environment(variable.name)  # what the code raises errors from
             if environment is not None:
                 codegen.set_env(variable.name, environment)
@@ -134,10 +134,10 @@ class _PartLowering(_LOWERING):
     _name = "carom_part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state["library"] = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        lowered, libraries = state["cr"], (state.library,)
+        lowered, libraries = state["cr"], (state["library"],)
         # numba knows what can be called by such an object; this one is no entry into machine code.
         known_by = _dynfunc.make_function(
             lowered.fndesc.lookup_module(), state.func_id.func_name, "a part of kernels", 0, lowered.env, libraries

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from ..reporting.progress import StepProgress
 from ..reporting.run_report import print_report
 from .choices import parse_assignments, parse_view, preset
 from .loading import Loaded, load, stdout_kept_clean
-from .options import plugin_option, seed_number, seed_option, set_option, settings_option
+from .options import plugin_option, seed_number, seed_option, set_option, settings_option, writable_folder
 from .usage_errors import Problem
 
 DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
@@ -108,13 +107,7 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
             err=True,
         )
         return None
-    folder = out.parent if is_file(out) else out
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Problem(f"--out {out}: {error.strerror or error}") from error
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise Problem(f"--out {out}: no permission to write there")
+    writable_folder(out.parent if is_file(out) else out, out)
     return draw_run
 
 

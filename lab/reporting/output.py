@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import click
 from rich.console import Console
 
+from ..commands.options import writable_folder
 from ..commands.usage_errors import Problem
 from .text_tables import TextTable, between_marks, replace_between_marks
 
@@ -80,10 +80,5 @@ def _charts(out: Path, module: str) -> Any:
         charts = importlib.import_module(f"..{module}", __package__)
     except ImportError as error:
         raise Problem("--out: matplotlib is missing; it comes with the extra: pip install 'carom[bench]'") from error
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Problem(f"--out {out}: {error.strerror or error}") from error
-    if not os.access(out, os.W_OK | os.X_OK):
-        raise Problem(f"--out {out}: no permission to write there")
+    writable_folder(out)
     return charts
