@@ -11,7 +11,7 @@ from typing import Any
 
 from ..framework.jit.late import types
 from ..framework.jit.linking import Linked
-from ..framework.jit.record_type import record_type
+from ..framework.jit.records.record_type import record_type
 from .records import STATE
 from .shapes.linking.signatures import call_in_dimension, vector_type
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..components import Collider, RigidBody
-from ..framework.jit.schema import Schema, flag, flags, floats, integer, ints, number, table, vectors
+from ..framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, table, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
 from .broad_phase.records import GRID
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.jit.record import Record
-from ..framework.jit.schema import Column
+from ..framework.jit.records.record import Record
+from ..framework.jit.records.schema import Column
 from .broad_phase.search import CandidateSearch
 from .codes import (
     FIND_IN_PYTHON,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..components import AABBCollider, Collider
 from ..framework.data.table import Table
-from ..framework.jit.record import Record
+from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
 from ..framework.settings import Settings
 from .shapes.geometry_levels import arrange, in_order

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.jit.record import Record
+from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
 from ..framework.settings import AUTOMATIC, MIXING_RULES, Settings
 from .ccd.search_bounds import MODES

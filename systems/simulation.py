@@ -13,7 +13,7 @@ from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
 from ..framework.data.component import Component
 from ..framework.data.table import Table
-from ..framework.jit.record import make_record
+from ..framework.jit.records.record import make_record
 from ..framework.schedule.phases import System
 from ..framework.schedule.plan import PlannedColumn, PlannedKernel
 from ..framework.schedule.stages import Program, Segment

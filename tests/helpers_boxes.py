@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 
-from carom.framework.jit.record import make_record
+from carom.framework.jit.records.record import make_record
 from carom.framework.schedule.stages import Program, Stage
 from carom.framework.settings import Settings
 from carom.systems import codes

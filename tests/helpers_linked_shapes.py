@@ -9,9 +9,9 @@ import numpy as np
 from carom.components import AABBCollider, Collider, SphereCollider
 from carom.framework.compilation import kernel
 from carom.framework.data.columns import column
-from carom.framework.jit.record import make_record
-from carom.framework.jit.record_type import record_at
-from carom.framework.jit.schema import Schema, flags, floats, ints, vectors
+from carom.framework.jit.records.record import make_record
+from carom.framework.jit.records.record_type import record_at
+from carom.framework.jit.records.schema import Schema, flags, floats, ints, vectors
 from carom.framework.plugins.plugin import Plugin
 from carom.framework.plugins.registry import Registry
 from carom.framework.vectors import negative, sub

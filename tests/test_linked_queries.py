@@ -20,7 +20,7 @@ from helpers_linked_shapes import (
 )
 
 from carom.components import AABBCollider, SphereCollider
-from carom.framework.jit.record import make_record
+from carom.framework.jit.records.record import make_record
 from carom.framework.plugins.plugin import Plugin
 from carom.framework.vectors import add, negative
 from carom.plugins.capsule import CapsuleCollider

@@ -32,7 +32,7 @@ from numba.core.errors import NumbaError
 
 from carom.components import AABBCollider, SphereCollider
 from carom.framework.errors import PluginError
-from carom.framework.jit.record import make_record
+from carom.framework.jit.records.record import make_record
 from carom.framework.plugins.plugin import Plugin
 from carom.plugins.one_way_segment import OneWaySegmentCollider
 from carom.plugins.standard_shapes import standard_shapes

@@ -7,8 +7,8 @@ import pytest
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
-from carom.framework.jit.record import Record
-from carom.framework.jit.schema import Scalar
+from carom.framework.jit.records.record import Record
+from carom.framework.jit.records.schema import Scalar
 
 from .worlds import make_world
 

@@ -11,8 +11,8 @@ from helpers_processes import run_python
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
-from carom.framework.jit.record import make_record
-from carom.framework.jit.schema import Schema, flags, integer, ints, number, vectors
+from carom.framework.jit.records.record import make_record
+from carom.framework.jit.records.schema import Schema, flags, integer, ints, number, vectors
 from carom.framework.schedule.stages import Program, Stage
 from carom.lab.commands.stages import Stages
 from carom.lab.reporting.text_tables import between_marks
@@ -44,9 +44,9 @@ def test_every_stage_is_described_and_its_file_is_there():
 def test_the_checked_build_names_the_column_and_the_index():
     source = """
 from carom.framework.compilation import kernel
-from carom.framework.jit.record import make_record
-from carom.framework.jit.record_type import record_at, record_type
-from carom.framework.jit.schema import Schema, floats
+from carom.framework.jit.records.record import make_record
+from carom.framework.jit.records.record_type import record_at, record_type
+from carom.framework.jit.records.schema import Schema, floats
 
 SCHEMA = Schema("Shelf", weight=floats())
 shelf_at = record_at(SCHEMA, 2)

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.framework.jit.plain_view import PlainView
-from carom.framework.jit.record import make_record
+from carom.framework.jit.records.plain_view import PlainView
+from carom.framework.jit.records.record import make_record
 from carom.systems.broad_phase import boxes
 from carom.systems.ccd import search_bounds, time_of_impact
 from carom.systems.ccd.refresh_pairs import merge_pairs

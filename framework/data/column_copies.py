@@ -9,9 +9,9 @@ import numpy as np
 from ..compilation import kernel
 from ..jit.late import JIT, cgutils, intrinsic, ir, types
 from ..jit.linking import Called
-from ..jit.record import make_record
-from ..jit.record_type import record_at
-from ..jit.schema import Schema, ints
+from ..jit.records.record import make_record
+from ..jit.records.record_type import record_at
+from ..jit.records.schema import Schema, ints
 
 if TYPE_CHECKING:
     from .table import Table

@@ -1,5 +1,6 @@
-"""Compiled code: the disk cache of kernels, the hash that names its files, and arrays on the stack of a kernel.
+"""Compiled code: how kernels compile, when, and where their machine code is kept or comes from.
 
-Reads byte code, constants and captured values of kernels. Writes one file per kernel and signature into the cache
-folder. ``compilation.py``, one folder up, has the decorators.
+``dispatchers`` and ``pipeline`` compile; ``linking``, ``link_all`` and ``background`` say when; ``hash``, ``cache`` and
+``prebuilt`` find what is compiled already; ``late`` keeps numba out of imports; ``records`` is what kernels work on.
+``compilation.py``, one folder up, has the decorators.
 """

@@ -38,11 +38,13 @@ if TYPE_CHECKING:
     from numba.core import cgutils, errors, types
     from numba.np import arrayobj
 
-    from . import dispatchers, record_code
+    from . import dispatchers
+    from .records import record_code
 else:
     ir, arrayobj = LateModule("llvmlite.ir"), LateModule("numba.np.arrayobj")
     cgutils, errors, types = (LateModule(f"numba.core.{name}") for name in ("cgutils", "errors", "types"))
-    dispatchers, record_code = (LateModule(f"{__package__}.{name}") for name in ("dispatchers", "record_code"))
+    names = ("dispatchers", "records.record_code")
+    dispatchers, record_code = (LateModule(f"{__package__}.{name}") for name in names)
 
 
 class Late:

@@ -17,9 +17,9 @@ import numpy as np
 from ..compilation import entry_point, log, untimed_kernel
 from ..jit.late import types
 from ..jit.linking import Called, Linked, linked_call
-from ..jit.record import Record
-from ..jit.record_type import record_at, record_type
-from ..jit.schema import Schema, integer, ints
+from ..jit.records.record import Record
+from ..jit.records.record_type import record_at, record_type
+from ..jit.records.schema import Schema, integer, ints
 from ..jit.tick_counter import TICKS_NOW, TickClock, read_ticks
 
 # What every state begins with: addresses of the stages (0: not needed), the time that each has taken in ticks of the

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...framework.jit.record import make_record
+from ...framework.jit.records.record import make_record
 from ...framework.schedule.stages import Program
 from ...systems import Integrator
 from ...systems.integration.integrators import STANDARD_INTEGRATORS, Flight

@@ -16,7 +16,7 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 
 from ...framework import World
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from .stability import Complexes, Floats
 
 EPS = float(np.finfo(float).eps)

@@ -12,9 +12,9 @@ import numpy as np
 
 from ...framework.compilation import kernel
 from ...framework.jit.linking import Linked
-from ...framework.jit.record import Record, make_record
-from ...framework.jit.record_type import record_at
-from ...framework.jit.schema import Schema, flags, floats, vectors
+from ...framework.jit.records.record import Record, make_record
+from ...framework.jit.records.record_type import record_at
+from ...framework.jit.records.schema import Schema, flags, floats, vectors
 from ...framework.plugins.registry import Pair, Shape
 from ...systems.records import STATE
 from ...systems.shapes.linking.linked_pair import LinkedPair, linked_pair

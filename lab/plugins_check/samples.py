@@ -11,7 +11,7 @@ import numpy as np
 from ...components import Collider
 from ...framework.data.array_columns import ArrayColumn
 from ...framework.data.columns import REQUIRED, Column
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Shape
 from ...systems.shapes.linking.linked_shape import half_extents_of
 from ...systems.shapes.linking.parameters import bind, make_parameter_record

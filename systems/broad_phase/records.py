@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...framework.jit.schema import Schema, flag, floats, integer, ints, number, table, vectors
+from ...framework.jit.records.schema import Schema, flag, floats, integer, ints, number, table, vectors
 
 # A uniform grid of boxes, see :mod:`.uniform_grid`.
 GRID = Schema(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.settings import AUTOMATIC, Settings
 from ..codes import NEED_CANDIDATES, NEED_CELLS

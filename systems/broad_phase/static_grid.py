@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item
 from .boxes import HIGHEST, LARGEST, LOWEST
 from .uniform_grid import build_grid, reserve_grid

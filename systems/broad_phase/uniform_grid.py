@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, replace
 from .boxes import HIGHEST, LARGEST, LOWEST
 from .brute_force import boxes_overlap

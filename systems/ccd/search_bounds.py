@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, item, length, replace
 from ..codes import OK
 from ..integration.trajectory import (

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot, length, sub
 from ..integration.trajectory import ROUNDING, along, first_root, rate_along
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep

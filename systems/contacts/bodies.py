@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Check, Program, PythonPart, Stage
 from ...framework.settings import Settings

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...framework.compilation import inlined, part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, sub
 from ..codes import OK
 from ..impacts.impulses import EXCLUDED_FROM_REST

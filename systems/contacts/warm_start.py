@@ -7,7 +7,7 @@ over the step (total).
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, scale
 from ..codes import NEED_WARM_START, OK
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...framework.data.bodies import Bodies, SelectedBodies
 from ...framework.data.table import Table
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import ForceSystem, Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, PythonPart, Stage

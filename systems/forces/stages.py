@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, replace, scale
 from ..codes import NEED_COLUMNS
 

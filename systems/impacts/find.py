@@ -6,7 +6,7 @@ Pairs that are swept are taken where they first touch on their path, others wher
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept
 from ..ccd.time_of_impact import APART, AT_CORNER

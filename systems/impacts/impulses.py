@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 
 COUNTERS = {
     "bodies": "bodies_counted",

@@ -9,7 +9,7 @@ import numpy as np
 from ...framework.data.column_copies import ColumnCopies
 from ...framework.data.columns import REQUIRED
 from ...framework.data.table import Table
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.schedule.plan import PlannedColumn
 from ..room import SOLVER_BODIES
 from ..scene import COLLISIONS, CURVES, HALF_KICKS, SEVERAL_EVALUATIONS, SWEEPS, Scene

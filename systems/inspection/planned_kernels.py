@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...framework.data.column_copies import copy_blocks
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.schedule.plan import PlannedKernel
 from ..stage_list import CLOSING, OPENING
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
 
 

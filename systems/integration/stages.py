@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, scale, sub
 from ..codes import NEED_COLUMNS
 from ..forces.stages import within

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel

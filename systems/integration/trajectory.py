@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, length, scale, sub
 
 ROUNDING = 4e-16  # of a distance: what is smaller than that is none

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, sub
 from ..codes import OK
 from ..shapes.dispatch import evaluate

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...framework.data.component import Component
-from ...framework.jit.record import Record, make_record
+from ...framework.jit.records.record import Record, make_record
 from ...framework.plugins.registry import Registry
 from ..broad_phase.tree.build import MAX_LEVELS
 from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords

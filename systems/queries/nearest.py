@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, pasted
-from ...framework.jit.record_type import zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, item, replace, sub
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
 from ..shapes.query import evaluate_against

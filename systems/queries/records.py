@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...framework.jit.schema import Schema, flag, floats, integer, ints, number, vectors
+from ...framework.jit.records.schema import Schema, flag, floats, integer, ints, number, vectors
 from ..shapes.query import QUERY
 
 ENDLESS = 1e300  # m; in place of infinity, which times zero is nan

@@ -10,7 +10,7 @@ import numpy as np
 from ...components import AABBCollider, SphereCollider
 from ...framework.data.table import Table
 from ...framework.jit.linking import Linked
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours
 from ...framework.world.services import QueryServices

@@ -12,7 +12,7 @@ import numpy as np
 from ...framework.data.component import Component
 from ...framework.errors import PluginError
 from ...framework.jit.late import errors
-from ...framework.jit.record import Record
+from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry, Shape
 from .linking.signatures import ALONE, OUT_OF_TIME
 

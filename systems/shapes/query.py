@@ -16,8 +16,8 @@ import numpy as np
 from ...framework.compilation import inlined
 from ...framework.data.component import Component
 from ...framework.jit.linking import KEPT, Linked
-from ...framework.jit.record import Record
-from ...framework.jit.schema import Schema, flags, integer, ints
+from ...framework.jit.records.record import Record
+from ...framework.jit.records.schema import Schema, flags, integer, ints
 from ...framework.plugins.registry import Registry, Shape
 from ...framework.vectors import add, negative
 from .linking.linked_pair import LinkedPair, convex_sides, linked_pair

@@ -25,9 +25,9 @@ import numpy as np
 from ....components import Collider, RigidBody, SphereCollider, Transform
 from ....framework import Phase, Plugin, World, column
 from ....framework.compilation import inlined, kernel
-from ....framework.jit.record import Record, make_record
-from ....framework.jit.record_type import record_at
-from ....framework.jit.schema import Schema, floats
+from ....framework.jit.records.record import Record, make_record
+from ....framework.jit.records.record_type import record_at
+from ....framework.jit.records.schema import Schema, floats
 from ....framework.vectors import add, divided, length, scale, sub
 from ....plugins import Physics
 from ....systems.narrow_phase.stages import collect_contacts, evaluate_pairs, select_pairs

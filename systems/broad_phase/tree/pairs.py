@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ....framework.compilation import part
-from ....framework.jit.record_type import zero_of
+from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import item, replace
 from .build import CODE_BITS
 from .cells import cover

@@ -9,7 +9,7 @@ from typing import Any
 from ....framework.compilation import kernel
 from ....framework.jit.late import types
 from ....framework.jit.linking import Called, Linked, linked_call
-from ....framework.jit.record_type import record_at, record_type
+from ....framework.jit.records.record_type import record_at, record_type
 from ..records import TREE
 from . import build, pairs, queries
 

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ....framework.jit.record import Record, make_record
+from ....framework.jit.records.record import Record, make_record
 from ..brute_force import BRUTE_FORCE_MAX
 from ..records import TREE
 from ..stages import CANDIDATE_LIMIT

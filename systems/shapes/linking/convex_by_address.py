@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....framework.compilation import inlined
-from ....framework.jit.record_type import record_at
+from ....framework.jit.records.record_type import record_at
 from .parameters import HEADER
 from .signatures import call_rounding, call_support
 from .user_functions import as_argument

@@ -13,7 +13,7 @@ from typing import Any
 
 from ....framework.compilation import inlined
 from ....framework.jit.linking import KEPT, Linked
-from ....framework.jit.record_type import record_at
+from ....framework.jit.records.record_type import record_at
 from ....framework.plugins.registry import Convex, Pair, Shape
 from .batches import batch_by_address, checked, in_given_order, in_order_of_shapes, make_batch
 from .convex_by_address import convex_at, rounding_argument, support_argument

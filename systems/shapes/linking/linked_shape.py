@@ -11,9 +11,9 @@ import numpy as np
 from ....framework.compilation import kernel
 from ....framework.data.array_columns import ArrayColumn
 from ....framework.jit.linking import KEPT, Called, Linked
-from ....framework.jit.record import make_record
-from ....framework.jit.record_type import record_at, rows_of
-from ....framework.jit.schema import Schema, vectors
+from ....framework.jit.records.record import make_record
+from ....framework.jit.records.record_type import record_at, rows_of
+from ....framework.jit.records.schema import Schema, vectors
 from ....framework.plugins.registry import Shape
 from ...records import STATE
 from .parameters import (

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....framework.data.component import Component
 from ....framework.jit.linking import KEPT, Linked
-from ....framework.jit.record import Record
+from ....framework.jit.records.record import Record
 from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
 from .linked_shape import LinkedShape, linked_shape

@@ -17,9 +17,9 @@ import numpy as np
 from ....framework.compilation import pasted
 from ....framework.data.array_columns import ArrayColumn
 from ....framework.jit.linking import KEPT
-from ....framework.jit.record import Record, make_record
-from ....framework.jit.record_type import rows_of
-from ....framework.jit.schema import Column, Schema, axes, floats, integer, table, vectors
+from ....framework.jit.records.record import Record, make_record
+from ....framework.jit.records.record_type import rows_of
+from ....framework.jit.records.schema import Column, Schema, axes, floats, integer, table, vectors
 from ....framework.plugins.registry import Shape
 
 # What every parameter record begins with.

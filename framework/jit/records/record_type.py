@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .late import JIT, Late
+from ..late import JIT, Late
 from .plain_view import plain_view_at
 from .schema import Schema
 

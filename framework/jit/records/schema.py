@@ -1,7 +1,7 @@
 """Schemas: the columns and scalars of a record, written once for 2D and 3D.
 
-A schema is a list of named fields. :class:`~carom.framework.jit.record.Record` makes the memory for one,
-:class:`~carom.framework.jit.record_type.RecordType` is what compiled code knows it as.
+A schema is a list of named fields. :class:`~carom.framework.jit.records.record.Record` makes the memory for one,
+:class:`~carom.framework.jit.records.record_type.RecordType` is what compiled code knows it as.
 
     BODIES = Schema("Bodies", position=vectors(), inverse_mass=floats(), entity=ints())
     STATE = Schema("State", dt=number(), count=integer(), bodies=BODIES)
