@@ -25,6 +25,9 @@ DEV := .venv/dev-$(HERE)
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
 
+# Byte code is kept, whatever the environment says: or every worker would compile all tests and carom anew in each run.
+unexport PYTHONDONTWRITEBYTECODE
+
 TOGETHER := -n 2 --dist loadfile --no-loadscope-reorder
 
 test: $(TEST)

@@ -22,6 +22,7 @@ import pytest
 from click.testing import CliRunner
 
 from carom.framework import World
+from carom.lab.cases import case
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -126,7 +127,8 @@ RUN = [
 
 
 @pytest.mark.parametrize("page", RUN, ids=name_of)
-def test_the_python_blocks_run(page, namespace):
+def test_the_python_blocks_run(page, namespace, monkeypatch):
+    monkeypatch.setattr(case, "FINER", 2)  # pages of the laboratory: no block asks how exact its own references are
     run(python_blocks(page), page, namespace)
 
 

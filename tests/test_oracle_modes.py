@@ -204,9 +204,10 @@ def test_several_steps_together(mode, d):
 @each_sweep
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
 def test_damping_and_constant_forces(mode, integrator):
-    """They curve the paths, and damp the velocity changes of impacts: on straight paths, parabolas, flights."""
+    """They curve the paths, and damp the velocity changes of impacts: on straight paths, parabolas, flights. Both
+    integrators meet each dimension and each gravity, and these each other."""
     told = Told()
-    for seed in range(6):
+    for seed in range(3) if integrator == "semi_implicit_euler" else range(3, 6):
         rng = np.random.default_rng(seed)
         d = 2 + seed % 2
         world = scattered(rng, mode, d, 8, 10 ** rng.uniform(-1, 0.5), gravity=9.81 * (seed % 3), integrator=integrator)
@@ -217,7 +218,7 @@ def test_damping_and_constant_forces(mode, integrator):
                 body.constant_force = tuple(body.mass * 100 * rng.normal(size=d))
         told.compare(world, 4)
         world.close()
-    assert told.impacts > 10
+    assert told.impacts > 5
     assert told.differ <= 1
 
 

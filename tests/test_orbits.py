@@ -86,10 +86,10 @@ def test_circular_orbit_of_a_few_periods(method):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("method", "periods"), [(method, 60 if method == "velocity_verlet" else 15) for method in ORBIT]
+    ("method", "periods"), [(method, 30 if method == "velocity_verlet" else 10) for method in ORBIT]
 )
 def test_circular_orbit_of_many_periods(method, periods):
-    """B4: 15,000 steps, of velocity Verlet 60,000."""
+    """B4: 10,000 steps, of velocity Verlet 30,000."""
     check_orbit(method, periods)
 
 

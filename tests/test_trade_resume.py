@@ -9,6 +9,7 @@ import pytest
 from helpers_trade_scenes import BALL, DEADLY, dies, scene_file
 
 from carom.lab import Only, Trade, trade
+from carom.lab.cases import case as cases
 from carom.lab.jobs import runs as trade_runs
 from carom.lab.jobs.result_store import Store
 from carom.lab.jobs.tasks import perform
@@ -33,10 +34,13 @@ def measured(target, folder=None, resume=False, workers=1, **options) -> Trade:
         return trade(target, workers=workers, store=store, **{**FEW, **options})
 
 
-@pytest.fixture(autouse=True)
-def however_few(monkeypatch):
-    """Workers are used even for small amounts of work."""
-    monkeypatch.setattr(trade_runs, "FEW_STEPS", 0)
+@pytest.fixture(autouse=True, scope="module")
+def however_few():
+    """Workers are used even for small amounts of work, and references are no better than they must be here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trade_runs, "FEW_STEPS", 0)
+        patch.setattr(cases, "FINER", 2)
+        yield
 
 
 @pytest.fixture

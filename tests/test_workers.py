@@ -155,7 +155,8 @@ def started(folder: Path, script: str, **more) -> subprocess.Popen[str]:
 
 
 ENDLESS = f"""
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background of a shell
 sys.path.append({str(Path(__file__).parent)!r})
 from helpers_workers import Task, perform
 from carom.lab.jobs.workers import in_parallel
