@@ -31,15 +31,15 @@ def test_pressure_and_rate(mode, dt):
     ("continuous", 0.3), ("event_driven", 0.3), ("event_driven", 0.1), ("continuous", 0.03), ("event_driven", 0.01),
 ])  # fmt: skip
 def test_pressure_and_rate_with_many_collisions(mode, dt):
-    """Five seeds, 200,000 collisions: 3 sigma are 1.3 %, and 0.7 % are left for the method: 2 % together."""
+    """Three seeds, 120,000 collisions: 3 sigma are 1.7 %, and 0.3 % are left for the method: 2 % together."""
     runs = []
-    for seed in range(5):
+    for seed in range(3):
         world, side = gas(dt, seed, collision=mode, max_impacts_per_step=1000)
         runs.append(measure(world, side, 83.0))
     z, rate = np.mean([run.z for run in runs]), np.mean([run.rate for run in runs])
     drift, deepest = max(run.drift for run in runs), max(run.deepest for run in runs)
     print(f"{mode}, v dt/sigma {dt}: Z {z:.4f}, rate {rate:.4f}, drift {drift:.1e}, deepest overlap {deepest:.1e}")
-    assert sum(run.collisions for run in runs) > 190_000
+    assert sum(run.collisions for run in runs) > 114_000
     assert drift < 1e-11
     assert abs(z / REFERENCE - 1) < 0.02
     assert RATE * (1 - 0.01) < rate < RATE * (FINITE_RATE + 0.01)

@@ -298,7 +298,7 @@ def test_games_get_what_they_need(monkeypatch):
     """Those with a short search, in short runs; the shooter has its own test."""
     names = ["platformer", "puzzle stacks", "orbits"]
     short = {
-        "jump": {"repeats": 8}, "tower of 10": {}, "ten turns, e = 0.6": {"seconds": settings_scenes.TEN_TURNS / 5},
+        "jump": {"repeats": 8}, "tower of 10": {}, "ten turns, e = 0.6": {"seconds": settings_scenes.TEN_TURNS / 10},
     }  # fmt: skip
     shorter = [dataclasses.replace(game, **short[game.label]) for game in games.ALL if game.label in short]
     monkeypatch.setattr(games, "ALL", shorter)

@@ -18,7 +18,6 @@ import carom.lab
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Settings, World
 from carom.lab import NothingMeetsError, Only, search, tune
-from carom.lab.cases import case as cases
 from carom.lab.cli import cli
 from carom.lab.commands.loading import load
 from carom.lab.commands.usage_errors import Problem
@@ -276,14 +275,14 @@ def carom_command(tmp_path, monkeypatch):
 SHORT = ("--dt", "1/30,1/60,1/120", "--repeats", "2")
 
 
-def test_a_newcomers_file_is_measured_and_tuned_in_two_commands(tmp_path, carom_command, monkeypatch):
-    monkeypatch.setattr(cases, "FINER", 2)
+def test_a_newcomers_file_is_measured_and_tuned_in_two_commands(tmp_path, carom_command):
+    few = ("--dt", "1/30,1/60", "--repeats", "2")
     scene_file(tmp_path, BALL, "own.py")
-    measured = carom_command("trade", "own.py", *SHORT, "--no-timing", "--no-pictures", "--json")
+    measured = carom_command("trade", "own.py", *few, "--no-timing", "--no-pictures", "--json")
     assert measured.exit_code == 0, measured.output
     [case] = json.loads(measured.stdout)["cases"]
     assert (case["scene"], case["kind"]) == ("own.py", "impacts")
-    tuned = carom_command("tune", "own.py", *SHORT)
+    tuned = carom_command("tune", "own.py", *few)
     assert tuned.exit_code == 0, tuned.output
     settings = evaluated(tuned.stdout.splitlines()[-1])
     assert settings.dt == 1 / 30

@@ -68,7 +68,8 @@ class Laboratory:
     def tuned(self, name: str) -> Tuning:
         if name not in self.found:
             wanted = WANTED[name]
-            self.found[name] = search(name, wanted.max_error, wanted.norm, workers=1, store=self.store, **wanted.options)
+            options = {"workers": 1, "store": self.store, **wanted.options}
+            self.found[name] = search(name, wanted.max_error, wanted.norm, **options)
         return self.found[name]
 
 
