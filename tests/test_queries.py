@@ -14,7 +14,7 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System
 
 
-@pytest.mark.parametrize(("d", "n", "sizes"), pairwise((2, 3), (60, 1500), ("even", "power", "clusters")))
+@pytest.mark.parametrize(("d", "n", "sizes"), pairwise((2, 3), (60, 800), ("even", "power", "clusters")))
 def test_nearest_of_many_bodies(d, n, sizes):
     world, bodies, side = scene(d, n, seed=n, sizes=sizes)
     rng = np.random.default_rng(3)
@@ -43,7 +43,7 @@ def test_nearest_of_many_bodies(d, n, sizes):
 
 
 @both_dimensions
-@pytest.mark.parametrize("n", [60, 1500])
+@pytest.mark.parametrize("n", [60, 800])
 def test_touching_many_bodies(d, n):
     world, bodies, side = scene(d, n, seed=5)
     rng = np.random.default_rng(5)
@@ -76,7 +76,7 @@ def test_many_queries_of_few_bodies(d):
 
 
 @both_dimensions
-@pytest.mark.parametrize("n", [60, 1500])
+@pytest.mark.parametrize("n", [60, 800])
 def test_neighbours_of_many_bodies(d, n):
     world, bodies, side = scene(d, n, seed=9, sizes="clusters")
     radius = 0.1 * side
