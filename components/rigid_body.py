@@ -12,6 +12,7 @@ from ..framework.data.columns import Column, column, on_demand
 from ..framework.data.component import Component
 from ..framework.data.table import KINDS
 
+FASTEST = 1e307  # m/s along each axis: differences of two such velocities, and their lengths, are finite
 Kind = Literal["dynamic", "kinematic", "static"]
 # Arguments, checked like fields.
 FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
@@ -32,7 +33,7 @@ class RigidBody(Component, flat=True):
     mass
         kilograms, above zero
     linear_velocity
-        (d,) m/s
+        (d,) m/s, along each axis at most 1e307
     constant_force
         (d,) N, acts always
     gravity_scale
@@ -52,7 +53,7 @@ class RigidBody(Component, flat=True):
     __slots__ = ()
 
     mass = column(1.0, positive=True)
-    linear_velocity = column(0.0, item="vector")
+    linear_velocity = dataclasses.replace(column(0.0, item="vector"), largest=FASTEST)
     constant_force = on_demand(column(0.0, item="vector"))
     gravity_scale = on_demand(column(1.0))
     linear_damping = on_demand(column(0.0, minimum=0.0))

@@ -38,6 +38,7 @@ BODIES = Schema(
     step_force=vectors(default=default_of(RigidBody.step_force)),
     ccd=flags(default=default_of(RigidBody.ccd)),
     rotation=floats(),  # one angle, in 3D four numbers per body; without rows no body is rotated
+    quarantined=flags(default=False),  # takes no part: some value of it cannot be right
     # the start of the step, for going back when it fails
     kept_previous=vectors(),
     kept_velocity=vectors(),
@@ -83,6 +84,18 @@ BODIES = Schema(
     support_change=vectors(),
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
+)
+
+# Rows of a column that code of the game may write, and what the field allows: one of the two arrays has rows.
+CHECKED = Schema(
+    "Checked",
+    values=floats(),
+    numbers=ints(),
+    low=number(),
+    high=number(),
+    optional=flag(),  # nan stands for None
+    turns=flag(),  # quaternions
+    owned=flags(),  # bodies that have the component; without rows all have
 )
 
 # Fields that every collider has, by the slot of its type and the row.
@@ -281,6 +294,8 @@ STATE = Schema(
     **PROGRAM_FIELDS,
     links=ints(),  # addresses of parts of stages, see linked_parts
     needed=integer(),  # rows that a stage asks for
+    checked=ints(),  # addresses of records of CHECKED
+    quarantining=flag(),  # some body is, or was told of and may be sound again
     # the scene
     count=integer(),
     dynamic=integer(),  # rows before it are dynamic

@@ -37,7 +37,7 @@ SWEEPS = (
 HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
-ON_DEMAND = ("kept_step_force", "supported", "support_change", "held", "place")
+ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "held", "place")
 # Static bodies do not move: what stands in their rows of these stays 0.
 ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third")
 
@@ -59,12 +59,12 @@ class Scene:
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None
         self.levels = np.empty((1, 0), np.int8)
+        self._taken_out = np.empty(0, np.int64), self.levels  # rows without their shapes, and these
         self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
         self.rotated = False
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
         self.rotated_columns: dict[str, np.ndarray] = {}
         self._axes = np.empty((0, state.dimensions, state.dimensions))
-        table.on_make = self._bind_columns
 
     # -- structure --------------------------------------------------------------------------------
 
@@ -79,7 +79,7 @@ class Scene:
         bodies, count, moving = self.state.bodies, table.count, table.stops[1]
         table.arrays["linear_velocity"][moving:count] = 0.0
         present = self._present_colliders()
-        self._bind_columns()
+        self.bind_columns()
         self.state.count, (self.state.dynamic, self.state.moving, _) = table.count, table.stops
         self.state.version = table.version
         self.state.slot_count = len(table.stacked_types(Collider.stack))
@@ -111,7 +111,7 @@ class Scene:
         present = [c for c in known if c in self.prepared or table.has_mask(c)[: table.count].any()]
         return in_order(self.registry, present)
 
-    def _bind_columns(self) -> None:
+    def bind_columns(self) -> None:
         """The table's arrays, which are others after it has grown, and more when a column on demand is made."""
         bodies, colliders, table = self.state.bodies, self.state.colliders, self.table
         for name in TABLE_COLUMNS:
@@ -165,6 +165,7 @@ class Scene:
         several = len(levels) > 1
         self.levels = np.full((len(levels), capacity), -1, np.int8)
         self.levels[:, : levels.shape[1]] = levels
+        self._taken_out = np.empty(0, np.int64), self.levels[:, :0]
         rows = capacity if (levels >= 0).any() else 0
         offsets = np.zeros((len(levels), rows, state.dimensions))
         bodies.levels, bodies.level_offsets = self.levels, offsets
@@ -172,6 +173,19 @@ class Scene:
         bodies.level_not_enclosing = np.zeros(capacity if several else 0, bool)
         self.stretches = np.zeros(levels.shape[1] if several else 0, bool)
         state.several_levels, state.level_count = several, len(levels)
+
+    def take_out(self, out: np.ndarray) -> None:
+        """Bodies (count,) that take no part: they have no shape as long as that is so, and no say in what all share."""
+        count, moving, bodies = self.table.count, self.table.stops[1], self.state.bodies
+        if not len(bodies.quarantined):
+            self.reserve("quarantined")
+        self.state.statics_stale |= bool((bodies.quarantined[moving:count] != out[moving:]).any())
+        bodies.quarantined[:count] = out
+        rows, shapes = self._taken_out
+        self.levels[:, rows] = shapes
+        rows = np.flatnonzero(out)
+        self._taken_out = rows, self.levels[:, rows]
+        self.levels[:, rows] = -1
 
     def _bind_shapes(self) -> None:
         """The parameter columns of each shape: as the components have them, and as they are in the world."""
@@ -207,7 +221,7 @@ class Scene:
             return
         table, bodies = self.table, self.state.bodies
         rotation = table.column("rotation")
-        before, self.rotated = self.rotated, any_rotated(rotation)
+        before, self.rotated = self.rotated, any_rotated(rotation[self._taking_part()])
         self.state.rotated, self.state.rotation_stale = self.rotated, False
         count, needed = table.count, self.rotated or self.linked.needs_axes
         fresh = needed and len(self._axes) != table.capacity
@@ -222,6 +236,11 @@ class Scene:
         if self.state.several_levels:  # a box that is stretched may reach out of the level around it
             turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
             bodies.level_not_enclosing[:count] = self.stretches & turned
+
+    def _taking_part(self) -> Any:
+        """The rows of the bodies that are not taken out."""
+        quarantined = self.state.bodies.quarantined
+        return ~quarantined[: self.table.count] if len(quarantined) else slice(None)
 
     def refresh_statics(self) -> None:
         """The boxes of static bodies are made again if any of these may have changed."""

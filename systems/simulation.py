@@ -21,7 +21,7 @@ from ..framework.world.contacts import Contacts, EntityLookup
 from ..framework.world.services import PhysicsServices
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .codes import AFTERWARDS
+from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
@@ -32,6 +32,7 @@ from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
 from .narrow_phase.system import NarrowPhase
 from .preparation import prepare
+from .quarantine import Quarantine
 from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
 from .records import STATE
@@ -65,7 +66,13 @@ class Simulation(PhysicsServices):
         self.contacts = Contacts(dimensions, lookup, self._running_step, source)
         self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
         self._room = Room(self.state, self.scene, self.search)
-        self.program = Program(self.state, STAGES, self._room.handlers(self), AFTERWARDS)
+        self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
+        self.table.on_make = self._follow_columns
+        handlers = {
+            **self._room.handlers(self),
+            CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
+        }  # fmt: skip
+        self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
         self._attribution = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
         )
@@ -149,9 +156,15 @@ class Simulation(PhysicsServices):
                 state.warm_start.counts[:] = 0
             linked = scene.linked
             self._must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
+            self.quarantine.bind()
         scene.refresh_statics()
         if table.generation != self._generation:
             self._generation, state.ids_changed = table.generation, True
+
+    def _follow_columns(self) -> None:
+        """A column on demand has been made."""
+        self.scene.bind_columns()
+        self.quarantine.bind()
 
     def _check(self) -> None:
         """Errors of colliders that changes of their columns may bring about in any step."""
@@ -239,13 +252,12 @@ class Simulation(PhysicsServices):
             self.report_faults("")
 
     def report_faults(self, prefix: str) -> None:
-        """Name the bodies whose state is not finite in the world's faults; they disturb no others."""
+        """Name the bodies whose state is not finite in the world's faults; they are taken out of the next step."""
         moving, arrays = self.table.stops[1], self.table.arrays
         for name in ("position", "linear_velocity"):
             column = arrays[name][:moving]
             for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
-                entity = int(arrays["entity"][row])
-                self._world.report_fault(f"{prefix}entity {entity}: {name} is {column[row].tolist()}")
+                self.quarantine.tell(row, name, column[row].tolist(), prefix)
 
     def end_window(self) -> None:
         table, words = self.table, self._words

@@ -24,12 +24,16 @@ from .linked_parts import (
     WATCH_BOUNDS,
 )
 from .narrow_phase.system import NarrowPhase
-from .opening import check_finite, keep_state, read_bodies
+from .opening import check_columns, check_finite, keep_state, read_bodies
 from .records import BODIES, COLLIDERS, STATE
 from .scene import TABLE_COLUMNS
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("previous_position", "linear_velocity"), ("kept",)),
+    Stage(
+        check_columns, "takes out bodies with values that cannot be",
+        ("mass", "gravity_scale", "constant_force", "rotation", "restitution", "friction"), ("quarantined",),
+    ),
     Stage(
         read_bodies, "1 / mass of what moves freely; whether any speed is limited, any body swept or rotated",
         ("mass", "rotation", "ccd", "max_linear_speed"), ("inverse_mass",),

@@ -15,8 +15,8 @@ from .worlds import ball, box, floor, make_world
 
 STEPS = 40
 
-OUTSIDE = {"keep_state", "read_bodies", "check_finite"}  # of no system
-AROUND = OUTSIDE | {"keep_start", "end_flight"}  # in every step
+OUTSIDE = {"keep_state", "check_columns", "read_bodies", "check_finite"}  # of no system
+AROUND = OUTSIDE | {"keep_start", "end_flight", "check_flight"}  # in every step
 FORCES = {"limit_velocities", "sum_forces"}
 DRIFT = AROUND | FORCES | {"drift"}
 FALL = DRIFT | {"semi_implicit_euler"}

@@ -64,6 +64,10 @@ class ArrayColumn(Column):
         """What kernels need for :func:`array_at`."""
         return numbers, self.pool.data, self.pool.starts
 
+    def bounds(self) -> tuple[float, float]:
+        """Numbers of arrays in the pool that an entity may have."""
+        return 1, len(self.pool.digests) - 1
+
     def checked(self, value: Any, entity: int | None = None) -> Any:
         array = Column(item="vector", name=self.name, owner=self.owner)._as_numbers(value, entity)
         if array.ndim == 1 and self.width == 1:

@@ -27,6 +27,7 @@ class Column:
     dtype: Any = float
     positive: bool = False
     minimum: float | None = None
+    largest: float = LARGEST  # magnitude
     optional: bool = False  # None is allowed and stored as nan
     choices: tuple[str, ...] = ()  # stored as the index into it
     constructor: bool = True  # whether it is an argument of the constructor
@@ -55,6 +56,13 @@ class Column:
         if self.default is REQUIRED:
             return 0
         return self.checked(self.default)
+
+    def bounds(self) -> tuple[float, float] | None:
+        """From where to where numbers may be; None: any that the type holds."""
+        if self.dtype is not float:
+            return None
+        low = SMALLEST_WITH_INVERSE if self.positive else self.minimum
+        return (-self.largest if low is None else low), self.largest
 
     # -- checks -----------------------------------------------------------------------------------
 
@@ -91,11 +99,12 @@ class Column:
             if self.dtype is np.int64:
                 bounded = self.positive or self.minimum is not None
                 return value if kind is int and abs(value) < 2**63 and not bounded else None
-            if -LARGEST <= value <= LARGEST and self._within(value):
+            if -self.largest <= value <= self.largest and self._within(value):
                 return float(value)
         elif self.item == "vector" and (kind is tuple or kind is list) and len(value) in (2, 3):
+            largest = self.largest
             for number in value:
-                if type(number) not in (float, int) or not -LARGEST <= number <= LARGEST or not self._within(number):
+                if type(number) not in (float, int) or not -largest <= number <= largest or not self._within(number):
                     return None
             return np.array(value, float)
         return None
@@ -165,6 +174,7 @@ class Column:
             (array <= 0 if self.positive else None, "must be positive"),
             (array < SMALLEST_WITH_INVERSE if self.positive else None, "must not be so small that 1 / value overflows"),
             (array < self.minimum if self.minimum is not None else None, f"must be at least {self.minimum}"),
+            (abs(array) > self.largest, f"must be at most {self.largest:g} along each axis"),
         ):
             if bad is not None and np.any(bad):
                 if shown is None:

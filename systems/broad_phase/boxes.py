@@ -110,7 +110,7 @@ def statics_moved(state):
     for i in range(moving, state.count):
         here, before = bodies.position[i], bodies.static_position[i - moving]
         for k in range(len(here)):
-            moved |= item(here, k) != item(before, k)
+            moved |= (item(here, k) != item(before, k)) & (item(here, k) == item(here, k))  # nan has not moved
     return moved
 
 

@@ -37,7 +37,8 @@ def limit_velocities(state, dt):
     if state.limits_speed:
         bodies, zero = state.bodies, zero_of(state)
         for i in range(state.dynamic):
-            bodies.linear_velocity[i] = within(bodies.linear_velocity[i], zero, bodies.max_linear_speed[i])
+            if not bodies.quarantined[i]:
+                bodies.linear_velocity[i] = within(bodies.linear_velocity[i], zero, bodies.max_linear_speed[i])
     return 0
 
 
@@ -51,11 +52,11 @@ def is_zero(vector):
 
 
 @part
-def any_nonzero(vectors, count):
-    """Whether some vector of a column on demand is not 0, of the first ``count``."""
-    found = False
-    for i in range(count if len(vectors) > 0 else 0):
-        found |= not is_zero(vectors[i])
+def any_nonzero(state, vectors):
+    """Whether some vector of a column on demand is not 0, of a dynamic body that takes part."""
+    out, found = state.bodies.quarantined, False
+    for i in range(state.dynamic if len(vectors) > 0 else 0):
+        found |= (not is_zero(vectors[i])) & (not out[i])
     return found
 
 
@@ -66,10 +67,10 @@ def sum_forces(state, dt):
     state.forces_summed = True
     if dynamic == 0:
         return 0
-    pushed = any_nonzero(applied, dynamic) or any_nonzero(for_step, dynamic)
-    given = pushed or state.has_force_systems or not is_zero(gravity) or any_nonzero(bodies.constant_force, dynamic)
+    pushed = any_nonzero(state, applied) or any_nonzero(state, for_step)
+    given = pushed or state.has_force_systems or not is_zero(gravity) or any_nonzero(state, bodies.constant_force)
     if not given:
-        for i in range(dynamic if any_nonzero(force, dynamic) else 0):
+        for i in range(dynamic if any_nonzero(state, force) else 0):
             force[i] = zero_of(state)
         state.unforced, state.pushed = True, False
         return 0

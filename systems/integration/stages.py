@@ -9,13 +9,18 @@ from __future__ import annotations
 
 import math
 
+from ...components.rigid_body import FASTEST
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, divided, dot, scale, sub
-from ..codes import NEED_COLUMNS
+from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
+from ..codes import CHECK_FLIGHT, NEED_COLUMNS, OK
 from ..forces.stages import within
+from ..opening import LARGEST, are_columns_sound
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
+
+UNMOVED = 1e-6  # of its extent, at least of a metre: a body that should move by more, and does not, is too far out
+NEAR = 2.0**33  # m: up to here numbers are less than 2 UNMOVED apart
 
 
 @inlined
@@ -61,7 +66,8 @@ def keep_start(state, dt):
         previous[i] = position[i]
     if state.limits_speed:  # systems may have pushed since the forces were summed
         for i in range(state.dynamic):
-            velocity[i] = within(velocity[i], zero_of(state), bodies.max_linear_speed[i])
+            if not bodies.quarantined[i]:
+                velocity[i] = within(velocity[i], zero_of(state), bodies.max_linear_speed[i])
     for i in range(state.moving):
         start[i] = velocity[i]
     return 0
@@ -70,9 +76,9 @@ def keep_start(state, dt):
 @part
 def any_damping(bodies, dynamic):
     """Whether any dynamic body is damped."""
-    damping, damped = bodies.linear_damping, False
+    damping, out, damped = bodies.linear_damping, bodies.quarantined, False
     for i in range(dynamic if len(damping) > 0 else 0):
-        damped |= damping[i] != 0.0
+        damped |= (damping[i] != 0.0) & (not out[i])
     return damped
 
 
@@ -219,7 +225,7 @@ def first_half_kick(state, h):
     for i in range(state.dynamic):
         decay = 1.0
         if damping[i] != 0.0:
-            decay, damped = math.exp(-0.5 * damping[i] * h), True
+            decay, damped = math.exp(-0.5 * damping[i] * h), damped or not bodies.quarantined[i]
         a, v = scale(bodies.force[i], bodies.inverse_mass[i]), scale(velocity[i], decay)
         bodies.flight_velocity[i] = v
         bodies.acceleration[i] = scale(a, 0.5)
@@ -264,6 +270,39 @@ def end_flight(state, dt):
     state.forces_summed, state.moved = False, True
     state.motion_version += 1
     return 0
+
+
+@part
+def is_astray(state, i, dt):
+    """Whether a body is nowhere, or at a place where numbers are so far apart that its motion along an axis is lost."""
+    bodies, astray = state.bodies, False
+    x, before, v = bodies.position[i], bodies.previous_position[i], bodies.linear_velocity[i]
+    extent = max(1.0, bodies.min_extent[i] if len(bodies.min_extent) > 0 else 0.0)
+    for k in range(len(x)):
+        astray |= not abs(item(x, k)) <= LARGEST
+        astray |= item(x, k) == item(before, k) and abs(item(v, k)) * dt > UNMOVED * extent
+    return astray
+
+
+def check_flight(state, dt):
+    """Whether each body is where it can be, with a speed that it can have: else Python puts it back and takes it out,
+    before it touches another.
+
+    Where code of the game has run since the step began, columns are looked at once more.
+    """
+    bodies, near, slow = state.bodies, True, True
+    position, velocity = bodies.position, bodies.linear_velocity
+    for i in range(state.moving):
+        x, v = position[i], velocity[i]
+        for k in range(len(x)):  # comparisons with nan are false
+            near &= abs(item(x, k)) <= NEAR
+            slow &= abs(item(v, k)) <= FASTEST
+    if state.quarantining or not slow or (state.others_write and not are_columns_sound(state)):
+        return CHECK_FLIGHT
+    for i in range(0 if near else state.moving):
+        if is_astray(state, i, dt):
+            return CHECK_FLIGHT
+    return OK
 
 
 def note_path(state, dt):

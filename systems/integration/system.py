@@ -22,6 +22,7 @@ from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
 from .motion import Motion
 from .stages import (
     LINE,
+    check_flight,
     drift,
     end_flight,
     explicit_euler,
@@ -67,6 +68,10 @@ class Integration(StagedSystem):
         Stage(
             end_flight, "limits of speed, kinematic bodies, forces for one step", MOTION,
             (*MOTION, "step_force"),
+        ),
+        Stage(
+            check_flight, "puts back and takes out bodies whose place or speed cannot be", MOTION,
+            (*MOTION, "quarantined"),
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",
@@ -205,7 +210,7 @@ class Integration(StagedSystem):
         if self.world.force_systems and self.integrator.evaluations > 1:
             for kernel in self._forces.kernels_of_systems():
                 yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")
-        for name in ("end_flight", "note_path"):
+        for name in ("end_flight", "check_flight", "note_path"):
             if name in linked:
                 yield linked[name]
 

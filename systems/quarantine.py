@@ -1,0 +1,211 @@
+"""Bodies with values that cannot be: named once in ``world.faults`` and taken out, so that all others go on without
+them.
+
+The stages ``check_columns`` and ``check_flight`` find that something is wrong. What and where is found here, with
+numpy, which takes longer and is seldom needed. A body that is out has no shape, stands still and has no say in what all
+bodies share. Each step looks at it again, so that it takes part as soon as its values are mended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..components import RigidBody, Transform
+from ..components.rigid_body import FASTEST
+from ..framework.data.columns import Column
+from ..framework.data.table import Table
+from ..framework.jit.records.record import Record, make_record
+from .integration.stages import UNMOVED
+from .opening import LEAST_TURN
+from .records import CHECKED
+from .scene import Scene
+
+LARGEST_TURN = 1 / LEAST_TURN  # of a quaternion's numbers, whose squares are summed
+
+
+@dataclass
+class Checked:
+    """Some rows of one column that the step reads, and the record in which the stages find them.
+
+    start
+        the row of the table that ``values`` begin with
+    owned
+        which of these bodies have the component; None: the values of the others are sound as well
+    """
+
+    column: Column
+    values: np.ndarray
+    start: int
+    owned: np.ndarray | None
+    record: Record
+
+    def bad(self) -> np.ndarray:
+        """Mask of the rows whose value cannot be."""
+        low, high = self.record.low, self.record.high
+        good = (self.values >= low) & (self.values <= high)
+        if self.column.optional:
+            good |= np.isnan(self.values)
+        if good.ndim > 1:
+            good = good.all(axis=1)
+        if self.record.turns:
+            good &= np.abs(self.values).sum(axis=1) >= LEAST_TURN
+        return ~good if self.owned is None else ~good & self.owned
+
+
+class Quarantine:
+    """Who is out in one world, and why.
+
+    told
+        by entity, the field that was named in a fault; until the body takes part again
+    """
+
+    def __init__(self, state: Record, table: Table, scene: Scene, report: Callable[[str], None]) -> None:
+        self._state, self._table, self._scene, self._report = state, table, scene, report
+        self.told: dict[int, str] = {}
+        self._far: set[int] = set()  # who has been told to be too far from the origin
+        self._checked: list[Checked] = []
+        self._generation = table.generation
+
+    # -- what is looked at ------------------------------------------------------------------------
+
+    def bind(self) -> None:
+        """Rows have moved, or columns are others than before."""
+        self._checked = list(self._find_columns())
+        self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
+        if self._generation != self._table.generation:  # ids mean other entities
+            self._generation = self._table.generation
+            self.told.clear()
+            self._far.clear()
+        if self.told:
+            self._scene.take_out(self._find_bad())
+
+    def _find_columns(self) -> Iterator[Checked]:
+        """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
+        table, linked = self._table, self._scene.linked
+        dynamic, moving, _ = table.stops
+        for column in RigidBody.columns.values():
+            if column.name != "linear_velocity":
+                yield from self._rows(column, RigidBody, 0, dynamic)
+        yield from self._rows(Transform.columns["position"], Transform, moving, table.count)
+        if linked is not None:
+            yield from self._rows(Transform.columns["rotation"], Transform, 0, table.count)
+            for shape in linked.shapes:
+                for column in shape.component.columns.values():
+                    yield from self._rows(column, shape.component, 0, table.count)
+
+    def _rows(self, column: Column, component: Any, start: int, stop: int) -> Iterator[Checked]:
+        table, array = self._table, self._table.arrays.get(column.key)
+        bounds = column.bounds()
+        if array is None or bounds is None or start == stop:
+            return
+        values, (low, high), record = array[start:stop], bounds, make_record(CHECKED, 2)
+        record.low, record.high, record.optional = low, high, column.optional
+        if values.dtype == np.int64:
+            record.numbers = values.reshape(-1)
+        else:
+            record.values = values.reshape(-1)
+        if column.item == "rotation" and values.ndim > 1:
+            record.low, record.high, record.turns = -LARGEST_TURN, LARGEST_TURN, True
+        has, empty = table.has_mask(component)[start:stop], np.asarray(table.default_of(column.key))
+        owned = None
+        if not column.optional and not has.all() and not ((empty >= low) & (empty <= high)).all():
+            owned = record.owned = has
+        yield Checked(column, values, start, owned, record)
+
+    # -- what the stages ask for ------------------------------------------------------------------
+
+    def check_columns(self, dt: float) -> None:
+        """At the start of a step: take out whose values cannot be, and in again who is mended."""
+        self._scene.take_out(self._find_bad())
+        self._state.quarantining = bool(self.told)
+
+    def check_flight(self, dt: float) -> None:
+        """After the flight of all bodies: those that are nowhere, or too fast, are put back and taken out as well."""
+        state, table, bodies = self._state, self._table, self._state.bodies
+        moving, arrays = table.stops[1], table.arrays
+        position, velocity = arrays["position"][:moving], arrays["linear_velocity"][:moving]
+        out = self._find_bad() if state.others_write else self._out_now()
+        failed = ~(np.isfinite(position).all(axis=1) & (np.abs(velocity) <= FASTEST).all(axis=1))
+        for row in np.flatnonzero(failed & ~out[:moving]).tolist():
+            self._tell_of_flight(row)
+        out[:moving] |= failed
+        gone = np.flatnonzero(out[:moving])
+        position[gone], velocity[gone] = bodies.previous_position[gone], bodies.start_velocity[gone]
+        self._tell_of_distance(np.flatnonzero(~out[:moving]), dt)
+        self._scene.take_out(out)
+        if out.any():
+            self._forget_contacts(out)
+        still = set(arrays["entity"][: table.count][out].tolist())
+        self.told = {entity: field for entity, field in self.told.items() if entity in still}
+        state.quarantining = bool(self.told)
+
+    def tell(self, row: int, field: str, value: Any, prefix: str = "") -> None:
+        """A fault that names the body, unless that has been said."""
+        entity = int(self._table.arrays["entity"][row])
+        if entity in self.told:
+            return
+        self.told[entity] = field
+        self._state.quarantining = True
+        self._report(
+            f"{prefix}entity {entity}: {field} is {value}; until it is mended the body takes no part in the simulation"
+        )
+
+    def _out_now(self) -> np.ndarray:
+        """(count,) mask of the bodies that are out."""
+        quarantined, count = self._state.bodies.quarantined, self._table.count
+        return quarantined[:count].copy() if len(quarantined) else np.zeros(count, bool)
+
+    def _find_bad(self) -> np.ndarray:
+        """(count,) mask of the bodies with a value that cannot be; each is named."""
+        found = np.zeros(self._table.count, bool)
+        for checked in self._checked:
+            for k in np.flatnonzero(checked.bad()).tolist():
+                found[checked.start + k] = True
+                self.tell(checked.start + k, checked.column.key, checked.values[k].tolist())
+        return found
+
+    def _tell_of_flight(self, row: int) -> None:
+        """Name what made a flight end nowhere: the first value that is wrong, else where it led to."""
+        bodies, arrays = self._state.bodies, self._table.arrays
+        start = {"position": bodies.previous_position[row], "linear_velocity": bodies.start_velocity[row]}
+        if row < self._table.stops[0] and len(bodies.force):
+            start["force"] = bodies.force[row]
+        for field, value in start.items():
+            if not (np.abs(value) <= (FASTEST if field == "linear_velocity" else np.finfo(float).max)).all():
+                self.tell(row, field, value.tolist())
+                return
+        field = "position" if np.isfinite(arrays["linear_velocity"][row]).all() else "linear_velocity"
+        if field == "position" and np.isfinite(arrays["position"][row]).all():
+            field = "linear_velocity"
+        self.tell(row, field, arrays[field][row].tolist())
+
+    def _tell_of_distance(self, rows: np.ndarray, dt: float) -> None:
+        """Name bodies that have not moved along an axis because numbers are too far apart where they are."""
+        bodies, arrays = self._state.bodies, self._table.arrays
+        extent = np.maximum(1.0, bodies.min_extent[rows])[:, None] if len(bodies.min_extent) else 1.0
+        position, velocity = arrays["position"][rows], arrays["linear_velocity"][rows]
+        stuck = (position == bodies.previous_position[rows]) & (np.abs(velocity) * dt > UNMOVED * extent)
+        for k in np.flatnonzero(stuck.any(axis=1)).tolist():
+            entity = int(arrays["entity"][rows[k]])
+            if entity not in self._far:
+                self._far.add(entity)
+                apart = float(np.spacing(np.abs(position[k][stuck[k]]).max()))
+                self._report(
+                    f"entity {entity}: too far from the origin to move: at {position[k].tolist()} numbers are "
+                    f"{apart:.3g} m apart; bring the scene nearer to the origin, or take longer steps"
+                )
+
+    def _forget_contacts(self, out: np.ndarray) -> None:
+        """Contacts at rest of the last step with these bodies count as those with bodies that are gone."""
+        memory, version = self._state.warm_start, self._state.version
+        now = memory.now
+        count = int(memory.counts[now])
+        for rows, entities in ((memory.first, memory.entity_a), (memory.second, memory.entity_b)):
+            found = self._table.rows_of(entities[now, :count])
+            rows[now, :count] = np.where((found >= 0) & out[found], -1, found)
+        if count:
+            memory.rows_version[now] = version
