@@ -34,13 +34,13 @@ class Checked:
     start
         the row of the table that ``values`` begin with
     owned
-        which of these bodies have the component; None: the values of the others are sound as well
+        which of these bodies have the component
     """
 
     column: Column
     values: np.ndarray
     start: int
-    owned: np.ndarray | None
+    owned: np.ndarray
     record: Record
 
     def bad(self) -> np.ndarray:
@@ -53,7 +53,7 @@ class Checked:
             good = good.all(axis=1)
         if self.record.turns:
             good &= np.abs(self.values).sum(axis=1) >= LEAST_TURN
-        return ~good if self.owned is None else ~good & self.owned
+        return ~good & self.owned
 
 
 class Quarantine:
@@ -63,8 +63,8 @@ class Quarantine:
         by entity, the field that was named in a fault; until the body takes part again
     """
 
-    def __init__(self, state: Record, table: Table, scene: Scene, report: Callable[[str], None]) -> None:
-        self._state, self._table, self._scene, self._report = state, table, scene, report
+    def __init__(self, state: Record, table: Table, scene: Scene, report_fault: Callable[[str], None]) -> None:
+        self._state, self._table, self._scene, self.report_fault = state, table, scene, report_fault
         self.told: dict[int, str] = {}
         self._far: set[int] = set()  # who has been told to be too far from the origin
         self._checked: list[Checked] = []
@@ -110,10 +110,9 @@ class Quarantine:
             record.values = values.reshape(-1)
         if column.item == "rotation" and values.ndim > 1:
             record.low, record.high, record.turns = -LARGEST_TURN, LARGEST_TURN, True
-        has, empty = table.has_mask(component)[start:stop], np.asarray(table.default_of(column.key))
-        owned = None
-        if not column.optional and not has.all() and not ((empty >= low) & (empty <= high)).all():
-            owned = record.owned = has
+        owned, empty = table.has_mask(component)[start:stop], np.asarray(table.default_of(column.key))
+        if not column.optional and not owned.all() and not ((empty >= low) & (empty <= high)).all():
+            record.owned = owned  # what the others hold is not sound
         yield Checked(column, values, start, owned, record)
 
     # -- what the stages ask for ------------------------------------------------------------------
@@ -150,7 +149,7 @@ class Quarantine:
             return
         self.told[entity] = field
         self._state.quarantining = True
-        self._report(
+        self.report_fault(
             f"{prefix}entity {entity}: {field} is {value}; until it is mended the body takes no part in the simulation"
         )
 
@@ -194,7 +193,7 @@ class Quarantine:
             if entity not in self._far:
                 self._far.add(entity)
                 apart = float(np.spacing(np.abs(position[k][stuck[k]]).max()))
-                self._report(
+                self.report_fault(
                     f"entity {entity}: too far from the origin to move: at {position[k].tolist()} numbers are "
                     f"{apart:.3g} m apart; bring the scene nearer to the origin, or take longer steps"
                 )

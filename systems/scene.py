@@ -220,8 +220,8 @@ class Scene:
         if self.linked is None:
             return
         table, bodies = self.table, self.state.bodies
-        rotation = table.column("rotation")
-        before, self.rotated = self.rotated, any_rotated(rotation[self._taking_part()])
+        rotation = self._sound_rotation()
+        before, self.rotated = self.rotated, any_rotated(rotation)
         self.state.rotated, self.state.rotation_stale = self.rotated, False
         count, needed = table.count, self.rotated or self.linked.needs_axes
         fresh = needed and len(self._axes) != table.capacity
@@ -237,10 +237,13 @@ class Scene:
             turned = rotation != 0.0 if self.state.dimensions == 2 else rotation[:, 1:].any(axis=1)
             bodies.level_not_enclosing[:count] = self.stretches & turned
 
-    def _taking_part(self) -> Any:
-        """The rows of the bodies that are not taken out."""
-        quarantined = self.state.bodies.quarantined
-        return ~quarantined[: self.table.count] if len(quarantined) else slice(None)
+    def _sound_rotation(self) -> np.ndarray:
+        """The column, none for bodies that are taken out."""
+        rotation, rows = self.table.column("rotation"), self._taken_out[0]
+        if len(rows):
+            rotation = rotation.copy()
+            rotation[rows] = self.table.default_of("rotation") if rotation.ndim == 1 else (1.0, 0.0, 0.0, 0.0)
+        return rotation
 
     def refresh_statics(self) -> None:
         """The boxes of static bodies are made again if any of these may have changed."""

@@ -185,7 +185,9 @@ class Integration(StagedSystem):
         """Sums the forces at a later moment of the step."""
         forces, start = self._forces, self.world.time
         # What systems of the game added after the forces were summed acts throughout the step.
-        extra = None if forces.summed is None else force - forces.summed
+        extra, summed = None, forces.summed
+        if summed is not None:
+            extra = np.subtract(force, summed, out=np.zeros_like(force), where=force != summed)  # inf - inf is nan
 
         def evaluator(seconds: float) -> None:
             forces.evaluate(start + seconds)
