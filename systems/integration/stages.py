@@ -274,12 +274,12 @@ def end_flight(state, dt):
 
 @part
 def is_astray(state, i, dt):
-    """Whether a body is nowhere, or at a place where numbers are so far apart that its motion along an axis is lost."""
+    """Whether a body is nowhere, too fast, or where numbers are so far apart that its motion along an axis is lost."""
     bodies, astray = state.bodies, False
     x, before, v = bodies.position[i], bodies.previous_position[i], bodies.linear_velocity[i]
     extent = max(1.0, bodies.min_extent[i] if len(bodies.min_extent) > 0 else 0.0)
     for k in range(len(x)):
-        astray |= not abs(item(x, k)) <= LARGEST
+        astray |= not (abs(item(x, k)) <= LARGEST and abs(item(v, k)) <= FASTEST)
         astray |= item(x, k) == item(before, k) and abs(item(v, k)) * dt > UNMOVED * extent
     return astray
 
@@ -290,16 +290,15 @@ def check_flight(state, dt):
 
     Where code of the game has run since the step began, columns are looked at once more.
     """
-    bodies, near, slow = state.bodies, True, True
+    bodies, usual = state.bodies, True
     position, velocity = bodies.position, bodies.linear_velocity
     for i in range(state.moving):
         x, v = position[i], velocity[i]
-        for k in range(len(x)):  # comparisons with nan are false
-            near &= abs(item(x, k)) <= NEAR
-            slow &= abs(item(v, k)) <= FASTEST
-    if state.quarantining or not slow or (state.others_write and not are_columns_sound(state)):
+        for k in range(len(x)):  # one comparison, which is false if either is nan
+            usual &= abs(item(x, k)) + abs(item(v, k)) <= NEAR
+    if state.quarantining or (state.others_write and not are_columns_sound(state)):
         return CHECK_FLIGHT
-    for i in range(0 if near else state.moving):
+    for i in range(0 if usual else state.moving):
         if is_astray(state, i, dt):
             return CHECK_FLIGHT
     return OK
