@@ -80,7 +80,7 @@ class Quarantine:
             self._generation = self._table.generation
             self.told.clear()
             self._far.clear()
-        if self.told:
+        if self.told or len(self._state.bodies.quarantined):
             self._scene.take_out(self._find_bad())
 
     def _find_columns(self) -> Iterator[Checked]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import esper
 import numpy as np
 import pytest
 from helpers_processes import run_python
@@ -242,6 +243,28 @@ def test_bodies_that_come_and_go_meanwhile():
     broken.delete_entity(VICTIM)
     run(broken, 2)
     assert not broken.physics.quarantine.told
+
+
+def test_ids_that_mean_other_entities():
+    """After esper.clear_database() the ids begin again: the new body is none of those that were out."""
+    world = make_world()
+    for named in (1, 2):
+        a = ball(world, 0.0, 1.0)
+        run(world, 2)
+        world.bodies.mass[:] = -1.0
+        run(world, 2)
+        assert len(told(world)) == 1
+        assert "quarantined" in {column.column for column in world.plan().columns}
+        world.faults.clear()
+        if named == 1:
+            with world:
+                esper.clear_database()
+            b = ball(world, 0.0, 1.0)
+            assert b == a
+            run(world, 3)
+            assert told(world) == []
+            assert position(world, b)[0] > 0.0
+            world.delete_entity(b)
 
 
 def test_a_failed_step_and_a_snapshot():

@@ -26,6 +26,7 @@ STANDING = "where it stood when its box was made"
 MASKS = "which components it has"
 GROUPS = (
     ("the step", ("start_velocity",), "velocity at the start of the step, for the path"),
+    ("the step", ("quarantined",), "a body had a value that cannot be: it takes no part"),
     ("collisions", COLLISIONS, "some body has a collider: boxes, extents, the path in the step, the response"),
     ("collisions", ("supported", "support_change", "held", "place"), "contacts have rested"),
     ("curved paths", CURVES, "the integrator's paths are curved"),
