@@ -81,7 +81,8 @@ class Quarantine:
             self.told.clear()
             self._far.clear()
         if self.told or len(self._state.bodies.quarantined):
-            self._scene.take_out(self._find_bad())
+            told = np.isin(self._table.column("entity"), list(self.told))  # also those that no column shows
+            self._scene.take_out(self._find_bad() | told)
 
     def _find_columns(self) -> Iterator[Checked]:
         """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
@@ -127,7 +128,7 @@ class Quarantine:
         state, table, bodies = self._state, self._table, self._state.bodies
         moving, arrays = table.stops[1], table.arrays
         position, velocity = arrays["position"][:moving], arrays["linear_velocity"][:moving]
-        out = self._find_bad() if state.others_write else self._out_now()
+        out = self._find_bad() if state.others_write else self.out_now()
         failed = ~(np.isfinite(position).all(axis=1) & (np.abs(velocity) <= FASTEST).all(axis=1))
         for row in np.flatnonzero(failed & ~out[:moving]).tolist():
             self._tell_of_flight(row)
@@ -153,7 +154,7 @@ class Quarantine:
             f"{prefix}entity {entity}: {field} is {value}; until it is mended the body takes no part in the simulation"
         )
 
-    def _out_now(self) -> np.ndarray:
+    def out_now(self) -> np.ndarray:
         """(count,) mask of the bodies that are out."""
         quarantined, count = self._state.bodies.quarantined, self._table.count
         return quarantined[:count].copy() if len(quarantined) else np.zeros(count, bool)

@@ -259,6 +259,9 @@ class Simulation(PhysicsServices):
             for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
                 self.quarantine.tell(row, name, column[row].tolist(), prefix)
 
+    def taken_out(self) -> np.ndarray:
+        return self.quarantine.out_now()
+
     def end_window(self) -> None:
         table, words = self.table, self._words
         if "applied_force" in table.arrays and (words[self._pushed] or words[self._others_write]):

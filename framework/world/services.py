@@ -125,6 +125,10 @@ class PhysicsServices(ABC):
     def report_faults(self, prefix: str) -> None:
         """Add what is wrong with the bodies' state to the world's faults."""
 
+    @abstractmethod
+    def taken_out(self) -> np.ndarray:
+        """(n,) mask of the bodies that took no part in the last step, because some value of them cannot be."""
+
     # -- looking inside ---------------------------------------------------------------------------
 
     @abstractmethod

@@ -132,7 +132,8 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
             while world.step_count < look:
                 world.step()
             moving = world.bodies.dynamic
-            if not (np.isfinite(moving.position).all() and np.isfinite(moving.linear_velocity).all()):
+            out = world.physics is not None and world.physics.taken_out().any()
+            if out or not (np.isfinite(moving.position).all() and np.isfinite(moving.linear_velocity).all()):
                 raise Problem(f"{loaded.name}: not finite after {world.time:.4g} s: {'; '.join(world.faults[:1])}")
             found.append((world.time, step_limits(world)))
             progress.advance(world.step_count - before)

@@ -270,6 +270,8 @@ class Meter:
         report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
         positions = np.asarray(bodies.dynamic.position)
         finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
+        if world.physics is not None:
+            finite &= ~world.physics.taken_out()[bodies.dynamic.rows]
         report.escaped = {
             "outside": self.enclosure.outside(positions[finite]),
             "non_finite": int((~finite).sum()),
