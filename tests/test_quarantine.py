@@ -61,6 +61,7 @@ def assert_like_deleted(broken, healthy, steps=8, entity=VICTIM):
 
 @mostly_2d
 @each_mode
+@pytest.mark.compiled
 def test_others_go_on_as_if_it_was_deleted(d, mode):
     """Wherever the value stands, and whatever it is; the fault names entity and field, once."""
     healthy, expected = pile(d, mode), []
@@ -84,6 +85,7 @@ def test_others_go_on_as_if_it_was_deleted(d, mode):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
+@pytest.mark.compiled
 def test_with_every_integrator_and_without_forces(method, gravity):
     """A field that decides what a step computes for all bodies says nothing while its body is out."""
     for name in ("constant_force", "linear_damping", "max_linear_speed", "rotation", "mass"):
@@ -94,6 +96,7 @@ def test_with_every_integrator_and_without_forces(method, gravity):
         assert_like_deleted(broken, healthy)
 
 
+@pytest.mark.compiled
 def test_the_only_body_that_bounces():
     """Whether anything bounces is asked of all bodies."""
     broken, healthy = pile(restitution=0.0), pile(restitution=0.0)
@@ -105,6 +108,7 @@ def test_the_only_body_that_bounces():
 
 @both_dimensions
 @each_mode
+@pytest.mark.compiled
 def test_a_sum_of_forces_that_is_infinite(d, mode):
     """Found only within the step: the body touches nobody in it. Without the force it takes part again."""
 
@@ -132,6 +136,7 @@ def test_a_sum_of_forces_that_is_infinite(d, mode):
 
 
 @each_mode
+@pytest.mark.compiled
 def test_what_a_system_of_the_game_writes(mode):
     """Within the step too: START comes after the look at all columns."""
 
@@ -167,6 +172,7 @@ def test_static_and_kinematic_bodies():
             assert told(broken)[0].startswith(f"entity {block}: {name} is ")
 
 
+@pytest.mark.compiled
 def test_many_among_many():
     """More than a list of faults holds, in a world with a grid: each is named, once."""
     random = np.random.default_rng(3)
