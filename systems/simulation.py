@@ -32,7 +32,7 @@ from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
 from .narrow_phase.system import NarrowPhase
 from .preparation import prepare
-from .quarantine import Quarantine
+from .quarantine.taken_out import Quarantine
 from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
 from .records import STATE

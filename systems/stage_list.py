@@ -24,7 +24,8 @@ from .linked_parts import (
     WATCH_BOUNDS,
 )
 from .narrow_phase.system import NarrowPhase
-from .opening import check_columns, check_finite, keep_state, read_bodies
+from .opening import check_finite, keep_state, read_bodies
+from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE
 from .scene import TABLE_COLUMNS
 

@@ -15,7 +15,8 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
 from ..codes import CHECK_FLIGHT, NEED_COLUMNS, OK
 from ..forces.stages import within
-from ..opening import LARGEST, are_columns_sound
+from ..opening import LARGEST
+from ..quarantine.columns import are_columns_sound
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
 

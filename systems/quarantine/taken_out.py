@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from ..components import RigidBody, Transform
-from ..components.rigid_body import FASTEST
-from ..framework.data.columns import Column
-from ..framework.data.table import Table
-from ..framework.jit.records.record import Record, make_record
-from .integration.stages import UNMOVED
-from .opening import LEAST_TURN
-from .records import CHECKED
-from .scene import Scene
+from ...components import RigidBody, Transform
+from ...components.rigid_body import FASTEST
+from ...framework.data.columns import Column
+from ...framework.data.table import Table
+from ...framework.jit.records.record import Record, make_record
+from ..integration.stages import UNMOVED
+from ..records import CHECKED
+from ..scene import Scene
+from .columns import LEAST_TURN
 
 LARGEST_TURN = 1 / LEAST_TURN  # of a quaternion's numbers, whose squares are summed
 
