@@ -31,8 +31,8 @@ COLLISIONS = (
 )  # fmt: skip
 CURVES = ("path_second", "path_third")
 SWEEPS = (
-    "search_margin", "search_lower", "search_upper", "last_impact", "cluster_root", "cluster_next", "cluster_tail",
-    "cluster_inverse_mass",
+    "search_margin", "search_lower", "search_upper", "caught", "last_impact", "cluster_root", "cluster_next",
+    "cluster_tail", "cluster_inverse_mass",
 )  # fmt: skip
 HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems

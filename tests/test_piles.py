@@ -90,7 +90,7 @@ def throw(count, dimensions, e=0.0, side=10.0):
 
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.parametrize(("count", "dimensions", "side"), [(500, 2, 5.0), (1200, 3, 6.2)])
-def test_bodies_spawned_in_each_other(count, dimensions, side, e):
+def test_c19_bodies_spawned_in_each_other(count, dimensions, side, e):
     """C19: finite, slow (pushed out in position, so 1.5 sizes a second at most), the overlap falls all the time."""
     world = throw(count, dimensions, e, side)
     before = np.inf
@@ -105,7 +105,7 @@ def test_bodies_spawned_in_each_other(count, dimensions, side, e):
 
 
 @pytest.mark.parametrize(("count", "dimensions"), [(100, 2), (1000, 2), (100, 3)])
-def test_bodies_at_one_point(count, dimensions):
+def test_c3_bodies_at_one_point(count, dimensions):
     """C3: they separate, slowly, and none is lost."""
     world = throw(count, dimensions, side=0.0)
     for _ in range(10):

@@ -61,8 +61,10 @@ COLLISIONS = {"path_velocity", "origin", "min_extent", "collider_slot", "force_s
 COLLISIONS |= {"level_offsets", "impact_count", "counted_impacts"}
 RESTING = {"held", "place"}
 SOLVER = {"body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled"}
+SOLVER |= {"heaviest", "fastest", "size"}
+SOLVER |= {"island", "open", "going", "across", "along", "far", "worst", "stopper", "velocity_before", "velocity_way"}
 CURVES = {"path_second", "path_third"}
-SWEPT = {"search_margin", "search_lower", "search_upper", "last_impact"}
+SWEPT = {"search_margin", "search_lower", "search_upper", "caught", "last_impact"}
 SWEPT |= {"cluster_root", "cluster_next", "cluster_tail", "cluster_inverse_mass"}
 ROTATION = {"axes", "aabb_collider.half_extents, rotated"}
 FREE = RigidBody.many(mass=1.0)

@@ -315,6 +315,21 @@ def test_oracle_of_heavy_on_light(d):
 
 
 @both_dimensions
+def test_oracle_of_rigid_contacts(d):
+    """Their islands converge in the world, and are calculated in the oracle: a stack that gravity moves by a third of
+    its size in a step, with masses that make no blocks."""
+    world = kit.make_world(d, 1000.0)
+    kit.floor(world)
+    for k, mass in enumerate((1.0, 3.0, 0.5, 4.0)):
+        kit.box(world, v(d, 0.1 * k, 0.51 + 1.01 * k), mass=mass, friction=0.3)
+    assert step_by_step(world, 20) == 0
+    oracle = kit.Oracle(world)
+    oracle.step()
+    assert max(oracle.slack.values()) > 0.0
+    assert max(oracle.slack.values()) < 0.01 * 1000.0 * world.settings.dt
+
+
+@both_dimensions
 def test_oracle_of_a_ball_that_falls_on_a_ball(d):
     world = kit.make_world(d, G)
     kit.floor(world)

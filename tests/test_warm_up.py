@@ -57,13 +57,13 @@ def test_the_second_time_everything_is_there_already(carom, tmp_path):
     assert second.returncode == 0, second.stderr
     needed = row["found"] + len(row["compiled"])
     assert second.stdout.splitlines()[1].split()[:3] == ["falling.py", "0", str(needed)]
-    assert f"{len(files)} kernels" in second.stdout.splitlines()[-1]
+    assert f"{len(files):,} kernels" in second.stdout.splitlines()[-1]
     assert "compiled, with seconds" not in second.stdout
     assert "first use" not in second.stderr
 
     cleared = carom("--clear")
     assert cleared.returncode == 0, cleared.stderr
-    assert cleared.stdout.startswith(f"{len(files)} kernels deleted from {tmp_path / 'kernels'} (")
+    assert cleared.stdout.startswith(f"{len(files):,} kernels deleted from {tmp_path / 'kernels'} (")
     assert not list((tmp_path / "kernels").iterdir())
     assert json.loads(carom("--clear", "--json").stdout)["cache"]["kernels_before"] == 0
 

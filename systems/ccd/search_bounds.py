@@ -34,6 +34,7 @@ FAST = 0.2  # of the smaller body's extent
 SPREAD = 2.0  # times the speed at which a body has its share of the energy: few are ever faster after an impact
 CROWD = 0.5  # neighbours that the search bounds of a body may hold, on average
 ALL_PAIRS = 32  # bodies: so few may all be each other's neighbours
+MOST_SEARCHES = 64  # in a step, without those after impacts
 GIVE = 0.05  # of the extent: that much farther than its search bounds a body may go
 
 
@@ -166,12 +167,17 @@ def find_margins(state, now, span):
     largest = 0.5 * width_that_holds(CROWD / max(1, wide), extents)
     speeds, fast = 0.0, 0
     for i in range(state.moving):
-        margin[i] = min(margin[i], largest)
         speed = speed_at(state, i, now)
         if shape[i] >= 0 and speed * span > largest:
             speeds += speed
             fast += 1
-    return SPREAD * largest * fast / speeds if fast > 0 else math.inf
+    crossing = SPREAD * largest * fast / speeds if fast > 0 else math.inf
+    if crossing < (now + span) / MOST_SEARCHES:  # rather more neighbours than more searches
+        largest *= (now + span) / (MOST_SEARCHES * crossing)
+        crossing = (now + span) / MOST_SEARCHES
+    for i in range(state.moving):
+        margin[i] = min(margin[i], largest)
+    return crossing
 
 
 @part
@@ -204,7 +210,7 @@ def sweep_pairs(state, dt):
                 continue
             pairs.normal[c] = normal
             pairs.point[c] = add(centre_at(state, a, t), point)
-            pairs.depth[c] = 0.0
+            pairs.depth[c], pairs.near_contact[c] = 0.0, True
         pairs.hits[found] = c
         found += 1
     pairs.found = found

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, scale, sub
+from ...framework.vectors import add, add_scaled, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED
+from ..integration.trajectory import along, path_of
 from .resting_prediction import drop_support
 
 COLOURS = 62  # bits of a mask; contacts beyond share the last
@@ -52,6 +53,15 @@ def colour_contacts(state):
         starts[k] += starts[k - 1]
 
 
+@part
+def start_of_flight(state, i, v, a, dt):
+    """From where the substeps would take body i to the place of its last impact in time."""
+    bodies = state.bodies
+    t = bodies.last_impact[i]
+    there = sub(along(path_of(state, i), t), bodies.previous_position[i])
+    return add_scaled(add_scaled(there, v, -t), a, -0.5 * t * (t + dt / state.substeps))
+
+
 def gather(state, dt):
     """The bodies of the contacts at rest, where the step starts; the contacts sorted by colour.
 
@@ -86,6 +96,8 @@ def gather(state, dt):
                 if bodies.supported[i]:
                     a = sub(a, bodies.support_change[i])
                 a = scale(a, 1.0 / dt)
+                if state.impacts.sweeps and bodies.impact_count[i] > 0:
+                    x = start_of_flight(state, i, v, a, dt)
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
     return OK
 

@@ -7,11 +7,16 @@ needs r passes. For two contacts the exact answer is a linear complementarity pr
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.vectors import add_scaled, dot, negative, sub
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add_scaled, dot, length, negative, scale, sub
 from ..codes import OK
 
 RATIO = 10.0  # a body is light between two that have at least this many times its mass
 OPPOSED = -0.5  # cosine between the two contacts' directions, below which they squeeze
+
+# Times the fastest closing speed of its contacts: no light body leaves them faster. Their planes are those of the
+# step's start, so what is pinched at a small angle would be shot out; in truth the angle opens on the way.
+SHOT = 4.0
 
 
 @part
@@ -92,3 +97,52 @@ def solve_blocks(solver, bias, chosen):
         velocity[light] = add_scaled(add_scaled(v, one, -change_j * w), two, -change_k * w)
         velocity[p] = add_scaled(velocity[p], one, change_j * w_p)
         velocity[r] = add_scaled(velocity[r], two, change_k * w_r)
+
+
+@part
+def note_heaviest(state, dt):
+    """Of each light body the heaviest partner and the speed that it may have; returns whether there are any."""
+    solver, start, any_light = state.solver, state.bodies.start_velocity, False
+    nothing = zero_of(state)
+    for k in range(solver.contacts):
+        light = solver.light_of[k]
+        if light >= 0:
+            any_light = True
+            solver.heaviest[light], solver.fastest[light] = -1, 0.0
+    for k in range(solver.contacts if any_light else 0):
+        light = solver.light_of[k]
+        if light < 0:
+            continue
+        heavy = solver.second[k] if solver.first[k] == light else solver.first[k]
+        if solver.heaviest[light] < 0 or solver.inverse_mass[heavy] < solver.inverse_mass[solver.heaviest[light]]:
+            solver.heaviest[light] = heavy
+        row = solver.body_row[heavy]
+        w = sub(start[solver.body_row[light]], start[row] if row < state.moving else nothing)
+        pull = sub(solver.acceleration[light], solver.acceleration[heavy])
+        speed = length(w) + length(pull) * dt
+        solver.fastest[light] = max(solver.fastest[light], speed)
+    return any_light
+
+
+@part
+def hold_light(state, dt):
+    """A light body that is shot out from between heavy ones gives its heaviest partner what it has too much, so that
+    momentum stays."""
+    solver = state.solver
+    if solver.contacts == 0 or not note_heaviest(state, dt):
+        return OK
+    velocity, inverse_mass = solver.velocity, solver.inverse_mass
+    for k in range(solver.contacts):
+        light = solver.light_of[k]
+        if light < 0 or solver.heaviest[light] < 0:
+            continue
+        heavy, limit = solver.heaviest[light], SHOT * solver.fastest[light]
+        solver.heaviest[light] = -1  # once
+        w = sub(velocity[light], velocity[heavy])
+        speed = length(w)
+        if speed > limit:
+            share = inverse_mass[heavy] / (inverse_mass[light] + inverse_mass[heavy])
+            change = scale(w, 1.0 - limit / speed)
+            velocity[light] = add_scaled(velocity[light], change, share - 1.0)
+            velocity[heavy] = add_scaled(velocity[heavy], change, share)
+    return OK

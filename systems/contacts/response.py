@@ -16,6 +16,7 @@ from ..staged import StagedSystem
 from .bodies import gather, put_back
 from .event_stages import publish_contacts
 from .heavy_light_blocks import find_blocks
+from .last_word import obey_statics
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .resting_prediction import predict_rest
@@ -58,6 +59,10 @@ class Response(StagedSystem):
         Stage(find_blocks, "light bodies between heavy ones", ("solver",), ("solver",), "colliders", REST),
         Stage(solve_contacts, "substeps under forces and contacts", ("solver",), ("solver",), "colliders", REST),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, "colliders", REST),
+        Stage(
+            obey_statics, "what the solver has pushed into or through what cannot be moved is put back", ("pairs",),
+            MOTION, "colliders", REST,
+        ),
         Stage(store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST),
         Stage(find_touching, "which pairs touch in the end", MOTION, ("pairs",), "colliders", NEAR),
         Stage(publish_contacts, "the contacts of the step", ("pairs",), ("contacts",), "contacts"),

@@ -2,45 +2,38 @@
 
 from __future__ import annotations
 
-from ...framework.compilation import inlined, part
+from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, sub
+from ...framework.vectors import add, add_scaled, dot, length, sub
+from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
-from ..impacts.impulses import EXCLUDED_FROM_REST
-from ..shapes.dispatch import evaluate, is_corner_touch, mix, mix_friction
+from ..impacts.impulses import STOPPED, is_caught
+from ..shapes.dispatch import mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
+from .approach import between, between_at_start, leg_start, meet, meets_at_corner, touch_on_way
+from .softness import SAG
 
 ENTRY_ITERATIONS = 24
+OWN_SAG = 0.0003  # of the extent: a contact that would sag more under one body alone is rigid
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
 SAME_PLACE = 1e-9  # of the extent: a gap of rounding errors is none
 
 
-@inlined
-def between(bodies, a, b):
-    """From the centre of a's shape to that of b's, where they are now."""
-    position, offset = bodies.position, bodies.offset
-    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
-
-
-@inlined
-def between_at_start(bodies, a, b):
-    """The same where the step starts."""
-    position, offset = bodies.previous_position, bodies.offset
-    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
-
-
 @part
-def meet(state, a, b, d):
-    """The answer of the pair's function: (hit, depth, normal, point)."""
-    shape = state.bodies.shape
-    return evaluate(state, shape[a], a, shape[b], b, d)
+def far_touch(state, dt, a, b):
+    """As :func:`touch_on_way`, on the last stretch of the way of a pair that goes so far on it that its end may say
+    nothing; the gap is that at the start of the step.
 
-
-@part
-def meets_at_corner(state, a, b, d, slop):
-    """Whether the two touch at a corner only."""
-    shape = state.bodies.shape
-    return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
+    In a discrete world only as far as forces lead: who is faster than that passes through what is thin.
+    """
+    bodies, edge, nothing = state.bodies, FAST * smaller_extent(state.bodies, a, b), zero_of(state)
+    d, margin = leg_start(state, a, b), contact_margin(state, dt, a, b)
+    travel = sub(between(bodies, a, b), d)
+    way = length(travel)
+    if not (way > edge and (is_swept(state, a, b, way) or way <= margin)):
+        return False, 0.0, nothing, nothing
+    found, gap, normal, point = touch_on_way(state, a, b, d, travel, min(edge, margin))
+    return found, gap + dot(sub(between_at_start(bodies, a, b), d), normal), normal, point
 
 
 @part
@@ -65,8 +58,11 @@ def still_bounces(state, dt, c, depth, normal):
     pairs, bodies, colliders = state.pairs, state.bodies, state.colliders
     a, b, slot = pairs.a[c], pairs.b[c], bodies.collider_slot
     restitution, velocity = colliders.restitution, bodies.linear_velocity
-    if not mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b]) > 0.0:
+    e = mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b])
+    if not e > 0.0:
         return False
+    if e == 1.0 and state.impacts.sweeps and is_caught(state, a, b):
+        return True
     slop, fixed = slop_of(state, a, b), state.restitution_threshold
     threshold = fixed if fixed >= 0.0 else (contact_margin(state, dt, a, b) - slop) / dt
     speed = dot(sub(velocity[b], velocity[a]), normal)
@@ -89,7 +85,7 @@ def is_resting(state, dt, c):
     """
     pairs, bodies, count = state.pairs, state.bodies, state.bodies.impact_count
     a, b = pairs.a[c], pairs.b[c]
-    if count[a] >= EXCLUDED_FROM_REST or count[b] >= EXCLUDED_FROM_REST:  # stopped, or deflected far
+    if count[a] >= STOPPED or count[b] >= STOPPED:
         pairs.near_contact[c] = True  # they may touch where they are now
         return False
     hit, carried = count[a] > 0 or count[b] > 0, bodies.supported[a] or bodies.supported[b]
@@ -101,6 +97,9 @@ def is_resting(state, dt, c):
         return False
     d = between(bodies, a, b)
     _, depth, normal, _ = meet(state, a, b, d)
+    far, gap, plane, _ = far_touch(state, dt, a, b)
+    if far:
+        normal, depth = plane, -gap - dot(sub(d, between_at_start(bodies, a, b)), plane)
     if depth < -margin:
         if hit or not carried:
             return False
@@ -168,8 +167,10 @@ def linearise(state, dt):
         _, depth, normal, point = meet(state, a, b, d)
         gap = -depth
         if depth < 0.0 or parting != STAYS or meets_at_corner(state, a, b, d, slop):
-            travel = sub(between(bodies, a, b), d)
-            gap, normal, point = entry(state, a, b, d, travel, parting != STAYS, slop)
+            far, gap, normal, point = far_touch(state, dt, a, b)
+            if not far or parting != STAYS:
+                travel = sub(between(bodies, a, b), d)
+                gap, normal, point = entry(state, a, b, d, travel, parting != STAYS, slop)
         if pairs.impulse[c] > 0.0 and dot(normal, pairs.normal[c]) <= 0.0:
             normal = pairs.normal[c]  # coincident centres have parted: not back again
         solver.normal[k], pairs.normal[c] = normal, normal
@@ -179,6 +180,8 @@ def linearise(state, dt):
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = smaller_extent(bodies, a, b)
+        weight = SAG * max(bodies.force_speed_change[a], bodies.force_speed_change[b]) * dt
+        solver.rigid[k] = weight > OWN_SAG * state.substeps * state.substeps * solver.extent[k]
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu
         has_friction |= mu != 0.0

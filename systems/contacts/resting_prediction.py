@@ -8,9 +8,13 @@ shock is not repeated, and they never pull.
 from __future__ import annotations
 
 from ...framework.compilation import part
-from ...framework.vectors import add_scaled, dot, sub
+from ...framework.vectors import add_scaled, dot, length, sub
 from ..codes import NEED_COLUMNS, OK
+from .heavy_light_blocks import RATIO
 from .warm_start import find_rows, scale_to
+
+UNEVEN_PASSES = 8
+THROWN = 20.0  # times the change of speed that forces make in the step; more, and more than a pair closes with: a shock
 
 
 @part
@@ -54,18 +58,55 @@ def apply_remembered(state):
 
 
 @part
-def relax_remembered(state):
-    """Take back what pushes two bodies apart, never more than has pushed."""
+def relax_remembered(state, uneven):
+    """Take back what pushes two bodies apart, never more than has pushed; uneven: only of a light and a heavy body."""
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
+    velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
+    for m in range(memory.counts[now]):
+        a, b, n = memory.first[now, m], memory.second[now, m], memory.normal[now, m]
+        if not impulse[m] > 0.0:
+            continue
+        light, heavy = max(inverse_mass[a], inverse_mass[b]), min(inverse_mass[a], inverse_mass[b])
+        if uneven and not (heavy > 0.0 and light >= RATIO * heavy):
+            continue
+        parting = dot(sub(velocity[b], velocity[a]), n)
+        if parting > 0.0:
+            back = min(impulse[m], parting / (inverse_mass[a] + inverse_mass[b]))
+            impulse[m] -= back
+            velocity[a] = add_scaled(velocity[a], n, back * inverse_mass[a])
+            velocity[b] = add_scaled(velocity[b], n, -back * inverse_mass[b])
+
+
+@part
+def is_thrown(bodies, i, fastest):
+    """Whether the remembered impulses change the velocity of body i by more than that."""
+    if bodies.inverse_mass[i] == 0.0:
+        return False
+    dv = sub(bodies.linear_velocity[i], bodies.support_change[i])
+    return dot(dv, dv) > fastest * fastest
+
+
+@part
+def speed_before(bodies, i):
+    """The velocity of body i without the remembered impulses."""
+    return bodies.support_change[i] if bodies.supported[i] else bodies.linear_velocity[i]
+
+
+@part
+def drop_shocks(state):
+    """Take back what was a shock: contacts at rest act against forces and against the little that bodies close with."""
+    memory, bodies, now, any_thrown = state.warm_start, state.bodies, state.warm_start.now, False
     velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
     for m in range(memory.counts[now]):
         if impulse[m] > 0.0:
             a, b, n = memory.first[now, m], memory.second[now, m], memory.normal[now, m]
-            parting = dot(sub(velocity[b], velocity[a]), n)
-            if parting > 0.0:
-                back = min(impulse[m], parting / (inverse_mass[a] + inverse_mass[b]))
-                velocity[a] = add_scaled(velocity[a], n, back * inverse_mass[a])
-                velocity[b] = add_scaled(velocity[b], n, -back * inverse_mass[b])
+            closing = length(sub(speed_before(bodies, b), speed_before(bodies, a)))
+            fastest = THROWN * max(bodies.force_speed_change[a], bodies.force_speed_change[b]) + closing
+            if is_thrown(bodies, a, fastest) or is_thrown(bodies, b, fastest):
+                velocity[a] = add_scaled(velocity[a], n, impulse[m] * inverse_mass[a])
+                velocity[b] = add_scaled(velocity[b], n, -impulse[m] * inverse_mass[b])
+                impulse[m], any_thrown = 0.0, True
+    return any_thrown
 
 
 def predict_rest(state, dt):
@@ -88,7 +129,12 @@ def predict_rest(state, dt):
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
     apply_remembered(state)
-    relax_remembered(state)
+    relax_remembered(state, False)
+    for _ in range(UNEVEN_PASSES):  # one leaves the more the more the masses differ
+        relax_remembered(state, True)
+    for _ in range(UNEVEN_PASSES):
+        if not drop_shocks(state):
+            break
     travels = state.force_travels
     for i in range(state.moving):
         if bodies.supported[i]:

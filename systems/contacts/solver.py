@@ -16,10 +16,11 @@ import math
 from ...framework.compilation import part
 from ...framework.vectors import add, add_scaled, dot, scale, sub
 from ..codes import OK
-from .heavy_light_blocks import solve_blocks
+from .heavy_light_blocks import hold_light, solve_blocks
+from .passes import solve_friction, solve_normals
+from .rigid import choose_rigid, converge, leave_out_rigid
+from .softness import DAMPING_RATIO, FREQUENCY
 
-FREQUENCY = 0.25  # of the soft contact, times the rate of the substeps
-DAMPING_RATIO = 10.0
 RELAX_PASSES = 2
 LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
 LET_GO_PASSES = 4  # once, after contacts have been lost
@@ -56,38 +57,19 @@ def measure(solver, h, bias_rate):
     well, softly where ``soft`` says so. Returns whether some overlap is too deep for that.
     """
     first, second, normal, gap = solver.first, solver.second, solver.normal, solver.gap
-    shift, opening, pushing, soft = solver.shift, solver.opening, solver.pushing, solver.soft
+    shift, opening, pushing, soft, deep = solver.shift, solver.opening, solver.pushing, solver.soft, solver.deep
     any_deep = False
     for k in range(solver.contacts):
         room = gap[k] + dot(sub(shift[second[k]], shift[first[k]]), normal[k])
         opening[k] = pushing[k] = max(0.0, room) / h
-        soft[k] = False
+        soft[k] = deep[k] = False
         if room <= 0.0 and not solver.parting[k]:
-            if room >= -DEEP * solver.extent[k]:
-                soft[k] = True
-                pushing[k] = bias_rate * room
-            else:
-                any_deep = True
+            deep[k] = room < -DEEP * solver.extent[k]
+            any_deep |= deep[k]
+            if solver.rigid[k] or not deep[k]:
+                pushing[k] = bias_rate * max(room, -DEEP * solver.extent[k])
+                soft[k] = not (solver.rigid[k] or solver.in_block[k])
     return any_deep
-
-
-@part
-def solve_friction(solver, chosen):
-    """Stop what slides, with at most ``friction`` times the normal impulse (Coulomb). chosen: only active ones."""
-    velocity, inverse_mass, tangent, normal = solver.velocity, solver.inverse_mass, solver.tangent, solver.normal
-    for k in range(solver.contacts):
-        if solver.friction[k] == 0.0 or (chosen and not solver.active[k]):
-            continue
-        a, b, n, old = solver.first[k], solver.second[k], normal[k], tangent[k]
-        w = sub(velocity[b], velocity[a])
-        pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -solver.mass[k])
-        strength, limit = math.sqrt(dot(pull, pull)), solver.friction[k] * solver.impulse[k]
-        if strength > limit:
-            pull = scale(pull, limit / strength)
-        tangent[k] = pull
-        change = sub(pull, old)
-        velocity[a] = add_scaled(velocity[a], change, -inverse_mass[a])
-        velocity[b] = add_scaled(velocity[b], change, inverse_mass[b])
 
 
 @part
@@ -109,7 +91,7 @@ def push_deep(solver, substeps):
     for k in range(solver.contacts):
         a, b, n = solver.first[k], solver.second[k], solver.normal[k]
         overlap = -solver.gap[k] - dot(sub(shift[b], shift[a]), n)
-        if overlap > DEEP * solver.extent[k] and not solver.parting[k]:
+        if overlap > DEEP * solver.extent[k] and not (solver.parting[k] or solver.rigid[k]):
             push = min(PUSH_RATE * overlap, PUSH_LIMIT * solver.extent[k]) / substeps * solver.mass[k]
             shift[a] = add_scaled(shift[a], n, -push * inverse_mass[a])
             shift[b] = add_scaled(shift[b], n, push * inverse_mass[b])
@@ -135,37 +117,6 @@ def apply_warm_start(solver, h):
 
 
 @part
-def solve_normals(solver, bias, softness, pushes, chosen):
-    """One pass over the contacts, those in blocks left out; returns the largest change of speed.
-
-    softness: (share of the speed asked for that a soft contact takes, share of its impulse that it gives back), where
-    this pass ``pushes``. chosen: only active contacts.
-    """
-    velocity, inverse_mass, impulse, mass = solver.velocity, solver.inverse_mass, solver.impulse, solver.mass
-    first, second, normal = solver.first, solver.second, solver.normal
-    in_block, active, soft = solver.in_block, solver.active, solver.soft
-    mass_scale, impulse_scale = softness
-    largest = 0.0
-    for k in range(solver.contacts):
-        if in_block[k] or (chosen and not active[k]):
-            continue
-        a, b, n, old = first[k], second[k], normal[k], impulse[k]
-        v_a, v_b = velocity[a], velocity[b]
-        wanted = mass[k] * (dot(sub(v_b, v_a), n) + bias[k])
-        if pushes and soft[k]:
-            wanted = mass_scale * wanted + impulse_scale * old
-        new = max(0.0, old - wanted)
-        largest = max(largest, abs(new - old) / mass[k])
-        impulse[k] = new
-        # Storing what stays as it is would make contacts with one floor wait for each other.
-        if inverse_mass[a] > 0.0:
-            velocity[a] = add_scaled(v_a, n, (old - new) * inverse_mass[a])
-        if inverse_mass[b] > 0.0:
-            velocity[b] = add_scaled(v_b, n, (new - old) * inverse_mass[b])
-    return largest
-
-
-@part
 def solve_substep(solver, h, substeps, passes, shock):
     """One substep; passes: (how many before the one that pushes, how many after it)."""
     omega = 2.0 * math.pi * FREQUENCY / h
@@ -173,16 +124,24 @@ def solve_substep(solver, h, substeps, passes, shock):
     stiffness = h * omega * damping
     bias_rate = omega / damping
     softness = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
+    any_rigid = choose_rigid(solver, h, shock)
     apply_warm_start(solver, h)
     turn, last = -passes[0], passes[1]
     while turn <= last:
         if turn < 0:
             propagate(solver)
+        elif any_rigid:
+            leave_out_rigid(solver)
+        chosen = turn < 0 or any_rigid
         bias = solver.pushing if turn == 0 else solver.opening
-        largest = solve_normals(solver, bias, softness, turn == 0, turn < 0)
-        solve_blocks(solver, bias, turn < 0)
+        largest = solve_normals(solver, bias, softness, turn == 0, chosen)
+        solve_blocks(solver, bias, chosen)
         if solver.has_friction:
-            solve_friction(solver, turn < 0)
+            solve_friction(solver, chosen)
+        if any_rigid and turn >= 0:
+            if turn == 0:
+                converge(solver, bias, softness, True, DEEP, h)
+            converge(solver, bias, softness, turn == 0, math.inf, h)
         if turn == 0:
             for k in range(solver.contacts):
                 solver.worked[k] |= solver.impulse[k] > 0.0
@@ -211,10 +170,12 @@ def solve_contacts(state, dt):
     for k in range(solver.contacts):
         solver.total[k], solver.worked[k] = 0.0, False
     measure(solver, h, omega / (2.0 * DAMPING_RATIO + h * omega))
+    solver.islands_known = False
     shock = detect_shock(solver, substeps * h) if state.impacts.logged == 0 else 0.0
     for step in range(substeps):
         before = LET_GO_PASSES if solver.any_unsettled and step == 0 else 0
         before = SHOCK_PASSES if shock > 0.0 else before
         after = LAST_RELAX_PASSES if step == substeps - 1 else RELAX_PASSES
         solve_substep(solver, h, substeps, (before, after), shock)
+    hold_light(state, dt)
     return OK

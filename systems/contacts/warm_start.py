@@ -114,7 +114,7 @@ def store_warm_start(state, dt):
     new, count = 1 - memory.now, 0
     for r in range(solver.contacts):
         k, c = solver.slot[r], pairs.resting[r]
-        if solver.total[k] <= 0.0:
+        if not solver.total[k] > 0.0:  # also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
         memory.first[new, count], memory.second[new, count] = a, b

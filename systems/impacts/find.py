@@ -31,7 +31,7 @@ from ..linked_parts import (
 from ..shapes.dispatch import evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .heap import heap_push
-from .impulses import BOUNCE, CROSS, FREE, STICK, STOP, STOPPED, is_deflected
+from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, is_caught, is_deflected
 
 TIME_ITERATIONS = 80
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
@@ -135,24 +135,18 @@ def is_held_by_edge(state, a, b, path, touch, speed, dt):
 
 @part
 def closing_speed(state, a, b, path, touch, kind, dt):
-    """Of a solid pair: (is it an impact, speed along the normal, does it only stop, speed gained at least)."""
+    """Of a solid pair: (is it an impact, speed along the normal)."""
     bodies, impacts, (t, normal, _, _) = state.bodies, state.impacts, touch
-    speed, gain, stops = dot(rate_along(path, t), normal), 0.0, False
+    speed = dot(rate_along(path, t), normal)
     threshold, rounding = bounce_threshold(state, a, b), 0.0
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     if not speed < -(threshold + rounding):
-        # Too slow to bounce: a contact at rest, unless what is fast would be far past the surface by the end of the
-        # step. That is stopped there, or, on a path that leads back in, sent up so that it is there at the end.
-        left, curve = dt - t, dot(add_scaled(path[2], path[3], 3.0 * t), normal)
-        goes_far = kind == SWEPT and travel_of(path, left) > FAST * smaller_extent(bodies, a, b)
-        if not (goes_far and -(speed + curve * left) * left > slop_of(state, a, b)):
-            return False, speed, False, 0.0
-        stops, gain = True, max(0.0, -curve * left)
+        return False, speed  # a contact at rest
     supported = kind == SWEPT and (bodies.supported[a] or bodies.supported[b])
     if supported and call_held_by_edge(state.links[HELD_BY_EDGE], state, a, b, path, touch, speed, dt):
-        return False, speed, False, 0.0
-    return True, speed, stops, gain
+        return False, speed
+    return True, speed
 
 
 @part
@@ -167,7 +161,7 @@ def correct_speed(state, a, b, touch, speed, dt):
 
 
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
-    """STOP or STICK for a pair of which a body has had all the impacts it may have; -1: none of both, it is left."""
+    """STOP, STICK or SLIDE for a pair of which a body has had all the impacts it may have; -1: none, it is left."""
     bodies = state.bodies
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     still = (count[a] >= STOPPED or inverse_mass[a] == 0.0) and (count[b] >= STOPPED or inverse_mass[b] == 0.0)
@@ -177,6 +171,8 @@ def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     far = travel_of(path, dt - t) > FAST * smaller_extent(bodies, a, b)
     if not (far or is_deflected(state, a) or is_deflected(state, b)):
         return -1
+    if restitution == 1.0 and is_caught(state, a, b):
+        return SLIDE
     one, two = bodies.cluster_root[a], bodies.cluster_root[b]
     movable = one != two and bodies.cluster_inverse_mass[one] + bodies.cluster_inverse_mass[two] > 0.0
     since_last = t - max(bodies.last_impact[a], bodies.last_impact[b])
@@ -202,12 +198,14 @@ def counts_for_cap(state, a, b, t, restitution):
 def is_beyond_cap(state, a, b):
     """Whether one of the two has had all the impacts it may have in a step."""
     counted, count, cap = state.bodies.counted_impacts, state.bodies.impact_count, state.max_impacts
+    if state.impacts.sweeps and is_caught(state, a, b):
+        return True
     return counted[a] >= cap or counted[b] >= cap or count[a] >= MOST_IMPACTS or count[b] >= MOST_IMPACTS
 
 
 @part
-def queue_event(state, c, kind, path, touch, speed, restitution, gain):
-    """Put an event into the queue; gain: what the speed along the normal gains besides the bounce."""
+def queue_event(state, c, kind, path, touch, speed, restitution):
+    """Put an event into the queue."""
     impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
     slot, pull = bodies.collider_slot, zero_of(state)
@@ -224,7 +222,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution, gain):
     impacts.event_count_a[event], impacts.event_count_b[event] = bodies.impact_count[a], bodies.impact_count[b]
     impacts.event_time[event] = t
     impacts.event_key[event] = bodies.rank[a] * state.count + bodies.rank[b]
-    impacts.event_change[event], impacts.event_normal[event] = gain - (1.0 + restitution) * speed, normal
+    impacts.event_change[event], impacts.event_normal[event] = -(1.0 + restitution) * speed, normal
     impacts.event_point[event], impacts.event_pull[event] = add(centre_at(state, a, t), point), pull
     heap_push(impacts)
 
@@ -253,12 +251,11 @@ def consider(state, c, dt):
     ):
         normal = end_normal  # it slides from one thing onto the next: the edges do not stop it
     touch = (t, normal, point, apart)
-    speed, gain = dot(w, normal), 0.0
+    speed = dot(w, normal)
     if not passive:
-        is_impact, speed, stops, gain = closing_speed(state, a, b, path, touch, kind, dt)
+        is_impact, speed = closing_speed(state, a, b, path, touch, kind, dt)
         if not is_impact:
             return
-        e = 0.0 if stops else e
     if state.path_degree == 1 and e != 1.0:
         speed = correct_speed(state, a, b, touch, speed, dt)
         if impacts.sweeps and not passive:
@@ -274,5 +271,5 @@ def consider(state, c, dt):
             impacts.capped += 1
             return
         if event_kind == STICK:
-            e, gain = 0.0, 0.0
-    queue_event(state, c, event_kind, path, touch, speed, e, gain)
+            e = 0.0
+    queue_event(state, c, event_kind, path, touch, speed, e)

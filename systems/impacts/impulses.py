@@ -11,16 +11,17 @@ import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, length, scale, sub
+from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
 
-# Added to a body's impacts: the solver for contacts at rest leaves it alone in this step; it moves no more in it.
-EXCLUDED_FROM_REST, STOPPED = 1 << 29, 1 << 30
+STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
 
-# Kinds of events: an impact, one that no cap counts, two beyond the cap, a crossing of what does not push.
-BOUNCE, FREE, STICK, STOP, CROSS = range(5)
+# Kinds of events: an impact, one that no cap counts, two beyond the cap, a crossing of what does not push, and one of
+# what is caught between two walls.
+BOUNCE, FREE, STICK, STOP, CROSS, SLIDE = range(6)
+FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what cannot be moved
 
 
 @part
@@ -72,8 +73,31 @@ def bounce(state, event, dt):
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             bodies.impact_count[i] += 1
             bodies.counted_impacts[i] += 1 if impacts.event_kind[event] == BOUNCE else 0
+            if impacts.sweeps:
+                bodies.caught[i] = bodies.caught[i] + 1 if inverse_mass[a + b - i] == 0.0 else 0
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
     log_impact(state, event, impacts.event_change[event] * mass)
+
+
+@part
+def mean_rate(state, root, now):
+    """The velocity of a cluster's centre of mass, of its bodies that can be moved."""
+    bodies, i, mass, total = state.bodies, root, 0.0, zero_of(state)
+    rate = rate_along(path_of(state, root), now)
+    while i >= 0:
+        if bodies.inverse_mass[i] > 0.0:
+            weight = 1.0 / bodies.inverse_mass[i]
+            total, mass = add_scaled(total, rate_along(path_of(state, i), now), weight), mass + weight
+        i = bodies.cluster_next[i]
+    return scale(total, 1.0 / mass) if mass > 0.0 else rate
+
+
+@part
+def can_stick(state, event):
+    """Whether the clusters of an event still are two, and one of them can be moved: others may have changed since."""
+    bodies, c = state.bodies, state.impacts.event_pair[event]
+    a, b = bodies.cluster_root[state.pairs.a[c]], bodies.cluster_root[state.pairs.b[c]]
+    return a != b and bodies.cluster_inverse_mass[a] + bodies.cluster_inverse_mass[b] > 0.0
 
 
 @part
@@ -86,8 +110,10 @@ def stick(state, event, dt):
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     root, following, lightness = bodies.cluster_root, bodies.cluster_next, bodies.cluster_inverse_mass
     inverse_mass, c = bodies.inverse_mass, impacts.event_pair[event]
-    a, b = root[pairs.a[c]], root[pairs.b[c]]
+    a, b, now = root[pairs.a[c]], root[pairs.b[c]], impacts.event_time[event]
     impulse = impacts.event_change[event] / (lightness[a] + lightness[b])
+    closing = max(0.0, -dot(sub(mean_rate(state, b, now), mean_rate(state, a, now)), impacts.event_normal[event]))
+    impulse = min(impulse, 2.0 * closing / (lightness[a] + lightness[b]))  # more would add energy
     for side in range(2):
         i = a if side == 0 else b
         dv = scale(impacts.event_normal[event], (-impulse if side == 0 else impulse) * lightness[i])
@@ -95,7 +121,7 @@ def stick(state, event, dt):
             if inverse_mass[i] > 0.0:
                 bodies.impact_count[i] += 1
                 bodies.counted_impacts[i] |= STUCK
-                deflect(state, i, dv, impacts.event_time[event], dt)
+                deflect(state, i, dv, now, dt)
             i = following[i]
     log_impact(state, event, impulse)
     impacts.capped += 1
@@ -133,6 +159,14 @@ def is_deflected(state, i):
 
 
 @part
+def is_caught(state, a, b):
+    """Whether one of the two bounces for ever between things that cannot be moved, of which the other is one."""
+    caught, inverse_mass = state.bodies.caught, state.bodies.inverse_mass
+    most = CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))
+    return (caught[a] >= most and inverse_mass[b] == 0.0) or (caught[b] >= most and inverse_mass[a] == 0.0)
+
+
+@part
 def stop(state, i, now):
     """Beyond the cap a fast body stays where it is until the step ends, and keeps its velocity."""
     bodies, path, zero = state.bodies, path_of(state, i), zero_of(state)
@@ -144,3 +178,20 @@ def stop(state, i, now):
         bodies.path_second[i], bodies.path_third[i] = zero, zero
     bodies.impact_count[i] += STOPPED
     bodies.counted_impacts[i] += STOPPED
+
+
+@part
+def slide(state, i, normal, now, dt):
+    """A body that is caught in a slot little wider than itself keeps its velocity, but moves only along the slot until
+    the step ends: its impacts in between would be too many to count, and end where they began."""
+    bodies = state.bodies
+    x0, x1, x2, x3 = path_of(state, i)
+    old = x0, x1, x2, x3
+    x1 = add_scaled(x1, normal, -dot(x1, normal))
+    x2, x3 = add_scaled(x2, normal, -dot(x2, normal)), add_scaled(x3, normal, -dot(x3, normal))
+    x0 = add(x0, sub(along(old, now), along((x0, x1, x2, x3), now)))
+    bodies.position[i] = add(bodies.position[i], sub(along((x0, x1, x2, x3), dt), along(old, dt)))
+    bodies.origin[i], bodies.path_velocity[i] = x0, x1
+    if state.path_degree > 1:
+        bodies.path_second[i], bodies.path_third[i] = x2, x3
+    bodies.impact_count[i] += 1

@@ -10,7 +10,7 @@ from ..codes import NEED_EVENTS, OK, REFRESH_PAIRS
 from ..linked_parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
 from .find import consider
 from .heap import heap_pop
-from .impulses import BOUNCE, CROSS, EXCLUDED_FROM_REST, FREE, STICK, STOPPED, bounce, is_deflected, stick, stop
+from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
 
 # In place of a pair in ``last_pair``: what is searched next.
 HITS, ALL, NONE, MEMBERS = -1, -2, -3, -4
@@ -42,6 +42,7 @@ def begin_impacts(state, dt):
         return OK
     impacts.active = impacts.sweeps or any_restitution(state)
     for i in range(state.count if impacts.sweeps else 0):
+        bodies.caught[i] = 0
         bodies.last_impact[i], bodies.cluster_inverse_mass[i] = -1.0, bodies.inverse_mass[i]
         bodies.cluster_root[i], bodies.cluster_next[i], bodies.cluster_tail[i] = i, -1, i
     begin_search(state, HITS, 0.0)
@@ -178,13 +179,17 @@ def take_swept_event(state, event, dt):
         pairs.crossed[c] = True
         impacts.crossings += 1
         impacts.last_pair = NONE
-    elif kind == STICK:
+    elif kind == STICK and can_stick(state, event):
         impacts.cluster = stick(state, event, dt)
         impacts.last_pair = MEMBERS
         i = impacts.cluster
         while i >= 0:
             watch_again(state, i, dt)
             i = bodies.cluster_next[i]
+    elif kind == SLIDE:
+        impacts.capped += 1
+        a, b = pairs.a[c], pairs.b[c]
+        slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], impacts.now, dt)
     else:
         impacts.capped += 1
         pairs.depth[c], pairs.crossed[c] = 0.0, True
@@ -214,7 +219,7 @@ def take_event(state, event, dt):
 
 def resolve_impacts(state, dt):
     """Bounce every pair that touches in its motion and approaches faster than the threshold."""
-    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    impacts, pairs = state.impacts, state.pairs
     if not impacts.active:
         return OK
     while True:
@@ -236,9 +241,6 @@ def resolve_impacts(state, dt):
             return REFRESH_PAIRS
         else:
             break
-    for i in range(state.count if impacts.sweeps else 0):
-        if 0 < bodies.impact_count[i] < EXCLUDED_FROM_REST and is_deflected(state, i):
-            bodies.impact_count[i] += EXCLUDED_FROM_REST
     state.impacts_counted += impacts.logged
     state.capped_counted += impacts.capped
     return OK

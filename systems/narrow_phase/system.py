@@ -47,6 +47,7 @@ class NarrowPhase(StagedSystem):
         self._state, self._scene, self._registry, self._bodies = program.state, scene, registry, bodies
 
     def _parts(self) -> list[Any]:
+        self._state.pairs_filtered = bool(self._registry.pair_filters)
         if not self._registry.pair_filters:
             return [self.segment()]
         return [

@@ -12,6 +12,7 @@ from ....framework import Settings, World
 from ...measure.body_shapes import Floats, rotation_matrix
 
 FLAT = 0.005  # default slop, as a fraction of the smaller body's size
+NEIGHBOURS = 0.1  # of the smallest half extent: enlargement of the boxes around the motion
 FAST = 0.2  # of the smaller body's size: pairs that travel farther in a step are swept
 
 
@@ -46,10 +47,9 @@ class Body:
     resting_prediction: Floats | None = field(init=False, default=None)  # velocity change by contacts at rest
     impact_count: int = field(init=False, default=0)
     counted_impacts: int = field(init=False, default=0)  # impacts that count towards the cap
-    last: float = field(init=False, default=-math.inf)  # time of the latest impact
+    last: float = field(init=False, default=-math.inf)  # time of the latest impact, if bodies are swept
     cluster: Cluster = field(init=False)  # the bodies it sticks to, and itself
     stopped: bool = field(init=False, default=False)  # beyond the cap: does not move until the step ends
-    excluded_from_rest: bool = field(init=False, default=False)  # stopped or deflected
 
     @property
     def inverse_mass(self) -> float:
@@ -73,7 +73,7 @@ class Body:
         self.first_velocity = self.velocity
         self.resting_prediction, self.impact_count, self.counted_impacts = None, 0, 0
         self.last, self.cluster = -math.inf, Cluster([self], fixed=self.inverse_mass == 0.0)
-        self.stopped = self.excluded_from_rest = False
+        self.stopped = False
 
     def fly(self, dt: float, gravity: Floats, method: str, curved: bool) -> None:
         """The free flight of one step; ``curved``: paths are parabolas."""
@@ -112,6 +112,12 @@ class Cluster:
     members: list[Body]
     fixed: bool
 
+    def velocity_at(self, t: float) -> Floats:
+        """That of its centre of mass; an immovable body is alone in its cluster."""
+        masses = [body.mass if body.inverse_mass > 0.0 else 1.0 for body in self.members]
+        momenta = [mass * body.velocity_at(t) for mass, body in zip(masses, self.members, strict=True)]
+        return np.sum(momenta, axis=0) / sum(masses)
+
     @property
     def inverse_mass(self) -> float:
         return 0.0 if self.fixed else 1.0 / sum(body.mass for body in self.members)
@@ -129,12 +135,19 @@ class Pair:
     has_contact: bool = False  # had an impact or is a contact at rest
     impulse: float = 0.0  # N s, of this step
     normal: Floats | None = None
+    surely_near: bool = True  # a neighbour, however far bodies look for them
     crossed: bool = False  # met during the step without a collision response
     doubtful: bool = False  # whether they meet was decided by a number of the size of rounding
 
     @property
     def bodies(self) -> tuple[Body, Body]:
         return self.a, self.b
+
+    @property
+    def can_stick(self) -> bool:
+        """False if both are in one cluster, or nothing of the two clusters can be moved."""
+        one, two = self.a.cluster, self.b.cluster
+        return one is not two and not (one.fixed and two.fixed)
 
     @property
     def key(self) -> tuple[int, int]:
@@ -183,6 +196,17 @@ class Pair:
     def between(self, at_a: Floats, at_b: Floats) -> Floats:
         """From the centre of a's shape to that of b's, for these body positions."""
         return (at_b + self.b.offset) - (at_a + self.a.offset)
+
+
+def motions_come_near(a: Body, b: Body) -> bool:
+    """True if the boxes around the motions of the two within the step overlap."""
+    boxes = []
+    for body in (a, b):
+        ends = np.array([body.start, body.position]) + body.offset
+        reach = body.half + NEIGHBOURS * body.half.min()
+        boxes.append((ends.min(axis=0) - reach, ends.max(axis=0) + reach))
+    (low_a, high_a), (low_b, high_b) = boxes
+    return bool((low_a <= high_b).all() and (low_b <= high_a).all())
 
 
 def mixed(rule: str, one: float, other: float) -> float:

@@ -75,7 +75,7 @@ class Impacts:
                 impact.pair.crossed = True
                 continue
             moved = [body for body in impact.pair.bodies if body.inverse_mass > 0.0]
-            if impact.kind == "stop":
+            if impact.kind == "stop" or (impact.kind == "stick" and not impact.pair.can_stick):
                 self.capped += 1
                 impact.pair.crossed = impact.pair.has_contact = True
                 for body in moved:
@@ -84,13 +84,10 @@ class Impacts:
             elif impact.kind == "stick":
                 self.capped += 1
                 moved = self._stick(impact)
-                self.done.append(impact)
             else:
                 self._strike(impact)
                 self.done.append(impact)
             self._look([p for p in self._pairs if p.a in moved or p.b in moved], impact.time)
-        for body in {body: None for pair in self._pairs for body in pair.bodies}:
-            body.excluded_from_rest = body.stopped or (self._sweeping and body.impact_count > 0 and _is_deflected(body))
 
     def _look(self, chosen: Sequence[Pair], since: float) -> None:
         for pair in chosen:
@@ -99,8 +96,7 @@ class Impacts:
                 heapq.heappush(self._queue, (impact.time, *pair.key, next(self._number), impact))
 
     def _foresee(self, pair: Pair, since: float) -> Impact | None:
-        """The pair's next impact: a touch with approach above the threshold; below it, without restitution, if
-        swept."""
+        """The pair's next impact: a touch with approach above the threshold."""
         a, b, settings, dt = pair.a, pair.b, self._settings, self._settings.dt
         e, way = pair.restitution(settings), way_of(pair)
         swept = self._sweeping and is_swept(pair, way, settings)
@@ -128,14 +124,8 @@ class Impacts:
         along, nothing = float(approach @ normal), 0.0
         if self._sweeping:
             nothing = ROUNDING * sum(float(np.linalg.norm(body.path[0])) for body in pair.bodies)
-        gain, left = 0.0, dt - time
         if not along < -pair.threshold(settings) - nothing and pair.pushes:
-            # Too slow to bounce, but a fast body must not end far behind the surface: inelastic impact.
-            curve = float(way.bend @ normal)
-            fast = swept and way.length(left) > FAST * pair.size
-            if not (fast and -(along + curve * left) * left > pair.slop(settings)):
-                return None
-            e, gain = 0.0, max(0.0, -curve * left)
+            return None  # too slow to bounce: a contact at rest
         supported = a.resting_prediction is not None or b.resting_prediction is not None
         if swept and pair.pushes and supported and slides_over(pair, way, met, normal, settings):
             return None
@@ -155,7 +145,7 @@ class Impacts:
         fast, mu = float(np.linalg.norm(sliding)), pair.friction(settings)
         if mu > 0.0 and fast > 0.0:  # Coulomb: at most mu times the normal impulse
             slide = -sliding * min(1.0, -mu * (1.0 + e) * along / fast)
-        return Impact(pair, time, gain - (1.0 + e) * along, normal, slide, (a.impact_count, b.impact_count), kind)
+        return Impact(pair, time, -(1.0 + e) * along, normal, slide, (a.impact_count, b.impact_count), kind)
 
     def _strike(self, impact: Impact) -> None:
         """Apply the impulse to both bodies at the time of impact; they continue with new velocities."""
@@ -170,6 +160,9 @@ class Impacts:
     def _stick(self, impact: Impact) -> list[Body]:
         """An inelastic impact of two clusters, which are merged; returns the movable members."""
         one, two = impact.pair.a.cluster, impact.pair.b.cluster
+        closing = float((one.velocity_at(impact.time) - two.velocity_at(impact.time)) @ impact.normal)
+        impact = replace(impact, speed=min(impact.speed, max(0.0, 2.0 * closing)))  # more would add energy
+        self.done.append(impact)
         for cluster, sign in ((one, -1.0), (two, 1.0)):
             dv = sign * cluster.inverse_mass * impact.impulse * impact.normal
             for body in cluster.members:
@@ -188,7 +181,9 @@ class Impacts:
         the rest of the step on parabolas; none on straight paths, which have the end velocity."""
         dt = self._settings.dt
         fading = 0.5 * dt if self._settings.collision == "event_driven" else dt - time if self._curved else 0.0
-        body.impact_count, body.last = body.impact_count + 1, time
+        body.impact_count += 1
+        if self._sweeping:
+            body.last = time
         body.first_velocity = body.first_velocity + dv
         body.velocity = body.velocity + dv * math.exp(-body.damping * fading)
         body.position = body.position + dv * (dt - time)
@@ -210,8 +205,7 @@ class Impacts:
         if not (self._sweeping and moves and fast and -along * left > pair.slop(self._settings)):
             return None
         ends_up = e <= 0.0 or (e < 1.0 and since <= QUICK * self._settings.dt) or (events and since <= 0.0)
-        one, two = a.cluster, b.cluster
-        return "stick" if ends_up and one is not two and not (one.fixed and two.fixed) else "stop"
+        return "stick" if ends_up and pair.can_stick else "stop"
 
 
 def _overlap(pair: Pair, since: float, settings: Settings) -> tuple[Meeting | None, Touch]:

@@ -11,10 +11,11 @@ import numpy as np
 from ....framework import Settings
 from ...measure.body_shapes import Floats
 from .bodies import Body, Pair
-from .rest import ROUNDING, Kept, Moving, Resting
+from .islands import agree, choose_rigid, islands_of
+from .rest import OPPOSED, RATIO, ROUNDING, Kept, Moving, Resting
 
-LIGHT = 10.0  # mass ratio from which a body between two heavier ones is solved in a 2x2 block
 SHOCK, SHOCK_PASSES, SHOCK_LEFT = 0.01, 16, 0.02  # sizes per step; passes at most; fraction of the largest, to stop
+SHOT = 4.0  # times the fastest closing speed: no light body between heavy ones leaves them faster
 DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap corrected in position, its fraction, limit per step
 
 
@@ -28,7 +29,7 @@ def solve(
     """
     dt, substeps = settings.dt, settings.substeps
     h = dt / substeps
-    bodies = {body: Moving(body, dt) for contact in contacts for body in contact.pair.bodies}
+    bodies = {body: Moving(body, dt, h) for contact in contacts for body in contact.pair.bodies}
     contacts = by_colour(contacts)
     any_unsettled = warm_start(contacts, bodies, memory)
     blocks = find_blocks(contacts)
@@ -37,8 +38,10 @@ def solve(
     stiff = h * omega * damping
     soft = omega / damping, stiff / (1.0 + stiff), 1.0 / (1.0 + stiff)
     sweep = Sweep(contacts, blocks, bodies, h, soft)
+    sweep.measure()
     shock = detect_shock(contacts, bodies, dt) if plastic else 0.0
     for substep in range(substeps):
+        choose_rigid(contacts, bodies, h, shock)
         for body in bodies.values():
             body.velocity = body.velocity + h * body.acceleration
         for contact in contacts:
@@ -48,17 +51,20 @@ def solve(
             sweep.over(propagate(contacts, bodies), biased=False)
             if sweep.largest < SHOCK_LEFT * shock:
                 break
-        sweep.over(contacts, biased=True)
+        sweep.all_over(biased=True)
         for contact in contacts:
             contact.pushed = contact.pushed or contact.impulse > 0.0
         for body in bodies.values():
             body.shift = body.shift + h * body.velocity
+        sweep.measure()
         push_out(contacts, bodies, substeps)
+        sweep.measure()
         for _ in range(4 if substep == substeps - 1 else 2):
-            sweep.over(contacts, biased=False)
+            sweep.all_over(biased=False)
         for contact in contacts:
             contact.total += contact.impulse
             contact.pushed = contact.pushed or contact.impulse > 0.0
+    hold_light(contacts, bodies, dt)
     for contact in contacts:
         contact.pair.impulse += contact.total
         if contact.pushed:
@@ -107,8 +113,9 @@ def detect_shock(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: fl
     for contact in contacts:
         a, b = (bodies[body] for body in contact.pair.bodies)
         speed = float((a.velocity - b.velocity) @ contact.normal)
-        contact.doubtful |= abs(speed * dt - contact.gap) <= ROUNDING * contact.pair.size
-        if speed * dt > max(SHOCK * contact.pair.size, contact.gap):
+        least = max(SHOCK * contact.pair.size, contact.gap)
+        contact.doubtful |= abs(speed * dt - least) <= ROUNDING * contact.pair.size
+        if speed * dt > least:
             largest = max(largest, speed)
             a.unsettled = b.unsettled = True
     return largest
@@ -133,11 +140,34 @@ def push_out(contacts: Sequence[Resting], bodies: dict[Body, Moving], substeps: 
         pair, n = contact.pair, contact.normal
         a, b = bodies[pair.a], bodies[pair.b]
         overlap = -contact.gap - float((b.shift - a.shift) @ n)
-        if overlap > DEEP * pair.size and not contact.parting:
+        if overlap > DEEP * pair.size and not contact.parting and not contact.rigid:
             push = min(PUSH * overlap, PUSH_LIMIT * pair.size) / substeps * pair.mass
             a.shift = a.shift - push * a.inverse_mass * n
             b.shift = b.shift + push * b.inverse_mass * n
             contact.pushed = True
+
+
+def hold_light(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: float) -> None:
+    """A light body that leaves its heaviest partner too fast gives it what it has too much; momentum stays."""
+    partners: dict[Body, list[Body]] = {}
+    for contact in contacts:
+        light = _light_body(contact.pair)
+        if light is not None:
+            partners.setdefault(light, []).append(_other(light, contact.pair))
+    for light, heavy in partners.items():
+        fastest = 0.0
+        for other in heavy:
+            pull = bodies[light].acceleration - bodies[other].acceleration
+            speed = float(np.linalg.norm(light.first_velocity - other.first_velocity))
+            fastest = max(fastest, speed + dt * float(np.linalg.norm(pull)))
+        partner = min(heavy, key=lambda body: body.inverse_mass)
+        one, other = bodies[light], bodies[partner]
+        away = one.velocity - other.velocity
+        speed = float(np.linalg.norm(away))
+        if speed > SHOT * fastest:
+            impulse = away * (1.0 - SHOT * fastest / speed) / (one.inverse_mass + other.inverse_mass)
+            one.velocity = one.velocity - one.inverse_mass * impulse
+            other.velocity = other.velocity + other.inverse_mass * impulse
 
 
 # -- passes -----------------------------------------------------------------------------------------
@@ -154,7 +184,7 @@ def find_blocks(contacts: Sequence[Resting]) -> list[tuple[Resting, Resting]]:
         others = seen.setdefault(light, [])
         for other in reversed(others):
             ends = [_other(light, c.pair) for c in (contact, other)]
-            opposed = float(outwards(contact, light) @ outwards(other, light)) < -0.5
+            opposed = float(outwards(contact, light) @ outwards(other, light)) < OPPOSED
             movable = sum(body.inverse_mass for body in ends) > 0.0
             if opposed and movable and not other.in_block and not contact.in_block:
                 contact.in_block = other.in_block = True
@@ -165,9 +195,9 @@ def find_blocks(contacts: Sequence[Resting]) -> list[tuple[Resting, Resting]]:
 
 def _light_body(pair: Pair) -> Body | None:
     a, b = pair.bodies
-    if a.inverse_mass > 0.0 and a.inverse_mass >= LIGHT * b.inverse_mass:
+    if a.inverse_mass > 0.0 and a.inverse_mass >= RATIO * b.inverse_mass:
         return a
-    return b if b.inverse_mass >= LIGHT * a.inverse_mass else None
+    return b if b.inverse_mass >= RATIO * a.inverse_mass else None
 
 
 def _other(body: Body, pair: Pair) -> Body:
@@ -203,6 +233,36 @@ class Sweep:
             if contact.friction > 0.0:
                 self._solve_friction(contact)
 
+    def all_over(self, biased: bool) -> None:
+        """One pass over the contacts, but islands with rigid ones are solved until they agree; in the pass that pushes
+        first without the contacts that are far open, then all."""
+        self.over([contact for contact in self.contacts if contact.island < 0], biased)
+        islands = islands_of(self.contacts)
+        for near in (DEEP, math.inf) if biased else (math.inf,):
+            for island in islands:
+                active = [c for c in island if (c.pushing if biased else c.opening) * self.h <= near * c.pair.size]
+                partners = [c for block in self.blocks if set(block) & set(active) for c in block if c not in active]
+                agree([*active, *partners], self.bodies, self.h, biased, self.soft[2] / self.soft[1])
+                for contact in island:
+                    if contact.friction > 0.0:
+                        self._solve_friction(contact)
+
+    def measure(self) -> None:
+        """What each contact asks of the velocity along its normal, for the present displacements of the bodies."""
+        for contact in self.contacts:
+            a, b = (self.bodies[body] for body in contact.pair.bodies)
+            size = contact.pair.size
+            room = contact.gap + float((b.shift - a.shift) @ contact.normal)
+            near = ROUNDING * size + self.h * (a.slack + b.slack)
+            if not contact.rigid:  # else nothing changes suddenly there
+                contact.doubtful |= min(abs(room), abs(room + DEEP * size)) <= near
+            contact.opening = contact.pushing = max(0.0, room) / self.h  # it may close within the substep
+            contact.soft = contact.deep = False
+            if room <= 0.0 and not contact.parting:
+                contact.deep = room < -DEEP * size
+                if contact.rigid or not contact.deep:
+                    contact.pushing, contact.soft = self.soft[0] * max(room, -DEEP * size), not contact.rigid
+
     def push(self, contact: Resting, impulse: Floats) -> None:
         """Apply ``impulse`` to b and its opposite to a."""
         a, b = (self.bodies[body] for body in contact.pair.bodies)
@@ -215,15 +275,8 @@ class Sweep:
 
     def _wrong(self, contact: Resting, biased: bool) -> tuple[float, bool]:
         """The velocity error of the contact, and whether it is corrected softly."""
-        a, b = (self.bodies[body] for body in contact.pair.bodies)
-        speed = float((b.velocity - a.velocity) @ contact.normal)
-        separation = contact.gap + float((b.shift - a.shift) @ contact.normal)
-        contact.doubtful |= abs(separation) <= ROUNDING * contact.pair.size
-        if separation > 0.0:  # apart: it may close within the substep
-            return speed + separation / self.h, False
-        if biased and not contact.parting and separation >= -DEEP * contact.pair.size:
-            return speed + self.soft[0] * separation, True
-        return speed, False
+        speed = float(self._velocity(contact) @ contact.normal)
+        return speed + (contact.pushing if biased else contact.opening), biased and contact.soft
 
     def _stop(self, contact: Resting, biased: bool) -> None:
         wrong, softly = self._wrong(contact, biased)

@@ -23,6 +23,7 @@ NEARLY = 1e-9  # of the size: whether a gap this narrow closes is decided by rou
 PARTS = 64  # of a step, within which a parabola counts as straight
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SECTIONS, HALVINGS = 90, 70
+CORNERS = 20  # that are passed on one way
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,12 @@ def is_swept(pair: Pair, way: Way, settings: Settings) -> bool:
     """True if event-driven; else for fast pairs, in a discrete world only if one of the two has ccd."""
     if settings.collision == "event_driven":
         return True
-    asked = settings.collision == "continuous" or pair.a.ccd or pair.b.ccd
-    return asked and way.length(settings.dt) > FAST * pair.size
+    return may_be_swept(pair, settings) and way.length(settings.dt) > FAST * pair.size
+
+
+def may_be_swept(pair: Pair, settings: Settings) -> bool:
+    """True if the pair is swept when it is fast."""
+    return settings.collision != "discrete" or pair.a.ccd or pair.b.ccd
 
 
 def sweep(pair: Pair, way: Way, since: float, settings: Settings) -> Meeting | None:
@@ -84,6 +89,39 @@ def sweep(pair: Pair, way: Way, since: float, settings: Settings) -> Meeting | N
         if there.depth >= 0.0 and not is_corner_touch(a, b, way.at(further), edge):
             return Meeting(time, there, apart)
     return Meeting(time, met, apart, at_corner=True)
+
+
+def enters(pair: Pair, first: Floats, travel: Floats, edge: float, slop: float) -> tuple[float, Floats] | None:
+    """The first touch on the straight way from ``first`` to ``first + travel`` (b's centre from a's), if b gets deeper
+    than ``edge`` behind it: (gap at ``first``, normal) of its plane. None: there is no such touch.
+
+    Touches at corners are passed, in strides of two slops.
+    """
+    a, b, since = pair.a, pair.b, 0.0
+    way, stride = Way(first, travel, np.zeros_like(travel)), 2.0 * slop / float(np.linalg.norm(travel))
+    for _ in range(CORNERS):
+        time = _first_touch(pair, way, since, 1.0) if since < 1.0 else None
+        if time is None:
+            return None
+        met = touch(a, b, way.at(time))
+        rate = float(travel @ met.normal)
+        if not rate < 0.0:
+            return None
+        if is_corner_touch(a, b, way.at(time), slop):
+            since = time + stride
+            continue
+        ahead = time - 2.0 * edge / rate  # there its plane is entered by twice the edge
+        depth = touch(a, b, way.at(ahead)).depth if ahead < 1.0 else -math.inf
+        pair.doubtful = pair.doubtful or abs(ahead - 1.0) <= NEARLY or abs(depth - edge) <= NEARLY * pair.size
+        return (-met.depth - time * rate, met.normal) if depth > edge else None
+    return None
+
+
+def last_leg(pair: Pair) -> Floats:
+    """From a's centre to b's where the last straight part of their way begins: at the later of their last impacts in a
+    world that sweeps, else at the start of the step."""
+    last = max(pair.a.last, pair.b.last)
+    return way_of(pair).at(last) if last > -math.inf else pair.between(pair.a.start, pair.b.start)
 
 
 def slides_over(pair: Pair, way: Way, met: Meeting, normal: Floats, settings: Settings) -> bool:

@@ -1,0 +1,79 @@
+"""Where two bodies are to each other at the start and the end of a step, and where they first touch in between."""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, add_scaled, dot, length, sub
+from ..integration.trajectory import ROUNDING, along, relative_path
+from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
+from ..shapes.tolerances import slop_of
+
+LOOKS = 24
+
+
+@inlined
+def between(bodies, a, b):
+    """From the centre of a's shape to that of b's, where they are now."""
+    position, offset = bodies.position, bodies.offset
+    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
+
+
+@inlined
+def between_at_start(bodies, a, b):
+    """The same where the step starts."""
+    position, offset = bodies.previous_position, bodies.offset
+    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
+
+
+@part
+def meet(state, a, b, d):
+    """The answer of the pair's function: (hit, depth, normal, point)."""
+    shape = state.bodies.shape
+    return evaluate(state, shape[a], a, shape[b], b, d)
+
+
+@part
+def meets_at_corner(state, a, b, d, slop):
+    """Whether the two touch at a corner only."""
+    shape = state.bodies.shape
+    return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
+
+
+@part
+def leg_start(state, a, b):
+    """From a's centre to b's where the last stretch of their way begins: at the later of their last impacts."""
+    bodies = state.bodies
+    d = between_at_start(bodies, a, b)
+    if state.impacts.sweeps and (bodies.impact_count[a] > 0 or bodies.impact_count[b] > 0):
+        since = max(0.0, bodies.last_impact[a], bodies.last_impact[b])
+        d = along(relative_path(state, a, b), since)
+    return d
+
+
+@part
+def touch_on_way(state, a, b, d, travel, edge):
+    """(whether they touch on the way from d to d + travel and get deeper than ``edge``; gap at d, normal and point of
+    that), by conservative advancement; of concave shapes only whether they touch where they are. A touch of corners is
+    none, nor one that only is the edge of the next thing in a row that one of them slides along."""
+    shape, t, nothing = state.bodies.shape, 0.0, zero_of(state)
+    way, slop = length(travel), slop_of(state, a, b)
+    convex = both_convex(state, shape[a], shape[b])
+    _, depth, normal, point = meet(state, a, b, d)
+    for _ in range(LOOKS):
+        rate = dot(travel, normal)
+        if not rate < 0.0:
+            break
+        at, further = add_scaled(d, travel, t), t + depth / rate
+        if depth >= -ROUNDING * length(at) or (not convex and depth >= -slop):
+            further = t + 2.0 * slop / way
+            if not meets_at_corner(state, a, b, at, slop):
+                ahead = t - 2.0 * edge / rate
+                if not ahead < 1.0 or meet(state, a, b, add_scaled(d, travel, ahead))[1] <= edge:
+                    break
+                return True, -depth - t * rate, normal, point
+        if not further < 1.0 or not convex:
+            break
+        t = further
+        _, depth, normal, point = meet(state, a, b, add_scaled(d, travel, t))
+    return False, 0.0, nothing, nothing

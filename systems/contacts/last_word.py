@@ -1,0 +1,113 @@
+"""What cannot be moved has the last word: where the solver has pushed a body into it, or through it, the body is put
+back, and loses the speed that leads there.
+
+The solver knows contacts as planes where the step starts, and shares what its passes leave undone among all of them.
+So a light body between two heavy ones may be shot through a wall that is none of its contacts, or pressed into one a
+little deeper in each step, until it is nearer to the other side.
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import part
+from ...framework.vectors import add_scaled, dot, item, length, sub
+from ..ccd.search_bounds import FAST
+from ..codes import OK
+from ..impacts.impulses import STOPPED
+from ..integration.trajectory import along, path_of
+from ..narrow_phase.stages import is_solid_pair, layers_meet
+from ..shapes.tolerances import smaller_extent
+from .approach import between, leg_start, meet, touch_on_way
+
+ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
+ROUNDS = 4  # over what a body in a corner touches; the last one is for what stands still alone
+KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours of a body are known
+
+
+@part
+def how_deep(state, a, b):
+    """(by how much they overlap more than they may, normal) at the end of the step."""
+    bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
+    d, start = between(bodies, a, b), leg_start(state, a, b)
+    travel = sub(d, start)
+    way = length(travel)
+    _, deep, normal, _ = meet(state, a, b, start)
+    if -deep > way:  # it does not get there
+        return 0.0, normal
+    found = False
+    if way > FAST * extent:
+        found, gap, normal, _ = touch_on_way(state, a, b, start, travel, FAST * extent)
+        depth = -gap - dot(travel, normal)
+    if not found:
+        _, depth, normal, _ = meet(state, a, b, d)
+    return depth - max(deep, ALLOWED * extent), normal
+
+
+@part
+def keep_out(state, a, b):
+    """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
+    that leads there; returns whether it was."""
+    bodies = state.bodies
+    far, normal = how_deep(state, a, b)
+    if not far > 0.0:
+        return False
+    i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
+    bodies.position[i] = add_scaled(bodies.position[i], normal, sign * far)
+    velocity = bodies.linear_velocity[i]
+    if fixed < state.moving:
+        velocity = sub(velocity, bodies.linear_velocity[fixed])
+    closing = sign * dot(velocity, normal)
+    if closing < 0.0:
+        bodies.linear_velocity[i] = add_scaled(bodies.linear_velocity[i], normal, -sign * closing)
+    return True
+
+
+@part
+def is_led(bodies, i):
+    """Whether the solver has moved body i, and no impact has stopped it."""
+    return bodies.held[i] and bodies.impact_count[i] < STOPPED
+
+
+@part
+def is_astray(state, i, dt):
+    """Whether body i is where its neighbours are not known."""
+    bodies = state.bodies
+    at, start, end = bodies.position[i], bodies.previous_position[i], along(path_of(state, i), dt)
+    known, astray = KNOWN * bodies.min_extent[i], False
+    if state.impacts.sweeps:
+        start, end = bodies.search_lower[i], bodies.search_upper[i]
+    for k in range(len(at)):
+        low, high = min(item(start, k), item(end, k)), max(item(start, k), item(end, k))
+        astray |= not low - known <= item(at, k) <= high + known
+    return astray
+
+
+@part
+def keep_out_of_all(state, i):
+    """Body i against everything that cannot be moved."""
+    bodies, moved = state.bodies, False
+    for k in range(state.dynamic, state.count):
+        if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
+            moved |= keep_out(state, i, k)
+    return moved
+
+
+def obey_statics(state, dt):
+    """Put the bodies that the solver has moved out of what cannot be moved."""
+    pairs, bodies = state.pairs, state.bodies
+    if state.solver.contacts == 0:
+        return OK
+    for turn in range(ROUNDS):
+        first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
+        for c in range(pairs.count):
+            a, b = pairs.a[c], pairs.b[c]
+            fixed, i = max(a, b), min(a, b)  # dynamic rows come first
+            if fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(bodies, i):
+                moved |= keep_out(state, a, b)
+        if not moved:
+            break
+    for i in range(state.dynamic if not state.pairs_filtered else 0):
+        if is_led(bodies, i) and is_astray(state, i, dt):
+            for _ in range(ROUNDS):
+                if not keep_out_of_all(state, i):
+                    break
+    return OK

@@ -1,0 +1,59 @@
+"""Bodies that are caught: in a slot little wider than themselves, between a wall that moves and one that stands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers_modes import each_mode
+from worlds import ball, both_dimensions, box, make_world, velocity
+
+DT = 1 / 60
+MODES = ("discrete", "continuous", "event_driven")
+
+
+@each_mode
+@both_dimensions
+@pytest.mark.parametrize("gap", [1e-4, 1e-9, 1e-12])
+def test_a_ball_in_a_slot_little_wider_than_itself_slides_along_it(d, mode, gap):
+    """With restitution 1 it would have up to 1e11 impacts in a step. It stays in the slot, goes along it as if free,
+    and keeps its energy; the impacts that are counted are a thousand at most, and a fault says so."""
+    world = make_world(d, 0.0, collision=mode, dt=DT)
+    for side in (-1.0, 1.0):
+        place, half = np.zeros(d), np.full(d, 50.0)
+        place[0], half[0] = side * (1.5 + 0.5 * gap), 1.0
+        box(world, place, half=half, kind="static", restitution=1.0)
+    speed = np.zeros(d)
+    speed[:2] = 10.0, 3.0
+    caught = ball(world, np.zeros(d), speed, radius=0.5, restitution=1.0)
+    for _ in range(10):
+        world.step()
+        assert len(world.contacts.impacts) <= 1001
+    place = world.bodies.position[world.bodies.row_of(caught)]
+    assert abs(place[0]) <= gap + 1e-12
+    np.testing.assert_allclose(place[1:], [10 * DT * 3.0, *np.zeros(d - 2)], rtol=1e-12)
+    np.testing.assert_allclose(np.abs(velocity(world, caught)), speed, rtol=1e-12)
+    assert any("beyond" in str(fault) for fault in world.faults)
+
+
+@both_dimensions
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("speed", [2.0, 20.0])
+@pytest.mark.parametrize("maker", [ball, box])
+def test_what_a_moving_wall_squeezes_never_passes_one_that_stands(d, mode, speed, maker):
+    """A plastic body is pushed along a floor by a kinematic wall into a static wall of a fifth of its size. The
+    kinematic wall goes on through both; the body stays on its side of the static one, at rest."""
+    world = make_world(d, 9.81, collision=mode, dt=DT)
+    half = np.full(d, 5.0)
+    half[0] = 0.1
+    box(world, np.eye(d)[0] * 3.1, half=half, kind="static")
+    box(world, np.eye(d)[0] * -3.1, np.eye(d)[0] * speed, half=half, kind="kinematic")
+    floor, wide = np.zeros(d), np.full(d, 10.0)
+    floor[1], wide[1] = -1.0, 0.5
+    box(world, floor, half=wide, kind="static")
+    held = maker(world, np.eye(d)[0] * -1.0)
+    size = 0.5
+    for _ in range(round(8.0 / speed / DT)):
+        world.step()
+        assert world.bodies.position[world.bodies.row_of(held)][0] <= 3.0 - size + 0.06
+    assert np.isfinite(velocity(world, held)).all()
+    assert np.abs(velocity(world, held)).max() < 1e-6
