@@ -64,6 +64,7 @@ figures: $(BENCH)
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
 	$(BIN)/carom limits --long --into docs/limits.md --out docs/pictures
+	$(BIN)/carom limits --pairs --into docs/limits.md
 	$(BIN)/carom settings --into docs/settings.md
 	$(BIN)/carom settings --games --into docs/settings.md
 	$(BIN)/carom geometry --into docs/levels.md --out docs/pictures

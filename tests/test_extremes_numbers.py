@@ -170,7 +170,7 @@ def test_c12_huge_velocities(d):
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e5, 1e7, 1e9])
-def test_head_on_far_from_the_origin(offset):
+def test_c6_head_on_far_from_the_origin(offset):
     """The exchange is exact at any offset; its position is known to an ulp of the offset."""
     world = make_world()
     a, b = ball(world, offset - 0.6, 1.0, restitution=1.0), ball(world, offset + 0.6, -1.0, restitution=1.0)
@@ -179,7 +179,7 @@ def test_head_on_far_from_the_origin(offset):
     assert position(world, a)[0] - offset == pytest.approx(-0.5 - (0.5 - 0.1), abs=40 * EPS * (1 + offset))
 
 
-def test_sizes_from_1e_minus_9_to_1e9():
+def test_c4_sizes_from_1e_minus_9_to_1e9():
     """C4, impact as in B9: a speck of 1e-9 and a moon of 1e9 meet at the moon's surface, 2 m1 / m2 = 2e-54."""
     world = make_world()
     moon = ball(world, (0.0, -1e9), radius=1e9, mass=1e27, restitution=1.0)

@@ -191,7 +191,7 @@ def test_a_teleport_restarts_interpolation(kind):
 
 
 @pytest.mark.parametrize("cap", [1, 8, 299, 300, 1000])
-def test_a_frame_of_five_seconds(cap):
+def test_c26_a_frame_of_five_seconds(cap):
     """C26: at most max_steps_per_advance steps; other whole steps are dropped and counted, the rest of a step stays."""
     world = make_world(max_steps_per_advance=cap)
     steps = min(cap, 300)
@@ -244,7 +244,7 @@ def test_steps_that_are_none_are_refused(dt):
 # -- time ----------------------------------------------------------------------------------------
 
 
-def test_time_gathers_no_rounding():
+def test_c7_time_gathers_no_rounding():
     """C7: a million steps of 1/60 (summed one by one they would be off by 1.6e-7 s)."""
     clock = Clock(1 / 60)
     taken = sum(clock.gather(1 / 60, 8) for _ in range(1_000_000))
@@ -348,7 +348,7 @@ def test_frames_after_a_step_that_failed():
 
 
 @pytest.mark.parametrize("dt", [1e-9, 1e-6, 0.25, 1.0, 10.0])
-def test_extreme_steps_of_the_clock(dt):
+def test_c7_extreme_steps_of_the_clock(dt):
     """C7: frames of two and a half steps of any length."""
     world = make_world(dt=dt, gravity=9.81)
     world.create_entity(Transform((0, 0)), RigidBody())

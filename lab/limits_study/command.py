@@ -1,4 +1,4 @@
-"""``carom limits``: where carom fails, one axis at a time; and the longest safe step of a scene."""
+"""``carom limits``: where carom fails, one axis at a time or two; and the longest safe step of a scene."""
 
 from __future__ import annotations
 
@@ -30,20 +30,28 @@ from ..plugins_check.installed import plugin_named
 from ..reporting.output import Output
 from ..reporting.progress_bar import Bar, Progress
 from . import report as limits_report
+from .pairs import report as pairs_report
+from .pairs.axes import Draw
+from .pairs.scenes import played
+from .pairs.sweep import QUICK_SCENES, SCENES, pair_limits
 from .step_length import StepLimits, step_limits
 from .sweep import AXES, limits
 
 LOOKS = 20  # times that a running scene is examined
 DEFAULT_SECONDS = 10.0  # for a file that does not define it
-MARK = "carom limits"
+MARK, PAIRS_MARK = "carom limits", "carom limits --pairs"
 NAMES = tuple(axis.name for axis in AXES)
 
 
 @click.command("limits", short_help="Where carom fails; how long a scene's step may be.")
 @click.argument("target", metavar="[SCENE|FILE.py]", required=False)
 @click.option("--axes", "axis_names", metavar="NAME,NAME", help=f"Only these of {', '.join(NAMES)}.")
-@click.option("--quick", is_flag=True, help="Fewer values on each axis: about a minute.")
+@click.option("--quick", is_flag=True, help="Fewer values on each axis: about a minute; few scenes of --pairs.")
 @click.option("--long", "long_runs", is_flag=True, help="Runs of a million steps too: about ten minutes more.")
+@click.option("--pairs", is_flag=True, help=f"Cross the axes in pairs: {SCENES:,} short random scenes, some minutes.")
+@click.option("--scenes", type=click.IntRange(min=1), metavar="N", help="With --pairs: so many scenes.")
+@click.option("--play", type=click.IntRange(min=0), metavar="N", help="Play scene N of --pairs alone, and describe it.")
+@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes of --pairs (default: one a core).")
 @out_option("Draw a picture into this folder.")
 @shown_options
 @click.option(
@@ -59,6 +67,10 @@ def limits_command(
     axis_names: str | None,
     quick: bool,
     long_runs: bool,
+    pairs: bool,
+    scenes: int | None,
+    play: int | None,
+    workers: int | None,
     as_json: bool,
     as_markdown: bool,
     into: Path | None,
@@ -73,9 +85,33 @@ def limits_command(
     """Sweep one thing at a time until carom fails: the step, stiffness, speeds, ratios of masses and sizes, distance
     from the origin, towers, crowds, duration. Prints where the error passes 1 % and 10 %, and where it breaks.
 
+    With --pairs: random scenes that cross these axes in pairs; prints what went wrong in each mode, and where.
+
     With a scene, or a file that defines build(settings, seed=0): how long its step may be, and what limits it.
     """
     del traceback  # seen by Commands.main
+    crossing = pairs or play is not None
+    if not crossing:
+        _refuse({"--scenes": scenes is not None, "--workers": workers is not None}, "needs --pairs")
+    elif target is not None:
+        _refuse({"--pairs": pairs, "--play": play is not None}, "is for the sweep, without a scene")
+    if crossing:
+        of_others = {
+            "--axes": axis_names is not None, "--long": long_runs, "--out": out is not None,
+            "--seconds": seconds is not None, "--settings": preset_name is not None, "--set": bool(assignments),
+            "--plugin": bool(plugins),
+        }  # fmt: skip
+        _refuse(of_others, "does not go with --pairs or --play")
+        if play is not None:
+            _refuse({"--scenes": scenes is not None, "--into": into is not None}, "does not go with --play")
+            _play(seed_number(seed), play, as_json)
+            return
+        if quick and scenes is not None:
+            raise Problem("--quick and --scenes exclude each other")
+        wanted = scenes or (QUICK_SCENES if quick else SCENES)
+        output = Output.checked(PAIRS_MARK, as_json, as_markdown, into, None)
+        _cross(wanted, seed_number(seed), workers, output)
+        return
     if target is None:
         of_scene = {
             "--seconds": seconds is not None, "--settings": preset_name is not None, "--set": bool(assignments),
@@ -117,6 +153,22 @@ def _sweep(axis_names: str | None, quick: bool, long_runs: bool, output: Output)
         result = limits(names, progress=bar, quick=quick, long=long_runs)
     output.show(result, limits_report.tables(result), limits_report.remarks(result))
     output.draw("draw_limits", result)
+
+
+def _cross(scenes: int, seed: int, workers: int | None, output: Output) -> None:
+    with Bar(Console(stderr=True)) as bar:
+        result = pair_limits(scenes, seed, workers, bar)
+    output.show(result, pairs_report.tables(result), pairs_report.remarks(result))
+
+
+def _play(seed: int, number: int, as_json: bool) -> None:
+    draw = Draw.of(seed, number)
+    outcome = played(draw)
+    if as_json:
+        plain = {"scene": dataclasses.asdict(draw), "outcome": dataclasses.asdict(outcome)}
+        click.echo(json.dumps(plain, indent=2))
+    else:
+        click.echo(pairs_report.described(draw, outcome))
 
 
 def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -> list[tuple[float, StepLimits]]:
