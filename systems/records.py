@@ -248,7 +248,6 @@ SOLVER = Schema(
     far=floats(),
     worst=floats(),
     stopper=ints("int32"),
-    passes=integer(),
     islands_known=flag(),
     light_of=ints("int32"),
     before=ints("int32"),

@@ -275,7 +275,6 @@ def converge(solver, bias, softness, pushes, near, h):
         start_pass(solver, bias, give, near, h)
         solve_normals(solver, bias, softness, pushes, True)
         solve_blocks(solver, bias, True)
-        solver.passes += 1
         if not close_settled(solver, turn):
             break
         make_conjugate(solver, give)
