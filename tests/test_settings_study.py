@@ -37,6 +37,7 @@ from carom.lab.settings_study.clock import costs
 from carom.lab.settings_study.records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
 from carom.lab.settings_study.study import VARIED, measured
 from carom.scenes import drops, jump, stack
+from carom.systems.contacts.resting import OWN_SAG
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
@@ -108,12 +109,15 @@ def test_twice_the_steps_are_twice_the_work():
 
 @pytest.mark.parametrize("field", ["dt", "substeps"])
 def test_a_tower_gives_way_with_the_square_of_the_substep(field):
-    """load |a| / (m w^2), w = 2 pi substeps / 4 dt: largest between the lowest two, under nine boxes, m = 1/2."""
+    """load |a| / (m w^2), w = 2 pi substeps / 4 dt: largest between the lowest two, under nine boxes, m = 1/2; where
+    one box alone would sink in by 0.03 % of its size, contacts are rigid."""
     varied = EVERY[field, "stack of 10"]
     for value, found in zip(varied.values, errors(field, "stack of 10"), strict=True):
         settings = varied.base.replace(**{field: value})
         w = math.pi / 2 * settings.substeps / settings.dt
-        assert found["overlap"] == pytest.approx(100 * (stack.BODIES - 1) * stack.GRAVITY / (0.5 * w * w), rel=1e-3)
+        sag = stack.GRAVITY / (w * w)
+        soft = 100 * (stack.BODIES - 1) * 2 * sag if sag <= OWN_SAG else 0.0
+        assert found["overlap"] == pytest.approx(soft, rel=1e-3, abs=1e-6)
         assert found["speed"] < 1.0  # mm/s
 
 

@@ -62,9 +62,12 @@ def keep_out(state, a, b):
 
 
 @part
-def is_led(bodies, i):
-    """Whether the solver has moved body i, and no impact has stopped it."""
-    return bodies.held[i] and bodies.impact_count[i] < STOPPED
+def is_led(state, i):
+    """Whether contacts at rest have moved body i, now or in the prediction, and no impact has stopped it."""
+    bodies = state.bodies
+    if bodies.impact_count[i] >= STOPPED:
+        return False
+    return (state.any_support and bodies.supported[i]) or (state.solver.contacts > 0 and bodies.held[i])
 
 
 @part
@@ -94,19 +97,19 @@ def keep_out_of_all(state, i):
 def obey_statics(state, dt):
     """Put the bodies that the solver has moved out of what cannot be moved."""
     pairs, bodies = state.pairs, state.bodies
-    if state.solver.contacts == 0:
+    if state.solver.contacts == 0 and not state.any_support:
         return OK
     for turn in range(ROUNDS):
         first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(bodies, i):
+            if fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i):
                 moved |= keep_out(state, a, b)
         if not moved:
             break
     for i in range(state.dynamic if not state.pairs_filtered else 0):
-        if is_led(bodies, i) and is_astray(state, i, dt):
+        if is_led(state, i) and is_astray(state, i, dt):
             for _ in range(ROUNDS):
                 if not keep_out_of_all(state, i):
                     break

@@ -8,27 +8,28 @@ from ...framework.vectors import add, add_scaled, dot, length, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_caught
-from ..shapes.dispatch import mix, mix_friction
+from ..shapes.dispatch import both_convex, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .approach import between, between_at_start, leg_start, meet, meets_at_corner, touch_on_way
 from .softness import SAG
 
 ENTRY_ITERATIONS = 24
-OWN_SAG = 0.0003  # of the extent: a contact that would sag more under one body alone is rigid
+OWN_SAG = 0.0003  # of the extent: a contact that would sag more under one body alone is rigid;
+CONCAVE_SAG = 0.001  # one of concave shapes, which stands for all sides where they touch, by turns
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
 SAME_PLACE = 1e-9  # of the extent: a gap of rounding errors is none
 
 
 @part
-def far_touch(state, dt, a, b):
-    """As :func:`touch_on_way`, on the last stretch of the way of a pair that goes so far on it that its end may say
-    nothing; the gap is that at the start of the step.
+def far_touch(state, dt, a, b, end):
+    """As :func:`touch_on_way`, on the last stretch of the way of a pair, to ``end``, that goes so far on it that its
+    end may say nothing; the gap is that at the start of the step.
 
     In a discrete world only as far as forces lead: who is faster than that passes through what is thin.
     """
     bodies, edge, nothing = state.bodies, FAST * smaller_extent(state.bodies, a, b), zero_of(state)
     d, margin = leg_start(state, a, b), contact_margin(state, dt, a, b)
-    travel = sub(between(bodies, a, b), d)
+    travel = sub(end, d)
     way = length(travel)
     if not (way > edge and (is_swept(state, a, b, way) or way <= margin)):
         return False, 0.0, nothing, nothing
@@ -37,15 +38,25 @@ def far_touch(state, dt, a, b):
 
 
 @part
-def meet_without_support(state, dt, a, b):
-    """(depth, normal) where free flight alone would lead: the resting prediction may push too much."""
+def without_support(state, dt, a, b):
+    """From the centre of a's shape to that of b's where free flight alone would lead: the resting prediction may push
+    too much."""
     bodies, travelled = state.bodies, state.force_travels * dt
     free = between(bodies, a, b)
     if bodies.supported[a]:
         free = add_scaled(free, bodies.support_change[a], travelled)
     if bodies.supported[b]:
         free = add_scaled(free, bodies.support_change[b], -travelled)
-    _, depth, normal, _ = meet(state, a, b, free)
+    return free
+
+
+@part
+def deepest(state, dt, a, b, end):
+    """(depth at ``end``, normal) by the plane where the pair first touches on a long way there, else by its end."""
+    far, gap, normal, _ = far_touch(state, dt, a, b, end)
+    if far:
+        return -gap - dot(sub(end, between_at_start(state.bodies, a, b)), normal), normal
+    _, depth, normal, _ = meet(state, a, b, end)
     return depth, normal
 
 
@@ -96,14 +107,11 @@ def is_resting(state, dt, c):
     if not near and not hit and not carried:
         return False
     d = between(bodies, a, b)
-    _, depth, normal, _ = meet(state, a, b, d)
-    far, gap, plane, _ = far_touch(state, dt, a, b)
-    if far:
-        normal, depth = plane, -gap - dot(sub(d, between_at_start(bodies, a, b)), plane)
+    depth, normal = deepest(state, dt, a, b, d)
     if depth < -margin:
         if hit or not carried:
             return False
-        depth, normal = meet_without_support(state, dt, a, b)
+        depth, normal = deepest(state, dt, a, b, without_support(state, dt, a, b))
         if depth < -margin:
             return False
     if depth >= 0.0:
@@ -167,7 +175,7 @@ def linearise(state, dt):
         _, depth, normal, point = meet(state, a, b, d)
         gap = -depth
         if depth < 0.0 or parting != STAYS or meets_at_corner(state, a, b, d, slop):
-            far, gap, normal, point = far_touch(state, dt, a, b)
+            far, gap, normal, point = far_touch(state, dt, a, b, between(bodies, a, b))
             if not far or parting != STAYS:
                 travel = sub(between(bodies, a, b), d)
                 gap, normal, point = entry(state, a, b, d, travel, parting != STAYS, slop)
@@ -181,7 +189,8 @@ def linearise(state, dt):
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = smaller_extent(bodies, a, b)
         weight = SAG * max(bodies.force_speed_change[a], bodies.force_speed_change[b]) * dt
-        solver.rigid[k] = weight > OWN_SAG * state.substeps * state.substeps * solver.extent[k]
+        most = OWN_SAG if both_convex(state, bodies.shape[a], bodies.shape[b]) else CONCAVE_SAG
+        solver.rigid[k] = weight > most * state.substeps * state.substeps * solver.extent[k]
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu
         has_friction |= mu != 0.0

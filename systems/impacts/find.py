@@ -156,8 +156,11 @@ def correct_speed(state, a, b, touch, speed, dt):
     their flight then runs backwards exactly, and nothing drifts."""
     bodies, (t, normal, _, _) = state.bodies, touch
     velocity, start = bodies.linear_velocity, bodies.start_velocity
-    bend = sub(sub(velocity[b], start[b]), sub(velocity[a], start[a]))
-    return min(0.0, speed + dot(bend, normal) * (t / dt - 0.5))
+    bend = dot(sub(sub(velocity[b], start[b]), sub(velocity[a], start[a])), normal)
+    if state.any_support and (bodies.supported[a] or bodies.supported[b]):  # what pushed in the last step is no force
+        forced = bodies.force_speed_change[a] + bodies.force_speed_change[b]
+        bend = min(max(bend, -forced), forced)
+    return min(0.0, speed + bend * (t / dt - 0.5))
 
 
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):

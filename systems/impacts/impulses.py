@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
@@ -21,7 +21,7 @@ STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a
 # Kinds of events: an impact, one that no cap counts, two beyond the cap, a crossing of what does not push, and one of
 # what is caught between two walls.
 BOUNCE, FREE, STICK, STOP, CROSS, SLIDE = range(6)
-FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what cannot be moved
+FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
 
 @part
@@ -58,6 +58,12 @@ def log_impact(state, event, impulse):
     impacts.logged += 1
 
 
+@inlined
+def stands_still(bodies, i):
+    """Whether body i neither can be moved nor moves by itself."""
+    return bodies.inverse_mass[i] == 0.0 and length(bodies.path_velocity[i]) == 0.0
+
+
 @part
 def bounce(state, event, dt):
     """One impact: both bodies get their impulse now, and the rest of the step with the new velocities."""
@@ -74,7 +80,7 @@ def bounce(state, event, dt):
             bodies.impact_count[i] += 1
             bodies.counted_impacts[i] += 1 if impacts.event_kind[event] == BOUNCE else 0
             if impacts.sweeps:
-                bodies.caught[i] = bodies.caught[i] + 1 if inverse_mass[a + b - i] == 0.0 else 0
+                bodies.caught[i] = bodies.caught[i] + 1 if stands_still(bodies, a + b - i) else 0
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
     log_impact(state, event, impacts.event_change[event] * mass)
 
@@ -160,10 +166,10 @@ def is_deflected(state, i):
 
 @part
 def is_caught(state, a, b):
-    """Whether one of the two bounces for ever between things that cannot be moved, of which the other is one."""
-    caught, inverse_mass = state.bodies.caught, state.bodies.inverse_mass
+    """Whether one of the two bounces for ever between things that stand still, of which the other is one."""
+    bodies, caught = state.bodies, state.bodies.caught
     most = CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))
-    return (caught[a] >= most and inverse_mass[b] == 0.0) or (caught[b] >= most and inverse_mass[a] == 0.0)
+    return (caught[a] >= most and stands_still(bodies, b)) or (caught[b] >= most and stands_still(bodies, a))
 
 
 @part

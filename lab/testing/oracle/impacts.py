@@ -130,8 +130,10 @@ class Impacts:
         if swept and pair.pushes and supported and slides_over(pair, way, met, normal, settings):
             return None
         if not self._curved and e != 1.0:  # a straight path has the true velocity only in its middle
-            bend = (b.velocity - b.first_velocity) - (a.velocity - a.first_velocity)
-            along = min(0.0, along + float(bend @ normal) * (time / dt - 0.5))
+            bend = float(((b.velocity - b.first_velocity) - (a.velocity - a.first_velocity)) @ normal)
+            if supported:  # by the pushes of the last step, which may be far more than forces make
+                bend = min(max(bend, -a.gained - b.gained), a.gained + b.gained)
+            along = min(0.0, along + bend * (time / dt - 0.5))
             if self._sweeping and pair.pushes and not along < -nothing:
                 return None  # no approach at the true velocity
         kind = self._kind(pair, e, time, along, way)

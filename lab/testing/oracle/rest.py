@@ -92,22 +92,19 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     carried = a.resting_prediction is not None or b.resting_prediction is not None
     if a.stopped or b.stopped:
         return None
-    far = far_touch(pair, settings)
+    apart = pair.between(a.position, b.position)
+    far = far_touch(pair, apart, settings)
     free_flight = not struck and not carried
     if free_flight and pair.depth < -margin and not (far and _meets_in_flight(pair, settings)):
         return None
-    apart = pair.between(a.position, b.position)
-    now = touch(a, b, apart)
-    if far is not None:  # the end of a long way may be behind what it leads into
-        travel = apart - pair.between(a.start, b.start)
-        now = replace(now, depth=-far[0] - float(travel @ far[1]), normal=far[1])
+    now = _deepest(pair, apart, settings)
     if now.depth < -margin:
         if struck or not carried:
             return None
         # The resting prediction may push too much: do they meet without it?
         places = ((a, a.position), (b, b.position))
         free = [x if (dv := body.resting_prediction) is None else x - travels * dt * dv for body, x in places]
-        now = touch(a, b, pair.between(*free))
+        now = _deepest(pair, pair.between(*free), settings)
         if now.depth < -margin:
             return None
     bounced, at_end, parting = pair.impulse > 0.0, False, False
@@ -133,11 +130,20 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     return Resting(pair, normal, gap, parting, pair.friction(settings), np.zeros_like(normal), rigid=rigid)
 
 
-def far_touch(pair: Pair, settings: Settings) -> tuple[float, Floats] | None:
-    """(gap at the start of the step, normal) of what two bodies first touch on the last part of their way, if that is
-    so long that its end may be behind it. Without sweeping only ways count that forces alone make."""
+def _deepest(pair: Pair, end: Floats, settings: Settings) -> Touch:
+    """The touch at ``end``; on a long way there its depth and normal are those of what they first touch."""
+    far, now = far_touch(pair, end, settings), touch(pair.a, pair.b, end)
+    if far is None:
+        return now
+    travel = end - pair.between(pair.a.start, pair.b.start)
+    return replace(now, depth=-far[0] - float(travel @ far[1]), normal=far[1])
+
+
+def far_touch(pair: Pair, end: Floats, settings: Settings) -> tuple[float, Floats] | None:
+    """(gap at the start of the step, normal) of what two bodies first touch on the last part of their way to ``end``,
+    if that is so long that its end may be behind it. Without sweeping only ways count that forces alone make."""
     margin, first = pair.margin(settings), last_leg(pair)
-    travel = pair.between(pair.a.position, pair.b.position) - first
+    travel = end - first
     way, edge = float(np.linalg.norm(travel)), FAST * pair.size
     if not (way > edge and (may_be_swept(pair, settings) or way <= margin)):
         return None

@@ -16,10 +16,10 @@ ROUNDS = 4  # over what a body touches; the last one is for static bodies alone
 KNOWN = 0.05  # of the size: so far around its path the neighbours of a body are known
 
 
-def obey_statics(held: Iterable[Body], bodies: Sequence[Body], pairs: Sequence[Pair], settings: Settings) -> None:
-    """Put the ``held`` bodies out of what cannot be moved; bodies and pairs are in canonical order."""
+def obey_statics(led: Iterable[Body], bodies: Sequence[Body], pairs: Sequence[Pair], settings: Settings) -> None:
+    """Put these bodies out of what cannot be moved; bodies and pairs are in canonical order."""
     immovable = [body for body in bodies if body.inverse_mass == 0.0]
-    for body in held:
+    for body in led:
         if body.stopped:
             continue
         near = [pair for pair in pairs if body in pair.bodies and pair.pushes and _fixed(pair, body) in immovable]

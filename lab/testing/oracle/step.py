@@ -189,7 +189,8 @@ class Oracle:
                 if not body.stopped:
                     body.position = body.position - travels * self.settings.dt * body.resting_prediction
                 body.velocity = body.velocity - body.resting_prediction
-        obey_statics(held, self.bodies, pairs, self.settings)
+        led = {body for body in self.bodies if body in held or body.resting_prediction is not None}
+        obey_statics([body for body in self.bodies if body in led], self.bodies, pairs, self.settings)
         self.doubts += [pair.key for pair in pairs if pair.doubtful]
         self._memory = {
             contact.pair.key: Kept(contact.normal, contact.impulse, contact.tangent, contact.total)
