@@ -7,13 +7,12 @@ import math
 import esper
 import numpy as np
 import pytest
-from helpers_processes import run_python
 from worlds import ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, StepError, System
 
-from .helpers_poison import column_of, complaints, rest_of, scenes, told
+from .helpers_poison import column_of, rest_of, told
 
 MODES = ("discrete", "continuous", "event_driven")
 each_mode = pytest.mark.parametrize("mode", MODES)
@@ -327,22 +326,3 @@ def test_too_far_from_the_origin_to_move(d, mode):
     assert position(world, near)[0] > 1e9
     assert position(world, slow)[0] == 5.0
     assert position(world, still)[0] == 1e15
-
-
-# -- everything, everywhere ----------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "build"), list(scenes()), ids=[name for name, _ in scenes()])
-def test_every_value_in_every_column_of_every_body(name, build):
-    """nan, inf, -inf and -1: others stay finite, and as if it was deleted if a fault names the body."""
-    assert list(complaints(build)) == []
-
-
-@pytest.mark.slow
-def test_no_kernel_leaves_its_arrays():
-    """The same for some bodies in the build that checks every index."""
-    source = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
-    result = run_python(source, 7, CAROM_CHECK="1")
-    assert result.returncode == 0, result.stderr
-    assert result.stdout == ""
