@@ -16,10 +16,10 @@ os.environ["CAROM_CACHE_DIR"] = str(CACHE)  # before anything imports carom, and
 
 # Files that take long begin first, so that no worker is left with one at the end.
 LONG = (
-    "test_tune_grid", "test_wheel", "test_checked_build", "test_nobody_leaves", "test_trade", "test_oracle_modes",
-    "test_tune", "test_quarantine_everywhere", "test_extremes_duration", "test_piles", "test_plugin_package",
-    "test_docs", "test_settings_study", "test_gas_modes", "test_trade_resume", "test_trade_command", "test_limits",
-    "test_orbits", "test_plain_python",
+    "test_nobody_leaves", "test_tune_grid", "test_checked_build", "test_wheel", "test_trade",
+    "test_quarantine_everywhere", "test_extremes_duration", "test_oracle_modes", "test_tune", "test_piles",
+    "test_plugin_package", "test_docs", "test_settings_study", "test_gas_modes", "test_trade_resume",
+    "test_trade_command", "test_limits", "test_orbits", "test_plain_python",
 )  # fmt: skip
 
 
