@@ -18,7 +18,7 @@ def cases():
         yield pytest.param(build, slice(MODES.index(mode) % SHARES[kind], None, SHARES[kind]), id=name)
 
 
-@pytest.mark.parametrize(("build", "victims"), cases())
+@pytest.mark.parametrize(("build", "victims"), list(cases()))
 def test_every_value_in_every_column_of_every_body(build, victims):
     """nan, inf, -inf and -1: others stay finite, and as if it was deleted if a fault names the body."""
     assert list(complaints(build, victims)) == []
