@@ -57,3 +57,22 @@ def test_what_a_moving_wall_squeezes_never_passes_one_that_stands(d, mode, speed
         assert world.bodies.position[world.bodies.row_of(held)][0] <= 3.0 - size + 0.06
     assert np.isfinite(velocity(world, held)).all()
     assert np.abs(velocity(world, held)).max() < 1e-6
+    no_room = f"no room for 1 squeezed bodies, the first is entity {held}"
+    assert any(no_room in fault or "impacts beyond" in fault for fault in world.faults)
+
+
+@each_mode
+@both_dimensions
+def test_what_a_moving_wall_drives_to_and_fro_has_a_last_impact(d, mode):
+    """An elastic ball gains twice the wall's speed per turn, ever sooner: without a bound the step would not end."""
+    world = make_world(d, 0.0, collision=mode, dt=DT)
+    half = np.full(d, 5.0)
+    half[0] = 0.5
+    box(world, np.eye(d)[0] * 2.0, half=half, kind="static", restitution=1.0)
+    box(world, np.eye(d)[0] * -2.0, np.eye(d)[0] * 5.0, half=half, kind="kinematic", restitution=1.0)
+    driven = ball(world, np.zeros(d), np.eye(d)[0] * 3.0, radius=0.5, restitution=1.0)
+    for _ in range(40):
+        world.step()
+        assert len(world.contacts.impacts) <= 1001
+        assert world.bodies.position[world.bodies.row_of(driven)][0] <= 1.05
+    assert world.faults

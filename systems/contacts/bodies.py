@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, scale, sub
+from ...framework.vectors import add, add_scaled, length, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from .resting_prediction import drop_support
 
 COLOURS = 62  # bits of a mask; contacts beyond share the last
+MOST_THROW = 2.0  # times the speed around it: what the solver may give a body in a discrete world
+
+
+@part
+def note_squeezed(solver, i):
+    """There is no room for body i where it is pushed: a fault will name the first of them."""
+    if solver.squeezed == 0:
+        solver.squeezed_row = i
+    solver.squeezed += 1
 
 
 @part
@@ -102,9 +111,39 @@ def gather(state, dt):
     return OK
 
 
+@part
+def bound_throws(state, dt):
+    """Heavy bodies may squeeze a light one out between them at many times their speed, and in a discrete world what is
+    that fast passes through walls. So the solver makes no body go farther in a step than its own extent, or than
+    MOST_THROW times as far as it and those that it touches went."""
+    solver, bodies, any_far = state.solver, state.bodies, False
+    speed, fastest = solver.worst, solver.far
+    for q in range(solver.bodies):
+        far = max(length(solver.shift[q]), length(solver.velocity[q]) * dt)
+        any_far |= solver.inverse_mass[q] > 0.0 and far > bodies.min_extent[solver.body_row[q]]
+    if not any_far:
+        return
+    for q in range(solver.bodies):
+        i = solver.body_row[q]
+        before = length(bodies.start_velocity[i]) if i < state.moving else 0.0
+        speed[q] = fastest[q] = before + length(solver.acceleration[q]) * dt
+    for k in range(solver.contacts):
+        a, b = solver.first[k], solver.second[k]
+        fastest[a], fastest[b] = max(fastest[a], speed[b]), max(fastest[b], speed[a])
+    for q in range(solver.bodies):
+        i, way, rate = solver.body_row[q], length(solver.shift[q]), length(solver.velocity[q]) * dt
+        most = max(bodies.min_extent[i], MOST_THROW * fastest[q] * dt)
+        if solver.inverse_mass[q] > 0.0 and max(way, rate) > most:
+            solver.shift[q] = scale(solver.shift[q], min(1.0, most / way) if way > 0.0 else 1.0)
+            solver.velocity[q] = scale(solver.velocity[q], min(1.0, most / rate) if rate > 0.0 else 1.0)
+            note_squeezed(solver, i)
+
+
 def put_back(state, dt):
     """Bodies that some contact pushed take what the solver says; without the predicted support they fly free."""
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
+    if solver.contacts > 0 and not state.sweeping:
+        bound_throws(state, dt)
     for r in range(solver.contacts):
         k = solver.slot[r]
         pairs.impulse[pairs.resting[r]] += solver.total[k]

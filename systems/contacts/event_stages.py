@@ -60,5 +60,6 @@ def compare_contacts(state, dt):
             j += 1
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
-    state.news = ends + begins + state.impacts.logged + state.impacts.capped + (stays if state.stay_wanted else 0)
+    faults = state.impacts.capped + state.solver.squeezed
+    state.news = ends + begins + state.impacts.logged + faults + (stays if state.stay_wanted else 0)
     return OK

@@ -160,10 +160,16 @@ class ContactEvents(StagedSystem):
 
     def _defer(self, dt: float) -> None:
         """Nobody looks within the step: what has happened is recorded when it is read."""
-        self._report_capped()
+        self._report_faults()
         self._contacts.defer(self._record)
 
-    def _report_capped(self) -> None:
+    def _report_faults(self) -> None:
+        solver, bodies = self._state.solver, self._state.bodies
+        if solver.squeezed:
+            self.world.report_fault(
+                f"step {self.world.step_count}: no room for {solver.squeezed} squeezed bodies, the first is entity "
+                f"{bodies.entity[solver.squeezed_row]}"
+            )
         if self._impacts.capped:
             self.world.report_fault(
                 f"step {self.world.step_count}: {self._impacts.capped} impacts beyond {self._settings().impact_cap} "
@@ -181,7 +187,7 @@ class ContactEvents(StagedSystem):
 
     def _tell(self, dt: float) -> None:
         """Note it and call the handlers."""
-        self._report_capped()
+        self._report_faults()
         self._record()
         source, events = self._source, self.world.events
         begin = source.began() if events.wanted("contact_begin") else None

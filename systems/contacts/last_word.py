@@ -17,6 +17,7 @@ from ..integration.trajectory import along, path_of
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..shapes.tolerances import smaller_extent
 from .approach import between, leg_start, meet, touch_on_way
+from .bodies import note_squeezed
 
 ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
 ROUNDS = 4  # over what a body in a corner touches; the last one is for what stands still alone
@@ -104,8 +105,10 @@ def obey_statics(state, dt):
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i):
-                moved |= keep_out(state, a, b)
+            if fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i) and keep_out(state, a, b):
+                moved = True
+                if turn == ROUNDS - 1:
+                    note_squeezed(state.solver, i)
         if not moved:
             break
     for i in range(state.dynamic if not state.pairs_filtered else 0):
