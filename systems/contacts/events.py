@@ -165,6 +165,10 @@ class ContactEvents(StagedSystem):
 
     def _report_faults(self) -> None:
         solver, bodies = self._state.solver, self._state.bodies
+        if self._state.hasty:
+            self.world.report_fault(
+                f"entity {bodies.entity[self._state.hasty_row]}: so fast that discrete collisions may miss what it passes"
+            )
         if solver.squeezed:
             self.world.report_fault(
                 f"step {self.world.step_count}: no room for {solver.squeezed} squeezed bodies, the first is entity "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import inlined, part
 from ...framework.vectors import length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
@@ -77,6 +79,22 @@ def is_solid_pair(state, a, b):
     return not passive and inverse_mass[a] + inverse_mass[b] > 0.0
 
 
+@part
+def find_hasty(state, dt):
+    """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
+    no pair is swept, the two may have passed through each other."""
+    bodies, farthest, thinnest = state.bodies, 0.0, math.inf
+    state.hasty = False
+    for i in range(state.count if state.moved and not state.sweeping else 0):
+        if bodies.shape[i] >= 0:
+            extent = bodies.min_extent[i]
+            thinnest = min(thinnest, extent if extent > 0.0 else math.inf)
+            beyond = length(bodies.start_velocity[i]) * dt - extent
+            if beyond > farthest:
+                farthest, state.hasty_row = beyond, i
+    state.hasty = farthest > thinnest
+
+
 def select_pairs(state, dt):
     """The candidates whose layers meet become pairs; they are counted by the shapes of the two bodies."""
     candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes
@@ -86,6 +104,7 @@ def select_pairs(state, dt):
     velocity, start = bodies.linear_velocity, bodies.start_velocity
     for i in range(state.count):
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if state.moved else 0.0
+    find_hasty(state, dt)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):
         starts[k] = 0
