@@ -164,10 +164,10 @@ class ContactEvents(StagedSystem):
         self._contacts.defer(self._record)
 
     def _report_faults(self) -> None:
-        solver, bodies = self._state.solver, self._state.bodies
-        if self._state.hasty:
+        state, solver, bodies = self._state, self._state.solver, self._state.bodies
+        if state.hasty:
             self.world.report_fault(
-                f"entity {bodies.entity[self._state.hasty_row]}: so fast that discrete collisions may miss what it passes"
+                f"entity {bodies.entity[state.hasty_row]}: so fast that discrete collisions may miss what it passes"
             )
         if solver.squeezed:
             self.world.report_fault(

@@ -97,7 +97,7 @@ def keep_out_of_all(state, i):
 
 def obey_statics(state, dt):
     """Put the bodies that the solver has moved out of what cannot be moved."""
-    pairs, bodies = state.pairs, state.bodies
+    pairs = state.pairs
     if state.solver.contacts == 0 and not state.any_support:
         return OK
     for turn in range(ROUNDS):
@@ -105,7 +105,9 @@ def obey_statics(state, dt):
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i) and keep_out(state, a, b):
+            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i)):
+                continue
+            if keep_out(state, a, b):
                 moved = True
                 if turn == ROUNDS - 1:
                     note_squeezed(state.solver, i)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....framework import Settings
 from ...measure.body_shapes import Floats
-from .bodies import FAST, Body, Pair, is_corner_touch, motions_come_near, touch
+from .bodies import FAST, Body, Pair, Touch, is_corner_touch, motions_come_near, touch
 from .sweeps import enters, is_swept, last_leg, may_be_swept, sweep, way_of
 
 SEARCHES = 24  # iterations of the search for the first overlap
