@@ -10,7 +10,7 @@ from worlds import ball, both_dimensions, box, make_world
 
 HALF = 10.0  # m, half width of the rooms
 BODIES = 60
-SECONDS = 2.0
+SECONDS, WAY = 2.0, 2000.0  # s and m: as long as each room is played, at most so far as its bodies then go
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def check_room(d, mode, room, seed, gravity=9.81):
             world, place, room.speed * way / np.linalg.norm(way), radius=np.exp(random.uniform(*np.log((room.smallest,
             room.radius)))), mass=10.0 ** random.uniform(-room.masses, room.masses), restitution=room.restitution,
         )  # fmt: skip
-    for _ in range(round(SECONDS / room.dt)):
+    for _ in range(max(10, round(min(SECONDS, WAY / room.speed) / room.dt))):
         world.step()
         place = world.bodies.dynamic.position
         assert np.isfinite(place).all(), (seed, world.step_count)
