@@ -21,6 +21,14 @@ from carom.framework.compilation import log
 print(world.state_hash(), len(log.compiled), log.loaded)
 """
 POISON = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
+EXTREMES = (
+    "grains", "nobody_leaves", "caught", "continuous_extremes", "extremes_numbers", "determinism_histories", "oracle_modes",
+)  # fmt: skip
+TESTS = """
+import pytest, sys
+bare = ["--quiet", "--noconftest", "-p", "no:xdist", "-p", "no:cacheprovider", "-m", "not slow"]
+sys.exit(pytest.main([*bare, *sys.argv[1:]]))
+"""
 
 
 @pytest.fixture(scope="module")
@@ -51,3 +59,9 @@ def test_other_processes_with_a_cold_and_a_warm_cache_get_the_same_bits(folder):
 def test_no_kernel_leaves_its_arrays(folder):
     """Whatever stands in any column of some bodies of each scene."""
     assert run_checked(folder, POISON, 7) == ""
+
+
+def test_extremes_and_random_worlds_stay_in_their_arrays(folder):
+    """Gravity, masses, sizes and speeds far apart, caught bodies, bodies that come and go, scattered shapes."""
+    files = [Path(__file__).with_name(f"test_{name}.py") for name in EXTREMES]
+    assert " passed" in run_checked(folder, TESTS, *files)

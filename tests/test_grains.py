@@ -71,21 +71,8 @@ def test_a_stack_of_five_keeps_its_order_and_its_place(d, shape, mode, method, g
     check_column(world, entities)
 
 
-THROWN = pytest.mark.xfail(strict=True, reason="a known defect: boxes on a tile grid are thrown away, from G = 100 on")
-
-
-def known(case, *others):
-    """The defect's cases marked; explicit Euler does not move what is at rest in its first step."""
-    mode, method, gravity = others
-    moved = method != "explicit_euler" or mode == "event_driven"
-    thrown = case[2] == "tile_grid" and gravity >= 100.0 and moved
-    return pytest.param(case, *others, marks=THROWN if thrown else ())
-
-
 @pytest.mark.slow  # its shapes take long to compile
-@pytest.mark.parametrize(
-    ("case", "mode", "method", "gravity"), [known(*of) for of in pairwise(SHIPPED, MODES, METHODS, GRAVITIES)]
-)
+@pytest.mark.parametrize(("case", "mode", "method", "gravity"), pairwise(SHIPPED, MODES, METHODS, GRAVITIES))
 def test_a_stack_of_any_shipped_shape_keeps_its_order_and_its_place(case, mode, method, gravity):
     d, shape, ground = case
     plugins = (*PLUGINS, *PLUGINS_2D) if d == 2 else PLUGINS

@@ -54,25 +54,27 @@ def leg_start(state, a, b):
 @part
 def touch_on_way(state, a, b, d, travel, edge):
     """(whether they touch on the way from d to d + travel and get deeper than ``edge``; gap at d, normal and point of
-    that), by conservative advancement; of concave shapes only whether they touch where they are. A touch of corners is
-    none, nor one that only is the edge of the next thing in a row that one of them slides along."""
+    that), by conservative advancement; of concave shapes by their distance, as what comes next may have another normal.
+    A touch of corners is none, nor one that only is the edge of the next thing in a row that one of them slides along.
+    """
     shape, t, nothing = state.bodies.shape, 0.0, zero_of(state)
     way, slop = length(travel), slop_of(state, a, b)
     convex = both_convex(state, shape[a], shape[b])
     _, depth, normal, point = meet(state, a, b, d)
     for _ in range(LOOKS):
         rate = dot(travel, normal)
-        if not rate < 0.0:
+        if convex and not rate < 0.0:
             break
-        at, further = add_scaled(d, travel, t), t + depth / rate
-        if depth >= -ROUNDING * length(at) or (not convex and depth >= -slop):
+        at, further = add_scaled(d, travel, t), t - depth / (-rate if convex else way)
+        if depth >= -ROUNDING * (length(d) + t * way) or (not convex and depth >= -slop):
             further = t + 2.0 * slop / way
-            if not meets_at_corner(state, a, b, at, slop):
+            if rate < 0.0 and not meets_at_corner(state, a, b, at, slop):
                 ahead = t - 2.0 * edge / rate
-                if not ahead < 1.0 or meet(state, a, b, add_scaled(d, travel, ahead))[1] <= edge:
+                if ahead < 1.0 and meet(state, a, b, add_scaled(d, travel, ahead))[1] > edge:
+                    return True, -depth - t * rate, normal, point
+                if convex:
                     break
-                return True, -depth - t * rate, normal, point
-        if not further < 1.0 or not convex:
+        if not further < 1.0:
             break
         t = further
         _, depth, normal, point = meet(state, a, b, add_scaled(d, travel, t))
