@@ -22,7 +22,8 @@ print(world.state_hash(), len(log.compiled), log.loaded)
 """
 POISON = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
 EXTREMES = (
-    "grains", "nobody_leaves", "caught", "continuous_extremes", "extremes_numbers", "determinism_histories", "oracle_modes",
+    "grains", "nobody_leaves", "caught", "continuous_extremes", "extremes_numbers", "determinism_histories",
+    "oracle_modes",
 )  # fmt: skip
 TESTS = """
 import pytest, sys
