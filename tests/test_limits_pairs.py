@@ -70,7 +70,8 @@ def test_a_scene_is_drawn_from_its_seed_and_number_alone():
 
 
 def test_valid_ranges():
-    """A discrete world is left by what is fast or thin; all by what is far away or too stiff."""
+    """A discrete world is left by what is fast or thin, others by what forces make faster still; all by what is far
+    away, too stiff, or too heavy for those below it."""
     draw = dataclasses.replace(
         Draw.of(0, 0), mode="discrete", integrator="rk4", kind="room", wall=1.0,
         values=dict.fromkeys(NAMES, 0.0) | {"size": 2.0, "gravity": 1e-4, "speed": 0.2, "height": 3.0},
@@ -83,7 +84,11 @@ def test_valid_ranges():
     assert left(speed=0.4) == ["way in a step"]
     assert left(height=100.0) == ["way in a step"]
     assert left(wall=0.1) == ["thin walls"]
-    assert left("continuous", 0.1, speed=1e4, gravity=1e6) == []
+    assert left("continuous", 0.1, speed=1e4, gravity=1.0, mass=1e6) == []
+    assert left("continuous", 0.1, speed=10.0, gravity=1e6) == []
+    assert left("continuous", speed=1e4, gravity=1e6) == left("event_driven", speed=1e4, stiffness=0.5)
+    assert left("event_driven", speed=1e4, stiffness=0.5) == ["speed and forces"]
+    assert dataclasses.replace(draw, kind="stack", values=draw.values | {"mass": 1e5}).outside(1.0) == ["load"]
     assert left("event_driven", distance=6e8) == ["distance"]
     assert left("continuous", stiffness=2.5) == []
     assert left("event_driven", stiffness=2.5) == ["stiffness"]  # its flight is velocity Verlet

@@ -28,6 +28,8 @@ FALLS = (0.3, 10.0)  # heights of a drop, of the size of the body
 DISCRETE_WAY = 0.3  # of the smallest size: the way in a step, with the speed of the start and that of the fall
 DISCRETE_WALL = 1.0  # thinnest wall, of a radius
 FARTHEST = 1e9  # from the origin, of the smallest size
+HEAVIEST = 1e4  # mass of a body in a stack, of the lightest
+SWEPT_WAY, SWEPT_FALL = 100.0, 10.0  # of the smallest size in a step: by speed, where forces make more than the second
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,12 @@ class Draw:
                 found.append("way in a step")
             if self.kind == ROOM and self.wall < DISCRETE_WALL:
                 found.append("thin walls")
+        elif self.values["speed"] > SWEPT_WAY and (
+            self.values["gravity"] > SWEPT_FALL or self.values["stiffness"] > 0.0
+        ):
+            found.append("speed and forces")
+        if self.kind == STACK and self.values["mass"] > HEAVIEST:
+            found.append("load")
         if self.values["distance"] > FARTHEST * self.smallest:
             found.append("distance")
         if self.values["stiffness"] > STABLE.get(self._flight, 2.0):

@@ -6,7 +6,20 @@ from ...bench.report import NOTHING
 from ...reporting.text_tables import TextTable
 from ..records import MODES
 from ..report import number
-from .axes import AXES, DISCRETE_WALL, DISCRETE_WAY, DT, FARTHEST, NAMES, STABLE, CrossedAxis, Draw
+from .axes import (
+    AXES,
+    DISCRETE_WALL,
+    DISCRETE_WAY,
+    DT,
+    FARTHEST,
+    HEAVIEST,
+    NAMES,
+    STABLE,
+    SWEPT_FALL,
+    SWEPT_WAY,
+    CrossedAxis,
+    Draw,
+)
 from .scenes import Outcome
 from .sweep import PairLimits
 
@@ -18,11 +31,15 @@ VALID = {
         f"the way in a step, with the speed of the fall, is at most {DISCRETE_WAY:g} of the smallest size, walls are "
         f"at least {DISCRETE_WALL:g} radius thick. Faster or thinner: it may pass, by contract; use continuous"
     ),
-    "continuous": "any speed, gravity, ratio of masses and sizes, any wall. What fails in it is a defect",
+    "continuous": (
+        f"any speed, gravity, ratio of masses and sizes, any wall; but no more than {SWEPT_WAY:g} sizes in a step "
+        f"where also gravity makes more than {SWEPT_FALL:g}, or springs act. What fails in it is a defect"
+    ),
     "event_driven": "as continuous",
 }
 EVERYWHERE = (
-    f"In every mode: at most {number(FARTHEST)} sizes from the origin; springs up to w dt = 2 "
+    f"In every mode: at most {number(FARTHEST)} sizes from the origin; stacks of masses up to 1 to "
+    f"{number(HEAVIEST)}; springs up to w dt = 2 "
     f"({', '.join(f'{name} {limit:g}' for name, limit in STABLE.items())}). Scenes outside are counted apart."
 )
 
