@@ -19,7 +19,7 @@ from .schedule.phases import ForceSystem, Phase, System
 from .schedule.plan import Plan
 from .schedule.profile_report import Stats
 from .settings import Settings
-from .world.contacts import Contact, Contacts
+from .world.contacts import Contact, Contacts, ContactsBetween
 from .world.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
 from .world.world import World
 
@@ -32,6 +32,7 @@ __all__ = [
     "Component",
     "Contact",
     "Contacts",
+    "ContactsBetween",
     "Convex",
     "ForceSystem",
     "Hits",

@@ -12,6 +12,7 @@ from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
 from ..framework.data.component import Component
+from ..framework.data.esper_bridge import Membership
 from ..framework.data.table import Table
 from ..framework.jit.records.record import make_record
 from ..framework.schedule.phases import System
@@ -61,7 +62,7 @@ class Simulation(PhysicsServices):
         self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
         self.adoption = Adoption(self.table, Transform, _makes_body, LevelCheck(self.table, world.registry))
         self.bodies = Bodies(self.table)
-        lookup = EntityLookup(self._living_with)
+        lookup = EntityLookup(self._membership)
         source = RecordedContacts(self.state)
         self.contacts = Contacts(dimensions, lookup, self._running_step, source)
         self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
@@ -340,8 +341,9 @@ class Simulation(PhysicsServices):
     def _running_step(self) -> int | None:
         return self._world.step_count if self.table.in_step else None
 
-    def _living_with(self, entity: int, component: type[Any]) -> bool:
-        return self._world.entity_exists(entity) and self._world.has_component(entity, component)
+    def _membership(self) -> Membership:
+        with self._world:
+            return Membership()
 
 
 def _make_table(dimensions: int) -> Table:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 import esper
+import numpy as np
 
 _NAMES = (
     "_components", "_context_map", "_dead_entities", "_entities", "_entity_count", "_processors", "_processors_dict",
@@ -221,6 +222,40 @@ def all_components() -> dict[int, dict[type[Any], Any]]:
 def known_entity(entity: int) -> bool:
     """Whether the entity is in the database, dead or not."""
     return entity in esper._entities
+
+
+class Membership:
+    """Which entities of the current context have which components; later too, without switching to that context.
+
+    components
+        esper's own dict of all entities' components: do not change it
+    dead
+        esper's own set of the entities whose deletion is pending: do not change it
+    """
+
+    __slots__ = ("_members", "components", "dead")
+
+    def __init__(self) -> None:
+        self._members: dict[type[Any], set[int]] = esper._components
+        self.components: dict[int, dict[type[Any], Any]] = esper._entities
+        self.dead: set[int] = esper._dead_entities
+
+    def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
+        """(n,) which of these ids (n,) are living entities that have the component."""
+        mask = _among(entities, self._members.get(component, set()))
+        if self.dead:
+            mask &= ~_among(entities, self.dead)
+        return mask
+
+
+def _among(entities: np.ndarray, members: set[int]) -> np.ndarray:
+    """(n,) mask of the ids that are members; takes as long as the fewer of the two."""
+    if len(members) + _SORTING < len(entities):
+        return np.isin(entities, np.fromiter(members, np.int64, len(members)))
+    return np.fromiter(map(members.__contains__, entities.tolist()), bool, len(entities))
+
+
+_SORTING = 500  # look-ups in a set take as long as one call of np.isin
 
 
 def forget_death(entity: int) -> None:
