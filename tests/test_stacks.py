@@ -16,8 +16,8 @@ from worlds import ball, both_dimensions, box, floor, make_world, run
 from carom.components import AABBCollider, Transform
 from carom.scenes import pyramid
 from carom.systems.contacts.resting import OWN_SAG
-from carom.systems.contacts.rigid import MOST_SAG
-from carom.systems.contacts.softness import SAG
+from carom.systems.contacts.solving.rigid import MOST_SAG
+from carom.systems.contacts.solving.softness import SAG
 
 makers = pytest.mark.parametrize("maker", [box, ball])
 

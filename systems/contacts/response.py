@@ -15,13 +15,13 @@ from ..impacts.stages import begin_impacts, resolve_impacts
 from ..staged import StagedSystem
 from .bodies import gather, put_back
 from .event_stages import publish_contacts
-from .heavy_light_blocks import find_blocks
 from .last_word import obey_statics
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .resting_prediction import predict_rest
-from .solver import solve_contacts
-from .warm_start import match_warm_start, store_warm_start
+from .solving.heavy_light_blocks import find_blocks
+from .solving.solver import solve_contacts
+from .solving.warm_start import match_warm_start, store_warm_start
 
 MOTION = ("position", "linear_velocity", "path_velocity")
 NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"

@@ -11,7 +11,7 @@ from ..impacts.impulses import STOPPED, is_caught
 from ..shapes.dispatch import both_convex, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .approach import between, between_at_start, leg_start, meet, meets_at_corner, touch_on_way
-from .softness import SAG
+from .solving.softness import SAG
 
 ENTRY_ITERATIONS = 24
 OWN_SAG = 0.0003  # of the extent: a contact that would sag more under one body alone is rigid;

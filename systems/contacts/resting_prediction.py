@@ -10,8 +10,8 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.vectors import add_scaled, dot, length, sub
 from ..codes import NEED_COLUMNS, OK
-from .heavy_light_blocks import RATIO
-from .warm_start import find_rows, scale_to
+from .solving.heavy_light_blocks import RATIO
+from .solving.warm_start import find_rows, scale_to
 
 UNEVEN_PASSES = 8
 THROWN = 20.0  # times the change of speed that forces make in the step; more, and more than a pair closes with: a shock

@@ -10,8 +10,8 @@ the bounds). Islands do not know of each other.
 
 from __future__ import annotations
 
-from ...framework.compilation import part
-from ...framework.vectors import add_scaled, dot, length, negative, sub
+from ....framework.compilation import part
+from ....framework.vectors import add_scaled, dot, length, negative, sub
 from .heavy_light_blocks import OPPOSED, solve_blocks
 from .passes import solve_friction, solve_normals
 from .softness import SAG

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
-from ...framework.vectors import add_scaled, dot, scale, sub
+from ....framework.compilation import part
+from ....framework.vectors import add_scaled, dot, scale, sub
 
 
 @part

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
-from ...framework.vectors import add, add_scaled, dot, scale, sub
-from ..codes import OK
+from ....framework.compilation import part
+from ....framework.vectors import add, add_scaled, dot, scale, sub
+from ...codes import OK
 from .heavy_light_blocks import hold_light, solve_blocks
 from .passes import solve_friction, solve_normals
 from .rigid import choose_rigid, converge, leave_out_rigid

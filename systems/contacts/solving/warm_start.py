@@ -6,10 +6,10 @@ over the step (total).
 
 from __future__ import annotations
 
-from ...framework.compilation import part
-from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, dot, scale
-from ..codes import NEED_WARM_START, OK
+from ....framework.compilation import part
+from ....framework.jit.records.record_type import zero_of
+from ....framework.vectors import add_scaled, dot, scale
+from ...codes import NEED_WARM_START, OK
 
 TURNED = 0.5  # cosine between last step's normal and this one's, below which the impulses say nothing
 

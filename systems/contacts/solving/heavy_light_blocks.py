@@ -6,10 +6,10 @@ needs r passes. For two contacts the exact answer is a linear complementarity pr
 
 from __future__ import annotations
 
-from ...framework.compilation import part
-from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add_scaled, dot, length, negative, scale, sub
-from ..codes import OK
+from ....framework.compilation import part
+from ....framework.jit.records.record_type import zero_of
+from ....framework.vectors import add_scaled, dot, length, negative, scale, sub
+from ...codes import OK
 
 RATIO = 10.0  # a body is light between two that have at least this many times its mass
 OPPOSED = -0.5  # cosine between the two contacts' directions, below which they squeeze
