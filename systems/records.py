@@ -194,6 +194,8 @@ IMPACTS = Schema(
     linked=flag(),
     last_pair=integer(),
     cluster=integer(),
+    sunk_pair=integer(),  # the last one of whose bodies landings were searched
+    sunk_by=number(),  # the time of its impact while they are searched, else 0
     now=number(),
     until=number(),
     # what has happened in this step

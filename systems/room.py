@@ -172,6 +172,7 @@ class Room:
         state.pairs, state.merged = state.merged, state.pairs
         impacts = state.impacts
         impacts.waiting, impacts.last_pair, impacts.linked = 0, ALL, False
+        impacts.sunk_pair, impacts.sunk_by = -1, 0.0
         impacts.now, impacts.until = now, state.neighbours_known_until
 
 

@@ -4,7 +4,6 @@ seen from a moving frame."""
 from __future__ import annotations
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -127,10 +126,12 @@ def crowd(count, d, mode, side=10.0):
 @both_dimensions
 @pytest.mark.parametrize("mode", MODES)
 def test_c19_a_crowd_parts_slowly(mode, d):
-    """Three steps: a bounded time each, at most 1.5 sizes a second, so at most that energy; the overlap only falls."""
+    """Three steps: bounded work in each, at most 1.5 sizes a second, so at most that energy; the overlap only falls."""
     world = crowd(400, d, mode, side=8.0 if d == 2 else 4.0)
+    places = world.bodies.position
+    near = np.triu((np.abs(places[:, None] - places) <= 1.0).all(axis=2), 1).sum()  # pairs of boxes that meet
     world.step()
-    before, began = depths(world).sum(), time.perf_counter()
+    before = depths(world).sum()
     for _ in range(3):
         world.step()
         assert np.linalg.norm(world.bodies.linear_velocity, axis=1).max() < 1.5
@@ -138,31 +139,33 @@ def test_c19_a_crowd_parts_slowly(mode, d):
         total = depths(world).sum()
         assert total < before
         before = total
-    assert time.perf_counter() - began < 5.0
+    counted = world.stats().counters
+    assert counted["impacts"] == counted["rounds"] == 0
+    assert counted["resting_contacts"] <= counted["candidates"] < 4 * 1.2 * near
     np.testing.assert_allclose(world.momentum(), 0.0, rtol=0, atol=1e-9)
 
 
 @pytest.mark.slow
-def test_c19_a_hundred_thousand_are_refused_in_bounded_time():
-    """In a box of ten sizes: 5e9 pairs or more by candidates; an error that gives the number, and no body moves."""
+def test_c19_a_hundred_thousand_are_refused():
+    """In a box of ten sizes: they are counted, and an error gives the number; no pair is made and no body moves."""
     world = crowd(100_000, 3, "discrete")
-    before, began = world.bodies.position.copy(), time.perf_counter()
+    before = world.bodies.position.copy()
     with pytest.raises(StepError, match="candidate pairs exceed the limit"):
         world.step()
-    assert time.perf_counter() - began < 30.0
+    assert world.stats().counters["pairs"] == 0
     assert (world.bodies.position == before).all()
 
 
 # -- C23: from a moving frame ----------------------------------------------------------------------
 
-PLASTIC = pytest.mark.xfail(
-    strict=True, reason="a known defect: where plastic impacts leave bodies in touch, off by up to 4e-3 m"
+TIES = pytest.mark.xfail(
+    strict=True, reason="a known defect: rounding decides the order of plastic impacts at one time; off by 4e-4 m"
 )
+CASES = [(mode, e) for mode in MODES for e in (0.0, 0.5, 1.0) if (mode, e) != ("event_driven", 0.0)]
 
 
 @both_dimensions
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("e", [pytest.param(0.0, marks=PLASTIC), 0.5, 1.0])
+@pytest.mark.parametrize(("mode", "e"), [*CASES, pytest.param("event_driven", 0.0, marks=TIES)])
 def test_c23_galilean_in_every_mode(mode, d, e):
     """A velocity added to all: relative motion is the same to 1e-9, in impacts and after them."""
 
@@ -176,7 +179,8 @@ def test_c23_galilean_in_every_mode(mode, d, e):
             speed = random.normal(size=d) - 0.3 * (place - 2.4)
             (box, ball)[k % 2](world, place, speed + drift, restitution=e, mass=random.uniform(0.5, 2.0))
         run(world, 60)
-        assert world.stats().counters["impacts"] > 10
+        counted = world.stats().counters
+        assert counted["impacts" if e > 0.0 else "contacts"] > 10
         return world.bodies.position - drift * 60 * DT, world.bodies.linear_velocity - drift
 
     for still, drifting in zip(cluster(np.zeros(d)), cluster(np.array([1e3, -7e2, 0.0])[:d]), strict=True):

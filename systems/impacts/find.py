@@ -31,13 +31,14 @@ from ..linked_parts import (
 from ..shapes.dispatch import evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .heap import heap_push
-from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, is_caught, is_deflected
+from .impulses import BOUNCE, CROSS, FREE, LAND, SLIDE, STICK, STOP, STOPPED, is_caught, is_deflected
 
 TIME_ITERATIONS = 80
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
 MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
+NONE, LANDING, IMPACT = range(3)  # a landing is too slow to bounce
 
 
 @part
@@ -93,6 +94,7 @@ def find_touch(state, c, a, b, path, restitution, dt):
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
     since, swept, nothing = impacts.now, False, (dt, zero, zero, zero)
     if impacts.sweeps:
+        since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt)
         swept = is_swept(state, a, b, travel)
         if passive and (not swept or state.pairs.crossed[c]):
@@ -134,19 +136,35 @@ def is_held_by_edge(state, a, b, path, touch, speed, dt):
 
 
 @part
+def passes_unseen(state, a, b, path, touch, dt):
+    """Whether so slow an approach leads through something thin before or after an impact: contacts at rest know only
+    the way after the last one."""
+    bodies, sunk_by = state.bodies, state.impacts.sunk_by
+    count, inverse_mass = bodies.impact_count, bodies.inverse_mass
+    if not state.impacts.sweeps:
+        return False
+    until, (_, normal, _, start) = dt, touch
+    if count[a] == 0 and count[b] == 0:
+        if not (sunk_by > 0.0 and inverse_mass[a] * inverse_mass[b] == 0.0):
+            return False
+        until = sunk_by
+    return dot(sub(start, along(path, until)), normal) > FAST * smaller_extent(bodies, a, b)
+
+
+@part
 def closing_speed(state, a, b, path, touch, kind, dt):
-    """Of a solid pair: (is it an impact, speed along the normal)."""
+    """Of a solid pair: (NONE, LANDING or IMPACT, speed along the normal)."""
     bodies, impacts, (t, normal, _, _) = state.bodies, state.impacts, touch
     speed = dot(rate_along(path, t), normal)
     threshold, rounding = bounce_threshold(state, a, b), 0.0
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
-    if not speed < -(threshold + rounding):
-        return False, speed  # a contact at rest
+    if not speed < -(threshold + rounding):  # a contact at rest
+        return LANDING if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
     supported = kind == SWEPT and (bodies.supported[a] or bodies.supported[b])
     if supported and call_held_by_edge(state.links[HELD_BY_EDGE], state, a, b, path, touch, speed, dt):
-        return False, speed
-    return True, speed
+        return NONE, speed
+    return IMPACT, speed
 
 
 @part
@@ -254,18 +272,21 @@ def consider(state, c, dt):
     ):
         normal = end_normal  # it slides from one thing onto the next: the edges do not stop it
     touch = (t, normal, point, apart)
-    speed = dot(w, normal)
+    speed, approach = dot(w, normal), IMPACT
     if not passive:
-        is_impact, speed = closing_speed(state, a, b, path, touch, kind, dt)
-        if not is_impact:
+        approach, speed = closing_speed(state, a, b, path, touch, kind, dt)
+        if approach == NONE:
             return
-    if state.path_degree == 1 and e != 1.0:
+        e = 0.0 if approach == LANDING else e
+    if state.path_degree == 1 and e != 1.0 and approach == IMPACT:
         speed = correct_speed(state, a, b, touch, speed, dt)
         if impacts.sweeps and not passive:
             rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
             if not speed < -rounding:  # not in the flight
                 return
     event_kind = CROSS if passive else counts_for_cap(state, a, b, t, e)
+    if approach == LANDING:
+        event_kind = LAND
     if not passive and is_beyond_cap(state, a, b):
         event_kind = -1
         if impacts.sweeps:

@@ -18,9 +18,9 @@ from ..integration.trajectory import along, path_of, rate_along
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
 
-# Kinds of events: an impact, one that no cap counts, two beyond the cap, a crossing of what does not push, and one of
-# what is caught between two walls.
-BOUNCE, FREE, STICK, STOP, CROSS, SLIDE = range(6)
+# Kinds of events: an impact, one that no cap counts, one that is too slow to bounce, two beyond the cap, a crossing of
+# what does not push, and one of what is caught between two walls.
+BOUNCE, FREE, LAND, STICK, STOP, CROSS, SLIDE = range(7)
 FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
 
@@ -78,7 +78,7 @@ def bounce(state, event, dt):
         i = a if side == 0 else b
         if inverse_mass[i] > 0.0:  # what cannot be moved is as it was: its other impacts stand, and no cap is on it
             bodies.impact_count[i] += 1
-            bodies.counted_impacts[i] += 1 if impacts.event_kind[event] == BOUNCE else 0
+            bodies.counted_impacts[i] += 0 if impacts.event_kind[event] == FREE else 1
             if impacts.sweeps:
                 bodies.caught[i] = bodies.caught[i] + 1 if stands_still(bodies, a + b - i) else 0
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)

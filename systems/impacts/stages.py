@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ..ccd.search_bounds import leaves_bounds_at
+from ..ccd.search_bounds import FAST, leaves_bounds_at
 from ..codes import NEED_EVENTS, OK, REFRESH_PAIRS
 from ..linked_parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
-from .find import consider
+from ..shapes.tolerances import smaller_extent
+from .find import bounce_threshold, consider
 from .heap import heap_pop
-from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
+from .impulses import CROSS, LAND, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
 
 # In place of a pair in ``last_pair``: what is searched next.
-HITS, ALL, NONE, MEMBERS = -1, -2, -3, -4
+HITS, ALL, NONE, MEMBERS, LANDINGS = -1, -2, -3, -4, -5
 
 
 @part
@@ -54,6 +55,7 @@ def begin_search(state, last_pair, now):
     """The queue is empty, and the pairs may be others than before."""
     impacts = state.impacts
     impacts.waiting, impacts.last_pair, impacts.linked = 0, last_pair, False
+    impacts.sunk_pair, impacts.sunk_by = -1, 0.0
     impacts.now, impacts.until = now, state.neighbours_known_until if impacts.sweeps else math.inf
 
 
@@ -121,6 +123,31 @@ def look_at_partners(state, c):
 
 
 @part
+def may_have_sunk(state, i, k, now):
+    """Whether body i may by now have sunk through k, which cannot be moved, as slowly as a contact at rest lets it."""
+    if state.bodies.inverse_mass[k] > 0.0:
+        return False
+    return bounce_threshold(state, i, k) * now > FAST * smaller_extent(state.bodies, i, k)
+
+
+@part
+def look_at_landings(state, c, now):
+    """The pairs in which a body of pair c may have sunk before its impact, and that pair; returns how many."""
+    impacts, pairs, bodies, wanted = state.impacts, state.pairs, state.bodies, 1
+    impacts.looks[0] = c
+    for side in range(2):
+        i = pairs.a[c] if side == 0 else pairs.b[c]
+        entry = impacts.heads[i] if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] == 0 else -1
+        while entry >= 0:
+            p = entry // 2
+            if p != c and pairs.is_solid[p] and may_have_sunk(state, i, pairs.a[p] + pairs.b[p] - i, now):
+                impacts.looks[wanted] = p
+                wanted += 1
+            entry = impacts.links[entry]
+    return wanted
+
+
+@part
 def choose_looks(state):
     """Which pairs are searched now: at first what may have met, later the pairs of the two bodies of an impact."""
     impacts, pairs = state.impacts, state.pairs
@@ -135,6 +162,8 @@ def choose_looks(state):
         return 0
     if not impacts.linked:
         link_pairs(state)
+    if c == LANDINGS:
+        return look_at_landings(state, impacts.sunk_pair, impacts.sunk_by)
     return look_at_members(state) if c == MEMBERS else look_at_partners(state, c)
 
 
@@ -186,10 +215,11 @@ def take_swept_event(state, event, dt):
         while i >= 0:
             watch_again(state, i, dt)
             i = bodies.cluster_next[i]
-    elif kind == SLIDE:
-        impacts.capped += 1
+    elif kind in (SLIDE, LAND):
+        impacts.capped += 1 if kind == SLIDE else 0
         a, b = pairs.a[c], pairs.b[c]
-        slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], impacts.now, dt)
+        if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
+            slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], impacts.now, dt)
     else:
         impacts.capped += 1
         pairs.depth[c], pairs.crossed[c] = 0.0, True
@@ -202,15 +232,36 @@ def take_swept_event(state, event, dt):
 
 
 @part
+def lands_first(state, event):
+    """Whether a body of this impact may have to land on something thin before: then that is searched, and the impact
+    once more."""
+    impacts = state.impacts
+    c, kind, now = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
+    looked, impacts.sunk_by = impacts.sunk_pair == c, 0.0
+    if looked or not impacts.sweeps or kind in (LAND, CROSS):
+        return False
+    if not impacts.linked:
+        link_pairs(state)
+    if look_at_landings(state, c, now) == 1:
+        return False
+    impacts.sunk_pair, impacts.sunk_by, impacts.last_pair, impacts.now = c, now, LANDINGS, 0.0
+    return True
+
+
+@part
 def take_event(state, event, dt):
     """Carry an event out."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    if lands_first(state, event):
+        return
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.last_pair, impacts.now = c, impacts.event_time[event]
-    if kind != BOUNCE and kind != FREE:
+    if kind > LAND:
         call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
         return
     bounce(state, event, dt)
+    if kind == LAND:
+        call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
     for side in range(2 if impacts.sweeps else 0):
         i = pairs.a[c] if side == 0 else pairs.b[c]
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
