@@ -52,12 +52,13 @@ def without_support(state, dt, a, b):
 
 @part
 def deepest(state, dt, a, b, end):
-    """(depth at ``end``, normal) by the plane where the pair first touches on a long way there, else by its end."""
+    """(depth at ``end``, normal, whether it is) by the plane where the pair first touches on a long way there; else by
+    its end."""
     far, gap, normal, _ = far_touch(state, dt, a, b, end)
     if far:
-        return -gap - dot(sub(end, between_at_start(state.bodies, a, b)), normal), normal
+        return -gap - dot(sub(end, between_at_start(state.bodies, a, b)), normal), normal, True
     _, depth, normal, _ = meet(state, a, b, end)
-    return depth, normal
+    return depth, normal, False
 
 
 @part
@@ -107,11 +108,11 @@ def is_resting(state, dt, c):
     if not near and not hit and not carried:
         return False
     d = between(bodies, a, b)
-    depth, normal = deepest(state, dt, a, b, d)
+    depth, normal, far = deepest(state, dt, a, b, d)
     if depth < -margin:
         if hit or not carried:
             return False
-        depth, normal = deepest(state, dt, a, b, without_support(state, dt, a, b))
+        depth, normal, far = deepest(state, dt, a, b, without_support(state, dt, a, b))
         if depth < -margin:
             return False
     if depth >= 0.0:
@@ -119,7 +120,7 @@ def is_resting(state, dt, c):
     pairs.parting[c] = STAYS
     if still_bounces(state, dt, c, depth, normal):
         return False
-    return not meets_at_corner(state, a, b, d, slop_of(state, a, b))
+    return far or not meets_at_corner(state, a, b, d, slop_of(state, a, b))
 
 
 def find_resting(state, dt):

@@ -10,6 +10,8 @@ the bounds). Islands do not know of each other.
 
 from __future__ import annotations
 
+import math
+
 from ....framework.compilation import part
 from ....framework.vectors import add_scaled, dot, length, negative, sub
 from .heavy_light_blocks import OPPOSED, solve_blocks
@@ -235,12 +237,16 @@ def measure_step(solver, give):
             if solver.soft[k]:
                 curvature[r] += give / solver.mass[k] * direction[k] * direction[k]
     for q in range(solver.bodies):
-        far[q] = -slope[q] / curvature[q] if curvature[q] > 0.0 else 0.0
+        # Contacts that push against each other may change without any body: as far as none of them pulls.
+        endless = math.inf if slope[q] < 0.0 else 0.0
+        far[q] = -slope[q] / curvature[q] if curvature[q] > 0.0 else endless
         stopper[q] = -1
     for k in range(solver.contacts):
         r = island_of(solver, k)
         if solver.open[r] and solver.previous[k] + far[r] * direction[k] < 0.0:
             far[r], stopper[r] = -solver.previous[k] / direction[k], k
+    for q in range(solver.bodies):
+        far[q] = far[q] if far[q] < math.inf else 0.0
 
 
 @part

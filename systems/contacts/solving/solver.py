@@ -28,7 +28,6 @@ SHOCK = 0.01  # of the extent, per step: a contact that closes faster is a shock
 SHOCK_PASSES = 16  # at most, in each substep of a step with shocks
 SETTLED = 0.02  # of the largest shock's speed: corrections below it are left to the other passes
 DEEP = 0.02  # of the extent: overlap beyond it is pushed out in position only, for a speed given to many adds up
-TOUCHING = 1e-9  # of the extent: a gap of rounding errors is none
 PUSH_RATE = 0.2  # of the deep overlap, per step
 PUSH_LIMIT = 0.05  # of the extent, per step
 
@@ -64,7 +63,7 @@ def measure(solver, h, bias_rate):
         room = gap[k] + dot(sub(shift[second[k]], shift[first[k]]), normal[k])
         opening[k] = pushing[k] = max(0.0, room) / h
         soft[k] = deep[k] = False
-        if room <= TOUCHING * solver.extent[k] and not solver.parting[k]:
+        if room <= 0.0 and not solver.parting[k]:
             deep[k] = room < -DEEP * solver.extent[k]
             any_deep |= deep[k]
             if solver.rigid[k] or not deep[k]:
