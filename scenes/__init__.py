@@ -14,7 +14,7 @@ from .impacts import billiards, bouncing, bullets, cradle, drops, galperin, obli
 from .levels import conveyor, lift, maze, platforms, player, static_world
 from .motion import freefall, jump, orbit, spring
 from .protocol import Build, Scene
-from .rest import pile, pile2d, pile3d, pyramid, stack
+from .rest import few, pile, pile2d, pile3d, pyramid, stack
 
 _SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -37,6 +37,7 @@ _SCENES: dict[str, Scene] = {
         pile3d.SCENE,
         pyramid.SCENE,
         stack.SCENE,
+        few.SCENE,
         platforms.SCENE,
         conveyor.SCENE,
         lift.SCENE,

@@ -36,7 +36,9 @@ def times(rows: list[Row], repeats: int) -> TextTable:
         (
             row.label,
             digits(row.carom_ms.median),
+            digits(row.carom_fast_ms.median),
             digits(row.peer_ms.median) if row.peer_ms else NOTHING,
+            digits(row.peer_fast_ms.median) if row.peer_fast_ms else NOTHING,
             row.peer_index or NOTHING,
             digits(row.ratio.median) if row.ratio else NOTHING,
             span(row.ratio) if row.ratio else NOTHING,
@@ -48,8 +50,9 @@ def times(rows: list[Row], repeats: int) -> TextTable:
     if len({row.unit for row in rows}) > 1:
         what = "ms per step, of player_query per 1,000 queries"
     medians = f"medians of {repeats} repeats" if repeats > 1 else "one repeat"
-    title = f"{what}: {medians}; ratio: pymunk's time over carom's"
-    return TextTable(title, ("scene", "carom", "pymunk", "index", "ratio", "from .. to", "target"), cells)
+    title = f"{what}: {medians}; p10: a tenth of the steps took less; ratio: pymunk's median over carom's"
+    headings = ("scene", "carom", "p10", "pymunk", "p10", "index", "ratio", "from .. to", "target")
+    return TextTable(title, headings, cells)
 
 
 def quality(rows: list[Row]) -> TextTable:

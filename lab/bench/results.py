@@ -18,7 +18,8 @@ PACKAGES = ("carom", "numba", "numpy", "esper", "pymunk")
 class Row:
     """One window of one scene at one size, or one kind of query.
 
-    ``unit``: what the milliseconds are per. ``ratio``: pymunk's time over carom's, within each repeat.
+    ``unit``: what the milliseconds are per; medians of the steps of a repeat, and ``fast``: a tenth of them took
+    less. ``ratio``: pymunk's median over carom's, within each repeat.
     ``peer_index``: the pymunk index that was faster in the first repeat; the times are those with it.
     ``settings``: carom's settings that differ from the default.
     ``quality``: figures by engine and name, see :meth:`carom.lab.engines.quality.Quality.figures`.
@@ -33,7 +34,9 @@ class Row:
     target: float | None
     energy: str
     carom_ms: Spread
+    carom_fast_ms: Spread
     peer_ms: Spread | None = None
+    peer_fast_ms: Spread | None = None
     ratio: Spread | None = None
     peer_index: str | None = None
     compile_seconds: float = 0.0
@@ -54,7 +57,7 @@ class Row:
         """From the output of ``dataclasses.asdict``, also after JSON."""
         spreads = {
             key: None if plain[key] is None else Spread.from_dict(plain[key])
-            for key in ("carom_ms", "peer_ms", "ratio")
+            for key in ("carom_ms", "carom_fast_ms", "peer_ms", "peer_fast_ms", "ratio")
         }
         return cls(**{**plain, **spreads})
 

@@ -76,6 +76,7 @@ class Subject:
         return {**self.options, self.size_option: size}
 
 
+QUERIES = (("box 4 x 4", 20.0), ("disc r = 2", 20.0), ("nearest within 2", 15.0), ("ray across", 12.0))
 AFTER_START = (Window("", 10, 600),)
 
 
@@ -84,7 +85,12 @@ def _fastgas(collision: str, **more: Any) -> Subject:
     return Subject("fastgas", AFTER_START, variant=collision, settings=settings, sizes=(1000,), **more)
 
 
-def _pyramid(friction: float) -> Subject:
+def _few(what: str, n: int, target: float, **options: Any) -> Subject:
+    targets = {("", 0): target}
+    return Subject("few", (Window("", 10, 200),), "", what, options=options, sizes=(n,), targets=targets)
+
+
+def _pyramid(friction: float, target: float) -> Subject:
     return Subject(
         "pyramid",
         (Window("", 0, 500),),
@@ -93,28 +99,32 @@ def _pyramid(friction: float) -> Subject:
         options={"friction": friction},
         sizes=(50,),
         size_option="rows",
-        targets={("", 0): 3.0},
+        targets={("", 0): target},
         effort=4.0,
     )
 
 
 SUITE: tuple[Subject, ...] = (
-    Subject("gas2d", AFTER_START, targets={("", 1000): 2.0, ("", 10_000): 5.0, ("", LARGE): 8.0}),
-    Subject("mixed2d", AFTER_START, targets={("", 10_000): 4.0}),
+    _few("at rest", 20, 1.0),
+    _few("bouncing", 20, 0.7, height=5.0, restitution=0.8),
+    _few("flying", 20, 0.5, height=1000.0),
+    _few("at rest", 200, 2.0),
+    Subject("gas2d", AFTER_START, targets={("", 1000): 3.0, ("", 10_000): 6.0, ("", LARGE): 10.0}),
+    Subject("mixed2d", AFTER_START, targets={("", 10_000): 6.0}),
     Subject(
         "pile2d",
         (Window("falling", 0, 300), Window("settled", 600, 900)),
         energy="left",
-        targets={("settled", 1000): 2.0, ("settled", 10_000): 4.0},
+        targets={("falling", 1000): 2.0, ("settled", 1000): 4.0, ("falling", 10_000): 2.0, ("settled", 10_000): 8.0},
         effort=6.0,
     ),
-    _pyramid(0.6),
-    _pyramid(0.0),
-    Subject("static_world", AFTER_START, sizes=(1000,), targets={("", 0): 1.5}),
+    _pyramid(0.6, 4.0),
+    _pyramid(0.0, 5.0),
+    Subject("static_world", AFTER_START, sizes=(1000,), targets={("", 0): 2.0}),
     _fastgas("continuous", targets={("", 0): 1 / 3}, effort=12.0),
     _fastgas("discrete"),
-    Subject("freefall", (Window("", 10, 300),), energy="", sizes=(LARGE,), targets={("", 0): 5.0}, effort=0.1),
-    Subject("player_query", (), energy="", targets={("", 0): 5.0}, effort=0.2),
+    Subject("freefall", (Window("", 10, 300),), energy="", sizes=(LARGE,), targets={("", 0): 8.0}, effort=0.1),
+    Subject("player_query", (), energy="", targets={(query, 10_000): target for query, target in QUERIES}, effort=0.2),
 )
 
 

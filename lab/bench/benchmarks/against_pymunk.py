@@ -1,9 +1,9 @@
 """carom against pymunk on the same bodies, in one process.
 
-Both engines start from the same world and take the same steps, in short blocks that alternate, so that background
-load affects both equally. Each repeat runs every scene once, with another seed: timing one state repeatedly would train
-the branch predictor and give times that are too short. The result is the ratio within a repeat. Reading states,
-measuring quality, building and compiling happen between the timed blocks.
+Both engines start from the same world and take the same steps, one each by turns, so that background load affects both
+equally. Each repeat runs every scene once, with another seed: timing one state repeatedly would train the branch
+predictor and give times that are too short. The time of a repeat is the median of its steps, the result the ratio of
+these within a repeat. Reading states, measuring quality, building and compiling happen between the timed steps.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -33,7 +34,7 @@ from ..suite import Subject, Window, sizes_of
 from .queries import Query, time_queries
 
 CAROM = "carom"
-BLOCKS = 10  # per window: the engines alternate this many times
+LOOKS = 10  # at the quality of the states, per window
 REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the untimed run before the first repeat, which compiles the kernels
 
 
@@ -70,20 +71,25 @@ class CaromWorld:
 
 @dataclass
 class Case:
-    """A subject at one size with its results: by window (or query), one entry per repeat."""
+    """A subject at one size with its results: by window (or query) and engine, one entry per repeat.
+
+    ``milliseconds``: medians; ``fast``: the tenth percentiles.
+    """
 
     subject: Subject
     size: int
     bodies: int = 0
     timed: dict[str, int] = field(default_factory=dict)
     milliseconds: dict[str, dict[str, list[float]]] = field(default_factory=dict)
+    fast: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     quality: dict[str, dict[str, list[dict[str, float]]]] = field(default_factory=dict)
     peer: str | None = None
     compile_seconds: float = 0.0
 
-    def note(self, window: str, engine: str, milliseconds: float, figures: dict[str, float]) -> None:
-        """Record the result of one repeat for one engine."""
-        self.milliseconds.setdefault(window, {}).setdefault(engine, []).append(milliseconds)
+    def note(self, window: str, engine: str, seconds: list[float], figures: dict[str, float]) -> None:
+        """Record the result of one repeat for one engine: median and tenth percentile of its times."""
+        self.milliseconds.setdefault(window, {}).setdefault(engine, []).append(1e3 * float(np.median(seconds)))
+        self.fast.setdefault(window, {}).setdefault(engine, []).append(1e3 * float(np.percentile(seconds, 10)))
         self.quality.setdefault(window, {}).setdefault(engine, []).append(figures)
 
     def build(self, seed: int, settings: Settings | None = None) -> World:
@@ -127,7 +133,9 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
     waited = log.waited
     if repeat == 0:
         with contextlib.closing(CaromWorld(case.build(REHEARSAL_SEED))) as rehearsal:
-            rehearsal.step(REHEARSAL_STEPS)
+            engines = [rehearsal, *([PymunkSpace(rehearsal.world)] if peer else [])]
+            for engine in engines:
+                engine.step(REHEARSAL_STEPS)
     with contextlib.ExitStack() as stack:
         world = case.build(repeat)
         engines: dict[str, Any] = {CAROM: stack.enter_context(contextlib.closing(CaromWorld(world)))}
@@ -166,7 +174,7 @@ def _run_windows(case: Case, world: World, engines: dict[str, Engine], progress:
         seconds = _run_window(case, window, engines, quality, progress, case.effort() / whole)
         case.timed[window.name] = window.last - window.first
         for name, engine in engines.items():
-            case.note(window.name, name, 1e3 * seconds[name], quality[name].figures(*engine.state()))
+            case.note(window.name, name, seconds[name], quality[name].figures(*engine.state()))
         taken = window.last
 
 
@@ -177,37 +185,34 @@ def _run_window(
     quality: dict[str, Quality],
     progress: Progress,
     effort_per_step: float,
-) -> dict[str, float]:
-    """Seconds per step, by engine."""
+) -> dict[str, list[float]]:
+    """Seconds of each step, by engine; of steps in which a kernel came, none."""
     for seen in quality.values():
         seen.begin()
-    totals, counted = dict.fromkeys(engines, 0.0), 0
-    ends = np.linspace(window.first, window.last, min(BLOCKS, window.last - window.first) + 1).astype(int)
-    for block, steps in enumerate(np.diff(ends).tolist()):
-        seconds, counts = {}, True
-        names = list(engines)
-        turn = block % len(names)
+    names, seconds = list(engines), {name: [] for name in engines}
+    ends = np.linspace(window.first, window.last, min(LOOKS, window.last - window.first) + 1).astype(int)
+    for first, last in pairwise(ends.tolist()):
         with no_garbage_collection():
-            for name in names[turn:] + names[:turn]:
-                seconds[name], undisturbed, _ = timed(partial(engines[name].step, steps))
-                counts &= undisturbed
+            for step in range(first, last):
+                turn, taken = step % len(names), {}
+                for name in names[turn:] + names[:turn]:
+                    taken[name] = timed(partial(engines[name].step, 1))
+                if all(undisturbed for _, undisturbed, _ in taken.values()):
+                    for name in names:
+                        seconds[name].append(taken[name][0])
         for name, engine in engines.items():
             quality[name].sample(engine.state()[0])
-        if counts:
-            counted += steps
-            for name in names:
-                totals[name] += seconds[name]
-        progress.advance(effort_per_step * steps)
-    if not counted:
-        raise Problem(f"{case.subject.name}: kernels were compiled in all blocks of steps; run it once more")
-    return {name: total / counted for name, total in totals.items()}
+        progress.advance(effort_per_step * (last - first))
+    if not seconds[CAROM]:
+        raise Problem(f"{case.subject.name}: kernels were compiled in all steps; run it once more")
+    return seconds
 
 
 def _run_queries(case: Case, world: World, engines: dict[str, Any], repeat: int) -> None:
     for query, answers in time_queries(world, engines, case.bodies, repeat).items():
         case.timed[query] = Query.COUNT
         for name, (seconds, figures) in answers.items():
-            case.note(query, name, 1e3 * seconds, figures)
+            case.note(query, name, seconds, figures)
 
 
 def _rows(case: Case) -> list[Row]:
@@ -217,13 +222,14 @@ def _rows(case: Case) -> list[Row]:
         own = by_engine[CAROM]
         row = Row(
             subject.scene, subject.variant, case.bodies, window, unit, case.timed[window],
-            subject.target(window, case.size), subject.energy, Spread.of(own), compile_seconds=case.compile_seconds,
-            settings=dict(subject.settings),
+            subject.target(window, case.size), subject.energy, Spread.of(own), Spread.of(case.fast[window][CAROM]),
+            compile_seconds=case.compile_seconds, settings=dict(subject.settings),
         )  # fmt: skip
         row.quality[CAROM] = _together(case.quality[window][CAROM])
         if case.peer is not None:
             others = by_engine[case.peer]
             row.peer_index, row.peer_ms = case.peer, Spread.of(others)
+            row.peer_fast_ms = Spread.of(case.fast[window][case.peer])
             row.ratio = Spread.of([theirs / ours for theirs, ours in zip(others, own, strict=True)])
             row.quality["pymunk"] = _together(case.quality[window][case.peer])
         rows.append(row)

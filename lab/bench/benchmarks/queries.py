@@ -87,8 +87,8 @@ QUERIES = (
 
 def time_queries(
     world: World, engines: dict[str, Any], bodies: int, seed: int
-) -> dict[str, dict[str, tuple[float, dict[str, float]]]]:
-    """By query and engine: seconds per 1,000, and the figure of the results; both are means over the rounds.
+) -> dict[str, dict[str, tuple[list[float], dict[str, float]]]]:
+    """By query and engine: seconds per 1,000 in each round, and the figure of the results, a mean over the rounds.
 
     ``engines``: "carom" and pymunk spaces. Each round follows a step of all engines, as in a game, so the time includes
     what carom builds for the first query after a step; pymunk has built its tree in the step.
@@ -99,9 +99,9 @@ def time_queries(
 
 def _time_query(
     query: Query, world: World, engines: dict[str, Any], bodies: int, side: float, seed: int
-) -> dict[str, tuple[float, dict[str, float]]]:
+) -> dict[str, tuple[list[float], dict[str, float]]]:
     names = list(engines)
-    seconds, figures = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0)
+    seconds, figures = {name: [] for name in names}, dict.fromkeys(names, 0.0)
     for number in range(ROUNDS + 1):  # the first round compiles and is not counted
         places = player_query.places(bodies, Query.COUNT, seed * (ROUNDS + 1) + number)
         for engine in engines.values():
@@ -112,6 +112,6 @@ def _time_query(
             with no_garbage_collection():
                 took, _, answer = timed(partial(work, places, side))
             if number:
-                seconds[name] += took / ROUNDS
+                seconds[name].append(took)
                 figures[name] += answer / ROUNDS
     return {name: (seconds[name], {query.figure: figures[name]}) for name in names}
