@@ -1,4 +1,8 @@
-"""The tests have a kernel cache of their own, never the user's: made once, shared by all workers, kept between runs."""
+"""The tests have a kernel cache of their own, never the user's: made once, shared by all workers, kept between runs.
+
+Its kernels are made for any processor of this platform, as those in a wheel are: the tests run what ships.
+test_wheel packs them, and compares them with code for this processor.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,9 @@ from pathlib import Path
 CACHE = Path(__file__).resolve().parent.parent / ".kernels"
 
 os.environ["CAROM_BACKGROUND"] = "0"  # what compiles, and when, depends on no thread
-os.environ["CAROM_CACHE_DIR"] = str(CACHE)  # before anything imports carom, and for all processes that tests start
+# Before anything imports carom or numba, and for all processes that tests start:
+os.environ["CAROM_CACHE_DIR"] = str(CACHE)
+os.environ.update({"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
 
 
 # Files that take long begin first, so that no worker is left with one at the end.

@@ -26,19 +26,29 @@ PRELOAD = [
     "numba.np.npyimpl", "numba.np.polynomial", "numba.np.random.generator_methods", "numba.typed.dictimpl",
     "numba.typed.listobject", "numba.typed.setobject", "helpers_numba_loaded",
 ]  # fmt: skip
-AT_LOADING = {"PYTHONHASHSEED", "NUMBA_DISABLE_JIT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"}
+NATIVE = {"NUMBA_CPU_NAME": None, "NUMBA_CPU_FEATURES": None}  # code for this processor, as players have it
+AT_LOADING = {"PYTHONHASHSEED", "NUMBA_DISABLE_JIT", "NUMBA_OPT", *NATIVE}
 FORKED = sys.platform.startswith("linux")  # elsewhere system libraries do not survive it
-PATIENCE = 300  # seconds: what takes longer hangs
+PATIENCE = 900  # seconds: what takes longer hangs
 RUN_CAROM = "import runpy; runpy.run_module('carom', run_name='__main__')"
+
+
+Environment = dict[str, "str | None"]  # None: without that variable
+
+
+def with_variables(environment: Environment) -> dict[str, str]:
+    """The environment of here with these changes."""
+    changed = {**os.environ, **environment}
+    return {name: value for name, value in changed.items() if value is not None}
 
 
 class Started:
     """A program that runs; ``finish`` waits for its end."""
 
-    def __init__(self, code: str, arguments: tuple, cwd: Path | None, environment: dict[str, str]) -> None:
+    def __init__(self, code: str, arguments: tuple, cwd: Path | None, environment: Environment) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="carom-process-")
         self._arguments = [str(argument) for argument in arguments]
-        everything = {**os.environ, **environment}
+        everything = with_variables(environment)
         files = [os.path.join(self._folder.name, name) for name in ("stdout", "stderr")]
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload(PRELOAD)
@@ -61,14 +71,19 @@ class Started:
 class StartedAnew:
     """The same in a new Python."""
 
-    def __init__(self, code: str, arguments: tuple, cwd: Path | None, environment: dict[str, str]) -> None:
+    def __init__(self, code: str, arguments: tuple, cwd: Path | None, environment: Environment) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-c", code, *map(str, arguments)], cwd=cwd, env={**os.environ, **environment}, text=True,
+            [sys.executable, "-c", code, *map(str, arguments)], cwd=cwd, env=with_variables(environment), text=True,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
 
     def finish(self) -> subprocess.CompletedProcess[str]:
-        output = self._process.communicate(timeout=PATIENCE)
+        with self._process:
+            try:
+                output = self._process.communicate(timeout=PATIENCE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                raise
         return subprocess.CompletedProcess(self._process.args, self._process.returncode, *output)
 
 
@@ -78,8 +93,8 @@ def _byte_code() -> tempfile.TemporaryDirectory:
     return tempfile.TemporaryDirectory(prefix="carom-byte-code-")
 
 
-def start_python(code: str, *arguments, cwd: Path | None = None, anew: bool = False, **environment: str):
-    """Start ``code`` as ``python -c`` does; ``anew``: without fork; environment: variables besides those of here."""
+def start_python(code: str, *arguments, cwd: Path | None = None, anew: bool = False, **environment: str | None):
+    """Start ``code`` as ``python -c`` does; anew: without fork; environment: changes of that of here, None: without."""
     anew = anew or not FORKED or not AT_LOADING.isdisjoint(environment)
     return (StartedAnew if anew else Started)(code, arguments, cwd, environment)
 

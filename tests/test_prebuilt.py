@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from helpers_processes import run_carom, run_python
+from helpers_processes import NATIVE, copied_cache, run_carom, run_python
 
 from carom.framework.jit.prebuilt import INDEX, PORTABLE, made_with
 
@@ -24,6 +24,19 @@ def shifted(x):
 for folder in sys.argv[1:]:
     use_kernels(folder)
 print(shifted(2.0), len(log.compiled), log.loaded)
+"""
+EMPTY_GAME = """
+from carom.framework import World
+from carom.framework.compilation import kernel
+from carom.plugins import Physics
+
+@kernel
+def shifted(x):
+    return x + 1.0
+
+def build(settings=None, seed=0):
+    shifted(2.0)
+    return World(Physics(2), settings=settings)
 """
 WRITE = "import pathlib; write_index(pathlib.Path({folder!r}), {processor!r})"
 
@@ -68,7 +81,7 @@ def game(made, tmp_path):
 
 
 def test_a_process_of_any_processor_loads_what_was_shipped(game):
-    assert game.run(anew=True) == (5.0, 0, 1, [])
+    assert game.run(anew=True, **NATIVE) == (5.0, 0, 1, [])
 
 
 def test_a_kernel_that_was_edited_since_compiles(game):
@@ -121,6 +134,22 @@ def test_a_damaged_index_is_told_in_one_line(game):
 
 def test_they_can_be_switched_off(game):
     assert game.run(CAROM_PREBUILT="0")[:3] == (5.0, 1, 0)
+
+
+def test_the_command_takes_what_the_cache_holds_and_nothing_else(tmp_path):
+    """The first time its own kernel compiles; the second time nothing does, and the same files are copied."""
+    environment = copied_cache(tmp_path / "cache")
+    (tmp_path / "cache" / "other-1234.kernel").write_bytes(b"of another program")
+    (tmp_path / "game.py").write_text(EMPTY_GAME)
+    contents = []
+    for folder in ("first", "second"):
+        done = run_carom("warm-up", "game.py", "--portable", folder, cwd=tmp_path, **environment)
+        assert done.returncode == 0, done.stderr
+        assert ("first use" in done.stderr) == (folder == "first")
+        contents.append({file.name: file.read_bytes() for file in (tmp_path / folder).iterdir()})
+    assert contents[0] == contents[1]
+    assert any(name.startswith("shifted-") for name in contents[0])
+    assert "other-1234.kernel" not in contents[0]
 
 
 def test_the_command_refuses_a_folder_that_holds_other_things(tmp_path):

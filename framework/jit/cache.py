@@ -36,6 +36,7 @@ logger = logging.getLogger("carom")
 machine_code = operator.attrgetter("library")  # of numba's compile result
 _checksum = hashlib.sha256
 _reported: set[Path] = set()  # folders that could not be used or written, told once
+used: set[Path] = set()  # files that this process has loaded or written
 
 
 def cache_folder() -> Path | None:
@@ -150,6 +151,7 @@ class KernelCache(_Cache):
             for path in self._places(sig, target_context.codegen()):
                 found = _read(path)
                 if found is not None:
+                    used.add(path)
                     return compiler.CompileResult._rebuild(target_context, *found)
         self._missing(self._dispatcher)
         return None
@@ -177,6 +179,7 @@ class KernelCache(_Cache):
             with os.fdopen(handle, "wb") as file:
                 file.write(content + _checksum(content).digest())
             os.replace(temporary, path)
+            used.add(path)
         except OSError as error:  # a full or vanished disk costs speed, never the run
             if temporary is not None:
                 with contextlib.suppress(OSError):

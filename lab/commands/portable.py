@@ -6,35 +6,44 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
-from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, KERNELS
+from ...framework.jit.cache import used
 from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
 from .usage_errors import Problem
 
+COPY = "CAROM_COPY_USED"  # in the environment of the process that compiles: where copies go
+
 
 def compile_portable(folder: Path, arguments: Sequence[str]) -> None:
-    """Compile what ``carom warm-up ARGUMENTS`` compiles, for any processor, into that folder; replace what it held."""
+    """Put what ``carom warm-up ARGUMENTS`` needs, for any processor, into that folder; replace what it held.
+
+    What the cache folder holds already, made for any processor, is not compiled again.
+    """
     if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / INDEX).exists())):
         raise Problem(f"{folder} holds other things: name a new folder for the kernels, or one made by --portable")
-    with tempfile.TemporaryDirectory(prefix="carom-portable-") as cache:
-        # numba decides for a processor when it is imported: another process.
-        environment = {
-            **os.environ, CACHE_FOLDER_VARIABLE: cache, OFF: "0",
-            "NUMBA_CPU_NAME": PORTABLE[0], "NUMBA_CPU_FEATURES": PORTABLE[1],
-        }  # fmt: skip
-        done = subprocess.run([sys.executable, "-m", "carom", "warm-up", *arguments], env=environment)
-        if done.returncode:
-            raise click.exceptions.Exit(done.returncode)
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
-        files = sorted(Path(cache).glob(KERNELS))
-        for file in files:
-            shutil.copyfile(file, folder / file.name)
+    # numba decides for a processor when it is imported: another process.
+    environment = {
+        **os.environ, COPY: str(folder.absolute()), OFF: "0",
+        "NUMBA_CPU_NAME": PORTABLE[0], "NUMBA_CPU_FEATURES": PORTABLE[1],
+    }  # fmt: skip
+    done = subprocess.run([sys.executable, "-m", "carom", "warm-up", *arguments], env=environment)
+    if done.returncode:
+        raise click.exceptions.Exit(done.returncode)
     write_index(folder, PORTABLE)
-    size = sum(file.stat().st_size for file in folder.iterdir())
-    click.echo(f"{folder}: {len(files):,} kernels for any processor of this platform, {size / 1e6:.1f} MB")
+    sizes = [file.stat().st_size for file in folder.iterdir()]
+    size = f"{sum(sizes) / 1e6:.1f} MB"
+    click.echo(f"{folder}: {len(sizes) - 1:,} kernels for any processor of this platform, {size}")
+
+
+def copy_used() -> None:
+    """In the process that compiles: leave copies of all kernels that were needed."""
+    wanted = os.environ.get(COPY)
+    if wanted:
+        shutil.rmtree(wanted, ignore_errors=True)
+        os.makedirs(wanted)
+        for file in sorted(used):
+            shutil.copyfile(file, os.path.join(wanted, file.name))

@@ -22,7 +22,7 @@ from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from ..reporting.progress import CompileStatus
 from .loading import Loaded, load, stdout_kept_clean
-from .portable import compile_portable
+from .portable import compile_portable, copy_used
 from .usage_errors import Problem
 
 # The plugins that ship and bring shapes.
@@ -81,6 +81,7 @@ def warm_up_command(
     before = cache_contents()
     with CompileStatus(Console(stderr=True)) as status:
         rows = warm_up(_work(targets, everything, wanted), status.say)
+    copy_used()
     after = cache_contents()
     if as_json:
         cache = {"folder": str(folder), "kernels_before": before[0], "kernels": after[0], "bytes": after[1]}
