@@ -62,7 +62,7 @@ def test_c16_the_world_says_that_a_spring_is_too_stiff(mode):
 # -- C17: many steps -------------------------------------------------------------------------------
 
 
-def check_invariant(steps):
+def check_invariant(steps, tolerance=20):
     """B2: semi-implicit Euler keeps v^2 + z^2 x^2 - z^2 x v exactly; rounding adds up like a random walk."""
     z = np.array([0.05, 0.1, 0.3, 1.0])
     world = oscillators("semi_implicit_euler", 1.0, z**2)
@@ -70,7 +70,7 @@ def check_invariant(steps):
     start = v**2 + z**2 * x**2 - z**2 * x * v
     run(world, steps)
     end = v**2 + z**2 * x**2 - z**2 * x * v
-    np.testing.assert_allclose(end, start, rtol=20 * math.sqrt(steps) * EPS)
+    np.testing.assert_allclose(end, start, rtol=tolerance * math.sqrt(steps) * EPS)
 
 
 def test_c17_a_spring_drifts_no_more_than_rounding():
@@ -78,8 +78,9 @@ def test_c17_a_spring_drifts_no_more_than_rounding():
 
 
 @pytest.mark.slow
-def test_c17_a_spring_drifts_no_more_than_rounding_in_a_million_steps():
-    check_invariant(1_000_000)
+def test_c17_a_spring_drifts_no_more_than_rounding_in_many_steps():
+    """100,000 steps, where a drift of an eightieth of a rounding error per step would show."""
+    check_invariant(100_000, tolerance=4)
 
 
 class Sun(ForceSystem):
@@ -89,7 +90,7 @@ class Sun(ForceSystem):
         bodies.force -= bodies.position / np.linalg.norm(bodies.position, axis=1)[:, None] ** 3
 
 
-def check_orbit(method, steps):
+def check_orbit(method, steps, tolerance=20):
     """B4: both symplectic methods keep the angular momentum exactly, and the energy within its band."""
     world = make_world(dt=2 * math.pi / 1000, integrator=method)
     world.add_system(Sun())
@@ -97,7 +98,7 @@ def check_orbit(method, steps):
     (x, y), (vx, vy) = world.bodies.position[0], world.bodies.linear_velocity[0]
     run(world, steps)
     (x, y), (vx, vy) = world.bodies.position[0], world.bodies.linear_velocity[0]
-    assert x * vy - y * vx == pytest.approx(1.0, rel=20 * math.sqrt(steps) * EPS)
+    assert x * vy - y * vx == pytest.approx(1.0, rel=tolerance * math.sqrt(steps) * EPS)
     assert 0.5 * (vx * vx + vy * vy) - 1 / math.hypot(x, y) == pytest.approx(-0.5, abs=2e-4)
 
 
@@ -108,9 +109,9 @@ def test_c17_an_orbit_drifts_no_more_than_rounding(method):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet"])
-def test_c17_an_orbit_drifts_no_more_than_rounding_in_200_turns(method):
-    """200,000 steps: a drift of a twentieth of a rounding error per step would show."""
-    check_orbit(method, 200_000)
+def test_c17_an_orbit_drifts_no_more_than_rounding_in_50_turns(method):
+    """50,000 steps: a drift of a fortieth of a rounding error per step would show."""
+    check_orbit(method, 50_000, tolerance=5)
 
 
 # -- C19: crowds created in each other -------------------------------------------------------------
