@@ -1,6 +1,7 @@
 # carom: every target works on a fresh clone with python3 (3.11 or newer), pip and make.
 #   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
-#   make test    the tests, without the slow ones; make test-slow: those; make coverage: which lines they run
+#   make test    the tests, without the slow ones; make test-slow: those; make test-all: both in one run
+#   make coverage: which lines they run
 #   make wheel   a wheel that carries compiled kernels, into dist/
 #   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
 #   make figures measure again what the tables and charts of docs/accuracy.md, limits.md, settings.md and levels.md show
@@ -20,7 +21,7 @@ BENCH := .venv/bench-$(HERE)
 TEST := .venv/test-$(HERE)
 DEV := .venv/dev-$(HERE)
 
-.PHONY: run wheel test test-slow coverage bench figures ide typecheck lint clean
+.PHONY: run wheel test test-slow test-all install coverage bench figures ide typecheck lint clean
 
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -28,13 +29,20 @@ run: $(RUN)
 # Byte code is kept, whatever the environment says: or every worker would compile all tests and carom anew in each run.
 unexport PYTHONDONTWRITEBYTECODE
 
-TOGETHER := -n 2 --dist loadfile --no-loadscope-reorder
+WORKERS ?= 2
+TOGETHER := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test: $(TEST)
 	$(BIN)/pytest $(TOGETHER) -m "not slow" $(ARGS)
 
 test-slow: $(TEST)
 	$(BIN)/pytest $(TOGETHER) -m slow $(ARGS) || [ $$? -eq 5 ]  # 5: nothing is marked slow
+
+test-all: $(TEST)
+	$(BIN)/pytest $(TOGETHER) $(ARGS)
+
+# All that the checks need, at once.
+install: $(DEV)
 
 # Kernels as plain Python: the same bits as compiled, and which lines of the engine tests have run.
 PLAIN := plain_python components_* systems_* world_* contacts_rows filters_enabled filters_sensors forces_kinds forces_systems \
@@ -106,6 +114,6 @@ $(TEST): $(VENV) pyproject.toml
 	$(PIP) -e ".[test]"
 	touch $@
 
-$(DEV): $(TEST) pyproject.toml
+$(DEV): $(VENV) pyproject.toml
 	$(PIP) -e ".[test,dev]"
-	touch $@
+	touch $(TEST) $@
