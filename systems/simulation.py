@@ -179,9 +179,8 @@ class Simulation(PhysicsServices):
 
     def _link(self) -> None:
         """Compile or load what the step needs."""
-        self.parts_version += 1
         try:
-            self.links.link(len(self._world.force_systems))
+            self.parts_version += self.links.link(len(self._world.force_systems))
         except Exception as error:
             self._attribution.describe(error)
             raise

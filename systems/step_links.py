@@ -30,6 +30,7 @@ class StepLinks:
         self._integration, self._search = integration, search
         self._state.links = np.zeros(COUNT, np.int64)
         self._version = self._forces = NEVER  # of the scene, and how many force systems there were
+        self._key: Any = None  # what the linked stages depend on
         self._shapes_key: Any = None
         self._kept_key: Any = None
 
@@ -40,33 +41,48 @@ class StepLinks:
     def needs_sweeps(self) -> bool:
         """Whether some body is swept: all of them in the mode, or those whose ccd is set."""
         state, table = self._state, self._scene.table
-        return state.collides and (state.mode != DISCRETE or bool(table.column("ccd")[: table.stops[1]].any()))
+        ccd = table.arrays.get("ccd")
+        return state.collides and (state.mode != DISCRETE or (ccd is not None and bool(ccd[: table.stops[1]].any())))
 
     def forget(self) -> None:
         """Other settings: link again before the next step."""
-        self._version = NEVER
+        self._version, self._key = NEVER, None
 
-    def link(self, force_systems: int) -> None:
-        """Compile or load what the step needs, and see to what later steps and queries may need."""
-        self.forget()  # until it is done
+    def link(self, force_systems: int) -> bool:
+        """Compile or load what the step needs, and see to what later steps and queries may need.
+
+        True if these are other stages than before; bodies that come and go seldom change that.
+        """
+        self._version = NEVER  # until it is done
         self._integration.prepare()
         state = self._state
         state.sweeps_ready = self.needs_sweeps()
         if state.sweeps_ready:
             self._scene.reserve(*SWEEPS)
         conditions = self._conditions()
+        key = (self._scene.linked, state.sweeps_ready, force_systems, conditions)
+        changed = key != self._key
+        if changed:
+            self._key = None
+            self._link_stages(conditions)
+            self._key = key
+        self.link_shapes()
+        self._link_possible()
+        self._version, self._forces = self._scene.version, force_systems
+        return changed
+
+    def _link_stages(self, conditions: dict[str, bool]) -> None:
+        """The stages whose condition is met, and what these call."""
+        state = self._state
 
         def wanted(stage: Stage) -> bool:
             return conditions.get(stage.needed, False)
 
         parts = self._parts()
         link_all((*self._functions_of_shapes(), *parts.values(), *self._program.functions(wanted)))
-        self.link_shapes()
         for place, part in parts.items():
             state.links[place] = part.address
         self._program.link(wanted)
-        self._link_possible()
-        self._version, self._forces = self._scene.version, force_systems
 
     def _conditions(self) -> dict[str, bool]:
         """What is true of the scene now, as in ``stage_list.CONDITIONS``."""
@@ -98,7 +114,7 @@ class StepLinks:
 
     def link_shapes(self) -> None:
         """The functions of the shapes alone, where they are not linked yet."""
-        key = (self._scene.version, self._state.sweeps_ready)
+        key = (self._scene.linked, self._state.sweeps_ready)
         if key != self._shapes_key:
             link_all(self._functions_of_shapes())
             self._scene.link_shapes(self._state.sweeps_ready)
