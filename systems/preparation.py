@@ -18,6 +18,7 @@ from ..components import AABBCollider, Collider, SphereCollider
 from ..framework.data.bodies import SelectedBodies
 from ..framework.data.column_copies import COPY_BLOCKS
 from ..framework.data.component import Component
+from ..framework.data.row_moves import MOVE_ROWS
 from ..framework.jit.background import link_in_background
 from ..framework.jit.link_all import link_all
 from ..framework.jit.linking import Called, Linked
@@ -61,7 +62,7 @@ def needed_functions(
 ) -> Iterator[Linked | Called]:
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
-    yield from (RUN_STAGES, TICKS_NOW, COPY_BLOCKS)
+    yield from (RUN_STAGES, TICKS_NOW, COPY_BLOCKS, MOVE_ROWS)
     for stage in STAGES:
         if stage.needed in conditions or stage.name in conditions:
             yield linked_stage(stage, STATE, dimensions)

@@ -327,6 +327,7 @@ STATE = Schema(
     dynamic=integer(),  # rows before it are dynamic
     moving=integer(),  # rows before it move
     version=integer(),  # of the table's rows
+    ranks_version=integer(),  # of the rows that ``bodies.rank`` is of
     gravity=vectors(),  # one row
     collides=flag(),
     several_levels=flag(),

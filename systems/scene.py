@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..components import AABBCollider, Collider
+from ..framework.data.row_moves import RowMoves
 from ..framework.data.table import Table
 from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
@@ -38,6 +39,9 @@ HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
 ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "held", "place")
+# What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others.
+KEPT_COLUMNS = ("shape", "collider_slot", "offset", "min_extent", "lower", "upper")
+ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.
 ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third")
 
@@ -65,6 +69,12 @@ class Scene:
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
         self.rotated_columns: dict[str, np.ndarray] = {}
         self._axes = np.empty((0, state.dimensions, state.dimensions))
+        self._kept: list[np.ndarray] = []  # the columns that move with the rows
+        self._moves = RowMoves()
+        self._columns_version = -1  # of the table, when its columns were bound
+        self._built_for: Any = None  # what the scene was made for, beside the rows
+        self._several = False  # bodies have several colliders
+        table.on_rows_moved = self._move_rows
 
     # -- structure --------------------------------------------------------------------------------
 
@@ -76,34 +86,81 @@ class Scene:
             return False
         self.structure = key
         self.version += 1
-        bodies, count, moving = self.state.bodies, table.count, table.stops[1]
+        self._count_rows()
+        built_for = (table.members_version, self.registry.version, table.capacity, self._present_colliders())
+        if built_for != self._built_for or not self._place_arrivals():
+            self._built_for = None  # until it is done
+            self._build(built_for[-1])
+            self._built_for = built_for
+        return True
+
+    def _count_rows(self) -> None:
+        """What the records know of the table's rows."""
+        state, table = self.state, self.table
+        bodies, count, moving = state.bodies, table.count, table.stops[1]
         table.arrays["linear_velocity"][moving:count] = 0.0
-        present = self._present_colliders()
-        self.bind_columns()
-        self.state.count, (self.state.dynamic, self.state.moving, _) = table.count, table.stops
-        self.state.version = table.version
+        for name in ZERO_WHERE_STATIC:
+            if len(getattr(bodies, name)):
+                getattr(bodies, name)[moving:count] = 0.0
+        if self._columns_version != table.columns_version:
+            self.bind_columns()
+        state.count, (state.dynamic, state.moving, _) = count, table.stops
+        state.version = table.version
+
+    def _build(self, present: list[type[Any]]) -> None:
+        """Make everything that depends on which colliders there are."""
+        table, bodies, count, moving = self.table, self.state.bodies, self.table.count, self.table.stops[1]
         self.state.slot_count = len(table.stacked_types(Collider.stack))
         self.reserve(*FLIGHT, *(name for name in ON_DEMAND if len(getattr(bodies, name))))
         if present:
             self.reserve(*COLLISIONS)
             if len(bodies.static_position) < count - moving:
                 bodies.reserve((count - moving) * 3 // 2, "static_position")
-        for name in ZERO_WHERE_STATIC:
-            if len(getattr(bodies, name)):
-                getattr(bodies, name)[moving:count] = 0.0
         present = self._place_levels(present)
         self.state.collides = bool((self.levels[0, :moving] >= 0).any())
         self.linked = linked_shapes(self.registry, present, self.state.dimensions) if present else None
         self.parameters = ParameterRecords(self.linked) if self.linked else None
-        if self.linked is not None:
-            bodies.rank[np.argsort(table.arrays["entity"][:count], kind="stable")] = np.arange(count)
         self._bind_shapes()
         self.state.statics_stale = self.state.rotation_stale = True
+
+    # -- bodies that come and go ------------------------------------------------------------------
+
+    def _move_rows(self, before: int, removed: np.ndarray, places: np.ndarray) -> None:
+        """The table's rows move, and those of the columns that are kept go along; if they cannot, all is made again."""
+        bodies = self.state.bodies
+        kept = [*(getattr(bodies, name) for name in KEPT_COLUMNS), *self.rotated_columns.values()]
+        kept = [column for column in kept if len(column)]  # without colliders there is the first alone
+        if self._several or any(len(column) != self.table.capacity for column in kept):
+            self._built_for = None
+            return
+        if len(kept) != len(self._kept) or any(one is not two for one, two in zip(kept, self._kept, strict=True)):
+            self._kept = kept
+            self._moves.bind(kept, [ARRIVED, *[None] * (len(kept) - 1)])
+        self._moves.run(before, removed, places)
+
+    def _place_arrivals(self) -> bool:
+        """Find the shapes of the bodies that have come since the last time; False if all has to be made again."""
+        state, table, count, moving = self.state, self.table, self.table.count, self.table.stops[1]
+        shapes, slots = state.bodies.shape[:count], state.shapes.slots
+        if len(self._taken_out[0]) or (self.linked and count - moving > len(state.bodies.static_position)):
+            return False
+        arrived = np.flatnonzero(shapes == ARRIVED)
+        shapes[arrived] = -1
+        for index, shape in enumerate(self.linked.shapes if self.linked else ()):
+            rows = arrived[table.has_mask(shape.component)[arrived]]
+            if (shapes[rows] >= 0).any():
+                return False
+            shapes[rows] = index
+        state.collides = bool((shapes[:moving] >= 0).any())
+        if self.linked is not None:
+            state.bodies.collider_slot[arrived] = slots[shapes[arrived]]
+            self._bind_shapes()
+            state.rotation_stale |= self.rotated or self.linked.needs_axes
         return True
 
     def forget(self) -> None:
         """Make everything again at the next refresh."""
-        self.structure = -1
+        self.structure, self._built_for = -1, None
 
     def _present_colliders(self) -> list[type[Any]]:
         table = self.table
@@ -114,6 +171,7 @@ class Scene:
     def bind_columns(self) -> None:
         """The table's arrays, which are others after it has grown, and more when a column on demand is made."""
         bodies, colliders, table = self.state.bodies, self.state.colliders, self.table
+        self._columns_version = table.columns_version
         for name in TABLE_COLUMNS:
             if name in table.arrays:
                 setattr(bodies, name, table.arrays[name])
@@ -144,6 +202,7 @@ class Scene:
         table, state, count = self.table, self.state, self.table.count
         masks = [table.has_mask(component)[:count] for component in present]
         levels = arrange(np.array(masks).reshape(len(present), count))
+        self._several = len(levels) > 1
         slots = np.array([table.slot_of(component) for component in present], np.int64)
         if present:
             state.bodies.collider_slot[:count] = slots[levels[-1]]

@@ -6,7 +6,7 @@ handles of the entities concerned are compared with those the table knows, every
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from typing import Any
 
 import numpy as np
@@ -174,20 +174,26 @@ class Adoption:
     ) -> bool:
         table = self.table
         for component in fresh:
-            table.add_component_type(component)
-            self._members.setdefault(component, {})
+            if component not in self._members:
+                table.add_component_type(component)
+                table.members_version += 1
+                self._members[component] = {}
         for component, entities in gone.items():
-            self._let_go(component, entities)
+            self._let_go(component, entities, left)
         sources = {component: Sources(component, list(handles.values())) for component, handles in fresh.items()}
         added = np.array(sorted(come), np.int64)
         kinds = self._kinds(added, fresh, sources)
         moved = bool(len(left) or len(added) or table.kind_changed)
         if moved:
             table.rebuild(table.rows_of(_array(left)), added, kinds)
+        ids, rows = _NONE, _NONE
         for component, handles in fresh.items():
-            self._adopt(component, handles, sources[component])
-        if fresh or gone:
-            table.members_version += 1
+            before, ids = ids, np.fromiter(handles, np.int64, len(handles))
+            if ids.tobytes() != before.tobytes():  # else the same bodies as of the type before
+                rows = table.rows_of(ids)
+            self._adopt(component, handles, sources[component], rows)
+        if any(not handles.keys() <= come for handles in fresh.values()) or any(not e <= left for e in gone.values()):
+            table.members_version += 1  # bodies that stay have other components
             table.static_version += 1
         return moved or bool(fresh or gone)
 
@@ -200,13 +206,18 @@ class Adoption:
         if carrier in fresh:
             entities = _array(fresh[carrier])
             values = sources[carrier].values(carrier.columns["kind"], self.table.dimensions)
-            here = np.isin(entities, added, assume_unique=True)
-            kinds[np.searchsorted(added, entities[here])] = values[here]
-            self.table.set_kinds(self.table.rows_of(entities[~here]), values[~here])
+            places = np.searchsorted(added, entities)
+            here = np.append(added, -1)[places] == entities
+            kinds[places[here]] = values[here]
+            if not here.all():
+                self.table.set_kinds(self.table.rows_of(entities[~here]), values[~here])
         return kinds
 
-    def _let_go(self, component: type[Component], entities: Ids) -> None:
-        """Handles of removed components keep their last values; the rows fall back to the defaults."""
+    def _let_go(self, component: type[Component], entities: Ids, leaving: Set[int] = frozenset()) -> None:
+        """Handles of removed components keep their last values; the rows fall back to the defaults.
+
+        leaving: entities whose rows go anyway.
+        """
         members, table = self._members[component], self.table
         ids = _array(entities)
         rows = table.rows_of(ids)
@@ -215,6 +226,8 @@ class Adoption:
             handle = members.pop(entity)
             if handle._store is table and handle._entity == entity:
                 handle._bind(store, None, index, store.version)
+        if entities <= leaving:
+            return
         for column in component.columns.values():
             if column.key in table.arrays:
                 table.arrays[column.key][rows] = column.empty_value(table.dimensions)
@@ -222,12 +235,10 @@ class Adoption:
         if component is table.kind_carrier:
             table.set_kinds(rows, np.full(len(rows), STATIC))
 
-    def _adopt(self, component: type[Component], handles: Handles, sources: Sources) -> None:
-        """Write the handles' values into their rows, column by column, and bind the handles."""
+    def _adopt(self, component: type[Component], handles: Handles, sources: Sources, rows: np.ndarray) -> None:
+        """Write the handles' values into their rows and bind the handles."""
         table = self.table
-        rows = table.rows_of(np.fromiter(handles, np.int64, len(handles)))
-        for column in component.columns.values():
-            table.write(column.key, rows, sources.values(column, table.dimensions))
+        sources.write(table, rows)
         if component is self.anchor and "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
         table.has_mask(component)[rows] = True
@@ -239,6 +250,9 @@ class Adoption:
             handle._version = version
             handle._values = None
         self._members[component].update(handles)
+
+
+_NONE = np.empty(0, np.int64)
 
 
 def _is_ours(component: type[Any]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -53,9 +54,17 @@ class Column:
         """What rows hold whose entity lacks the component, and what an omitted scalar expands to."""
         if self.item == "rotation" and dimensions == 3:
             return np.array([1.0, 0.0, 0.0, 0.0])
-        if self.default is REQUIRED:
-            return 0
-        return self.checked(self.default)
+        return 0 if self.default is REQUIRED else self.stored_default
+
+    @cached_property
+    def stored_default(self) -> Any:
+        """The default as it is stored; a single number stands for all of a vector's."""
+        return REQUIRED if self.default is REQUIRED else self.checked(self.default)
+
+    def whole(self, value: Any, dimensions: int) -> np.ndarray:
+        """The array that a single number stands for in a world of that many dimensions (rotation 0: no rotation)."""
+        rotated = self.item == "rotation" and dimensions == 3
+        return np.full(self.item_shape(dimensions), self.empty_value(3) if rotated else value, self.dtype)
 
     def bounds(self) -> tuple[float, float] | None:
         """From where to where numbers may be; None: any that the type holds."""

@@ -78,10 +78,14 @@ class Component:
         self._version = -1
         stored: dict[str, Any] = {}
         for name, column in self.columns.items():
-            value = given.get(name, column.default)
+            if name in given:
+                stored[name] = column.checked(given[name])
+                continue
+            value = stored[name] = column.stored_default
             if value is REQUIRED:
                 raise TypeError(f"{type(self).__name__} needs a value for {name!r}")
-            stored[name] = column.checked(value)
+            if type(value) is np.ndarray:
+                stored[name] = value.copy()
         self._values = stored
 
     # -- being adopted and let go -----------------------------------------------------------------
@@ -117,9 +121,8 @@ class Component:
         if self._store is None:
             for column in self._shaped:
                 value = self._values[column.name]
-                if np.ndim(value) == 0 and column.item_shape(dimensions):
-                    whole = column.empty_value(dimensions) if column.item == "rotation" else value
-                    self._values[column.name] = np.full(column.item_shape(dimensions), whole)
+                if type(value) is float and column.item_shape(dimensions):
+                    self._values[column.name] = column.whole(value, dimensions)
 
     def copy(self) -> Self:
         """An unbound component with the same values, for another entity (prefabs)."""
@@ -180,19 +183,33 @@ class Many:
 
 
 class RowStore:
-    """Values of handles that have no row in a table: created in bulk and not adopted yet, or removed already."""
+    """Values of handles that have no row in a table: created in bulk and not adopted yet, or removed already.
+
+    unmade: columns without an array of so many rows, all of which hold the default.
+    """
 
     version = 0
 
-    def __init__(self, arrays: dict[str, np.ndarray], dimensions: int) -> None:
+    def __init__(
+        self, arrays: dict[str, np.ndarray], dimensions: int, unmade: dict[str, Column] | None = None, count: int = 0
+    ) -> None:
         self.arrays = arrays
         self.dimensions = dimensions
+        self._unmade, self._count = unmade or {}, count
 
     def values(self, key: str, rows: np.ndarray) -> np.ndarray:
-        return self.arrays[key][rows]
+        return self.make(key)[rows]
+
+    def default_of(self, key: str) -> Any:
+        return self._unmade[key].empty_value(self.dimensions)
 
     def make(self, key: str) -> np.ndarray:
-        return self.arrays[key]  # it has all columns
+        """The array of that column, for writing."""
+        if key not in self.arrays:
+            column = self._unmade[key]
+            self.arrays[key] = np.empty((self._count, *column.item_shape(self.dimensions)), column.dtype)
+            self.arrays[key][...] = column.empty_value(self.dimensions)
+        return self.arrays[key]
 
     def find(self, entity: int) -> int:
         raise KeyError(entity)  # handles into a store never lose their row

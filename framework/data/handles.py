@@ -9,13 +9,14 @@ import numpy as np
 
 from .columns import Column
 from .component import Component, RowStore
+from .table import Table
 
 
 class Sources:
     """Where the values of some handles of one type are: with the handle itself, or in rows of stores."""
 
     def __init__(self, component: type[Component], handles: list[Component]) -> None:
-        self._count = len(handles)
+        self._component, self._count = component, len(handles)
         self._loose: list[int] = []  # indices of handles that hold their values themselves
         self._values: list[dict[str, Any]] = []
         store = handles[0]._store
@@ -45,6 +46,18 @@ class Sources:
         for store, indices, rows in self._groups:
             result[indices] = store.values(column.key, rows)
         return result
+
+
+    def write(self, table: Table, rows: np.ndarray) -> None:
+        """Write all values into these rows of a table, one row per handle."""
+        columns = self._component.columns.values()
+        for index, values in zip(self._loose, self._values, strict=True):
+            row = int(rows[index])
+            for column in columns:
+                table.write_one(column.key, row, values[column.name])
+        for store, indices, source in self._groups:
+            for column in columns:
+                table.write(column.key, rows[indices], store.values(column.key, source))
 
 
 def _vectors(values: list[Any], column: Column, dimensions: int) -> np.ndarray:

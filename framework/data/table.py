@@ -13,6 +13,7 @@ import numpy as np
 
 from .columns import Column
 from .component import Component, RowStore
+from .row_moves import RowMoves
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
@@ -40,13 +41,18 @@ class Table:
         self.kind_changed = False
         self.arrays: dict[str, np.ndarray] = {}  # those there are
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
+        self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
+        # Called with the number of rows before, those that leave and the places of those that come, see row_moves.
+        self.on_rows_moved: Callable[[int, np.ndarray, np.ndarray], None] = lambda *_: None
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
         self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
         self._fills: dict[str, Any] = {}
+        self._default_bits: dict[str, bytes] = {}
+        self._moves, self._bound_columns = RowMoves(), -1
         self._stack_rows: dict[str, tuple[str, int]] = {}  # column key -> (stack, slot)
         self._stacked_types: dict[str, list[type[Component]]] = {}
         self.add_array("entity", dtype=np.int64)
@@ -63,6 +69,7 @@ class Table:
             self.on_demand[key] = column
         else:
             self.arrays[key] = self._filled(column, fill)
+            self.columns_version += 1
 
     def _filled(self, column: Column, fill: Any) -> np.ndarray:
         array = np.empty((self.capacity, *column.item_shape(self.dimensions)), column.dtype)
@@ -138,6 +145,7 @@ class Table:
         for key, (stack, slot) in self._stack_rows.items():
             if stack in self.stacks:
                 self.arrays[key] = self.stacks[stack][slot]
+        self.columns_version += 1
 
     def column_keys(self) -> set[str]:
         """The names of all columns."""
@@ -183,6 +191,7 @@ class Table:
             else:
                 self.arrays[key] = self._filled(column, self._fills[key])
             array = self.arrays[key]
+            self.columns_version += 1
             self.on_make()
         return array
 
@@ -190,6 +199,27 @@ class Table:
         """Values for those rows; defaults need no array."""
         if key in self.arrays or values.tobytes() != self._defaults(key, (len(rows),)).tobytes():  # 0.0 is not -0.0
             self.make(key)[rows] = values
+
+    def write_one(self, key: str, row: int, value: Any) -> None:
+        """The same for one row; ``value`` as a handle keeps it: a single number may stand for a whole vector."""
+        array = self.arrays.get(key)
+        if array is None:
+            if self._is_default(key, value):
+                return
+            array = self.make(key)
+        fill = self._fills[key]
+        array[row] = fill if type(fill) is np.ndarray and type(value) is float else value  # 3D: no rotation
+
+    def _is_default(self, key: str, value: Any) -> bool:
+        """Whether that value has the bits of the default of a column on demand."""
+        fill = self._fills[key]
+        if type(value) is np.ndarray:
+            if key not in self._default_bits:
+                self._default_bits[key] = self.on_demand[key].whole(fill, self.dimensions).tobytes()
+            return value.tobytes() == self._default_bits[key]
+        if type(value) is float and type(fill) is float:
+            return value is fill or value.hex() == fill.hex()  # 0.0 is not -0.0
+        return type(fill) is np.ndarray or value == fill
 
     def unmade(self) -> list[str]:
         """Columns on demand that have no array."""
@@ -221,54 +251,68 @@ class Table:
         for stop in self.stops:
             block = self.arrays["entity"][start:stop]
             if stop > start:
-                place = np.minimum(np.searchsorted(block, entities), stop - start - 1)
+                place = np.minimum(block.searchsorted(entities), stop - start - 1)
                 found = block[place] == entities
                 rows[found] = place[found] + start
             start = stop
         return rows
 
-    def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> np.ndarray:
-        """Take rows out, put rows in, restore the order; returns the rows of ``added``.
+    def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> None:
+        """Take rows out, put rows in, and bring bodies of another kind to their place.
 
-        removed: rows that go. added: entity ids, any order. Rows before the first change stay where they are.
+        removed: rows that go. added: entity ids that come, with their kinds; their rows hold the defaults.
         """
-        kinds = np.repeat(np.arange(3), np.diff((0, *self.stops)))
-        if self.kind_changed:
-            kinds = self.column("kind").astype(np.int64)
-        keep = np.ones(self.count, bool)
-        keep[removed] = False
-        old = np.flatnonzero(keep)
-        entity = np.concatenate((self.column("entity")[old], added))
-        kind = np.concatenate((kinds[old], added_kinds))
-        source = np.concatenate((old, np.full(len(added), -1)))
-        order = np.argsort((kind << 48) | entity, kind="stable")
-        source, entity, kind = source[order], entity[order], kind[order]
-
-        count = len(order)
-        self.reserve(count)
-        moved = source != np.arange(count)
-        first = int(np.argmax(moved)) if moved.any() else count
-        tail = source[first:]
-        fresh = tail < 0
-        only_fresh = bool(fresh.all())
-        for key, array in self.arrays.items():
-            if only_fresh:
-                array[first:count] = self._fills[key]
-                continue
-            block = array.take(tail, axis=0)  # a copy
-            block[fresh] = self._fills[key]
-            array[first:count] = block
-        self.arrays["entity"][:count] = entity
+        changed = self._changed_kinds(removed) if self.kind_changed else {}
+        if changed:
+            removed = np.concatenate((removed, self.rows_of(changed["entity"])))
+            added = np.concatenate((added, changed["entity"]))
+            added_kinds = np.concatenate((added_kinds, changed["kind"]))
+        removed = np.sort(removed)
+        order = np.argsort((added_kinds << 48) | added)
+        added, added_kinds = added[order], added_kinds[order]
+        places = self._places_for(added, added_kinds)
+        gone, come = np.searchsorted(removed, self.stops), np.searchsorted(added_kinds, (1, 2, 3))
+        before, stops = self.count, tuple((self.stops - gone + come).tolist())
+        if gone[2] > gone[1] or come[2] > come[1]:
+            self.static_version += 1
+        self.reserve(stops[2])
+        if self._bound_columns != self.columns_version:
+            self._bind_moves()
+        rows = self._moves.run(before, removed, places)
+        self.arrays["entity"][rows] = added
         if self.kind_carrier is not None:
-            self.arrays["kind"][:count] = kind
-        self.count = count
-        self.stops = tuple(int(s) for s in np.searchsorted(kind, (1, 2, 3)))  # type: ignore[assignment]
+            self.arrays["kind"][rows] = added_kinds
+        self.on_rows_moved(before, removed, places)
+        self.count, self.stops = stops[2], stops
         self.kind_changed = False
         self.version += 1
-        self.static_version += 1
-        position = np.empty(count, np.int64)
-        position[order] = np.arange(count)
-        return position[len(old) :]
+        if changed:
+            rows = self.rows_of(changed["entity"])
+            for key, values in changed.items():
+                self.arrays[key][rows] = values
+
+    def _changed_kinds(self, removed: np.ndarray) -> dict[str, np.ndarray]:
+        """All columns of the bodies whose kind is another than that of their rows, but for those that go."""
+        kinds = np.repeat(np.arange(3), np.diff((0, *self.stops)))
+        rows = np.setdiff1d(np.flatnonzero(self.column("kind") != kinds), removed)
+        return {key: self.values(key, rows) for key in self.arrays} if len(rows) else {}
+
+    def _places_for(self, added: np.ndarray, kinds: np.ndarray) -> np.ndarray:
+        """The rows in front of which these bodies belong, which are in order of kind and id."""
+        ids, places, start, first = self.arrays["entity"], np.empty(len(added), np.int64), 0, 0
+        for stop, last in zip(self.stops, np.searchsorted(kinds, (1, 2, 3)).tolist(), strict=True):
+            if last > first:
+                places[first:last] = start + np.searchsorted(ids[start:stop], added[first:last])
+            start, first = stop, last
+        return places
+
+    def _bind_moves(self) -> None:
+        columns = list(self.arrays.values())
+        defaults = [np.empty_like(column[:1]) for column in columns]
+        for key, row in zip(self.arrays, defaults, strict=True):
+            row[...] = self._fills[key]
+        self._moves.bind(columns, defaults)
+        self._bound_columns = self.columns_version
 
     def set_kinds(self, rows: np.ndarray, kinds: np.ndarray) -> None:
         """Bodies that are of another kind from now on; they move to their place at the next ``rebuild``."""
@@ -298,8 +342,9 @@ class Table:
 
     def take_out(self, component: type[Component], rows: np.ndarray) -> RowStore:
         """Copies of those rows of one component, for handles that outlive their rows."""
-        arrays = {column.key: self.values(column.key, rows) for column in component.columns.values()}
-        return RowStore(arrays, self.dimensions)
+        columns = {column.key: column for column in component.columns.values()}
+        made = {key: self.arrays[key][rows] for key in columns if key in self.arrays}
+        return RowStore(made, self.dimensions, columns, len(rows))
 
     # -- written through handles ------------------------------------------------------------------
 

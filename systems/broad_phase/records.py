@@ -9,6 +9,7 @@ GRID = Schema(
     "Grid",
     suits=flag(),  # the boxes are even enough for a grid
     version=integer(),  # static grid: ``state.statics_version`` when it was built; -1: never
+    first=integer(),  # static grid: the first static row, of which the other rows are counted
     # cells are numbered x + y * row + z * layer, with one empty cell around the outermost
     inverse_cell=number(),  # 1/m
     row=integer(),

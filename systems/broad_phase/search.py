@@ -34,7 +34,7 @@ class CandidateSearch:
         self._state, self._settings, self._box_now = state, settings, box_now
         self._plugin = PluginBroadPhase(registry)
         self._moving, self._static = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
-        self._static_version = NEVER_BUILT
+        self._static_version, self._static_first = NEVER_BUILT, 0
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
             grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
@@ -103,9 +103,14 @@ class CandidateSearch:
         index.build(self._state.bodies.lower, self._state.bodies.upper, start, stop)
 
     def _build_static(self) -> None:
+        """The index of what does not move, if that has changed; other rows are no reason to build it again."""
+        first = self._state.moving
         if self._static_version != self._state.statics_version:
-            self._build(self._static, self._state.moving, self._state.count)
+            self._build(self._static, first, self._state.count)
             self._static_version = self._state.statics_version
+        elif first != self._static_first:
+            self._static.shift_rows(first - self._static_first)
+        self._static_first = first
 
     # -- plan -------------------------------------------------------------------------------------
 

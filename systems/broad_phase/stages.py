@@ -18,7 +18,7 @@ from ...framework.compilation import part
 from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
 from .boxes import FRAME_SIZE
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
-from .static_grid import build_static_grid
+from .static_grid import build_static_grid, follow_rows
 from .uniform_grid import FULL, build_grid, look_around, look_inside, test_notes
 
 # 8 million candidates: with everything that is kept of a pair about 4 gigabytes. A game has 1 to 50 per body.
@@ -81,6 +81,8 @@ def place_statics(state, dt):
             state.needed = state.count - state.moving
             return NEED_CELLS
         build_static_grid(state)
+    elif grid.first != state.moving:
+        follow_rows(state)
     return OK if grid.suits else leave_to_trees(state)
 
 

@@ -82,7 +82,18 @@ def build_static_grid(state):
     if grid.suits:
         for k in range(grid.directory[grid.total]):
             order[k] = grid.rows[order[k]]
-    grid.version = state.statics_version
+    grid.version, grid.first = state.statics_version, state.moving
+
+
+@part
+def follow_rows(state):
+    """Static bodies have moved to other rows, all by as many, because others have come or gone before them."""
+    grid, by = state.static_grid, state.moving - state.static_grid.first
+    for k in range(grid.directory[grid.total] if grid.suits else 0):
+        grid.order[k] += by
+    for k in range(grid.outside_count):
+        grid.outside[k] += by
+    grid.first = state.moving
 
 
 def reserve_static_grid(grid, count):

@@ -11,6 +11,26 @@ from ..shapes.dispatch import evaluate_batch
 from ..shapes.tolerances import contact_margin
 
 
+@part
+def rank_rows(state):
+    """The place of each row in the order of entity ids: three sorted runs are merged."""
+    entity, rank = state.bodies.entity, state.bodies.rank
+    dynamic, kinematic, static = 0, state.dynamic, state.moving
+    for place in range(state.count):
+        row, lowest = -1, 0
+        if dynamic < state.dynamic:
+            row, lowest = dynamic, entity[dynamic]
+        if kinematic < state.moving and (row < 0 or entity[kinematic] < lowest):
+            row, lowest = kinematic, entity[kinematic]
+        if static < state.count and (row < 0 or entity[static] < lowest):
+            row = static
+        rank[row] = place
+        dynamic += row == dynamic
+        kinematic += row == kinematic
+        static += row == static
+    state.ranks_version = state.version
+
+
 def order_candidates(state, dt):
     """Candidates by the smaller entity id, then by the larger, the row of the smaller id first.
 
@@ -22,6 +42,8 @@ def order_candidates(state, dt):
     if count > len(candidates.sorted_a) or state.count + 1 > len(candidates.starts):
         state.needed = count
         return NEED_ORDER
+    if state.ranks_version != state.version:
+        rank_rows(state)
     state.candidates_counted += count
     first, second, starts = candidates.first, candidates.second, candidates.starts
     half_a, half_b = candidates.half_a, candidates.half_b

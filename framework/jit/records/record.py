@@ -55,6 +55,11 @@ class Record:
                 after[:keep] = before[:keep]
                 setattr(self, name, after)
 
+    def show(self, name: str, array: np.ndarray) -> None:
+        """Assign a column, unless it is that very array already."""
+        if self._arrays[name] is not array:
+            setattr(self, name, array)
+
     def columns(self) -> dict[str, np.ndarray]:
         """The arrays by name."""
         return dict(self._arrays)

@@ -93,6 +93,10 @@ class SpatialTree:
             refine(record, lambda: run("assign_again", record))
             run("finish_tree", record)
 
+    def shift_rows(self, by: int) -> None:
+        """The same boxes are those of rows further on by that many; until the next build."""
+        self.rows[:] += by
+
     @property
     def boxes(self) -> Corners:
         """(count, 2 d): lower and upper corners of the boxes, in the tree's order."""

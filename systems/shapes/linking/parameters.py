@@ -87,11 +87,11 @@ def make_parameter_record(shape: Shape, dimensions: int) -> Record:
 def bind(record: Record, shape: Shape, columns: Mapping[str, np.ndarray], axes: np.ndarray | None = None) -> None:
     """Let the record show these columns, by name; ``axes`` (n, d, d): rotation matrices of the bodies."""
     for name in shape.columns:
-        setattr(record, f"column_{name}", columns[name])
+        record.show(f"column_{name}", columns[name])
         column = shape.component.columns[name]
         if isinstance(column, ArrayColumn):
-            setattr(record, f"data_{name}", column.pool.data)
-            setattr(record, f"starts_{name}", column.pool.starts)
+            record.show(f"data_{name}", column.pool.data)
+            record.show(f"starts_{name}", column.pool.starts)
     if axes is not None and shape.rotates:
         record.axes = axes
     if axes is not None and shape.turned is not None:
