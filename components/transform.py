@@ -30,7 +30,7 @@ class Transform(Component, flat=True):
     rotation = on_demand(column(0.0, item="rotation"))
 
     def __init__(self, position: Any, rotation: Any = 0.0) -> None:
-        if np.ndim(position) == 0:
+        if type(position) is not tuple and np.ndim(position) == 0:
             raise ValueError(f"Transform.position must be 2 or 3 numbers, got {position!r}")
         self._fill({"position": position, "rotation": rotation})
 

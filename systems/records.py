@@ -87,16 +87,21 @@ BODIES = Schema(
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
 )
 
-# Rows of a column that code of the game may write, and what the field allows: one of the two arrays has rows.
+DYNAMIC_ROWS, STATIC_ROWS, ALL_ROWS = range(3)
+
+# A column that code of the game may write, and what the field allows: one of the two arrays has rows.
 CHECKED = Schema(
     "Checked",
     values=floats(),
     numbers=ints(),
+    width=integer(),  # numbers per body
+    rows=integer(),  # which bodies: DYNAMIC_ROWS and the like
     low=number(),
     high=number(),
     optional=flag(),  # nan stands for None
     turns=flag(),  # quaternions
-    owned=flags(),  # bodies that have the component; without rows all have
+    some=flag(),  # not all of these bodies have the component,
+    owned=flags(),  # but these
 )
 
 # Fields that every collider has, by the slot of its type and the row.

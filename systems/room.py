@@ -99,7 +99,7 @@ class Room:
         candidates, state = self._state.candidates, self._state
         if state.needed > len(candidates.sorted_a):
             candidates.reserve(_with_spare(state.needed), *ORDER)
-        candidates.reserve(state.count + 1, "starts")
+        candidates.reserve(self._scene.table.capacity + 1, "starts")
         kinds = state.shapes.count**2 + 2
         candidates.reserve(kinds, "bucket_starts")
 

@@ -71,7 +71,7 @@ class Scene:
         self._axes = np.empty((0, state.dimensions, state.dimensions))
         self._kept: list[np.ndarray] = []  # the columns that move with the rows
         self._moves = RowMoves()
-        self._columns_version = -1  # of the table, when its columns were bound
+        self._columns_version = self._shapes_version = -1  # of the table, when its columns were bound
         self._built_for: Any = None  # what the scene was made for, beside the rows
         self._several = False  # bodies have several colliders
         table.on_rows_moved = self._move_rows
@@ -154,7 +154,8 @@ class Scene:
         state.collides = bool((shapes[:moving] >= 0).any())
         if self.linked is not None:
             state.bodies.collider_slot[arrived] = slots[shapes[arrived]]
-            self._bind_shapes()
+            if self._shapes_version != table.columns_version or self.linked.has_array_columns:
+                self._bind_shapes()
             state.rotation_stale |= self.rotated or self.linked.needs_axes
         return True
 
@@ -259,6 +260,7 @@ class Scene:
                 rotated = {name: self._rotated_column(key, columns[name]) for name, key in keys.items()}
             self.parameters.bind(number, columns, self._axes, rotated)
         self.parameters.fill(self.state.shapes)
+        self._shapes_version = self.table.columns_version
 
     def _rotated_column(self, key: str, own: np.ndarray) -> np.ndarray:
         """Room for a shape's parameter as it is in the world."""

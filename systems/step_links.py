@@ -60,14 +60,14 @@ class StepLinks:
         if state.sweeps_ready:
             self._scene.reserve(*SWEEPS)
         conditions = self._conditions()
-        key = (self._scene.linked, state.sweeps_ready, force_systems, conditions)
+        key = (self._scene.linked, self._scene.registry.version, state.sweeps_ready, force_systems, conditions)
         changed = key != self._key
         if changed:
             self._key = None
             self._link_stages(conditions)
+            self.link_shapes()
+            self._link_possible()
             self._key = key
-        self.link_shapes()
-        self._link_possible()
         self._version, self._forces = self._scene.version, force_systems
         return changed
 

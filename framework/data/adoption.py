@@ -42,6 +42,7 @@ class Adoption:
         self._members: dict[type[Component], Handles] = {}
         self._log: esper_bridge.ChangeLog | None = None  # of this world's context
         self._pending: dict[type[Any], Ids] = {}  # changes that could not be taken in yet
+        self._looked_up: tuple[Any, Any] = (None, None)  # ids and their rows, within one synchronize
 
     def settled(self) -> bool:
         """Whether nothing has changed since the last synchronize; needs no switch of contexts to find out."""
@@ -185,16 +186,13 @@ class Adoption:
         kinds = self._kinds(added, fresh, sources)
         moved = bool(len(left) or len(added) or table.kind_changed)
         if moved:
-            table.rebuild(table.rows_of(_array(left)), added, kinds)
-        ids, rows = _NONE, _NONE
+            table.rebuild(self._rows_of(_array(left)), added, kinds)
         for component, handles in fresh.items():
-            before, ids = ids, np.fromiter(handles, np.int64, len(handles))
-            if ids.tobytes() != before.tobytes():  # else the same bodies as of the type before
-                rows = table.rows_of(ids)
-            self._adopt(component, handles, sources[component], rows)
+            self._adopt(component, handles, sources[component])
         if any(not handles.keys() <= come for handles in fresh.values()) or any(not e <= left for e in gone.values()):
             table.members_version += 1  # bodies that stay have other components
             table.static_version += 1
+        self._looked_up = (None, None)
         return moved or bool(fresh or gone)
 
     def _kinds(
@@ -213,6 +211,13 @@ class Adoption:
                 self.table.set_kinds(self.table.rows_of(entities[~here]), values[~here])
         return kinds
 
+    def _rows_of(self, ids: np.ndarray) -> np.ndarray:
+        """Their rows, looked up once for component types that have come or gone together."""
+        key = self.table.version, ids.tobytes()
+        if key != self._looked_up[0]:
+            self._looked_up = key, self.table.rows_of(ids)
+        return self._looked_up[1]
+
     def _let_go(self, component: type[Component], entities: Ids, leaving: Set[int] = frozenset()) -> None:
         """Handles of removed components keep their last values; the rows fall back to the defaults.
 
@@ -220,7 +225,7 @@ class Adoption:
         """
         members, table = self._members[component], self.table
         ids = _array(entities)
-        rows = table.rows_of(ids)
+        rows = self._rows_of(ids)
         store = table.take_out(component, rows)
         for index, entity in enumerate(ids.tolist()):
             handle = members.pop(entity)
@@ -235,9 +240,10 @@ class Adoption:
         if component is table.kind_carrier:
             table.set_kinds(rows, np.full(len(rows), STATIC))
 
-    def _adopt(self, component: type[Component], handles: Handles, sources: Sources, rows: np.ndarray) -> None:
+    def _adopt(self, component: type[Component], handles: Handles, sources: Sources) -> None:
         """Write the handles' values into their rows and bind the handles."""
         table = self.table
+        rows = self._rows_of(np.fromiter(handles, np.int64, len(handles)))
         sources.write(table, rows)
         if component is self.anchor and "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
@@ -250,9 +256,6 @@ class Adoption:
             handle._version = version
             handle._values = None
         self._members[component].update(handles)
-
-
-_NONE = np.empty(0, np.int64)
 
 
 def _is_ours(component: type[Any]) -> bool:

@@ -63,8 +63,9 @@ class Column:
 
     def whole(self, value: Any, dimensions: int) -> np.ndarray:
         """The array that a single number stands for in a world of that many dimensions (rotation 0: no rotation)."""
-        rotated = self.item == "rotation" and dimensions == 3
-        return np.full(self.item_shape(dimensions), self.empty_value(3) if rotated else value, self.dtype)
+        array = np.empty(self.item_shape(dimensions), self.dtype)
+        array[...] = self.empty_value(3) if self.item == "rotation" and dimensions == 3 else value
+        return array
 
     def bounds(self) -> tuple[float, float] | None:
         """From where to where numbers may be; None: any that the type holds."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
-from collections.abc import Iterator
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -78,14 +77,14 @@ class Component:
         self._version = -1
         stored: dict[str, Any] = {}
         for name, column in self.columns.items():
-            if name in given:
-                stored[name] = column.checked(given[name])
+            value = given.get(name, column.default)
+            if value is not column.default:
+                stored[name] = column.checked(value)
                 continue
-            value = stored[name] = column.stored_default
+            value = column.stored_default
             if value is REQUIRED:
                 raise TypeError(f"{type(self).__name__} needs a value for {name!r}")
-            if type(value) is np.ndarray:
-                stored[name] = value.copy()
+            stored[name] = value.copy() if type(value) is np.ndarray else value
         self._values = stored
 
     # -- being adopted and let go -----------------------------------------------------------------
@@ -114,7 +113,8 @@ class Component:
             return
         for column in self._shaped:
             value = self._values[column.name] if self._store is None else getattr(self, column.name)
-            column.check_dimensions(value, dimensions, entity)
+            if type(value) is not float or column.item == "rotation":  # a number stands for any vector
+                column.check_dimensions(value, dimensions, entity)
 
     def expand(self, dimensions: int) -> None:
         """Make whole vectors of single numbers that stand for one, now that the dimensions are known."""
@@ -219,11 +219,6 @@ class RowStore:
 
     def written(self, column: Column, row: int) -> None:
         pass
-
-
-def components_in(components: Any) -> Iterator[Component]:
-    """Those of ``components`` that are carom's (others are esper's business alone)."""
-    return (component for component in components if isinstance(component, Component))
 
 
 def _copy_of(column: Column) -> Column:

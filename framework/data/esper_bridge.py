@@ -265,8 +265,8 @@ def forget_death(entity: int) -> None:
 
 def forget_unknown_dead() -> None:
     """The same for deletions that plain esper calls have left behind: of entities that do not exist (any more)."""
-    if esper._dead_entities:
-        esper._dead_entities.intersection_update(esper._entities)
+    unknown = [entity for entity in esper._dead_entities if entity not in esper._entities]
+    esper._dead_entities.difference_update(unknown)
 
 
 # -- processors and events -----------------------------------------------------------------------

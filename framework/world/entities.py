@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import esper
 
 from ..data import esper_bridge
-from ..data.component import Component, Many, RowStore, components_in
+from ..data.component import Component, Many, RowStore
 from ..data.handles import make_handles
 from ..errors import NoPhysicsError
 
@@ -150,11 +150,11 @@ class EntityVerbs:
     def _check(self, components: Iterable[Any], entity: int | None) -> None:
         dimensions = self.dimensions
         for component in components:
-            if isinstance(component, type):
+            if isinstance(component, Component):
+                if dimensions is not None:
+                    component.check_dimensions(dimensions, entity)
+                    component.expand(dimensions)
+            elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
-            if isinstance(component, (list, tuple, Many)):
+            elif isinstance(component, (list, tuple, Many)):
                 raise TypeError(f"components are given one by one, got {component!r}")
-        if dimensions is not None:
-            for component in components_in(components):
-                component.check_dimensions(dimensions, entity)
-                component.expand(dimensions)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import record_at
 from ..codes import CHECK_COLUMNS, OK
-from ..records import CHECKED
+from ..records import CHECKED, DYNAMIC_ROWS, STATIC_ROWS
 
 LEAST_TURN = 1e-150  # of a quaternion: below, the squares of its numbers may be 0
 
@@ -14,29 +14,29 @@ _checked_at = record_at(CHECKED, 2)
 
 
 @part
-def all_within(values, low, high):
+def all_within(values, start, stop, low, high):
     """Whether every number is from low to high; nan is not."""
     within = True
-    for i in range(len(values)):
+    for i in range(start, stop):
         within &= (values[i] >= low) & (values[i] <= high)
     return within
 
 
 @part
-def none_beyond(values, low, high):
+def none_beyond(values, start, stop, low, high):
     """The same where nan stands for None."""
     beyond = False
-    for i in range(len(values)):
+    for i in range(start, stop):
         beyond |= (values[i] < low) | (values[i] > high)
     return not beyond
 
 
 @part
-def owned_within(checked):
+def owned_within(checked, start, stop):
     """The same for a column of a component that not every body has."""
-    owned, values, numbers, within = checked.owned, checked.values, checked.numbers, True
-    floats, integers = len(values) // max(1, len(owned)), len(numbers) // max(1, len(owned))
-    for i in range(len(owned)):
+    owned, values, numbers, within, width = checked.owned, checked.values, checked.numbers, True, checked.width
+    floats, integers = width if len(values) > 0 else 0, width if len(numbers) > 0 else 0
+    for i in range(start, stop):
         for k in range(i * floats, (i + 1) * floats if owned[i] else 0):
             within &= (values[k] >= checked.low) & (values[k] <= checked.high)
         for k in range(i * integers, (i + 1) * integers if owned[i] else 0):
@@ -45,27 +45,30 @@ def owned_within(checked):
 
 
 @part
-def are_quaternions(values, low, high):
+def are_quaternions(values, start, stop, low, high):
     """Whether all of them are, of any length but 0."""
-    within = all_within(values, low, high)
-    for i in range(0, len(values), 4):
+    within = all_within(values, start, stop, low, high)
+    for i in range(start, stop, 4):
         total = abs(values[i]) + abs(values[i + 1]) + abs(values[i + 2]) + abs(values[i + 3])
         within &= total >= LEAST_TURN
     return within
 
 
 @part
-def is_column_sound(checked):
+def is_column_sound(state, checked):
     """Whether all rows of a column hold what the field allows."""
+    first = state.moving if checked.rows == STATIC_ROWS else 0
+    last = state.dynamic if checked.rows == DYNAMIC_ROWS else state.count
+    start, stop, low, high = first * checked.width, last * checked.width, checked.low, checked.high
     if checked.turns:
-        return are_quaternions(checked.values, checked.low, checked.high)
-    if len(checked.owned) > 0:
-        return owned_within(checked)
+        return are_quaternions(checked.values, start, stop, low, high)
+    if checked.some:
+        return owned_within(checked, first, last)
     if checked.optional:
-        return none_beyond(checked.values, checked.low, checked.high)
+        return none_beyond(checked.values, start, stop, low, high)
     if len(checked.numbers) > 0:
-        return all_within(checked.numbers, checked.low, checked.high)
-    return all_within(checked.values, checked.low, checked.high)
+        return all_within(checked.numbers, start, stop, low, high)
+    return all_within(checked.values, start, stop, low, high)
 
 
 @part
@@ -73,7 +76,7 @@ def are_columns_sound(state):
     """Whether everything that the step reads and the game may write is what it has to be, but for what moves."""
     sound = True
     for c in range(len(state.checked)):
-        sound &= is_column_sound(_checked_at(state.checked[c]))
+        sound &= is_column_sound(state, _checked_at(state.checked[c]))
     return sound
 
 

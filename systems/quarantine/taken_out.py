@@ -20,7 +20,7 @@ from ...framework.data.columns import Column
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record, make_record
 from ..integration.stages import UNMOVED
-from ..records import CHECKED
+from ..records import ALL_ROWS, CHECKED, DYNAMIC_ROWS, STATIC_ROWS
 from ..scene import Scene
 from .columns import LEAST_TURN
 
@@ -29,31 +29,33 @@ LARGEST_TURN = 1 / LEAST_TURN  # of a quaternion's numbers, whose squares are su
 
 @dataclass
 class Checked:
-    """Some rows of one column that the step reads, and the record in which the stages find them.
+    """A column that the step reads, and the record in which the stages find it.
 
-    start
-        the row of the table that ``values`` begin with
+    array
+        all rows of the table, in use or not
     owned
-        which of these bodies have the component
+        mask of the bodies that have the component
+    partial
+        whether rows without the component hold what the field does not allow
     """
 
     column: Column
-    values: np.ndarray
-    start: int
+    array: np.ndarray
     owned: np.ndarray
+    partial: bool
     record: Record
 
-    def bad(self) -> np.ndarray:
-        """Mask of the rows whose value cannot be."""
-        low, high = self.record.low, self.record.high
-        good = (self.values >= low) & (self.values <= high)
+    def bad(self, rows: slice) -> np.ndarray:
+        """Mask of those of these rows whose value cannot be."""
+        values, low, high = self.array[rows], self.record.low, self.record.high
+        good = (values >= low) & (values <= high)
         if self.column.optional:
-            good |= np.isnan(self.values)
+            good |= np.isnan(values)
         if good.ndim > 1:
             good = good.all(axis=1)
         if self.record.turns:
-            good &= np.abs(self.values).sum(axis=1) >= LEAST_TURN
-        return ~good & self.owned
+            good &= np.abs(values).sum(axis=1) >= LEAST_TURN
+        return ~good & self.owned[rows]
 
 
 class Quarantine:
@@ -68,14 +70,21 @@ class Quarantine:
         self.told: dict[int, str] = {}
         self._far: set[int] = set()  # who has been told to be too far from the origin
         self._checked: list[Checked] = []
+        self._bound: Any = None  # what the list was made for
         self._generation = table.generation
 
     # -- what is looked at ------------------------------------------------------------------------
 
     def bind(self) -> None:
         """Rows have moved, or columns are others than before."""
-        self._checked = list(self._find_columns())
-        self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
+        bound = self._table.columns_version, self._scene.linked
+        if bound != self._bound:
+            self._checked = list(self._find_columns())
+            self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
+            self._bound = bound
+        for checked in self._checked:
+            if checked.partial:
+                checked.record.some = not checked.owned[self._rows(checked)].all()
         if self._generation != self._table.generation:  # ids mean other entities
             self._generation = self._table.generation
             self.told.clear()
@@ -86,35 +95,42 @@ class Quarantine:
 
     def _find_columns(self) -> Iterator[Checked]:
         """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
-        table, linked = self._table, self._scene.linked
-        dynamic, moving, _ = table.stops
         for column in RigidBody.columns.values():
             if column.name != "linear_velocity":
-                yield from self._rows(column, RigidBody, 0, dynamic)
-        yield from self._rows(Transform.columns["position"], Transform, moving, table.count)
-        if linked is not None:
-            yield from self._rows(Transform.columns["rotation"], Transform, 0, table.count)
-            for shape in linked.shapes:
+                yield from self._check(column, RigidBody, DYNAMIC_ROWS)
+        yield from self._check(Transform.columns["position"], Transform, STATIC_ROWS)
+        if self._scene.linked is not None:
+            yield from self._check(Transform.columns["rotation"], Transform, ALL_ROWS)
+            for shape in self._scene.linked.shapes:
                 for column in shape.component.columns.values():
-                    yield from self._rows(column, shape.component, 0, table.count)
+                    yield from self._check(column, shape.component, ALL_ROWS)
 
-    def _rows(self, column: Column, component: Any, start: int, stop: int) -> Iterator[Checked]:
+    def _check(self, column: Column, component: Any, rows: int) -> Iterator[Checked]:
         table, array = self._table, self._table.arrays.get(column.key)
         bounds = column.bounds()
-        if array is None or bounds is None or start == stop:
+        if array is None or bounds is None:
             return
-        values, (low, high), record = array[start:stop], bounds, make_record(CHECKED, 2)
-        record.low, record.high, record.optional = low, high, column.optional
-        if values.dtype == np.int64:
-            record.numbers = values.reshape(-1)
+        (low, high), record = bounds, make_record(CHECKED, 2)
+        record.low, record.high, record.optional, record.rows = low, high, column.optional, rows
+        record.width = array[:1].size
+        if array.dtype == np.int64:
+            record.numbers = array.reshape(-1)
         else:
-            record.values = values.reshape(-1)
-        if column.item == "rotation" and values.ndim > 1:
+            record.values = array.reshape(-1)
+        if column.item == "rotation" and array.ndim > 1:
             record.low, record.high, record.turns = -LARGEST_TURN, LARGEST_TURN, True
-        owned, empty = table.has_mask(component)[start:stop], np.asarray(table.default_of(column.key))
-        if not column.optional and not owned.all() and not ((empty >= low) & (empty <= high)).all():
-            record.owned = owned  # what the others hold is not sound
-        yield Checked(column, values, start, owned, record)
+        owned, empty = table.has_mask(component), np.asarray(table.default_of(column.key))
+        partial = not column.optional and not ((empty >= low) & (empty <= high)).all()
+        if partial:
+            record.owned = owned
+        yield Checked(column, array, owned, partial, record)
+
+    def _rows(self, checked: Checked) -> slice:
+        """The rows that a step reads of that column."""
+        dynamic, moving, count = self._table.stops
+        return {
+            DYNAMIC_ROWS: slice(0, dynamic), STATIC_ROWS: slice(moving, count), ALL_ROWS: slice(0, count),
+        }[checked.record.rows]  # fmt: skip
 
     # -- what the stages ask for ------------------------------------------------------------------
 
@@ -163,9 +179,11 @@ class Quarantine:
         """(count,) mask of the bodies with a value that cannot be; each is named."""
         found = np.zeros(self._table.count, bool)
         for checked in self._checked:
-            for k in np.flatnonzero(checked.bad()).tolist():
-                found[checked.start + k] = True
-                self.tell(checked.start + k, checked.column.key, checked.values[k].tolist())
+            rows = self._rows(checked)
+            for k in np.flatnonzero(checked.bad(rows)).tolist():
+                row = rows.start + k
+                found[row] = True
+                self.tell(row, checked.column.key, checked.array[row].tolist())
         return found
 
     def _tell_of_flight(self, row: int) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ....framework.data.array_columns import ArrayColumn
 from ....framework.data.component import Component
 from ....framework.jit.linking import KEPT, Linked
 from ....framework.jit.records.record import Record
@@ -69,10 +70,16 @@ class LinkedShapes:
         """Whether some shape is not convex."""
         return not all(shape.convex for shape in self.shapes)
 
-    @property
+    @cached_property
     def needs_axes(self) -> bool:
         """Whether functions of some shape see the bodies' axes."""
         return any(shape.rotates for shape in self.shapes)
+
+    @cached_property
+    def has_array_columns(self) -> bool:
+        """Whether some shape has parameters in a pool of arrays, which may move when bodies come."""
+        columns = (shape.component.columns[name] for shape in self.shapes for name in shape.columns)
+        return any(isinstance(column, ArrayColumn) for column in columns)
 
     @property
     def rotation_changes(self) -> bool:
