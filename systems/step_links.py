@@ -54,21 +54,21 @@ class StepLinks:
         True if these are other stages than before; bodies that come and go seldom change that.
         """
         self._version = NEVER  # until it is done
-        self._integration.prepare()
-        state = self._state
+        scene, state = self._scene, self._state
         state.sweeps_ready = self.needs_sweeps()
-        if state.sweeps_ready:
-            self._scene.reserve(*SWEEPS)
         conditions = self._conditions()
-        key = (self._scene.linked, self._scene.registry.version, state.sweeps_ready, force_systems, conditions)
+        key = (scene.linked, scene.registry.version, scene.table.capacity, force_systems, conditions)
         changed = key != self._key
         if changed:
             self._key = None
+            self._integration.prepare()
+            if state.sweeps_ready:
+                scene.reserve(*SWEEPS)
             self._link_stages(conditions)
             self.link_shapes()
             self._link_possible()
             self._key = key
-        self._version, self._forces = self._scene.version, force_systems
+        self._version, self._forces = scene.version, force_systems
         return changed
 
     def _link_stages(self, conditions: dict[str, bool]) -> None:

@@ -227,10 +227,14 @@ class Adoption:
         ids = _array(entities)
         rows = self._rows_of(ids)
         store = table.take_out(component, rows)
+        version = store.version
         for index, entity in enumerate(ids.tolist()):
             handle = members.pop(entity)
             if handle._store is table and handle._entity == entity:
-                handle._bind(store, None, index, store.version)
+                handle._store = store
+                handle._entity = None
+                handle._row = index
+                handle._version = version
         if entities <= leaving:
             return
         for column in component.columns.values():

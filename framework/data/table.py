@@ -271,9 +271,9 @@ class Table:
         order = np.argsort((added_kinds << 48) | added)
         added, added_kinds = added[order], added_kinds[order]
         places = self._places_for(added, added_kinds)
-        gone, come = np.searchsorted(removed, self.stops), np.searchsorted(added_kinds, (1, 2, 3))
+        gone, come = removed.searchsorted(self.stops), added_kinds.searchsorted((1, 2, 3))
         before, stops = self.count, tuple((self.stops - gone + come).tolist())
-        if gone[2] > gone[1] or come[2] > come[1]:
+        if gone[2] > gone[1] or come[2] > come[1]:  # static ones
             self.static_version += 1
         self.reserve(stops[2])
         if self._bound_columns != self.columns_version:
@@ -300,9 +300,9 @@ class Table:
     def _places_for(self, added: np.ndarray, kinds: np.ndarray) -> np.ndarray:
         """The rows in front of which these bodies belong, which are in order of kind and id."""
         ids, places, start, first = self.arrays["entity"], np.empty(len(added), np.int64), 0, 0
-        for stop, last in zip(self.stops, np.searchsorted(kinds, (1, 2, 3)).tolist(), strict=True):
+        for stop, last in zip(self.stops, kinds.searchsorted((1, 2, 3)).tolist(), strict=True):
             if last > first:
-                places[first:last] = start + np.searchsorted(ids[start:stop], added[first:last])
+                places[first:last] = start + ids[start:stop].searchsorted(added[first:last])
             start, first = stop, last
         return places
 
