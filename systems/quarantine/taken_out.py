@@ -16,6 +16,7 @@ import numpy as np
 
 from ...components import RigidBody, Transform
 from ...components.rigid_body import FASTEST
+from ...framework.data.array_columns import ArrayColumn
 from ...framework.data.columns import Column
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record, make_record
@@ -83,6 +84,8 @@ class Quarantine:
             self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
             self._bound = bound
         for checked in self._checked:
+            if isinstance(checked.column, ArrayColumn):  # its bounds grow with the number of arrays
+                checked.record.low, checked.record.high = checked.column.bounds()
             if checked.partial:
                 checked.record.some = not checked.owned[self._rows(checked)].all()
         if self._generation != self._table.generation:  # ids mean other entities
