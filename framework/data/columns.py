@@ -149,6 +149,8 @@ class Column:
 
     def _full(self, array: np.ndarray, count: int, shape: tuple[int, ...]) -> np.ndarray:
         """One value for all or one per row, as a row for each."""
+        if array.shape == (count, *shape):
+            return array
         try:
             return np.broadcast_to(array, (count, *shape))
         except ValueError:
@@ -179,6 +181,8 @@ class Column:
 
     def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
         """Finite and within the field's bounds; ``shown`` is what the message quotes (None: the first bad row)."""
+        if self.item != "rotation" and array.size and self._all_within(array.min(), array.max()):
+            return
         for bad, rule in (
             (~np.isfinite(array), "must be finite"),
             (array <= 0 if self.positive else None, "must be positive"),
@@ -194,6 +198,10 @@ class Column:
         if self.item == "rotation" and array.ndim and array.shape[-1] == 4 and not np.all(np.any(array, axis=-1)):
             where = "" if shown is not None else f" (row {int(np.argmin(np.any(array, axis=-1)))})"
             raise self._error([0.0] * 4 if shown is None else shown, f"must not be the zero quaternion{where}", entity)
+
+    def _all_within(self, low: Any, high: Any) -> bool:
+        """Whether the smallest and the largest of some numbers are what the field allows."""
+        return bool(-self.largest <= low and high <= self.largest and self._within(low))  # neither is nan then
 
     def _as_numbers(self, value: Any, entity: int | None) -> np.ndarray:
         try:
@@ -254,7 +262,7 @@ class Column:
         store = handle._store
         if store is None or self.key in store.arrays:
             return self.__get__(handle)
-        shape, default = self.item_shape(store.dimensions), self.empty_value(store.dimensions)
+        shape, default = self.item_shape(store.dimensions), store.default_of(self.key)
         return np.full(shape, default, self.dtype) if shape else self.shown(default)
 
     def unshared(self, value: Any) -> Any:

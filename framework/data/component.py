@@ -170,45 +170,59 @@ class Many:
         self.component = component
         self.values = values
 
-    def arrays(self, count: int, dimensions: int) -> dict[str, np.ndarray]:
-        """Checked columns by key, shape (count, ...), arrays of their own; ValueError names field and row."""
-        arrays = {}
+    def store(self, count: int, dimensions: int) -> RowStore:
+        """Checked columns of ``count`` rows, or one value for all; ValueError names field and row."""
+        arrays, constants = {}, {}
         for name, column in self.component.columns.items():
-            array = np.empty((count, *column.item_shape(dimensions)), column.dtype)
-            given = name in self.values
-            default = column.empty_value(dimensions)
-            array[...] = column.checked_many(self.values[name], count, dimensions) if given else default
-            arrays[column.key] = array
-        return arrays
+            if name not in self.values:
+                constants[column.key] = column, column.empty_value(dimensions)
+                continue
+            array = column.checked_many(self.values[name], count, dimensions)
+            if count > 1 and array.strides[0] == 0:  # one value for all
+                constants[column.key] = column, array[0].copy() if array.ndim > 1 else array[0].item()
+            else:
+                arrays[column.key] = np.require(array, requirements=("C", "W"))
+        return RowStore(arrays, dimensions, constants, count)
+
+    def arrays(self, count: int, dimensions: int) -> dict[str, np.ndarray]:
+        """The same, all of it as arrays (count, ...)."""
+        store = self.store(count, dimensions)
+        return {column.key: store.make(column.key) for column in self.component.columns.values()}
 
 
 class RowStore:
     """Values of handles that have no row in a table: created in bulk and not adopted yet, or removed already.
 
-    unmade: columns without an array of so many rows, all of which hold the default.
+    constants: columns without an array of their ``count`` rows, and the value that all rows hold.
     """
 
     version = 0
 
     def __init__(
-        self, arrays: dict[str, np.ndarray], dimensions: int, unmade: dict[str, Column] | None = None, count: int = 0
+        self, arrays: dict[str, np.ndarray], dimensions: int, constants: dict[str, tuple[Column, Any]], count: int
     ) -> None:
         self.arrays = arrays
         self.dimensions = dimensions
-        self._unmade, self._count = unmade or {}, count
+        self.constants, self._count = constants, count
 
-    def values(self, key: str, rows: np.ndarray) -> np.ndarray:
-        return self.make(key)[rows]
+    def values(self, key: str, rows: Any) -> np.ndarray:
+        """Those rows of a column, for reading."""
+        array = self.arrays.get(key)
+        if array is None:
+            column, value = self.constants[key]
+            array = np.broadcast_to(np.asarray(value, column.dtype), (self._count, *column.item_shape(self.dimensions)))
+        return array[rows]
 
     def default_of(self, key: str) -> Any:
-        return self._unmade[key].empty_value(self.dimensions)
+        """What all rows of a column without an array hold."""
+        return self.constants[key][1]
 
     def make(self, key: str) -> np.ndarray:
         """The array of that column, for writing."""
         if key not in self.arrays:
-            column = self._unmade[key]
+            column, value = self.constants[key]
             self.arrays[key] = np.empty((self._count, *column.item_shape(self.dimensions)), column.dtype)
-            self.arrays[key][...] = column.empty_value(self.dimensions)
+            self.arrays[key][...] = value
         return self.arrays[key]
 
     def find(self, entity: int) -> int:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import esper
 import numpy as np
+
+from .batches import Batch, Stores
+from .watched import ChangeLog, Entities, Members, WatchedComponents, among
 
 _NAMES = (
     "_components", "_context_map", "_dead_entities", "_entities", "_entity_count", "_processors", "_processors_dict",
@@ -50,104 +53,21 @@ def leave(before: str) -> None:
 # -- what has changed ----------------------------------------------------------------------------
 
 
-class ChangeLog:
-    """The entities that gained, lost or replaced a component, by component type; carom's own types only.
-
-    esper notes every such change in one place, the set of entities it keeps per component type. Those sets are watched,
-    so finding what has changed costs as much as there is of it, however many entities there are.
-    """
-
-    def __init__(self, base: type[Any]) -> None:
-        self.base = base  # only types derived from it are watched
-        self.cleared = False  # by esper.clear_database(): everything before it has gone
-        self.dirty = False  # something has been logged since the last time
-        self._touched: dict[type[Any], _Touched] = {}
-
-    def of(self, component: type[Any]) -> _Touched:
-        return self._touched.setdefault(component, _Touched(self))
-
-    def take(self) -> tuple[dict[type[Any], set[int]], bool]:
-        """What has been logged since the last time."""
-        touched = {component: entry.entities for component, entry in self._touched.items() if entry.entities}
-        for component in touched:
-            self._touched[component].entities = set()
-        cleared, self.cleared = self.cleared, False
-        self.dirty = False
-        return touched, cleared
-
-
-class _Touched:
-    """Where the sets of one component type log into; the set inside is exchanged when the log is read."""
-
-    __slots__ = ("entities", "log")
-
-    def __init__(self, log: ChangeLog) -> None:
-        self.entities: set[int] = set()
-        self.log = log
-
-
-class _Members(set[int]):
-    """esper's set of the entities with one component; logs who enters and leaves, and who enters again (replaced)."""
-
-    __slots__ = ("_touched",)
-
-    def __init__(self, entities: Iterable[int], touched: _Touched) -> None:
-        super().__init__(entities)
-        self._touched = touched
-        touched.log.dirty = True
-        touched.entities.update(self)
-
-    def add(self, entity: int) -> None:
-        self._touched.log.dirty = True
-        self._touched.entities.add(entity)
-        super().add(entity)
-
-    def discard(self, entity: int) -> None:
-        self._touched.log.dirty = True
-        self._touched.entities.add(entity)
-        super().discard(entity)
-
-    def update(self, *entities: Iterable[int]) -> None:
-        self._touched.log.dirty = True
-        self._touched.entities.update(*entities)
-        super().update(*entities)
-
-
-class _WatchedComponents(dict[type[Any], set[int]]):
-    """esper's dict of those sets."""
-
-    def __init__(self, content: dict[type[Any], set[int]], log: ChangeLog) -> None:
-        super().__init__()
-        self.log = log
-        for component, entities in content.items():
-            self[component] = entities
-
-    def __setitem__(self, component: type[Any], entities: set[int]) -> None:
-        if isinstance(component, type) and issubclass(component, self.log.base):
-            entities = _Members(entities, self.log.of(component))
-        super().__setitem__(component, entities)
-
-    def clear(self) -> None:
-        self.log.cleared = self.log.dirty = True
-        super().clear()
-
-
 def watch(base: type[Any]) -> None:
     """Log changes of components derived from ``base`` in the current context; what is there already counts as new."""
-    esper._components = _WatchedComponents(esper._components, ChangeLog(base))
+    esper._entities = Entities(esper._entities)
+    esper._components = WatchedComponents(esper._components, esper._entities, ChangeLog(base))  # type: ignore[assignment]
 
 
 def watched() -> bool:
     """Whether the current context is."""
-    return isinstance(esper._components, _WatchedComponents)
+    return isinstance(esper._components, WatchedComponents)
 
 
 def unwatch() -> None:
     """Give esper plain containers back."""
-    esper._components = {
-        component: set(entities) if isinstance(entities, _Members) else entities
-        for component, entities in esper._components.items()
-    }
+    esper._components = {component: set(entities) for component, entities in esper._components.items()}
+    esper._entities = dict(esper._entities.items())
 
 
 def changes() -> ChangeLog:
@@ -155,63 +75,39 @@ def changes() -> ChangeLog:
     return esper._components.log  # type: ignore[attr-defined]
 
 
-def _check_that_nothing_escapes() -> None:
-    """ImportError if this esper changes components in a way that the log does not see."""
-
-    class Probe:
-        pass
-
-    def expect(action: Any, *entities: int) -> None:
-        action()
-        touched, cleared = log.take()
-        if touched.get(Probe, set()) != set(entities) or cleared != (not entities):
-            raise ImportError(f"carom cannot work with esper {esper.version}: it hides changes of components")
-
-    with context("carom is looking at esper"):
-        watch(Probe)
-        log = changes()
-        expect(lambda: esper.create_entity(Probe()), 1)
-        expect(lambda: esper.create_entity(Probe()), 2)
-        expect(lambda: esper.add_component(1, Probe()), 1)
-        expect(lambda: esper.remove_component(1, Probe), 1)
-        expect(lambda: esper.add_component(1, Probe()), 1)
-        expect(lambda: esper.delete_entity(1, immediate=True), 1)
-        esper.delete_entity(2)
-        expect(esper.process, 2)
-        expect(lambda: esper.create_entity(Probe()), 3)
-        expect(esper.clear_database)
-    esper.delete_world("carom is looking at esper")
-
-
-_check_that_nothing_escapes()
-
-
 # -- entities ------------------------------------------------------------------------------------
 
 
-def create_many(types: list[type[Any]], columns: list[list[Any]], count: int) -> range:
-    """``count`` entities with one component of each type, as ``esper.create_entity`` makes them one by one."""
-    ids = list(itertools.islice(esper._entity_count, count))
-    rows: list[dict[type[Any], Any]] = [{} for _ in ids]
-    for component, handles in zip(types, columns, strict=True):
-        for row, handle in zip(rows, handles, strict=True):
-            row[component] = handle
-    esper._entities.update(zip(ids, rows, strict=True))
-    for component in types if ids else ():
+def create_many(stores: Stores, count: int) -> range:
+    """``count`` entities with one component of each type; they have no objects before somebody asks for them."""
+    if not count:
+        return range(0)
+    first = next(esper._entity_count)
+    esper._entity_count = itertools.count(first + count)
+    for component in stores:
         if component not in esper._components:
             esper._components[component] = set()
-        esper._components[component].update(ids)
+    batch = Batch(first, count, stores)
+    entities, log = _containers()
+    entities.batches.add(batch)
+    log.batches.append(batch)
+    log.dirty = True
     esper.clear_cache()
-    return range(ids[0], ids[-1] + 1) if ids else range(0)
+    return range(first, first + count)
+
+
+def _containers() -> tuple[Entities, ChangeLog]:
+    return esper._entities, changes()  # type: ignore[return-value]
 
 
 def component_types() -> list[type[Any]]:
     return list(esper._components)
 
 
-def entities_with(component: type[Any]) -> set[int]:
-    """esper's own set of the entities that have the component: do not change it."""
-    return esper._components.get(component, set())
+def listed_with(component: type[Any]) -> set[int]:
+    """Entities that have the component, but for those in batches: do not change it."""
+    members = esper._components.get(component)
+    return members.listed if isinstance(members, Members) else set()
 
 
 def all_components() -> dict[int, dict[type[Any], Any]]:
@@ -227,35 +123,24 @@ def known_entity(entity: int) -> bool:
 class Membership:
     """Which entities of the current context have which components; later too, without switching to that context.
 
-    components
-        esper's own dict of all entities' components: do not change it
     dead
         esper's own set of the entities whose deletion is pending: do not change it
     """
 
-    __slots__ = ("_members", "components", "dead")
+    __slots__ = ("_members", "dead", "types_of")
 
     def __init__(self) -> None:
-        self._members: dict[type[Any], set[int]] = esper._components
-        self.components: dict[int, dict[type[Any], Any]] = esper._entities
+        self._members: Any = esper._components
+        self.types_of: Callable[[int], Iterable[type[Any]]] = esper._entities.types_of  # type: ignore[attr-defined]
         self.dead: set[int] = esper._dead_entities
 
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
         """(n,) which of these ids (n,) are living entities that have the component."""
-        mask = _among(entities, self._members.get(component, set()))
+        members = self._members.get(component)
+        mask = np.zeros(len(entities), bool) if members is None else members.mask(entities)
         if self.dead:
-            mask &= ~_among(entities, self.dead)
+            mask &= ~among(entities, self.dead)
         return mask
-
-
-def _among(entities: np.ndarray, members: set[int]) -> np.ndarray:
-    """(n,) mask of the ids that are members; takes as long as the fewer of the two."""
-    if len(members) + _SORTING < len(entities):
-        return np.isin(entities, np.fromiter(members, np.int64, len(members)))
-    return np.fromiter(map(members.__contains__, entities.tolist()), bool, len(entities))
-
-
-_SORTING = 500  # look-ups in a set take as long as one call of np.isin
 
 
 def forget_death(entity: int) -> None:
@@ -263,10 +148,30 @@ def forget_death(entity: int) -> None:
     esper._dead_entities.discard(entity)
 
 
-def forget_unknown_dead() -> None:
-    """The same for deletions that plain esper calls have left behind: of entities that do not exist (any more)."""
-    unknown = [entity for entity in esper._dead_entities if entity not in esper._entities]
-    esper._dead_entities.difference_update(unknown)
+def clear_dead() -> None:
+    """What ``esper.clear_dead_entities`` does, for all at once; what does not exist (any more) is no error."""
+    dead = esper._dead_entities
+    if not dead:
+        return
+    entities, log = _containers()
+    own = [entity for entity in dead if dict.__contains__(entities, entity)]
+    if len(own) < len(dead) and entities.batches:
+        ids = np.array([int(entity) for entity in dead if hasattr(entity, "__index__")], np.int64)
+        for batch in entities.batches.all:
+            deleted = batch.take_out_many(ids)
+            if len(deleted) and batch.make_handle is not None:
+                log.deleted.append(deleted)
+                log.dirty = True
+    by_type: dict[type[Any], list[int]] = {}
+    for entity in own:
+        for component in entities.pop(entity):
+            by_type.setdefault(component, []).append(entity)
+    for component, gone in by_type.items():
+        esper._components[component].discard_many(gone)  # type: ignore[attr-defined]
+    for component in [component for component, members in esper._components.items() if not members]:
+        del esper._components[component]
+    dead.clear()
+    esper.clear_cache()
 
 
 # -- processors and events -----------------------------------------------------------------------
@@ -354,3 +259,53 @@ running: set[str] = set()  # the contexts that are inside a step
 def step_is_running() -> bool:
     """Whether the current context is inside a step; for components that no world has adopted yet."""
     return esper.current_world in running
+
+
+# -- what esper must do --------------------------------------------------------------------------
+
+
+def _check_that_nothing_escapes() -> None:
+    """ImportError if this esper changes components in a way that the log does not see."""
+
+    class Probe:
+        def _bind(self, *_: Any) -> None:
+            pass
+
+    def expect(action: Any, *entities: int) -> None:
+        action()
+        touched, cleared = log.take()
+        if touched.get(Probe, set()) != set(entities) or cleared != (not entities):
+            raise ImportError(f"carom cannot work with esper {esper.version}: it hides changes of components")
+
+    with context("carom is looking at esper"):
+        watch(Probe)
+        log = changes()
+        expect(lambda: esper.create_entity(Probe()), 1)
+        expect(lambda: esper.create_entity(Probe()), 2)
+        expect(lambda: esper.add_component(1, Probe()), 1)
+        expect(lambda: esper.remove_component(1, Probe), 1)
+        expect(lambda: esper.add_component(1, Probe()), 1)
+        expect(lambda: esper.delete_entity(1, immediate=True), 1)
+        esper.delete_entity(2)
+        expect(esper.process, 2)
+        expect(lambda: esper.create_entity(Probe()), 3)
+        expect(esper.clear_database)
+        _check_batches(Probe)
+    esper.delete_world("carom is looking at esper")
+
+
+
+def _check_batches(probe: Any) -> None:
+    """ImportError if this esper looks at its containers in a way that does not see what is in batches."""
+    first = create_many({probe: None}, 4)[0]  # type: ignore[dict-item]
+    seen = [esper.entity_exists(first), len(list(esper.get_entities())) == 4, bool(esper.try_component(first, probe))]
+    esper.delete_entity(first, immediate=True)
+    esper.delete_entity(first + 1)
+    esper.clear_dead_entities()
+    esper.add_component(first + 2, 1.0)
+    left = [entity for entity, _ in esper.get_components(probe, float)], [e for e, _ in esper.get_component(probe)]
+    if not all(seen) or left != ([first + 2], [first + 2, first + 3]):
+        raise ImportError(f"carom cannot work with esper {esper.version}: it does not see entities created in bulk")
+
+
+_check_that_nothing_escapes()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any
 
 import numpy as np
@@ -47,7 +46,6 @@ class Sources:
             result[indices] = store.values(column.key, rows)
         return result
 
-
     def write(self, table: Table, rows: np.ndarray) -> None:
         """Write all values into these rows of a table, one row per handle."""
         columns = self._component.columns.values()
@@ -72,16 +70,3 @@ def _vectors(values: list[Any], column: Column, dimensions: int) -> np.ndarray:
 
     rows = [row(value) for value in values]
     return np.array(rows, column.dtype).reshape(len(rows), width)
-
-
-def make_handles(component: type[Component], store: RowStore, count: int) -> list[Component]:
-    """Handles into the rows of a store, in order."""
-    make = component.__new__
-    handles = [make(component) for _ in itertools.repeat(None, count)]
-    for row, handle in enumerate(handles):
-        handle._store = store
-        handle._values = None
-        handle._entity = None
-        handle._row = row
-        handle._version = 0
-    return handles

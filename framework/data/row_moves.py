@@ -32,6 +32,8 @@ ROW_MOVES = Schema(
     defaults=ints(),  # address of a row that new rows are copies of; 0: they stay as they are
 )
 
+MOST_KEPT = 65536  # rows; the lists of more do not stay in memory
+
 _moves_at = record_at(ROW_MOVES, 2)
 
 
@@ -118,9 +120,8 @@ class RowMoves:
         end. Columns must have room for all.
         """
         if not count:  # nothing moves; most worlds need no kernel
-            fresh = np.arange(len(places))
-            self._fill(fresh)
-            return fresh
+            self._fill(slice(0, len(places)))
+            return np.arange(len(places))
         moves, leaving, coming = self._moves, len(removed), len(places)
         moves.reserve(leaving, "removed")
         moves.reserve(coming, "places", "fresh")
@@ -131,9 +132,13 @@ class RowMoves:
             move_rows(moves.address)
         else:
             self._run_plain()
-        return moves.fresh[:coming].copy()
+        fresh = moves.fresh[:coming].copy()
+        if leaving + coming > MOST_KEPT:
+            for name in ("removed", "places", "fresh", "source", "target", "length"):
+                setattr(moves, name, np.empty(0, np.int64))
+        return fresh
 
-    def _fill(self, rows: np.ndarray) -> None:
+    def _fill(self, rows: Any) -> None:
         for column, default in zip(self._columns, self._defaults, strict=True):
             if default is not None:
                 column[rows] = default

@@ -195,13 +195,21 @@ class Table:
             self.on_make()
         return array
 
-    def write(self, key: str, rows: np.ndarray, values: np.ndarray) -> None:
-        """Values for those rows; defaults need no array."""
-        if key in self.arrays or values.tobytes() != self._defaults(key, (len(rows),)).tobytes():  # 0.0 is not -0.0
+    def write(self, key: str, rows: Any, values: np.ndarray) -> None:
+        """Values for those rows, a slice or indices; defaults need no array."""
+        if key in self.arrays or not self._are_defaults(key, values):
             self.make(key)[rows] = values
 
-    def write_one(self, key: str, row: int, value: Any) -> None:
-        """The same for one row; ``value`` as a handle keeps it: a single number may stand for a whole vector."""
+    def _are_defaults(self, key: str, values: np.ndarray) -> bool:
+        """Whether all of them have the bits of the default of a column on demand."""
+        if values[:1].tobytes() != self._defaults(key, (len(values[:1]),)).tobytes():  # 0.0 is not -0.0
+            return False
+        return values.tobytes() == self._defaults(key, (len(values),)).tobytes()
+
+    def write_one(self, key: str, row: Any, value: Any) -> None:
+        """One value for a row, or for each of a slice or of indices; ``value`` as a handle keeps it: a single number
+        may stand for a whole vector.
+        """
         array = self.arrays.get(key)
         if array is None:
             if self._is_default(key, value):
@@ -257,6 +265,16 @@ class Table:
             start = stop
         return rows
 
+    def run_of(self, entities: np.ndarray) -> Any:
+        """The rows of entities (n,) that all have one, ascending ids: a slice if they stand next to each other."""
+        count, start = len(entities), self.find(int(entities[0]))
+        stop = start + count
+        if entities[-1] - entities[0] == count - 1 and not any(start < limit < stop for limit in self.stops):
+            rows = slice(start, stop)  # of one kind: if the last one is right, all are
+            if self.arrays["entity"][rows][-1] == entities[-1]:
+                return rows
+        return self.rows_of(entities)
+
     def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> None:
         """Take rows out, put rows in, and bring bodies of another kind to their place.
 
@@ -268,8 +286,10 @@ class Table:
             added = np.concatenate((added, changed["entity"]))
             added_kinds = np.concatenate((added_kinds, changed["kind"]))
         removed = np.sort(removed)
-        order = np.argsort((added_kinds << 48) | added)
-        added, added_kinds = added[order], added_kinds[order]
+        keys = (added_kinds << 48) | added
+        if (keys[1:] < keys[:-1]).any():
+            order = np.argsort(keys, kind="stable")  # fast on what is partly in order
+            added, added_kinds = added[order], added_kinds[order]
         places = self._places_for(added, added_kinds)
         gone, come = removed.searchsorted(self.stops), added_kinds.searchsorted((1, 2, 3))
         before, stops = self.count, tuple((self.stops - gone + come).tolist())
@@ -301,7 +321,9 @@ class Table:
         """The rows in front of which these bodies belong, which are in order of kind and id."""
         ids, places, start, first = self.arrays["entity"], np.empty(len(added), np.int64), 0, 0
         for stop, last in zip(self.stops, kinds.searchsorted((1, 2, 3)).tolist(), strict=True):
-            if last > first:
+            if stop == start or (last > first and ids[stop - 1] < added[first]):  # most come behind all there are
+                places[first:last] = stop
+            elif last > first:
                 places[first:last] = start + ids[start:stop].searchsorted(added[first:last])
             start, first = stop, last
         return places
@@ -335,16 +357,18 @@ class Table:
     def _grown(self, array: np.ndarray, axis: int, fill: Any) -> np.ndarray:
         shape = list(array.shape)
         shape[axis] = self.capacity
-        fresh = np.empty(shape, array.dtype)
-        fresh[...] = fill
-        fresh[(slice(None),) * axis + (slice(self.count),)] = array[(slice(None),) * axis + (slice(self.count),)]
+        fresh, before = np.zeros(shape, array.dtype), (slice(None),) * axis
+        fresh[(*before, slice(self.count))] = array[(*before, slice(self.count))]
+        if any(np.asarray(fill, array.dtype).tobytes()):  # else it takes no memory before it is used
+            fresh[(*before, slice(self.count, None))] = fill
         return fresh
 
     def take_out(self, component: type[Component], rows: np.ndarray) -> RowStore:
         """Copies of those rows of one component, for handles that outlive their rows."""
         columns = {column.key: column for column in component.columns.values()}
         made = {key: self.arrays[key][rows] for key in columns if key in self.arrays}
-        return RowStore(made, self.dimensions, columns, len(rows))
+        constants = {key: (column, self._fills[key]) for key, column in columns.items() if key not in made}
+        return RowStore(made, self.dimensions, constants, len(rows))
 
     # -- written through handles ------------------------------------------------------------------
 

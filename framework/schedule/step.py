@@ -95,7 +95,7 @@ class Pipeline:
                 others_write = self.others_write()
                 if others_write or self._dead or self.processors.changed:  # code of the game needs its context
                     with esper_bridge.context(self.world.name):
-                        esper_bridge.forget_unknown_dead()
+                        esper_bridge.clear_dead()
                         esper.process(self.clock.dt)
                 else:
                     self._run(self.clock.dt, False)

@@ -137,7 +137,7 @@ class ContactRows:
         made_row, made_record = next(made, NONE_LEFT)
         entities = seen.entity_a[start:].tolist(), seen.entity_b[start:].tolist()
         enabled = seen._columns.get("enabled")
-        components: dict[int, Any] = {}
+        types_of: Any = None
         dead: set[int] = set()
         for row, a, b in zip(range(start, len(seen)), *entities, strict=True):  # the loop's body may change any of it
             contact = None
@@ -146,15 +146,17 @@ class ContactRows:
                 made_row, made_record = next(made, NONE_LEFT)
             if enabled is not None and not enabled[row]:
                 continue
-            if not components:  # at the first row; and CaromError if the loop has closed the world
+            if types_of is None:  # at the first row
                 membership = self._lookup.membership()
-                components, dead = membership.components, membership.dead
-            of_a, of_b = components.get(a, ()), components.get(b, ())
+                types_of, dead = membership.types_of, membership.dead
+            of_a, of_b = types_of(a), types_of(b)
             if first in of_a and second in of_b:
                 turned = False
             elif first in of_b and second in of_a:
                 a, b, turned = b, a, True
             else:
+                if not of_a and not of_b:
+                    self._lookup.membership()  # CaromError if the loop has closed the world
                 continue
             if dead and (a in dead or b in dead):
                 continue

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import operator
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
@@ -11,8 +10,7 @@ from typing import Any, TypeVar
 import esper
 
 from ..data import esper_bridge
-from ..data.component import Component, Many, RowStore
-from ..data.handles import make_handles
+from ..data.component import Component, Many
 from ..errors import NoPhysicsError
 
 C = TypeVar("C")
@@ -56,16 +54,9 @@ class EntityVerbs:
         dimensions = self.dimensions
         if dimensions is None:
             raise NoPhysicsError("no physics in this world: World(Physics(...))")
-        collecting = gc.isenabled()
-        gc.disable()  # a hundred thousand new objects would start it again and again for nothing
-        try:
-            stores = [RowStore(one.arrays(count, dimensions), dimensions) for one in many]
-            columns = [make_handles(t, store, count) for t, store in zip(types, stores, strict=True)]
-            with self._context():
-                return esper_bridge.create_many(types, columns, count)
-        finally:
-            if collecting:
-                gc.enable()
+        stores = {one.component: one.store(count, dimensions) for one in many}
+        with self._context():
+            return esper_bridge.create_many(stores, count)
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
         """Delete at the start of the next step, or at once; KeyError if there is no such entity."""

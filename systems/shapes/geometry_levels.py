@@ -7,12 +7,14 @@ that it never hides a contact; that is checked here when the colliders are adopt
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
+from ...framework.data.adoption import TogetherCheck
+from ...framework.data.batches import Stores
 from ...framework.data.component import Component
 from ...framework.data.handles import Sources
 from ...framework.data.table import Table
@@ -27,6 +29,7 @@ COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 TOLERANCE = 1e-6
 
 Handles = Mapping[int, Component]
+Values = dict[str, np.ndarray]  # columns by name, a row for each of some entities
 
 
 def in_order(registry: Registry, colliders: Iterable[type[Component]]) -> list[type[Component]]:
@@ -46,18 +49,19 @@ def arrange(has: np.ndarray) -> np.ndarray:
 
     has (types, n): who has which of the types, these being in order.
     """
-    place = has.cumsum(axis=0) - 1  # of each type among the body's own
-    count = int(place[-1].max(initial=0)) + 1 if len(has) else 1
+    place = np.zeros(has.shape[1], np.int8)  # of the next type among the body's own
+    count = max(1, int(has.sum(axis=0, dtype=np.int8).max(initial=0)))
     levels = np.full((count, has.shape[1]), -1, np.int8)
     for index in range(len(has)):
         bodies = np.flatnonzero(has[index])
-        levels[place[index, bodies], bodies] = index
+        levels[place[bodies], bodies] = index
+        place[bodies] += 1
     for k in range(1, count):
         levels[k] = np.where(levels[k] < 0, levels[k - 1], levels[k])
     return levels
 
 
-class LevelCheck:
+class LevelCheck(TogetherCheck):
     """Called before colliders are adopted: ValueError if those of one entity cannot be its levels."""
 
     def __init__(self, table: Table, registry: Registry) -> None:
@@ -70,15 +74,10 @@ class LevelCheck:
         members: Mapping[type[Component], Handles],
         gone: Mapping[type[Component], set[int]],
     ) -> None:
-        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: who loses them."""
         types = [c for c in dict.fromkeys((*fresh, *members)) if issubclass(c, Collider)]
         for collider in types:
-            if fresh.get(collider) and self._table.dimensions not in collider.dimensions:
-                worlds = " and ".join(f"{d}D" for d in collider.dimensions)
-                raise ValueError(
-                    f"entity {min(fresh[collider])}: {collider.__name__} is a shape of {worlds} worlds, this world is "
-                    f"{self._table.dimensions}D"
-                )
+            if fresh.get(collider):
+                self._check_dimensions(collider, min(fresh[collider]))
         holders = {c: (fresh.get(c, {}).keys(), members.get(c, {}).keys(), gone.get(c, set())) for c in types}
         several: set[int] = set()  # entities that get a collider and have another
         for collider, other in itertools.permutations(types, 2):
@@ -92,17 +91,53 @@ class LevelCheck:
         for index, collider in enumerate(types):
             new, old, lost = holders[collider]
             has[index] = [e in new or (e in old and e not in lost) for e in entities.tolist()]
+
+        def values(collider: type[Component], chosen: np.ndarray) -> Values:
+            return self._values(collider, entities[chosen], fresh.get(collider, {}))
+
+        self._check_levels(types, has, entities, values)
+
+    def batch(self, stores: Stores, entities: np.ndarray, rows: Any) -> None:
+        types = [component for component in stores if issubclass(component, Collider)]
+        for collider in types:
+            self._check_dimensions(collider, int(entities[0]))
+        if len(types) < 2:
+            return
+
+        def values(collider: type[Component], chosen: np.ndarray) -> Values:
+            columns = collider.columns.items()
+            return {name: stores[collider].values(column.key, rows)[chosen] for name, column in columns}
+
+        types = in_order(self._registry, types)
+        self._check_levels(types, np.ones((len(types), len(entities)), bool), entities, values)
+
+    def _check_dimensions(self, collider: type[Any], entity: int) -> None:
+        if self._table.dimensions not in collider.dimensions:
+            worlds = " and ".join(f"{d}D" for d in collider.dimensions)
+            raise ValueError(
+                f"entity {entity}: {collider.__name__} is a shape of {worlds} worlds, this world is "
+                f"{self._table.dimensions}D"
+            )
+
+    def _check_levels(
+        self,
+        types: list[type[Component]],
+        has: np.ndarray,
+        entities: np.ndarray,
+        values: Callable[[type[Component], np.ndarray], Values],
+    ) -> None:
+        """has (types, n): which of these entities have which colliders; values: of a collider, for those of a mask."""
         levels = arrange(has)
         for k in range(1, len(levels)):
             for outer, inner in sorted(set(zip(levels[k - 1].tolist(), levels[k].tolist(), strict=True))):
                 if outer != inner:
-                    chosen = entities[(levels[k - 1] == outer) & (levels[k] == inner)]
-                    self._check_pair(types[outer], types[inner], chosen, fresh)
+                    chosen = (levels[k - 1] == outer) & (levels[k] == inner)
+                    one, two = (values(types[index], chosen) for index in (outer, inner))
+                    self._check_pair(types[outer], types[inner], entities[chosen], one, two)
 
     def _check_pair(
-        self, outer: type[Any], inner: type[Any], entities: np.ndarray, fresh: Mapping[type[Component], Handles]
+        self, outer: type[Any], inner: type[Any], entities: np.ndarray, one: Values, two: Values
     ) -> None:
-        one, two = (self._values(collider, entities, fresh.get(collider, {})) for collider in (outer, inner))
         mixed = one["sensor"] != two["sensor"]
         if mixed.any():
             entity = int(entities[np.argmax(mixed)])
@@ -118,7 +153,7 @@ class LevelCheck:
                 f"second entity for a shape of its own" + (f" ({more} more entities likewise)" if more else "")
             )
 
-    def _values(self, collider: type[Component], entities: np.ndarray, fresh: Handles) -> dict[str, np.ndarray]:
+    def _values(self, collider: type[Component], entities: np.ndarray, fresh: Handles) -> Values:
         """Columns by name, of handles to adopt and of those in the table."""
         new = np.array([entity in fresh for entity in entities.tolist()], bool)
         sources = Sources(collider, [fresh[e] for e in entities[new].tolist()]) if new.any() else None
@@ -134,7 +169,7 @@ class LevelCheck:
         return values
 
     def _sticking_out(
-        self, outer: type[Any], inner: type[Any], one: dict[str, np.ndarray], two: dict[str, np.ndarray]
+        self, outer: type[Any], inner: type[Any], one: Values, two: Values
     ) -> tuple[np.ndarray, np.ndarray]:
         """How far the inner shape reaches beyond the outer one, unrotated, and the size to measure it by; (n,) each.
 
@@ -148,7 +183,7 @@ class LevelCheck:
         outside = self._half_extents(outer, one)
         return (apart + inside - outside).max(axis=1), outside.max(axis=1)
 
-    def _half_extents(self, collider: type[Any], values: dict[str, np.ndarray]) -> np.ndarray:
+    def _half_extents(self, collider: type[Any], values: Values) -> np.ndarray:
         """(n, d) of the boxes around the shapes."""
         count, dimensions = len(values["offset"]), self._table.dimensions
         if collider is AABBCollider:

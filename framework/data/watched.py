@@ -1,0 +1,231 @@
+"""What a world has in place of esper's containers: they log which components come and go, and know of batches.
+
+esper notes every change of components in one place, the set of entities it keeps per component type. Those sets are
+watched, so finding what has changed costs as much as there is of it, however many entities there are.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, ValuesView
+from typing import Any
+
+import numpy as np
+
+from .batches import Batch, Batches
+
+
+class ChangeLog:
+    """The entities that gained, lost or replaced a component, by component type; carom's own types only.
+
+    batches: those that have come. deleted: ids of entities that were deleted while in a batch.
+    """
+
+    def __init__(self, base: type[Any]) -> None:
+        self.base = base  # only types derived from it are watched
+        self.cleared = False  # by esper.clear_database(): everything before it has gone
+        self.dirty = False  # something has been logged since the last time
+        self.batches: list[Batch] = []
+        self.deleted: list[np.ndarray] = []
+        self._touched: dict[type[Any], _Touched] = {}
+
+    def of(self, component: type[Any]) -> _Touched:
+        return self._touched.setdefault(component, _Touched(self))
+
+    def take(self) -> tuple[dict[type[Any], set[int]], bool]:
+        """Which entities have been touched since the last time, by component type, and whether all was cleared."""
+        touched = {component: entry.entities for component, entry in self._touched.items() if entry.entities}
+        for component in touched:
+            self._touched[component].entities = set()
+        cleared, self.cleared = self.cleared, False
+        self.dirty = False
+        return touched, cleared
+
+    def take_many(self) -> tuple[list[Batch], list[np.ndarray]]:
+        """The same for batches that have come and what was deleted out of them."""
+        taken = self.batches, self.deleted
+        self.batches, self.deleted = [], []
+        return taken
+
+
+class _Touched:
+    """Where the sets of one component type log into; the set inside is exchanged when the log is read."""
+
+    __slots__ = ("entities", "log")
+
+    def __init__(self, log: ChangeLog) -> None:
+        self.entities: set[int] = set()
+        self.log = log
+
+
+class Members:
+    """The entities with one component: those that are listed, and those of batches.
+
+    Logs who enters and leaves, and who enters again (replaced).
+    """
+
+    __slots__ = ("_component", "_entities", "_touched", "listed")
+
+    def __init__(self, component: type[Any], listed: Iterable[int], entities: Entities, log: ChangeLog | None) -> None:
+        self.listed = set(listed)
+        self._component, self._entities = component, entities
+        self._touched = None if log is None else log.of(component)
+        if self._touched is not None and self.listed:
+            self._touched.log.dirty = True
+            self._touched.entities.update(self.listed)
+
+    def add(self, entity: int) -> None:
+        self._change(entity)
+        self.listed.add(entity)
+
+    def discard(self, entity: int) -> None:
+        self._change(entity)
+        self.listed.discard(entity)
+
+    def _change(self, entity: int) -> None:
+        touched = self._touched
+        if touched is not None:
+            touched.log.dirty = True
+            touched.entities.add(entity)
+        if self._entities.batches.all:
+            self._entities.take_out(entity)
+
+    def discard_many(self, entities: list[int]) -> None:
+        """Entities that are listed."""
+        if self._touched is not None:
+            self._touched.log.dirty = True
+            self._touched.entities.update(entities)
+        self.listed.difference_update(entities)
+
+    def settle(self, entity: int, log: bool) -> None:
+        """An entity leaves its batch and keeps the component."""
+        if log and self._touched is not None:
+            self._touched.log.dirty = True
+            self._touched.entities.add(entity)
+        self.listed.add(entity)
+
+    def _batches(self) -> list[Batch]:
+        return [batch for batch in self._entities.batches.all if batch.left and self._component in batch.types]
+
+    def __contains__(self, entity: Any) -> bool:
+        if entity in self.listed:
+            return True
+        batch = self._entities.batches.of(entity)
+        return batch is not None and self._component in batch.types
+
+    def __len__(self) -> int:
+        return len(self.listed) + sum(batch.left for batch in self._batches())
+
+    def __bool__(self) -> bool:
+        return bool(self.listed) or bool(self._batches())
+
+    def __iter__(self) -> Iterator[int]:
+        """As they are now: walking through them may take them out of their batches."""
+        ids = list(self.listed)
+        for batch in self._batches():
+            ids += batch.ids().tolist()
+        return iter(ids)
+
+    def mask(self, entities: np.ndarray) -> np.ndarray:
+        """(n,) which of these ids (n,) have the component."""
+        mask = among(entities, self.listed)
+        for batch in self._batches():
+            mask |= batch.among(entities)
+        return mask
+
+
+class WatchedComponents(dict[type[Any], Members]):
+    """esper's dict of those sets; of types that are not carom's they are not logged."""
+
+    def __init__(self, content: dict[type[Any], set[int]], entities: Entities, log: ChangeLog) -> None:
+        super().__init__()
+        self.entities, self.log = entities, log
+        entities.members = self
+        for component, members in content.items():
+            self[component] = members
+
+    def __setitem__(self, component: type[Any], entities: Iterable[int]) -> None:
+        ours = isinstance(component, type) and issubclass(component, self.log.base)
+        super().__setitem__(component, Members(component, entities, self.entities, self.log if ours else None))
+
+    def clear(self) -> None:
+        self.log.cleared = self.log.dirty = True
+        self.log.take_many()
+        super().clear()
+
+
+class Entities(dict[int, dict[type[Any], Any]]):
+    """esper's dict of the components of each entity; those of an entity in a batch are made when they are looked up."""
+
+    def __init__(self, content: dict[int, dict[type[Any], Any]]) -> None:
+        super().__init__(content)
+        self.batches = Batches()
+        self.members: dict[type[Any], Members] = {}
+
+    def __missing__(self, entity: Any) -> dict[type[Any], Any]:
+        batch = self.batches.of(entity)
+        if batch is None:
+            raise KeyError(entity)
+        number = int(entity)
+        components: dict[type[Any], Any] = batch.take_out(number)
+        self[number] = components
+        for component in batch.types:
+            self.members[component].settle(number, batch.make_handle is None)
+        return components
+
+    def take_out(self, entity: Any) -> None:
+        """Make the components of an entity if it is in a batch."""
+        if self.batches.of(entity) is not None:
+            self.__missing__(entity)
+
+    def types_of(self, entity: int) -> Iterable[type[Any]]:
+        """The types of its components, () for what is no entity."""
+        components = dict.get(self, entity)
+        if components is not None:
+            return components
+        batch = self.batches.of(entity)
+        return () if batch is None else batch.types
+
+    def __contains__(self, entity: object) -> bool:
+        return dict.__contains__(self, entity) or self.batches.of(entity) is not None
+
+    def get(self, entity: Any, default: Any = None) -> Any:
+        components = dict.get(self, entity)
+        if components is not None:
+            return components
+        return default if self.batches.of(entity) is None else self.__missing__(entity)
+
+    def __len__(self) -> int:
+        return dict.__len__(self) + sum(batch.left for batch in self.batches.all)
+
+    def __bool__(self) -> bool:
+        return len(self) > 0
+
+    def __iter__(self) -> Iterator[int]:
+        """By ascending id, which is the order in which they were created."""
+        if not self.batches:
+            return dict.__iter__(self)
+        return iter(sorted(itertools.chain(dict.__iter__(self), *(batch.ids().tolist() for batch in self.batches.all))))
+
+    def keys(self) -> Any:
+        return KeysView(self)
+
+    def values(self) -> Any:
+        return ValuesView(self)
+
+    def items(self) -> Any:
+        return ItemsView(self)
+
+    def clear(self) -> None:
+        self.batches.clear()
+        super().clear()
+
+
+def among(entities: np.ndarray, members: set[int]) -> np.ndarray:
+    """(n,) mask of the ids that are members; takes as long as the fewer of the two."""
+    if len(members) + _SORTING < len(entities):
+        return np.isin(entities, np.fromiter(members, np.int64, len(members)))
+    return np.fromiter(map(members.__contains__, entities.tolist()), bool, len(entities))
+
+
+_SORTING = 500  # look-ups in a set take as long as one call of np.isin
