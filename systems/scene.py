@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..components import AABBCollider, Collider
-from ..framework.data.row_moves import RowMoves
+from ..framework.data.row_moves import MovedColumns, RowPlan
 from ..framework.data.table import Table
 from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
@@ -70,8 +70,10 @@ class Scene:
         self.structure = self.static_version = -1  # of the table and the registry, when they were followed last
         self.rotated_columns: dict[str, np.ndarray] = {}
         self._axes = np.empty((0, state.dimensions, state.dimensions))
-        self._kept: list[np.ndarray] = []  # the columns that move with the rows
-        self._moves = RowMoves()
+        self._moved = MovedColumns()  # those that move with the rows
+        self._keeps = False  # whether they do
+        self._columns_made = 0  # changes whenever one of them may be another array
+        self._kept_version: Any = None
         self._columns_version = self._shapes_version = -1  # of the table, when its columns were bound
         self._built_for: Any = None  # what the scene was made for, beside the rows
         self._several = False  # bodies have several colliders
@@ -126,18 +128,24 @@ class Scene:
 
     # -- bodies that come and go ------------------------------------------------------------------
 
-    def _move_rows(self, before: int, removed: np.ndarray, places: np.ndarray) -> None:
+    def _move_rows(self, plan: RowPlan) -> None:
         """The table's rows move, and those of the columns that are kept go along; if they cannot, all is made again."""
-        bodies = self.state.bodies
+        if self._kept_version != (self._columns_made, self.table.capacity):
+            self._bind_kept()
+        if self._keeps:
+            self._moved.move(plan)
+        else:
+            self._built_for = None
+
+    def _bind_kept(self) -> None:
+        """Other columns are kept than before."""
+        bodies, capacity = self.state.bodies, self.table.capacity
         kept = [*(getattr(bodies, name) for name in KEPT_COLUMNS), *self.rotated_columns.values()]
         kept = [column for column in kept if len(column)]  # without colliders there is the first alone
-        if self._several or any(len(column) != self.table.capacity for column in kept):
-            self._built_for = None
-            return
-        if len(kept) != len(self._kept) or any(one is not two for one, two in zip(kept, self._kept, strict=True)):
-            self._kept = kept
-            self._moves.bind(kept, [ARRIVED, *[None] * (len(kept) - 1)])
-        self._moves.run(before, removed, places)
+        self._keeps = bool(kept) and not self._several and all(len(column) == capacity for column in kept)
+        if self._keeps:
+            self._moved.bind(kept, [ARRIVED, *[None] * (len(kept) - 1)])
+        self._kept_version = self._columns_made, capacity
 
     def _place_arrivals(self) -> bool:
         """Find the shapes of the bodies that have come since the last time; False if all has to be made again."""
@@ -197,6 +205,7 @@ class Scene:
         bodies, capacity = self.state.bodies, self.table.capacity
         for name in names:
             if len(getattr(bodies, name)) != capacity:
+                self._columns_made += 1
                 setattr(bodies, name, bodies.schema.fields[name].full(capacity, self.state.dimensions))
 
     def _place_levels(self, present: list[type[Any]]) -> list[type[Any]]:
@@ -224,6 +233,7 @@ class Scene:
         """The last level decides; it is also known as the body's shape."""
         state, bodies, capacity = self.state, self.state.bodies, self.table.capacity
         several = len(levels) > 1
+        self._columns_made += 1
         self.levels = np.full((len(levels), capacity), -1, np.int8)
         self.levels[:, : levels.shape[1]] = levels
         self._taken_out = np.empty(0, np.int64), self.levels[:, :0]
@@ -268,6 +278,7 @@ class Scene:
         column = self.rotated_columns.get(key)
         if column is None or column.shape != own.shape:
             column = self.rotated_columns[key] = np.zeros_like(own)
+            self._columns_made += 1
         return column
 
     def link_shapes(self, sweeps: bool) -> None:

@@ -7,7 +7,7 @@ from worlds import both_dimensions
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
 from carom.framework.data.adoption import Adoption
-from carom.framework.data.row_moves import RowMoves
+from carom.framework.data.row_moves import MovedColumns, RowPlan
 from carom.framework.schedule.stages import Program
 from carom.plugins import Physics
 from carom.systems.scene import Scene
@@ -105,22 +105,34 @@ def test_a_spawn_adopts_one_body_and_neither_builds_the_scene_nor_links_stages(m
 
 @pytest.mark.parametrize("seed", range(40))
 def test_rows_move_as_in_a_list(seed):
+    """Bodies of three kinds leave and come; columns of several types follow, also those that are moved later."""
     random = np.random.default_rng(seed)
     count, coming = int(random.integers(0, 30)), int(random.integers(0, 20))
+    ids = np.zeros(80, np.int64)
+    chosen = random.permutation(100)
+    kinds, added_kinds = np.sort(random.integers(0, 3, count)), np.sort(random.integers(0, 3, coming))
+    ids[:count], added = chosen[:count], chosen[count : count + coming]
+    for kind in range(3):
+        ids[:count][kinds == kind] = np.sort(ids[:count][kinds == kind])
+        added[added_kinds == kind] = np.sort(added[added_kinds == kind])
     removed = np.flatnonzero(random.random(count) < random.random())
-    places = np.sort(random.integers(0, count + 1, coming))
-    expected = []
-    for row in range(count + 1):
-        expected += [-1] * int((places == row).sum())
-        if row < count and row not in removed:
-            expected.append(row)
+    stay = np.setdiff1d(np.arange(count), removed)
+    bodies = [(kinds[row], ids[row], row) for row in stay.tolist()]
+    bodies += [(kind, entity, -1) for kind, entity in zip(added_kinds, added, strict=True)]
+    expected = [row for _, _, row in sorted(bodies)]
+
     numbers = np.arange(80.0)
     vectors, flags = np.stack((numbers, -numbers), axis=1), np.arange(80, dtype=np.int8)
-    moves = RowMoves()
-    moves.bind([numbers, vectors, flags], [np.array([-1.0]), np.array([[-1.0, 1.0]]), None])
-    fresh = moves.run(count, removed, places)
+    plan, first, second = RowPlan(), MovedColumns(), MovedColumns()
+    plan.record.stops[:] = kinds.searchsorted((1, 2, 3))
+    plan.begin(ids, removed, added, added_kinds)
+    first.bind([numbers, flags], [np.array([-1.0]), None])
+    first.move(plan)
+    second.bind([vectors], [np.array([[-1.0, 1.0]])])
+    second.move(plan)
     assert numbers[: len(expected)].tolist() == expected
     assert vectors[: len(expected)].tolist() == [[row, -row] for row in expected]
-    assert fresh.tolist() == [at for at, row in enumerate(expected) if row == -1]
+    assert plan.fresh.tolist() == [at for at, row in enumerate(expected) if row == -1]
+    assert plan.record.stops.tolist() == [sum(kind < stop for kind, _, _ in bodies) for stop in (1, 2, 3)]
     stays = [at for at, row in enumerate(expected) if row != -1]
     assert flags[stays].tolist() == [expected[at] for at in stays]

@@ -1,13 +1,14 @@
 """Keeping the table in step with esper: who has come, gone or changed since the last look.
 
-esper's changes are logged as they happen (see esper_bridge), so the work here is in proportion to what has changed: the
+esper's changes are logged as they happen (see watched), so the work here is in proportion to what has changed: the
 handles of the entities concerned are compared with those the table knows, everything is checked, and only then written.
 Entities that were created in bulk (batches) come as arrays and have no handles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Collection, Mapping, Set
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,35 @@ from ..errors import MissingComponentError
 from . import esper_bridge
 from .batches import Batch, Stores
 from .component import Component
-from .handles import Sources
+from .handles import write_handles
 from .table import STATIC, Table
 from .watched import ChangeLog
 
 Ids = set[int]
 Handles = dict[int, Component]
+OTHER, OURS, PARTNER = range(3)  # component types: not carom's; with columns; such that make a body with the anchor
+
+
+@dataclass
+class Changes:
+    """What has to be done so that the table knows what esper has.
+
+    come, left
+        ids that become bodies, ids that cease to be; ascending
+    fresh
+        handles to adopt, by type and ascending id
+    gone
+        ids that lose a handle, by type
+    batches, deleted
+        whose entities become bodies; ids that cease to be and have no handles
+    """
+
+    come: list[int] = field(default_factory=list)
+    left: list[int] = field(default_factory=list)
+    fresh: dict[type[Component], Handles] = field(default_factory=dict)
+    gone: dict[type[Component], Ids] = field(default_factory=dict)
+    batches: list[Batch] = field(default_factory=list)
+    deleted: list[np.ndarray] = field(default_factory=list)
 
 
 class TogetherCheck:
@@ -53,22 +77,22 @@ class Adoption:
         self.anchor = anchor
         self._check_together = check_together or TogetherCheck()
         self._is_partner = is_partner  # component type -> whether it makes a body together with the anchor
+        self._roles: dict[Any, int] = {}  # by component type
         # Handles of the bodies in the table, but for those of batches that nobody has asked for.
         self._members: dict[type[Component], Handles] = {}
         self._log: ChangeLog | None = None  # of this world's context
         # Changes that have not been taken in yet, as the log has them.
-        self._pending: dict[type[Any], Ids] = {}
+        self._touched: Ids = set()
         self._batches: list[Batch] = []
         self._deleted: list[np.ndarray] = []
         self._cleared = False
-        self._looked_up: tuple[Any, Any] = (None, None)  # ids and their rows, within one synchronize
 
     def settled(self) -> bool:
         """Whether nothing has changed since the last synchronize; needs no switch of contexts to find out."""
         return not (self._log is None or self._log.dirty or self._waiting())
 
     def _waiting(self) -> bool:
-        return bool(self._pending or self._batches or self._deleted or self._cleared or self.table.kind_changed)
+        return bool(self._touched or self._batches or self._deleted or self._cleared or self.table.kind_changed)
 
     def synchronize(self) -> bool:
         """Bring the table up to date; True if anything has changed.
@@ -80,20 +104,11 @@ class Adoption:
         if not log.dirty and not self._waiting():
             return False
         self._gather(log)
-        touched = self._pending
-        types = list(dict.fromkeys((*self._members, *(t for t in touched if t in esper_bridge.component_types()))))
-        come, left = self._bodies(touched)
-        batches = [batch for batch in self._batches if batch.left and self._is_body(batch)]
-        gone, fresh = self._differences(types, touched, come, left)
-        self._check(fresh)
-        self._check_together(fresh, self._members, gone)
-        for batch in batches:
-            for component in batch.types:
-                self.table.check_component_type(component)
-            self._check_together.batch(batch.stores, batch.ids(), batch.rows())
-        deleted, cleared = self._deleted, self._cleared
-        self._pending, self._batches, self._deleted, self._cleared = {}, [], [], False
-        return self._apply(gone, come, _array(left), fresh, batches, deleted, cleared)
+        changes = self._find_changes()
+        self._check(changes)
+        cleared = self._cleared
+        self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
+        return self._apply(changes, cleared)
 
     def release(self) -> None:
         """Let all handles go: the world closes, they keep their last values."""
@@ -103,39 +118,74 @@ class Adoption:
     # -- what has changed -------------------------------------------------------------------------
 
     def _gather(self, log: ChangeLog) -> None:
-        touched, cleared = log.take()
-        batches, deleted = log.take_many()
+        touched, batches, deleted, cleared = log.take()
         if cleared:
             self.table.generation += 1
-            self._pending, self._batches, self._deleted, self._cleared = {}, [], [], True
-        for component, entities in self._pending.items():
-            touched.setdefault(component, set()).update(entities)
-        self._pending = touched
+            self._touched, self._batches, self._deleted, self._cleared = set(), [], [], True
+        self._touched = self._touched | touched if self._touched else touched
         self._batches += batches
         self._deleted += deleted
 
-    def _bodies(self, touched: dict[type[Any], Ids]) -> tuple[Ids, Ids]:
-        """Ids that become bodies, ids that cease to be."""
-        affected = set().union(*touched.values())
-        anchored = affected & esper_bridge.listed_with(self.anchor)
-        bodies: Ids = set()
-        for component in esper_bridge.component_types():
-            if self._is_partner(component):
-                entities = affected & esper_bridge.listed_with(component)
-                if not entities <= anchored:
-                    self._refuse_without_anchor(min(entities - anchored), component)
-                bodies |= entities
-        if self._cleared:
-            return bodies, set()
-        known = self._members.get(self.anchor, {}).keys() & affected
-        return bodies - known, known - bodies
+    def _role(self, component: Any) -> int:
+        role = self._roles.get(component)
+        if role is None:
+            ours = isinstance(component, type) and issubclass(component, Component)
+            role = self._roles[component] = OTHER if not ours else PARTNER if self._is_partner(component) else OURS
+        return role
 
-    def _is_body(self, batch: Batch) -> bool:
-        """Whether the entities of a batch become bodies."""
-        partners = [component for component in batch.types if self._is_partner(component)]
-        if partners and self.anchor not in batch.types:
-            self._refuse_without_anchor(int(batch.ids()[0]), partners[0])
-        return bool(partners)
+    def _find_changes(self) -> Changes:
+        changes = Changes(deleted=self._deleted)
+        known = self._members
+        if self._cleared:  # whatever has been, the ids mean other entities now
+            changes.gone = {component: set(members) for component, members in known.items() if members}
+            known = {}
+        for entity in sorted(self._touched):
+            self._compare(entity, esper_bridge.components_of(entity), known, changes)
+        for batch in self._batches:
+            partners = [component for component in batch.types if self._role(component) == PARTNER]
+            if batch.left and partners:
+                if self.anchor not in batch.types:
+                    self._refuse_without_anchor(int(batch.ids()[0]), partners[0])
+                changes.batches.append(batch)
+        return changes
+
+    def _compare(
+        self, entity: int, now: Mapping[type[Any], Any], known: dict[type[Component], Handles], changes: Changes
+    ) -> None:
+        """Of one entity, the components that esper has with the handles that the table has."""
+        roles, anchors = self._roles, known.get(self.anchor)
+        was, partner = anchors is not None and entity in anchors, None
+        for component in now:
+            role = roles.get(component)
+            if role == PARTNER or (role is None and self._role(component) == PARTNER):
+                partner = component
+        if partner is None:
+            if was:
+                changes.left.append(entity)
+                self._lose(entity, (), known, changes)
+            return
+        if self.anchor not in now:
+            self._refuse_without_anchor(entity, partner)
+        if was:
+            self._lose(entity, now, known, changes)
+        else:
+            changes.come.append(entity)
+        for component, handle in now.items():
+            if roles[component] == OTHER:
+                continue
+            old = known[component].get(entity) if was and component in known else None
+            if old is not handle:
+                changes.fresh.setdefault(component, {})[entity] = handle
+                if old is not None:
+                    changes.gone.setdefault(component, set()).add(entity)
+
+    def _lose(
+        self, entity: int, kept: Collection[type[Any]], known: dict[type[Component], Handles], changes: Changes
+    ) -> None:
+        """The handles that a body has lost: all but those of the types that are kept."""
+        for component, members in known.items():
+            if component not in kept and entity in members:
+                changes.gone.setdefault(component, set()).add(entity)
 
     def _refuse_without_anchor(self, entity: int, component: type[Component]) -> None:
         raise MissingComponentError(
@@ -143,53 +193,25 @@ class Adoption:
             f"add {self.anchor.__name__}(...) or remove {component.__name__}"
         )
 
-    def _differences(
-        self, types: list[type[Any]], touched: dict[type[Any], Ids], come: Ids, left: Ids
-    ) -> tuple[dict[type[Component], Ids], dict[type[Component], Handles]]:
-        """Per component type, ids whose handle goes and handles to adopt, by ascending id."""
-        known = {} if self._cleared else self._members
-        anchors = known.get(self.anchor, {})
-        everything = esper_bridge.all_components()
-        gone: dict[type[Component], Ids] = {}
-        fresh: dict[type[Component], Handles] = {}
-        # A body that comes brings all its components, also those that it has had for long.
-        types = [*types, *(t for t in esper_bridge.component_types() if come and t not in types and _is_ours(t))]
-        for component in types:
-            members = known.get(component, {})
-            changed = touched.get(component, set())
-            present = esper_bridge.listed_with(component)
-            staying = {entity for entity in changed - come - left if entity in anchors}
-            leaving = (members.keys() & left) | {e for e in staying - present if e in members}
-            new: Handles = {}
-            for entity in sorted((come & present) | (staying & present)):
-                handle = everything[entity][component]
-                if members.get(entity) is not handle:
-                    new[entity] = handle
-            if members:
-                leaving |= members.keys() & new.keys()
-            if leaving:
-                gone[component] = leaving
-            if new:
-                fresh[component] = new
-        if self._cleared:
-            gone = {component: set(members) for component, members in self._members.items() if members}
-        return gone, fresh
-
     # -- checks: every error is found before anything is written ----------------------------------
 
-    def _check(self, fresh: dict[type[Component], Handles]) -> None:
-        dimensions = self.table.dimensions
-        for component, handles in fresh.items():
-            self.table.check_component_type(component)
-            values = handles.values()
-            if len(set(map(id, values))) < len(handles):
+    def _check(self, changes: Changes) -> None:
+        table, dimensions = self.table, self.table.dimensions
+        for component, handles in changes.fresh.items():
+            table.check_component_type(component)
+            if len(handles) > 1 and len(set(map(id, handles.values()))) < len(handles):
                 self._refuse_second_use(component, handles)
-            if set(map(type, values)) != {component}:
-                self._refuse_other_types(component, handles)
-            for entity in [entity for entity, handle in handles.items() if handle._entity is not None]:
-                self._check_owner(component, handles[entity], entity)
-            for entity in [e for e, h in handles.items() if h._store is None or h._store.dimensions != dimensions]:
-                handles[entity].check_dimensions(dimensions, entity)
+            for entity, handle in handles.items():
+                if type(handle) is not component:
+                    self._refuse_other_type(component, handle, entity)
+                if handle._entity is not None:
+                    self._check_owner(component, handle, entity)
+                handle.check_dimensions(dimensions, entity)
+        self._check_together(changes.fresh, self._members, changes.gone)
+        for batch in changes.batches:
+            for component in batch.types:
+                table.check_component_type(component)
+            self._check_together.batch(batch.stores, batch.ids(), batch.rows())
 
     def _refuse_second_use(self, component: type[Component], handles: Handles) -> None:
         seen: dict[int, int] = {}
@@ -198,8 +220,7 @@ class Adoption:
             if other != entity:
                 raise ValueError(_second_use(component, f"entities {other} and {entity}"))
 
-    def _refuse_other_types(self, component: type[Component], handles: Handles) -> None:
-        entity, handle = next((e, h) for e, h in handles.items() if type(h) is not component)
+    def _refuse_other_type(self, component: type[Component], handle: Component, entity: int) -> None:
         raise ValueError(
             f"entity {entity} has a {type(handle).__name__} under the type {component.__name__}: carom's components "
             f"are final and cannot be added under another type"
@@ -210,65 +231,61 @@ class Adoption:
         owner = handle._entity
         if handle._store is not self.table:
             raise ValueError(_second_use(component, f"entity {owner} of another world and to entity {entity}"))
-        if owner != entity and esper_bridge.all_components().get(owner, {}).get(component) is handle:
+        if owner != entity and esper_bridge.components_of(owner).get(component) is handle:
             raise ValueError(_second_use(component, f"entities {owner} and {entity}"))
 
     # -- bringing the table up to date ------------------------------------------------------------
 
-    def _apply(
-        self,
-        gone: dict[type[Component], Ids],
-        come: Ids,
-        left: np.ndarray,
-        fresh: dict[type[Component], Handles],
-        batches: list[Batch],
-        deleted: list[np.ndarray],
-        cleared: bool,
-    ) -> bool:
-        table = self.table
-        for component in dict.fromkeys((*fresh, *(component for batch in batches for component in batch.types))):
+    def _apply(self, changes: Changes, cleared: bool) -> bool:
+        table, fresh, gone, batches = self.table, changes.fresh, changes.gone, changes.batches
+        for component in (*fresh, *(component for batch in batches for component in batch.types)):
             if component not in self._members:
                 table.add_component_type(component)
                 table.members_version += 1
                 self._members[component] = {}
-        leaving = set().union(*gone.values()) if cleared else set(left.tolist())
+        leaving = set().union(*gone.values()) if cleared else set(changes.left)
         for component, entities in gone.items():
             self._let_go(component, entities, leaving)
-        sources = {component: Sources(component, list(handles.values())) for component, handles in fresh.items()}
-        added = _array(come)
-        kinds = self._kinds(added, fresh, sources)
-        left = np.concatenate((left, *deleted)) if deleted else left
-        moved = bool(len(left) or len(added) or batches or table.kind_changed or cleared)
-        if moved:
-            for batch in batches:
-                added, kinds = np.append(added, batch.ids()), np.append(kinds, self._kinds_of(batch))
-            table.rebuild(np.arange(table.count) if cleared else self._rows_of(left), added, kinds)
+        kinds_changed = self._other_kinds(fresh, changes.come)
+        places: dict[int, int] = {}
+        if changes.come or changes.left or batches or changes.deleted or cleared or kinds_changed:
+            places = self._move_rows(changes, cleared)
+        stays = False  # some body that stays has other components
         for component, handles in fresh.items():
-            self._adopt(component, handles, sources[component])
+            stays = stays or not handles.keys() <= places.keys()
+            self._adopt(component, handles, places)
         for batch in batches:
             self._adopt_batch(batch)
-        changed = any(not handles.keys() <= come for handles in fresh.values())
-        if changed or any(not entities <= leaving for entities in gone.values()):
-            table.members_version += 1  # bodies that stay have other components
+        if stays or any(not entities <= leaving for entities in gone.values()):
+            table.members_version += 1
             table.static_version += 1
-        self._looked_up = (None, None)
-        return moved or bool(fresh or gone)
+        return True
 
-    def _kinds(
-        self, added: np.ndarray, fresh: dict[type[Component], Handles], sources: dict[type[Component], Sources]
-    ) -> np.ndarray:
-        """Kinds of the bodies that come, and new kinds written for those that got another carrier of it."""
-        kinds = np.full(len(added), STATIC, np.int64)
-        carrier = self.table.kind_carrier
-        if carrier in fresh:
-            entities = _array(fresh[carrier])
-            values = sources[carrier].values(carrier.columns["kind"], self.table.dimensions)
-            places = np.searchsorted(added, entities)
-            here = np.append(added, -1)[places] == entities
-            kinds[places[here]] = values[here]
-            if not here.all():
-                self.table.set_kinds(self.table.rows_of(entities[~here]), values[~here])
-        return kinds
+    def _other_kinds(self, fresh: dict[type[Component], Handles], come: list[int]) -> bool:
+        """Write the kinds of bodies that stay and get another carrier of it; True if any has to move for it."""
+        table = self.table
+        carriers = fresh.get(table.kind_carrier, {})
+        if len(carriers) > len(come) or not carriers.keys() <= set(come):
+            staying = [entity for entity in carriers if entity not in come]
+            rows = np.array([table.find(entity) for entity in staying])
+            table.set_kinds(rows, np.array([_kind_of(carriers[entity]) for entity in staying]))
+        return table.kind_changed
+
+    def _move_rows(self, changes: Changes, cleared: bool) -> dict[int, int]:
+        """Rows leave and others come; returns the rows of bodies that come one by one, by id."""
+        table, come, carriers = self.table, changes.come, changes.fresh.get(self.table.kind_carrier, {})
+        added = np.array(come, np.int64)
+        kinds = np.array([_kind_of(carriers[e]) if e in carriers else STATIC for e in come], np.int64)
+        removed = np.arange(table.count) if cleared else table.rows_of(np.array(changes.left, np.int64))
+        if changes.deleted:
+            removed = np.concatenate((removed, *(table.rows_of(ids) for ids in changes.deleted)))
+        if changes.batches:
+            added = np.concatenate((added, *(batch.ids() for batch in changes.batches)))
+            kinds = np.concatenate((kinds, *(self._kinds_of(batch) for batch in changes.batches)))
+        table.rebuild(removed, added, kinds)
+        if len(come) == 1:
+            return {come[0]: table.find(come[0])}
+        return dict(zip(come, table.rows_of(np.array(come, np.int64)).tolist(), strict=True)) if come else {}
 
     def _kinds_of(self, batch: Batch) -> np.ndarray:
         """(left,) kinds of the bodies of a batch."""
@@ -277,13 +294,6 @@ class Adoption:
             return np.full(batch.left, STATIC, np.int64)
         return batch.stores[carrier].values(carrier.columns["kind"].key, batch.rows()).astype(np.int64)
 
-    def _rows_of(self, ids: np.ndarray) -> np.ndarray:
-        """Their rows, looked up once for component types that have come or gone together."""
-        key = self.table.version, ids.tobytes()
-        if key != self._looked_up[0]:
-            self._looked_up = key, self.table.rows_of(ids)
-        return self._looked_up[1]
-
     def _let_go(self, component: type[Component], entities: Ids, leaving: Set[int] = frozenset()) -> None:
         """Handles of removed components keep their last values; the rows fall back to the defaults.
 
@@ -291,7 +301,7 @@ class Adoption:
         """
         members, table = self._members[component], self.table
         ids = _array(entities)
-        rows = self._rows_of(ids)
+        rows = table.rows_of(ids)
         store = table.take_out(component, rows)
         version = store.version
         for index, entity in enumerate(ids.tolist()):
@@ -310,16 +320,15 @@ class Adoption:
         if component is table.kind_carrier:
             table.set_kinds(rows, np.full(len(rows), STATIC))
 
-    def _adopt(self, component: type[Component], handles: Handles, sources: Sources) -> None:
-        """Write the handles' values into their rows and bind the handles."""
-        table = self.table
-        rows = self._rows_of(np.fromiter(handles, np.int64, len(handles)))
-        sources.write(table, rows)
+    def _adopt(self, component: type[Component], handles: Handles, places: dict[int, int]) -> None:
+        """Write the handles' values into their rows and bind the handles; places: rows that hold the defaults."""
+        table, version = self.table, self.table.version
+        rows = [places[entity] if entity in places else table.find(entity) for entity in handles]
+        write_handles(table, component, list(handles.values()), rows, handles.keys() <= places.keys())
         if component is self.anchor and "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
         table.has_mask(component)[rows] = True
-        version = table.version
-        for (entity, handle), row in zip(handles.items(), rows.tolist(), strict=True):
+        for (entity, handle), row in zip(handles.items(), rows, strict=True):
             handle._store = table
             handle._entity = entity
             handle._row = row
@@ -349,8 +358,11 @@ class Adoption:
         return handle
 
 
-def _is_ours(component: type[Any]) -> bool:
-    return isinstance(component, type) and issubclass(component, Component)
+def _kind_of(carrier: Component) -> int:
+    """The kind as it is stored."""
+    column = type(carrier).columns["kind"]
+    store = carrier._store
+    return carrier._values["kind"] if store is None else int(store.values(column.key, carrier._row))
 
 
 def _array(entities: Any) -> np.ndarray:

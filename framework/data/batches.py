@@ -89,6 +89,7 @@ class Batches:
 
     def __init__(self) -> None:
         self.all: list[Batch] = []
+        self.stop = 0  # their ids are smaller
         self._firsts: list[int] = []
 
     def __bool__(self) -> bool:
@@ -98,6 +99,7 @@ class Batches:
         """The ids of a batch are larger than those of the batches before it."""
         self.all = [*(one for one in self.all if one.left), batch]
         self._firsts = [one.first for one in self.all]
+        self.stop = batch.first + batch.count
 
     def of(self, entity: Any) -> Batch | None:
         """The batch that an entity is inside of; None for whatever else."""
@@ -113,4 +115,4 @@ class Batches:
         return batch if at < batch.count and batch.inside[at] else None
 
     def clear(self) -> None:
-        self.all, self._firsts = [], []
+        self.all, self._firsts, self.stop = [], [], 0

@@ -22,6 +22,7 @@ class Component:
     __slots__ = ("__weakref__", "_entity", "_row", "_store", "_values", "_version")
 
     columns: ClassVar[dict[str, Column]] = {}
+    fields: ClassVar[tuple[tuple[str, str], ...]] = ()  # name and key in a table of each
     prefix: ClassVar[str] = ""  # of the columns' names in a table
     _abstract: ClassVar[bool] = True
     _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
@@ -52,6 +53,7 @@ class Component:
             setattr(cls, name, field)
             fields[name] = field
         cls.columns = fields
+        cls.fields = tuple((name, field.key) for name, field in fields.items())
         if "__slots__" not in vars(cls):
             cls.__setattr__ = _set_field  # type: ignore[method-assign]
         cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
@@ -113,6 +115,8 @@ class Component:
             return
         for column in self._shaped:
             value = self._values[column.name] if self._store is None else getattr(self, column.name)
+            if type(value) is np.ndarray and column.item == "vector" and len(value) == dimensions:
+                continue
             if type(value) is not float or column.item == "rotation":  # a number stands for any vector
                 column.check_dimensions(value, dimensions, entity)
 

@@ -14,14 +14,10 @@ from .table import Table
 class Sources:
     """Where the values of some handles of one type are: with the handle itself, or in rows of stores."""
 
-    def __init__(self, component: type[Component], handles: list[Component]) -> None:
-        self._component, self._count = component, len(handles)
+    def __init__(self, handles: list[Component]) -> None:
+        self._count = len(handles)
         self._loose: list[int] = []  # indices of handles that hold their values themselves
         self._values: list[dict[str, Any]] = []
-        store = handles[0]._store
-        if store is not None and all(handle._store is store for handle in handles):  # made in bulk, all of them
-            self._groups = [(store, np.arange(self._count), np.array([handle._row for handle in handles]))]
-            return
         groups: dict[int, tuple[RowStore, list[int], list[int]]] = {}
         for index, handle in enumerate(handles):
             store = handle._store
@@ -46,16 +42,28 @@ class Sources:
             result[indices] = store.values(column.key, rows)
         return result
 
-    def write(self, table: Table, rows: np.ndarray) -> None:
-        """Write all values into these rows of a table, one row per handle."""
-        columns = self._component.columns.values()
-        for index, values in zip(self._loose, self._values, strict=True):
-            row = int(rows[index])
-            for column in columns:
-                table.write_one(column.key, row, values[column.name])
-        for store, indices, source in self._groups:
-            for column in columns:
-                table.write(column.key, rows[indices], store.values(column.key, source))
+
+def write_handles(
+    table: Table, component: type[Component], handles: list[Component], rows: list[int], fresh: bool
+) -> None:
+    """Write the values of handles into these rows of a table; fresh: the rows hold the defaults."""
+    defaults, fields = table.defaults, component.fields
+    groups: dict[int, tuple[RowStore, list[int], list[int]]] = {}
+    for handle, row in zip(handles, rows, strict=True):
+        store = handle._store
+        if store is not None:
+            group = groups.setdefault(id(store), (store, [], []))
+            group[1].append(row)
+            group[2].append(handle._row)
+            continue
+        values = handle._values
+        for name, key in fields:
+            value = values[name]
+            if value is not defaults[key] or not fresh:
+                table.write_one(key, row, value)
+    for store, targets, sources in groups.values():
+        for _, key in fields:
+            table.write(key, np.array(targets), store.values(key, np.array(sources)))
 
 
 def _vectors(values: list[Any], column: Column, dimensions: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Rows that make room and close up: what happens to columns when rows leave and others come, in one call for all."""
+"""Rows that make room and close up: what happens to columns when bodies leave and others come, in one call for all."""
 
 from __future__ import annotations
 
@@ -13,28 +13,33 @@ from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at
 from ..jit.records.schema import Schema, integer, ints
 
-ROW_MOVES = Schema(
-    "RowMoves",
-    count=integer(),  # rows before
+ROW_PLAN = Schema(
+    "RowPlan",
+    ids=ints(),  # of the bodies, ascending within each kind,
+    stops=ints(),  # and the first row after each kind: before, and when the rows have moved
     leaving=integer(),  # how many leave,
-    removed=ints(),  # and which, ascending
+    removed=ints(),  # and which rows, ascending
     coming=integer(),  # how many come,
-    places=ints(),  # the row that stands behind each of them, ascending,
+    added=ints(),  # their ids,
+    kinds=ints(),  # by ascending kind and id,
+    places=ints(),  # the row that stands behind each of them,
     fresh=ints(),  # and their rows, afterwards
     # runs of rows that stay together and move
     runs=integer(),
     source=ints(),
     target=ints(),
     length=ints(),
-    # of each column
+)
+MOVED_COLUMNS = Schema(
+    "MovedColumns",
     addresses=ints(),
     row_bytes=ints(),
     defaults=ints(),  # address of a row that new rows are copies of; 0: they stay as they are
 )
-
 MOST_KEPT = 65536  # rows; the lists of more do not stay in memory
 
-_moves_at = record_at(ROW_MOVES, 2)
+_plan_at = record_at(ROW_PLAN, 2)
+_columns_at = record_at(MOVED_COLUMNS, 2)
 
 
 @intrinsic
@@ -49,20 +54,49 @@ def _move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any
 
 
 @part
-def find_runs(moves):
+def place_of(ids, start, stop, entity):
+    """The first of these rows whose id is larger; most come behind all there are."""
+    if start == stop or ids[stop - 1] < entity:
+        return stop
+    while start < stop:
+        middle = (start + stop) // 2
+        if ids[middle] < entity:
+            start = middle + 1
+        else:
+            stop = middle
+    return start
+
+
+@part
+def find_places(plan):
+    """The places of those that come, and the stops afterwards."""
+    gone, come, start = 0, 0, 0
+    for kind in range(3):
+        stop = plan.stops[kind]
+        while come < plan.coming and plan.kinds[come] == kind:
+            plan.places[come] = place_of(plan.ids, start, stop, plan.added[come])
+            come += 1
+        while gone < plan.leaving and plan.removed[gone] < stop:
+            gone += 1
+        plan.stops[kind] = stop - gone + come
+        start = stop
+
+
+@part
+def find_runs(plan, count):
     """List the runs between the rows that leave and the places of those that come, and the rows of the latter."""
-    gone, come, start, count, moves.runs = 0, 0, 0, moves.count, 0
+    gone, come, start, plan.runs = 0, 0, 0, 0
     while start <= count:
-        leaves = moves.removed[gone] if gone < moves.leaving else count
-        place = moves.places[come] if come < moves.coming else count
+        leaves = plan.removed[gone] if gone < plan.leaving else count
+        place = plan.places[come] if come < plan.coming else count
         stop = min(leaves, place)
         if stop > start and come != gone:
-            moves.source[moves.runs], moves.target[moves.runs] = start, start - gone + come
-            moves.length[moves.runs] = stop - start
-            moves.runs += 1
+            plan.source[plan.runs], plan.target[plan.runs] = start, start - gone + come
+            plan.length[plan.runs] = stop - start
+            plan.runs += 1
         start = stop
-        if come < moves.coming and place == stop:
-            moves.fresh[come] = stop - gone + come
+        if come < plan.coming and place == stop:
+            plan.fresh[come] = stop - gone + come
             come += 1
         else:  # a row leaves, or this was the last run
             gone += 1
@@ -70,86 +104,112 @@ def find_runs(moves):
 
 
 @part
-def move_rows_of(moves, column):
+def move_rows_of(plan, columns, column):
     """Move the runs of one column: first those that go down, from the lowest on, then those that go up, from the
     highest on, so that none is written over before it has moved. Then the new rows get the default."""
-    address, size, default = moves.addresses[column], moves.row_bytes[column], moves.defaults[column]
-    source, target, length = moves.source, moves.target, moves.length
-    for k in range(moves.runs):
+    address, size, default = columns.addresses[column], columns.row_bytes[column], columns.defaults[column]
+    source, target, length = plan.source, plan.target, plan.length
+    for k in range(plan.runs):
         if target[k] < source[k]:
             _move_bytes(address + target[k] * size, address + source[k] * size, length[k] * size)
-    for k in range(moves.runs - 1, -1, -1):
+    for k in range(plan.runs - 1, -1, -1):
         if target[k] > source[k]:
             _move_bytes(address + target[k] * size, address + source[k] * size, length[k] * size)
-    for k in range(moves.coming if default != 0 else 0):
-        _move_bytes(address + moves.fresh[k] * size, default, size)
+    for k in range(plan.coming if default != 0 else 0):
+        _move_bytes(address + plan.fresh[k] * size, default, size)
 
 
 @kernel
-def move_rows(address):
-    """Carry out the record at that address."""
-    moves = _moves_at(address)
-    find_runs(moves)
-    for column in range(len(moves.addresses)):
-        move_rows_of(moves, column)
+def move_rows(plan_address, columns_address, new_plan):
+    """Move the rows of some columns as planned; new_plan: find out first what has to move."""
+    plan, columns = _plan_at(plan_address), _columns_at(columns_address)
+    if new_plan:
+        count = plan.stops[2]
+        find_places(plan)
+        find_runs(plan, count)
+    for column in range(len(columns.addresses)):
+        move_rows_of(plan, columns, column)
 
 
-MOVE_ROWS = Called(move_rows, int)
+MOVE_ROWS = Called(move_rows, int, int, bool)
 
 
-class RowMoves:
-    """Moves the rows of some columns at once."""
+class RowPlan:
+    """Which rows leave, which come, and so which have to move."""
 
     def __init__(self) -> None:
-        self._moves = make_record(ROW_MOVES, 2)
+        self.record = make_record(ROW_PLAN, 2)
+        self.record.stops = np.zeros(3, np.int64)
+        self.new = False  # the runs have not been found yet
+        self.count = 0  # rows before
+
+    def begin(self, ids: np.ndarray, removed: np.ndarray, added: np.ndarray, kinds: np.ndarray) -> None:
+        """removed: ascending rows; added: ids by ascending kind and id; the stops are those of the bodies before."""
+        plan, leaving, coming = self.record, len(removed), len(added)
+        plan.show("ids", ids)
+        if leaving > len(plan.removed) or coming > len(plan.added) or leaving + coming >= len(plan.source):
+            plan.reserve(leaving, "removed")
+            plan.reserve(coming, "added", "kinds", "places", "fresh")
+            plan.reserve(leaving + coming + 1, "source", "target", "length")
+        if leaving:
+            plan.removed[:leaving] = removed
+        if coming:
+            plan.added[:coming], plan.kinds[:coming] = added, kinds
+        plan.leaving, plan.coming = leaving, coming
+        self.count, self.new = int(plan.stops[2]), True
+
+    @property
+    def fresh(self) -> np.ndarray:
+        """The rows of those that have come, in order."""
+        return self.record.fresh[: self.record.coming].copy()
+
+    def end(self) -> None:
+        """Long lists do not stay in memory."""
+        if len(self.record.source) > MOST_KEPT:
+            for name in ("removed", "added", "kinds", "places", "fresh", "source", "target", "length"):
+                setattr(self.record, name, np.empty(0, np.int64))
+
+
+class MovedColumns:
+    """Columns whose rows move together."""
+
+    def __init__(self) -> None:
+        self._record = make_record(MOVED_COLUMNS, 2)
         self._columns: list[np.ndarray] = []
         self._defaults: list[np.ndarray | None] = []
 
     def bind(self, columns: list[np.ndarray], defaults: list[np.ndarray | None]) -> None:
-        """Contiguous columns whose rows move together, and for each what new rows hold (None: whatever is there)."""
+        """Contiguous columns, and for each what new rows hold (None: whatever is there)."""
         self._columns, self._defaults = columns, defaults
-        moves = self._moves
-        moves.addresses = np.array([column.ctypes.data for column in columns], np.int64)
-        moves.row_bytes = np.array([column[:1].nbytes for column in columns], np.int64)
-        moves.defaults = np.array([0 if row is None else row.ctypes.data for row in defaults], np.int64)
+        record = self._record
+        record.addresses = np.array([column.ctypes.data for column in columns], np.int64)
+        record.row_bytes = np.array([column[:1].nbytes for column in columns], np.int64)
+        record.defaults = np.array([0 if row is None else row.ctypes.data for row in defaults], np.int64)
 
-    def run(self, count: int, removed: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Of the first ``count`` rows take some out, make room in front of others; returns the new rows.
+    def move(self, plan: RowPlan) -> None:
+        """Move the rows as planned; the columns must have room for all."""
+        if JIT and plan.count:
+            move_rows(plan.record.address, self._record.address, plan.new)
+        else:  # nothing moves where there are no rows yet, and most worlds need no kernel
+            self._move_plain(plan)
+        plan.new = False
 
-        removed: ascending rows. places: ascending; a row once for each that comes in front of it, ``count``: at the
-        end. Columns must have room for all.
-        """
-        if not count:  # nothing moves; most worlds need no kernel
-            self._fill(slice(0, len(places)))
-            return np.arange(len(places))
-        moves, leaving, coming = self._moves, len(removed), len(places)
-        moves.reserve(leaving, "removed")
-        moves.reserve(coming, "places", "fresh")
-        moves.reserve(leaving + coming + 1, "source", "target", "length")
-        moves.removed[:leaving], moves.places[:coming] = removed, places
-        moves.count, moves.leaving, moves.coming = count, leaving, coming
-        if JIT:
-            move_rows(moves.address)
-        else:
-            self._run_plain()
-        fresh = moves.fresh[:coming].copy()
-        if leaving + coming > MOST_KEPT:
-            for name in ("removed", "places", "fresh", "source", "target", "length"):
-                setattr(moves, name, np.empty(0, np.int64))
-        return fresh
-
-    def _fill(self, rows: Any) -> None:
-        for column, default in zip(self._columns, self._defaults, strict=True):
-            if default is not None:
-                column[rows] = default
-
-    def _run_plain(self) -> None:
-        moves = self._moves
-        find_runs(moves)
-        listed = (column[: moves.runs].tolist() for column in (moves.source, moves.target, moves.length))
+    def _move_plain(self, plan: RowPlan) -> None:
+        record = plan.record
+        if plan.new:
+            if plan.count:
+                find_places(record)
+                find_runs(record, plan.count)
+            else:
+                coming = record.coming
+                record.runs, record.fresh[:coming] = 0, np.arange(coming)
+                record.stops[:] = record.kinds[:coming].searchsorted((1, 2, 3))
+        listed = (column[: record.runs].tolist() for column in (record.source, record.target, record.length))
         runs = list(zip(*listed, strict=True))
         down, up = [run for run in runs if run[1] < run[0]], [run for run in reversed(runs) if run[1] > run[0]]
-        for column in self._columns:
+        rows: Any = record.fresh[: record.coming] if plan.count else slice(0, record.coming)
+        for column, default in zip(self._columns, self._defaults, strict=True):
             for source, target, length in (*down, *up):
                 column[target : target + length] = column[source : source + length].copy()
-        self._fill(moves.fresh[: moves.coming])
+            if default is not None:
+                column[rows] = default

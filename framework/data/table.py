@@ -13,7 +13,7 @@ import numpy as np
 
 from .columns import Column
 from .component import Component, RowStore
-from .row_moves import RowMoves
+from .row_moves import MovedColumns, RowPlan
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
@@ -43,16 +43,15 @@ class Table:
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
         self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
-        # Called with the number of rows before, those that leave and the places of those that come, see row_moves.
-        self.on_rows_moved: Callable[[int, np.ndarray, np.ndarray], None] = lambda *_: None
+        self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
         self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
-        self._fills: dict[str, Any] = {}
+        self._fills: dict[str, Any] = {}  # what rows of a column hold that have no value of their own
         self._default_bits: dict[str, bytes] = {}
-        self._moves, self._bound_columns = RowMoves(), -1
+        self._plan, self._columns, self._bound_columns = RowPlan(), MovedColumns(), -1
         self._stack_rows: dict[str, tuple[str, int]] = {}  # column key -> (stack, slot)
         self._stacked_types: dict[str, list[type[Component]]] = {}
         self.add_array("entity", dtype=np.int64)
@@ -173,6 +172,11 @@ class Table:
         default = np.asarray(self._fills[key], column.dtype)
         return np.broadcast_to(default, (*rows, *column.item_shape(self.dimensions)))
 
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """By column, what rows hold that have no value of their own: do not change it."""
+        return self._fills
+
     def default_of(self, key: str) -> Any:
         """What rows of that column hold that have no value of their own."""
         return self._fills[key]
@@ -285,25 +289,30 @@ class Table:
             removed = np.concatenate((removed, self.rows_of(changed["entity"])))
             added = np.concatenate((added, changed["entity"]))
             added_kinds = np.concatenate((added_kinds, changed["kind"]))
-        removed = np.sort(removed)
-        keys = (added_kinds << 48) | added
-        if (keys[1:] < keys[:-1]).any():
-            order = np.argsort(keys, kind="stable")  # fast on what is partly in order
-            added, added_kinds = added[order], added_kinds[order]
-        places = self._places_for(added, added_kinds)
-        gone, come = removed.searchsorted(self.stops), added_kinds.searchsorted((1, 2, 3))
-        before, stops = self.count, tuple((self.stops - gone + come).tolist())
-        if gone[2] > gone[1] or come[2] > come[1]:  # static ones
+        if len(removed) > 1:
+            removed = np.sort(removed)
+        if len(added) > 1:
+            keys = (added_kinds << 48) | added
+            if (keys[1:] < keys[:-1]).any():
+                order = np.argsort(keys, kind="stable")  # fast on what is partly in order
+                added, added_kinds = added[order], added_kinds[order]
+        moving = self.stops[1]
+        if (len(added) and added_kinds[-1] == STATIC) or (len(removed) and removed[-1] >= moving):
             self.static_version += 1
-        self.reserve(stops[2])
+        self.reserve(self.count - len(removed) + len(added))
         if self._bound_columns != self.columns_version:
-            self._bind_moves()
-        rows = self._moves.run(before, removed, places)
+            self._bind_columns()
+        plan = self._plan
+        plan.begin(self.arrays["entity"], removed, added, added_kinds)
+        self._columns.move(plan)
+        rows = plan.fresh
         self.arrays["entity"][rows] = added
         if self.kind_carrier is not None:
             self.arrays["kind"][rows] = added_kinds
-        self.on_rows_moved(before, removed, places)
-        self.count, self.stops = stops[2], stops
+        self.on_rows_moved(plan)
+        plan.end()
+        self.stops = tuple(plan.record.stops.tolist())
+        self.count = self.stops[2]
         self.kind_changed = False
         self.version += 1
         if changed:
@@ -317,23 +326,12 @@ class Table:
         rows = np.setdiff1d(np.flatnonzero(self.column("kind") != kinds), removed)
         return {key: self.values(key, rows) for key in self.arrays} if len(rows) else {}
 
-    def _places_for(self, added: np.ndarray, kinds: np.ndarray) -> np.ndarray:
-        """The rows in front of which these bodies belong, which are in order of kind and id."""
-        ids, places, start, first = self.arrays["entity"], np.empty(len(added), np.int64), 0, 0
-        for stop, last in zip(self.stops, kinds.searchsorted((1, 2, 3)).tolist(), strict=True):
-            if stop == start or (last > first and ids[stop - 1] < added[first]):  # most come behind all there are
-                places[first:last] = stop
-            elif last > first:
-                places[first:last] = start + ids[start:stop].searchsorted(added[first:last])
-            start, first = stop, last
-        return places
-
-    def _bind_moves(self) -> None:
+    def _bind_columns(self) -> None:
         columns = list(self.arrays.values())
         defaults = [np.empty_like(column[:1]) for column in columns]
         for key, row in zip(self.arrays, defaults, strict=True):
             row[...] = self._fills[key]
-        self._moves.bind(columns, defaults)
+        self._columns.bind(columns, defaults)
         self._bound_columns = self.columns_version
 
     def set_kinds(self, rows: np.ndarray, kinds: np.ndarray) -> None:

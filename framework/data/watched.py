@@ -16,46 +16,31 @@ from .batches import Batch, Batches
 
 
 class ChangeLog:
-    """The entities that gained, lost or replaced a component, by component type; carom's own types only.
+    """The entities that gained, lost or replaced one of carom's own components.
 
-    batches: those that have come. deleted: ids of entities that were deleted while in a batch.
+    touched: their ids, those that have gone too. batches: those that have come. deleted: ids of entities that were
+    deleted while in a batch.
     """
+
+    __slots__ = ("base", "batches", "cleared", "deleted", "dirty", "touched")
 
     def __init__(self, base: type[Any]) -> None:
         self.base = base  # only types derived from it are watched
         self.cleared = False  # by esper.clear_database(): everything before it has gone
         self.dirty = False  # something has been logged since the last time
+        self.touched: set[int] = set()
         self.batches: list[Batch] = []
         self.deleted: list[np.ndarray] = []
-        self._touched: dict[type[Any], _Touched] = {}
 
-    def of(self, component: type[Any]) -> _Touched:
-        return self._touched.setdefault(component, _Touched(self))
-
-    def take(self) -> tuple[dict[type[Any], set[int]], bool]:
-        """Which entities have been touched since the last time, by component type, and whether all was cleared."""
-        touched = {component: entry.entities for component, entry in self._touched.items() if entry.entities}
-        for component in touched:
-            self._touched[component].entities = set()
-        cleared, self.cleared = self.cleared, False
-        self.dirty = False
-        return touched, cleared
-
-    def take_many(self) -> tuple[list[Batch], list[np.ndarray]]:
-        """The same for batches that have come and what was deleted out of them."""
-        taken = self.batches, self.deleted
-        self.batches, self.deleted = [], []
+    def take(self) -> tuple[set[int], list[Batch], list[np.ndarray], bool]:
+        """What has been logged since the last time: touched, batches, deleted, cleared."""
+        taken = self.touched, self.batches, self.deleted, self.cleared
+        self.touched, self.batches, self.deleted, self.cleared, self.dirty = set(), [], [], False, False
         return taken
 
-
-class _Touched:
-    """Where the sets of one component type log into; the set inside is exchanged when the log is read."""
-
-    __slots__ = ("entities", "log")
-
-    def __init__(self, log: ChangeLog) -> None:
-        self.entities: set[int] = set()
-        self.log = log
+    def touch(self, entities: Iterable[int]) -> None:
+        self.dirty = True
+        self.touched.update(entities)
 
 
 class Members:
@@ -64,44 +49,40 @@ class Members:
     Logs who enters and leaves, and who enters again (replaced).
     """
 
-    __slots__ = ("_component", "_entities", "_touched", "listed")
+    __slots__ = ("_component", "_entities", "_log", "listed")
 
     def __init__(self, component: type[Any], listed: Iterable[int], entities: Entities, log: ChangeLog | None) -> None:
         self.listed = set(listed)
-        self._component, self._entities = component, entities
-        self._touched = None if log is None else log.of(component)
-        if self._touched is not None and self.listed:
-            self._touched.log.dirty = True
-            self._touched.entities.update(self.listed)
+        self._component, self._entities, self._log = component, entities, log
+        if log is not None and self.listed:
+            log.touch(self.listed)
 
     def add(self, entity: int) -> None:
-        self._change(entity)
+        log = self._log
+        if log is not None:
+            log.dirty = True
+            log.touched.add(entity)
+        if entity < self._entities.batches.stop:
+            self._entities.take_out(entity)
         self.listed.add(entity)
 
     def discard(self, entity: int) -> None:
-        self._change(entity)
-        self.listed.discard(entity)
-
-    def _change(self, entity: int) -> None:
-        touched = self._touched
-        if touched is not None:
-            touched.log.dirty = True
-            touched.entities.add(entity)
-        if self._entities.batches.all:
+        if self._log is not None:
+            self._log.touch((entity,))
+        if entity < self._entities.batches.stop:
             self._entities.take_out(entity)
+        self.listed.discard(entity)
 
     def discard_many(self, entities: list[int]) -> None:
         """Entities that are listed."""
-        if self._touched is not None:
-            self._touched.log.dirty = True
-            self._touched.entities.update(entities)
+        if self._log is not None:
+            self._log.touch(entities)
         self.listed.difference_update(entities)
 
     def settle(self, entity: int, log: bool) -> None:
         """An entity leaves its batch and keeps the component."""
-        if log and self._touched is not None:
-            self._touched.log.dirty = True
-            self._touched.entities.add(entity)
+        if log and self._log is not None:
+            self._log.touch((entity,))
         self.listed.add(entity)
 
     def _batches(self) -> list[Batch]:
@@ -149,8 +130,8 @@ class WatchedComponents(dict[type[Any], Members]):
         super().__setitem__(component, Members(component, entities, self.entities, self.log if ours else None))
 
     def clear(self) -> None:
+        self.log.take()
         self.log.cleared = self.log.dirty = True
-        self.log.take_many()
         super().clear()
 
 

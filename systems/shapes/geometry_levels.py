@@ -156,7 +156,7 @@ class LevelCheck(TogetherCheck):
     def _values(self, collider: type[Component], entities: np.ndarray, fresh: Handles) -> Values:
         """Columns by name, of handles to adopt and of those in the table."""
         new = np.array([entity in fresh for entity in entities.tolist()], bool)
-        sources = Sources(collider, [fresh[e] for e in entities[new].tolist()]) if new.any() else None
+        sources = Sources([fresh[e] for e in entities[new].tolist()]) if new.any() else None
         rows = self._table.rows_of(entities[~new])
         values = {}
         for name, column in collider.columns.items():
