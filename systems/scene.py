@@ -44,7 +44,7 @@ ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "h
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "min_extent", "lower", "upper")
 ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.
-ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third")
+ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third", "force_speed_change")
 
 
 class Scene:
@@ -72,6 +72,7 @@ class Scene:
         self._axes = np.empty((0, state.dimensions, state.dimensions))
         self._moved = MovedColumns()  # those that move with the rows
         self._keeps = False  # whether they do
+        self._zero_rows = 0, 0  # the rows of static bodies, when these columns were made 0 in them
         self._columns_made = 0  # changes whenever one of them may be another array
         self._kept_version: Any = None
         self._columns_version = self._shapes_version = -1  # of the table, when its columns were bound
@@ -102,9 +103,15 @@ class Scene:
         state, table = self.state, self.table
         bodies, count, moving = state.bodies, table.count, table.stops[1]
         table.arrays["linear_velocity"][moving:count] = 0.0
+        start, stop = self._zero_rows
         for name in ZERO_WHERE_STATIC:
-            if len(getattr(bodies, name)):
-                getattr(bodies, name)[moving:count] = 0.0
+            column = getattr(bodies, name)
+            if len(column) and start < stop:
+                column[moving : max(moving, min(count, start))] = 0.0
+                column[max(moving, stop) : count] = 0.0
+            elif len(column):
+                column[moving:count] = 0.0
+        self._zero_rows = moving, count
         if self._columns_version != table.columns_version:
             self.bind_columns()
         state.count, (state.dynamic, state.moving, _) = count, table.stops

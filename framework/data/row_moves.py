@@ -36,7 +36,7 @@ MOVED_COLUMNS = Schema(
     row_bytes=ints(),
     defaults=ints(),  # address of a row that new rows are copies of; 0: they stay as they are
 )
-MOST_KEPT = 65536  # rows; the lists of more do not stay in memory
+MOST_KEPT = 128  # rows; the lists of more do not stay in memory
 
 _plan_at = record_at(ROW_PLAN, 2)
 _columns_at = record_at(MOVED_COLUMNS, 2)

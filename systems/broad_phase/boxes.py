@@ -145,6 +145,10 @@ def box_statics(state, dt):
             bodies.previous_position[i] = bodies.position[i]
             bodies.static_position[i - moving] = bodies.position[i]
         call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
+        state.thinnest_static = math.inf
+        for i in range(moving, state.count):
+            if bodies.shape[i] >= 0 and bodies.min_extent[i] > 0.0:
+                state.thinnest_static = min(state.thinnest_static, bodies.min_extent[i])
         state.statics_stale = False
         state.statics_version += 1
     return OK

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ..codes import NEED_MERGED, OK
-from ..narrow_phase.stages import is_solid_pair, layers_meet
+from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
 
 
 @part
@@ -65,6 +65,7 @@ def merge_pairs(state, dt):
         state.needed = old.count + candidates.count
         return NEED_MERGED
     mark_kept(state)
+    rank_rows(state)
     n, found, i, j = state.count, 0, 0, 0
     while i < candidates.count or j < old.count:
         new_key, old_key = n * n, n * n

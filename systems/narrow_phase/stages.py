@@ -10,13 +10,16 @@ from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
 from ..shapes.dispatch import evaluate_batch
 from ..shapes.tolerances import contact_margin
 
+# Candidates are sorted by comparison if there are so many times more bodies, else by counting.
+BODIES_PER_CANDIDATE = 64
+
 
 @part
 def rank_rows(state):
-    """The place of each row in the order of entity ids: three sorted runs are merged."""
+    """The place of each row in the order of entity ids, unless it is known: three sorted runs are merged."""
     entity, rank = state.bodies.entity, state.bodies.rank
     dynamic, kinematic, static = 0, state.dynamic, state.moving
-    for place in range(state.count):
+    for place in range(state.count if state.ranks_version != state.version else 0):
         row, lowest = -1, 0
         if dynamic < state.dynamic:
             row, lowest = dynamic, entity[dynamic]
@@ -32,19 +35,26 @@ def rank_rows(state):
 
 
 def order_candidates(state, dt):
-    """Candidates by the smaller entity id, then by the larger, the row of the smaller id first.
-
-    Two stable counting sorts, by the larger id and by the smaller.
-    """
-    candidates, rank, count = state.candidates, state.bodies.rank, state.candidates.count
+    """Candidates by the smaller entity id, then by the larger, the row of the smaller id first."""
+    candidates, count = state.candidates, state.candidates.count
     if not state.candidates_ready:
         return RUN_BROAD
     if count > len(candidates.sorted_a) or state.count + 1 > len(candidates.starts):
         state.needed = count
         return NEED_ORDER
-    if state.ranks_version != state.version:
-        rank_rows(state)
     state.candidates_counted += count
+    if BODIES_PER_CANDIDATE * count < state.count:
+        sort_few(state)
+    else:
+        sort_by_counting(state)
+    return OK
+
+
+@part
+def sort_by_counting(state):
+    """Two stable counting sorts, by the larger id and by the smaller."""
+    rank_rows(state)
+    candidates, rank, count = state.candidates, state.bodies.rank, state.candidates.count
     first, second, starts = candidates.first, candidates.second, candidates.starts
     half_a, half_b = candidates.half_a, candidates.half_b
     for i in range(state.count + 1):
@@ -70,7 +80,31 @@ def order_candidates(state, dt):
         k = starts[rank[half_a[c]]]
         starts[rank[half_a[c]]] += 1
         candidates.sorted_a[k], candidates.sorted_b[k] = half_a[c], half_b[c]
-    return OK
+
+
+@part
+def sort_few(state):
+    """Merge runs of candidates that are in order into longer ones, until it is one."""
+    candidates, entity, count, run = state.candidates, state.bodies.entity, state.candidates.count, 1
+    sorted_a, sorted_b, half_a, half_b = candidates.sorted_a, candidates.sorted_b, candidates.half_a, candidates.half_b
+    for c in range(count):
+        a, b = candidates.first[c], candidates.second[c]
+        sorted_a[c], sorted_b[c] = (b, a) if entity[a] > entity[b] else (a, b)
+    while run < count:
+        for c in range(count):
+            half_a[c], half_b[c] = sorted_a[c], sorted_b[c]
+        for start in range(0, count, 2 * run):
+            middle, stop = min(start + run, count), min(start + 2 * run, count)
+            i, j = start, middle
+            for k in range(start, stop):
+                later = i == middle
+                if i < middle and j < stop:
+                    one, other = entity[half_a[i]], entity[half_a[j]]
+                    later = other < one or (other == one and entity[half_b[j]] < entity[half_b[i]])
+                at = j if later else i
+                sorted_a[k], sorted_b[k] = half_a[at], half_b[at]
+                i, j = i + (not later), j + later
+        run *= 2
 
 
 @part
@@ -105,9 +139,9 @@ def is_solid_pair(state, a, b):
 def find_hasty(state, dt):
     """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
     no pair is swept, the two may have passed through each other."""
-    bodies, farthest, thinnest = state.bodies, 0.0, math.inf
+    bodies, farthest, thinnest = state.bodies, 0.0, state.thinnest_static
     state.hasty = False
-    for i in range(state.count if state.moved and not state.sweeping else 0):
+    for i in range(state.moving if state.moved and not state.sweeping else 0):
         if bodies.shape[i] >= 0:
             extent = bodies.min_extent[i]
             thinnest = min(thinnest, extent if extent > 0.0 else math.inf)
@@ -124,7 +158,7 @@ def select_pairs(state, dt):
         state.needed = candidates.count
         return NEED_PAIRS
     velocity, start = bodies.linear_velocity, bodies.start_velocity
-    for i in range(state.count):
+    for i in range(state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if state.moved else 0.0
     find_hasty(state, dt)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
