@@ -72,6 +72,8 @@ class Scene:
         self._axes = np.empty((0, state.dimensions, state.dimensions))
         self._moved = MovedColumns()  # those that move with the rows
         self._keeps = False  # whether they do
+        self._zero: list[np.ndarray] = []  # those of ZERO_WHERE_STATIC that there are
+        self._zero_version = -1
         self._zero_rows = 0, 0  # the rows of static bodies, when these columns were made 0 in them
         self._columns_made = 0  # changes whenever one of them may be another array
         self._kept_version: Any = None
@@ -103,14 +105,14 @@ class Scene:
         state, table = self.state, self.table
         bodies, count, moving = state.bodies, table.count, table.stops[1]
         table.arrays["linear_velocity"][moving:count] = 0.0
-        start, stop = self._zero_rows
-        for name in ZERO_WHERE_STATIC:
-            column = getattr(bodies, name)
-            if len(column) and start < stop:
-                column[moving : max(moving, min(count, start))] = 0.0
-                column[max(moving, stop) : count] = 0.0
-            elif len(column):
-                column[moving:count] = 0.0
+        if self._zero_version != self._columns_made:
+            self._zero = [column for name in ZERO_WHERE_STATIC if len(column := getattr(bodies, name))]
+            self._zero_version, self._zero_rows = self._columns_made, (0, 0)
+        start, stop = self._zero_rows if self._zero_rows[0] < self._zero_rows[1] else (count, count)
+        for low, high in ((moving, min(count, start)), (max(moving, stop), count)):
+            if low < high:
+                for column in self._zero:
+                    column[low:high] = 0.0
         self._zero_rows = moving, count
         if self._columns_version != table.columns_version:
             self.bind_columns()
@@ -160,14 +162,14 @@ class Scene:
         shapes, slots = state.bodies.shape[:count], state.shapes.slots
         if len(self._taken_out[0]) or (self.linked and count - moving > len(state.bodies.static_position)):
             return False
-        arrived = np.flatnonzero(shapes == ARRIVED)
+        arrived = (shapes == ARRIVED).nonzero()[0]
         shapes[arrived] = -1
         for index, shape in enumerate(self.linked.shapes if self.linked else ()):
             rows = arrived[table.has_mask(shape.component)[arrived]]
-            if (shapes[rows] >= 0).any():
+            if np.count_nonzero(shapes[rows] >= 0):
                 return False
             shapes[rows] = index
-        state.collides = bool((shapes[:moving] >= 0).any())
+        state.collides = bool(np.count_nonzero(shapes[:moving] >= 0))
         if self.linked is not None:
             state.bodies.collider_slot[arrived] = slots[shapes[arrived]]
             if self._shapes_version != table.columns_version or self.linked.has_array_columns:
@@ -182,7 +184,7 @@ class Scene:
     def _present_colliders(self) -> list[type[Any]]:
         table = self.table
         known = table.stacked_types(Collider.stack)
-        present = [c for c in known if c in self.prepared or table.has_mask(c)[: table.count].any()]
+        present = [c for c in known if c in self.prepared or np.count_nonzero(table.has_mask(c)[: table.count])]
         return in_order(self.registry, present)
 
     def bind_columns(self) -> None:

@@ -31,6 +31,7 @@ class StepLinks:
         self._state.links = np.zeros(COUNT, np.int64)
         self._version = self._forces = NEVER  # of the scene, and how many force systems there were
         self._key: Any = None  # what the linked stages depend on
+        self._usual: Any = None  # what of that bodies may change
         self._shapes_key: Any = None
         self._kept_key: Any = None
 
@@ -56,6 +57,14 @@ class StepLinks:
         self._version = NEVER  # until it is done
         scene, state = self._scene, self._state
         state.sweeps_ready = self.needs_sweeps()
+        usual = (
+            scene.linked, scene.registry.version, scene.table.capacity, force_systems, state.sweeps_ready,
+            state.collides, state.several_levels, state.dynamic > 0, self._search.needs_grids(),
+        )  # fmt: skip
+        if self._key is not None and usual == self._usual and usual[5]:  # bodies have come or gone, no more
+            self._version = scene.version
+            return False
+        self._usual = usual
         conditions = self._conditions()
         key = (scene.linked, scene.registry.version, scene.table.capacity, force_systems, conditions)
         changed = key != self._key

@@ -54,6 +54,8 @@ def test_bodies_nobody_looks_at_have_no_handles(handles):
     world.restore(world.snapshot())
     assert world.entity_exists(ids[3])
     assert len(world.bodies) == 501
+    assert world.has_components(ids[5], Transform, SphereCollider)
+    assert not world.has_component(ids[5], AABBCollider)
     for entity in ids[::2]:
         world.delete_entity(entity)
     world.step()

@@ -80,7 +80,7 @@ class Adoption:
         self._roles: dict[Any, int] = {}  # by component type
         # Handles of the bodies in the table, but for those of batches that nobody has asked for.
         self._members: dict[type[Component], Handles] = {}
-        self._log: ChangeLog | None = None  # of this world's context
+        self._contents: esper_bridge.Contents | None = None  # of this world's context
         # Changes that have not been taken in yet, as the log has them.
         self._touched: Ids = set()
         self._batches: list[Batch] = []
@@ -88,22 +88,22 @@ class Adoption:
         self._cleared = False
 
     def settled(self) -> bool:
-        """Whether nothing has changed since the last synchronize; needs no switch of contexts to find out."""
-        return not (self._log is None or self._log.dirty or self._waiting())
+        """Whether nothing has changed since the last synchronize."""
+        return not (self._contents is None or self._contents.log.dirty or self._waiting())
 
     def _waiting(self) -> bool:
         return bool(self._touched or self._batches or self._deleted or self._cleared or self.table.kind_changed)
 
-    def synchronize(self) -> bool:
-        """Bring the table up to date; True if anything has changed.
+    def synchronize(self, contents: esper_bridge.Contents) -> bool:
+        """Bring the table up to date with what is in the world's context; True if anything has changed.
 
         Raises MissingComponentError or ValueError, naming the entity, before anything has been written; what is amiss
         is looked at again the next time.
         """
-        log = self._log = esper_bridge.changes()
-        if not log.dirty and not self._waiting():
+        self._contents = contents
+        if self.settled():
             return False
-        self._gather(log)
+        self._gather(contents.log)
         changes = self._find_changes()
         self._check(changes)
         cleared = self._cleared
@@ -140,7 +140,7 @@ class Adoption:
             changes.gone = {component: set(members) for component, members in known.items() if members}
             known = {}
         for entity in sorted(self._touched):
-            self._compare(entity, esper_bridge.components_of(entity), known, changes)
+            self._compare(entity, self._contents.components_of(entity), known, changes)
         for batch in self._batches:
             partners = [component for component in batch.types if self._role(component) == PARTNER]
             if batch.left and partners:
@@ -231,7 +231,7 @@ class Adoption:
         owner = handle._entity
         if handle._store is not self.table:
             raise ValueError(_second_use(component, f"entity {owner} of another world and to entity {entity}"))
-        if owner != entity and esper_bridge.components_of(owner).get(component) is handle:
+        if owner != entity and self._contents.components_of(owner).get(component) is handle:
             raise ValueError(_second_use(component, f"entities {owner} and {entity}"))
 
     # -- bringing the table up to date ------------------------------------------------------------
@@ -282,10 +282,12 @@ class Adoption:
         if changes.batches:
             added = np.concatenate((added, *(batch.ids() for batch in changes.batches)))
             kinds = np.concatenate((kinds, *(self._kinds_of(batch) for batch in changes.batches)))
-        table.rebuild(removed, added, kinds)
-        if len(come) == 1:
-            return {come[0]: table.find(come[0])}
-        return dict(zip(come, table.rows_of(np.array(come, np.int64)).tolist(), strict=True)) if come else {}
+        added, rows = table.rebuild(removed, added, kinds)
+        if not come:
+            return {}
+        if len(added) > len(come):
+            added, rows = np.array(come), table.rows_of(np.array(come))
+        return dict(zip(added.tolist(), rows.tolist(), strict=True))
 
     def _kinds_of(self, batch: Batch) -> np.ndarray:
         """(left,) kinds of the bodies of a batch."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 import esper
@@ -71,9 +71,25 @@ def unwatch() -> None:
     esper._entities = dict(esper._entities.items())
 
 
-def changes() -> ChangeLog:
-    """The log of the current context."""
-    return esper._components.log  # type: ignore[attr-defined]
+class Contents:
+    """What is in the current context, later too: it can be read without switching to that context.
+
+    entities, dead
+        esper's own dict of all entities' components, and its set of those whose deletion is pending: do not change them
+    log
+        what has changed
+    """
+
+    __slots__ = ("dead", "entities", "log")
+
+    def __init__(self) -> None:
+        self.entities: Entities = esper._entities  # type: ignore[assignment]
+        self.dead: set[int] = esper._dead_entities
+        self.log: ChangeLog = esper._components.log  # type: ignore[attr-defined]
+
+    def components_of(self, entity: int) -> Mapping[type[Any], Any]:
+        """Those of an entity that is in no batch, empty for what is none."""
+        return dict.get(self.entities, entity, _NONE)
 
 
 # -- entities ------------------------------------------------------------------------------------
@@ -89,26 +105,13 @@ def create_many(stores: Stores, count: int) -> range:
         if component not in esper._components:
             esper._components[component] = set()
     batch = Batch(first, count, stores)
-    entities, log = _containers()
+    contents = Contents()
+    entities, log = contents.entities, contents.log
     entities.batches.add(batch)
     log.batches.append(batch)
     log.dirty = True
     esper.clear_cache()
     return range(first, first + count)
-
-
-def _containers() -> tuple[Entities, ChangeLog]:
-    return esper._entities, changes()  # type: ignore[return-value]
-
-
-def components_of(entity: int) -> Mapping[type[Any], Any]:
-    """esper's own dict of the components of an entity that is in no batch, empty for what is none: do not change it."""
-    return dict.get(esper._entities, entity, _NONE)
-
-
-def known_entity(entity: int) -> bool:
-    """Whether the entity is in the database, dead or not."""
-    return entity in esper._entities
 
 
 class Membership:
@@ -122,7 +125,7 @@ class Membership:
 
     def __init__(self) -> None:
         self._members: Any = esper._components
-        self.types_of: Callable[[int], Iterable[type[Any]]] = esper._entities.types_of  # type: ignore[attr-defined]
+        self.types_of: Callable[[int], Collection[type[Any]]] = esper._entities.types_of  # type: ignore[attr-defined]
         self.dead: set[int] = esper._dead_entities
 
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
@@ -144,7 +147,8 @@ def clear_dead() -> None:
     dead = esper._dead_entities
     if not dead:
         return
-    entities, log = _containers()
+    contents = Contents()
+    entities, log = contents.entities, contents.log
     own = [entity for entity in dead if dict.__contains__(entities, entity)]
     if len(own) < len(dead) and entities.batches:
         ids = np.array([int(entity) for entity in dead if hasattr(entity, "__index__")], np.int64)
@@ -211,11 +215,6 @@ def give_back_processors() -> None:
     esper._processors = [*esper._processors]
 
 
-def dead_entities() -> set[int]:
-    """esper's own set of the entities of the current context whose deletion is pending."""
-    return esper._dead_entities
-
-
 def remove_processor_instance(processor: esper.Processor) -> None:
     """Remove that very processor; esper's own removal is by type and loses sight of a second instance."""
     esper._processors[:] = [p for p in esper._processors if p is not processor]
@@ -270,7 +269,7 @@ def _check_that_nothing_escapes() -> None:
 
     with context("carom is looking at esper"):
         watch(Probe)
-        log = changes()
+        log = Contents().log
         expect(lambda: esper.create_entity(Probe()), 1)
         expect(lambda: esper.create_entity(Probe()), 2)
         expect(lambda: esper.add_component(1, Probe()), 1)

@@ -47,7 +47,7 @@ def write_handles(
     table: Table, component: type[Component], handles: list[Component], rows: list[int], fresh: bool
 ) -> None:
     """Write the values of handles into these rows of a table; fresh: the rows hold the defaults."""
-    defaults, fields = table.defaults, component.fields
+    defaults, arrays, fields = table.defaults, table.arrays, component.fields
     groups: dict[int, tuple[RowStore, list[int], list[int]]] = {}
     for handle, row in zip(handles, rows, strict=True):
         store = handle._store
@@ -59,7 +59,12 @@ def write_handles(
         values = handle._values
         for name, key in fields:
             value = values[name]
-            if value is not defaults[key] or not fresh:
+            if value is defaults[key] and fresh:
+                continue
+            kind = type(value)
+            if key in arrays and (kind is np.ndarray or type(defaults[key]) is kind):
+                arrays[key][row] = value
+            else:
                 table.write_one(key, row, value)
     for store, targets, sources in groups.values():
         for _, key in fields:

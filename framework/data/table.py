@@ -48,6 +48,7 @@ class Table:
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
+        self._mask_names: dict[type[Component], str] = {}
         self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
         self._fills: dict[str, Any] = {}  # what rows of a column hold that have no value of their own
         self._default_bits: dict[str, bytes] = {}
@@ -90,6 +91,7 @@ class Table:
             self._stacked_types[stack].append(component)
         if "kind" in component.columns and not component.prefix:
             self.kind_carrier = component
+        self._mask_names[component] = self.mask_name(component)
         self.add_array(self.mask_name(component), dtype=bool, fill=False)
         self.component_types.append(component)
 
@@ -120,7 +122,7 @@ class Table:
 
     def has_mask(self, component: type[Component]) -> np.ndarray:
         """Full-capacity mask of the rows whose entity has that component."""
-        return self.arrays[self.mask_name(component)]
+        return self.arrays[self._mask_names[component]]
 
     def _add_to_stack(self, stack: str, slot: int, column: Column) -> None:
         """The field of one more type. The whole stack has an array or none."""
@@ -250,7 +252,7 @@ class Table:
         ids = self.arrays["entity"]
         start = 0
         for stop in self.stops:
-            row = start + int(np.searchsorted(ids[start:stop], entity))
+            row = start + int(ids[start:stop].searchsorted(entity))
             if row < stop and ids[row] == entity:
                 return row
             start = stop
@@ -258,9 +260,9 @@ class Table:
 
     def rows_of(self, entities: np.ndarray) -> np.ndarray:
         """The rows of entities that all have one, vectorised."""
-        rows = np.full(len(entities), -1, np.int64)
+        rows = np.full(len(entities), -1, np.int64) if len(entities) else entities
         start = 0
-        for stop in self.stops:
+        for stop in self.stops if len(entities) else ():
             block = self.arrays["entity"][start:stop]
             if stop > start:
                 place = np.minimum(block.searchsorted(entities), stop - start - 1)
@@ -279,10 +281,12 @@ class Table:
                 return rows
         return self.rows_of(entities)
 
-    def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> None:
+    def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> tuple[Any, Any]:
         """Take rows out, put rows in, and bring bodies of another kind to their place.
 
-        removed: rows that go. added: entity ids that come, with their kinds; their rows hold the defaults.
+        removed: rows that go. added: entity ids that come, with their kinds; their rows hold the defaults. Returns the
+        ids that have got other rows than those of their neighbours, which are these and those of another kind, and
+        their rows.
         """
         changed = self._changed_kinds(removed) if self.kind_changed else {}
         if changed:
@@ -316,9 +320,10 @@ class Table:
         self.kind_changed = False
         self.version += 1
         if changed:
-            rows = self.rows_of(changed["entity"])
+            places = self.rows_of(changed["entity"])
             for key, values in changed.items():
-                self.arrays[key][rows] = values
+                self.arrays[key][places] = values
+        return added, rows
 
     def _changed_kinds(self, removed: np.ndarray) -> dict[str, np.ndarray]:
         """All columns of the bodies whose kind is another than that of their rows, but for those that go."""

@@ -7,7 +7,7 @@ watched, so finding what has changed costs as much as there is of it, however ma
 from __future__ import annotations
 
 import itertools
-from collections.abc import ItemsView, Iterable, Iterator, KeysView, ValuesView
+from collections.abc import Collection, ItemsView, Iterable, Iterator, KeysView, ValuesView
 from typing import Any
 
 import numpy as np
@@ -159,7 +159,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
         if self.batches.of(entity) is not None:
             self.__missing__(entity)
 
-    def types_of(self, entity: int) -> Iterable[type[Any]]:
+    def types_of(self, entity: int) -> Collection[type[Any]]:
         """The types of its components, () for what is no entity."""
         components = dict.get(self, entity)
         if components is not None:

@@ -48,12 +48,12 @@ class Pipeline:
         self._parts_order = self._parts_physics = -1  # versions that the parts were made of
         self._at = ""  # the system at work
         self.processors: esper_bridge.Processors
-        self._dead: set[int]
+        self.contents: esper_bridge.Contents
 
     def attach(self) -> None:
         """Become the first processor of the world's context; called in it."""
         self.processors = esper_bridge.take_over_processors()
-        self._dead = esper_bridge.dead_entities()
+        self.contents = esper_bridge.Contents()
         esper.add_processor(StepRunner(self), FIRST_PRIORITY)
 
     def must_be_between_steps(self, what: str) -> None:
@@ -93,7 +93,7 @@ class Pipeline:
                 if k and self.world.physics is not None:
                     self.world.physics.contacts.take_deferred()
                 others_write = self.others_write()
-                if others_write or self._dead or self.processors.changed:  # code of the game needs its context
+                if others_write or self.contents.dead or self.processors.changed:  # code of the game needs its context
                     with esper_bridge.context(self.world.name):
                         esper_bridge.clear_dead()
                         esper.process(self.clock.dt)
@@ -241,8 +241,7 @@ class Pipeline:
         if physics is None or self.in_step or physics.adoption.settled():
             return
         physics.contacts.take_deferred()
-        with esper_bridge.context(self.world.name):
-            physics.adoption.synchronize()
+        physics.adoption.synchronize(self.contents)
 
     def run(self, phase: Phase) -> None:
         """One phase alone; the clock stands still. If it raises, all is as it was before."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
@@ -21,6 +21,10 @@ class EntityVerbs:
 
     def _context(self) -> AbstractContextManager[None]:
         """The world's esper context, made the current one for a while."""
+        raise NotImplementedError
+
+    def _contents(self) -> esper_bridge.Contents:
+        """What is in that context, to read without making it the current one."""
         raise NotImplementedError
 
     @property
@@ -60,17 +64,20 @@ class EntityVerbs:
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
         """Delete at the start of the next step, or at once; KeyError if there is no such entity."""
+        contents = self._contents()
+        if entity not in contents.entities:
+            raise KeyError(f"no entity {entity!r} in this world")
+        if not immediate:
+            contents.dead.add(entity)
+            return
         with self._context():
-            if not esper_bridge.known_entity(entity):
-                raise KeyError(f"no entity {entity!r} in this world")
-            esper.delete_entity(entity, immediate=immediate)
-            if immediate:
-                esper_bridge.forget_death(entity)
+            esper.delete_entity(entity, immediate=True)
+            esper_bridge.forget_death(entity)
 
     def entity_exists(self, entity: int) -> bool:
         """False for unknown entities and those marked for deletion."""
-        with self._context():
-            return esper.entity_exists(entity)
+        contents = self._contents()
+        return entity in contents.entities and entity not in contents.dead
 
     def add_component(self, entity: int, component: Any, type_alias: type[Any] | None = None) -> None:
         """Add a component, or replace the one of its type; seen by the next step.
@@ -93,36 +100,30 @@ class EntityVerbs:
             return esper.remove_component(entity, component_type)
 
     def has_component(self, entity: int, component_type: type[Any]) -> bool:
-        with self._context():
-            self._known(entity)
-            return esper.has_component(entity, component_type)
+        return component_type in self._types_of(entity)
 
     def has_components(self, entity: int, *component_types: type[Any]) -> bool:
-        with self._context():
-            self._known(entity)
-            return esper.has_components(entity, *component_types)
+        types = self._types_of(entity)
+        return all(component_type in types for component_type in component_types)
 
     def component_for_entity(self, entity: int, component_type: type[C]) -> C:
         """The entity's component of that type; KeyError if either does not exist."""
-        with self._context():
-            self._known(entity)
-            found = esper.try_component(entity, component_type)
-            if found is None:
-                raise KeyError(f"entity {entity} has no {component_type.__name__}")
-            return found
+        found = self._components_of(entity).get(component_type)
+        if found is None:
+            raise KeyError(f"entity {entity} has no {component_type.__name__}")
+        return found
 
     def components_for_entity(self, entity: int) -> tuple[Any, ...]:
-        with self._context():
-            self._known(entity)
-            return esper.components_for_entity(entity)
+        return tuple(self._components_of(entity).values())
 
     def try_component(self, entity: int, component_type: type[C]) -> C | None:
-        with self._context():
-            return esper.try_component(entity, component_type)
+        return self._contents().entities.get(entity, {}).get(component_type)
 
     def try_components(self, entity: int, *component_types: type[Any]) -> tuple[Any, ...] | None:
-        with self._context():
-            return esper.try_components(entity, *component_types)
+        components = self._contents().entities.get(entity)
+        if not components or not all(component_type in components for component_type in component_types):
+            return None
+        return tuple(components[component_type] for component_type in component_types)
 
     def get_component(self, component_type: type[C]) -> list[tuple[int, C]]:
         """(entity, component) of all entities that have it, in no particular order; deleting meanwhile is safe."""
@@ -135,8 +136,22 @@ class EntityVerbs:
             return esper.get_components(*component_types)
 
     def _known(self, entity: int) -> None:
-        if not esper_bridge.known_entity(entity):
+        if entity not in self._contents().entities:
             raise KeyError(f"no entity {entity!r} in this world")
+
+    def _types_of(self, entity: int) -> Collection[type[Any]]:
+        """The types of an entity's components; KeyError if there is no such entity."""
+        types = self._contents().entities.types_of(entity)
+        if not types:
+            self._known(entity)
+        return types
+
+    def _components_of(self, entity: int) -> dict[type[Any], Any]:
+        """All components of an entity by type; KeyError if there is no such entity."""
+        try:
+            return self._contents().entities[entity]
+        except KeyError:
+            raise KeyError(f"no entity {entity!r} in this world") from None
 
     def _check(self, components: Iterable[Any], entity: int | None) -> None:
         dimensions = self.dimensions

@@ -128,6 +128,10 @@ class World(EntityVerbs, QueryVerbs):
         self._open()
         return esper_bridge.context(self.name)
 
+    def _contents(self) -> esper_bridge.Contents:
+        self._open()
+        return self._pipeline.contents
+
     def _open(self) -> None:
         if self.closed:
             raise CaromError(f"world {self.name!r} is closed")

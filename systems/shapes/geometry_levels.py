@@ -74,10 +74,12 @@ class LevelCheck(TogetherCheck):
         members: Mapping[type[Component], Handles],
         gone: Mapping[type[Component], set[int]],
     ) -> None:
+        for component, handles in fresh.items():
+            if issubclass(component, Collider):
+                self._check_dimensions(component, next(iter(handles)))
         types = [c for c in dict.fromkeys((*fresh, *members)) if issubclass(c, Collider)]
-        for collider in types:
-            if fresh.get(collider):
-                self._check_dimensions(collider, min(fresh[collider]))
+        if len(types) < 2:
+            return
         holders = {c: (fresh.get(c, {}).keys(), members.get(c, {}).keys(), gone.get(c, set())) for c in types}
         several: set[int] = set()  # entities that get a collider and have another
         for collider, other in itertools.permutations(types, 2):

@@ -60,7 +60,7 @@ class LinkedShapes:
             self.supported.update(number for number, side in zip((first, second), sides, strict=True) if side)
         self._rules = tuple(linked_rule(rule) for rule in rules)
 
-    @property
+    @cached_property
     def unhandled(self) -> tuple[tuple[int, int], ...]:
         """Pairs of numbers of shapes that no plugin has a pair for."""
         return tuple(numbers for numbers, pair in self.pairs.items() if pair is None)
