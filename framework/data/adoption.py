@@ -327,9 +327,10 @@ class Adoption:
         table, version = self.table, self.table.version
         rows = [places[entity] if entity in places else table.find(entity) for entity in handles]
         write_handles(table, component, list(handles.values()), rows, handles.keys() <= places.keys())
+        at: Any = rows[0] if len(rows) == 1 else np.array(rows)  # one is much faster by its number
         if component is self.anchor and "previous_position" in table.arrays:
-            table.arrays["previous_position"][rows] = table.arrays["position"][rows]
-        table.has_mask(component)[rows] = True
+            table.arrays["previous_position"][at] = table.arrays["position"][at]
+        table.has_mask(component)[at] = True
         for (entity, handle), row in zip(handles.items(), rows, strict=True):
             handle._store = table
             handle._entity = entity

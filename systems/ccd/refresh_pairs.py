@@ -65,7 +65,8 @@ def merge_pairs(state, dt):
         state.needed = old.count + candidates.count
         return NEED_MERGED
     mark_kept(state)
-    rank_rows(state)
+    if state.ranks_version != state.version:
+        rank_rows(state)
     n, found, i, j = state.count, 0, 0, 0
     while i < candidates.count or j < old.count:
         new_key, old_key = n * n, n * n

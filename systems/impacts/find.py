@@ -28,6 +28,7 @@ from ..linked_parts import (
     call_held_by_edge,
     call_kind_beyond_cap,
 )
+from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .heap import heap_push
@@ -238,6 +239,8 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
         fast = length(sliding)
         if fast > 0.0:
             pull = scale(sliding, -min(1.0, -mu * (1.0 + restitution) * speed / fast))
+    if state.ranks_version != state.version:
+        rank_rows(state)
     event = impacts.heap[impacts.waiting]
     impacts.event_pair[event], impacts.event_kind[event] = c, kind
     impacts.event_count_a[event], impacts.event_count_b[event] = bodies.impact_count[a], bodies.impact_count[b]

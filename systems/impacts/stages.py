@@ -8,7 +8,6 @@ from ...framework.compilation import part
 from ..ccd.search_bounds import FAST, leaves_bounds_at
 from ..codes import NEED_EVENTS, OK, REFRESH_PAIRS
 from ..linked_parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
-from ..narrow_phase.stages import rank_rows
 from ..shapes.tolerances import smaller_extent
 from .find import bounce_threshold, consider
 from .heap import heap_pop
@@ -55,7 +54,6 @@ def begin_impacts(state, dt):
 def begin_search(state, last_pair, now):
     """The queue is empty, and the pairs may be others than before."""
     impacts = state.impacts
-    rank_rows(state)
     impacts.waiting, impacts.last_pair, impacts.linked = 0, last_pair, False
     impacts.sunk_pair, impacts.sunk_by = -1, 0.0
     impacts.now, impacts.until = now, state.neighbours_known_until if impacts.sweeps else math.inf

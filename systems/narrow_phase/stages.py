@@ -16,10 +16,10 @@ BODIES_PER_CANDIDATE = 64
 
 @part
 def rank_rows(state):
-    """The place of each row in the order of entity ids, unless it is known: three sorted runs are merged."""
+    """The place of each row in the order of entity ids: three sorted runs are merged."""
     entity, rank = state.bodies.entity, state.bodies.rank
     dynamic, kinematic, static = 0, state.dynamic, state.moving
-    for place in range(state.count if state.ranks_version != state.version else 0):
+    for place in range(state.count):
         row, lowest = -1, 0
         if dynamic < state.dynamic:
             row, lowest = dynamic, entity[dynamic]
@@ -53,7 +53,8 @@ def order_candidates(state, dt):
 @part
 def sort_by_counting(state):
     """Two stable counting sorts, by the larger id and by the smaller."""
-    rank_rows(state)
+    if state.ranks_version != state.version:
+        rank_rows(state)
     candidates, rank, count = state.candidates, state.bodies.rank, state.candidates.count
     first, second, starts = candidates.first, candidates.second, candidates.starts
     half_a, half_b = candidates.half_a, candidates.half_b
