@@ -121,9 +121,9 @@ def move_rows_of(plan, columns, column):
 
 @kernel
 def move_rows(plan_address, columns_address, new_plan):
-    """Move the rows of some columns as planned; new_plan: find out first what has to move."""
+    """Move the rows of some columns as planned; new_plan, 0 or 1: find out first what has to move."""
     plan, columns = _plan_at(plan_address), _columns_at(columns_address)
-    if new_plan:
+    if new_plan != 0:
         count = plan.stops[2]
         find_places(plan)
         find_runs(plan, count)
@@ -131,7 +131,7 @@ def move_rows(plan_address, columns_address, new_plan):
         move_rows_of(plan, columns, column)
 
 
-MOVE_ROWS = Called(move_rows, int, int, bool)
+MOVE_ROWS = Called(move_rows, int, int, int)
 
 
 class RowPlan:
@@ -189,7 +189,7 @@ class MovedColumns:
     def move(self, plan: RowPlan) -> None:
         """Move the rows as planned; the columns must have room for all."""
         if JIT and plan.count:
-            move_rows(plan.record.address, self._record.address, plan.new)
+            move_rows(plan.record.address, self._record.address, int(plan.new))
         else:  # nothing moves where there are no rows yet, and most worlds need no kernel
             self._move_plain(plan)
         plan.new = False
