@@ -27,8 +27,8 @@ STACKED_COLUMNS = ("offset", "restitution", "friction", "sensor", "layer", "mask
 # Columns that are made within a step or when rows have moved, by what needs them.
 FLIGHT = ("start_velocity", "kept_previous", "kept_velocity")
 COLLISIONS = (
-    "origin", "path_velocity", "min_extent", "force_speed_change", "lower", "upper", "rank", "collider_slot",
-    "impact_count", "counted_impacts",
+    "origin", "path_velocity", "half_extents", "min_extent", "force_speed_change", "lower", "upper", "rank",
+    "collider_slot", "impact_count", "counted_impacts",
 )  # fmt: skip
 CURVES = ("path_second", "path_third")
 SWEEPS = (

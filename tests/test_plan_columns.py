@@ -58,7 +58,7 @@ def near(world, *components):
 
 STEP = {"start_velocity", "levels", "kept_previous", "kept_velocity"}
 COLLISIONS = {"path_velocity", "origin", "min_extent", "collider_slot", "force_speed_change", "lower", "upper", "rank"}
-COLLISIONS |= {"level_offsets", "impact_count", "counted_impacts"}
+COLLISIONS |= {"level_offsets", "impact_count", "counted_impacts", "half_extents"}
 RESTING = {"held", "place"}
 SOLVER = {"body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled"}
 SOLVER |= {"heaviest", "fastest", "size"}

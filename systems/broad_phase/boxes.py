@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
-from ...framework.vectors import add, item, replace
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, item, replace, scale
 from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
 from ..linked_parts import BOUND_SEARCHES, BOX_ROWS, call_bound_searches, call_box_rows
@@ -42,19 +43,31 @@ def smallest_of(vector):
 
 
 @part
+def find_extents(state, level, start, stop):
+    """Half extents of one level of rows start..stop-1 and where it stands from the body's position; nan without one.
+
+    The smallest extent of the last level stays.
+    """
+    bodies, offset, slots = state.bodies, state.colliders.offset, state.shapes.slots
+    for i in range(start, stop):
+        shape, half = bodies.levels[level, i], scale(zero_of(state), math.nan)
+        if shape >= 0:
+            at = offset[slots[shape], i]
+            if state.rotated:
+                at = rotated_offset(state, i, at)
+                write_rotated(state, shape, i, state.rotated)
+            bodies.level_offsets[level, i] = at
+            half = half_extents(state, shape, i)
+        smallest = smallest_of(half)
+        bodies.half_extents[i] = half
+        bodies.min_extent[i] = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
+
+
+@part
 def box_level(state, level, i, before, after):
-    """The box of one level of a body that moves from ``before`` to ``after``; its offset and its extent are noted."""
-    bodies = state.bodies
-    shape = bodies.levels[level, i]
-    at = state.colliders.offset[state.shapes.slots[shape], i]
-    if state.rotated:
-        at = rotated_offset(state, i, at)
-        write_rotated(state, shape, i, state.rotated)
-    bodies.level_offsets[level, i] = at
-    half = half_extents(state, shape, i)
-    smallest = smallest_of(half)
-    bodies.min_extent[i] = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
-    margin = MARGIN * smallest
+    """The box of one level of a body that moves from ``before`` to ``after``; of nan if it has no shape."""
+    at, half = state.bodies.level_offsets[level, i], state.bodies.half_extents[i]
+    margin = MARGIN * smallest_of(half)
     first, last, low, high = add(before, at), add(after, at), at, at
     for k in range(len(at)):
         low = replace(low, k, min(item(first, k), item(last, k)) - item(half, k) - margin)
@@ -63,44 +76,31 @@ def box_level(state, level, i, before, after):
 
 
 @part
-def box_body(state, i, before, after):
-    """Box the motion of a body: the box holds every level, so that what the first one meets is looked at.
-
-    A body without a shape gets a box of nan.
-    """
-    bodies = state.bodies
-    low, high = before, after
-    if bodies.levels[0, i] < 0:
-        for k in range(len(low)):
-            low, high = replace(low, k, math.nan), replace(high, k, math.nan)
-    else:
-        low, high = box_level(state, 0, i, before, after)
-    for level in range(1, state.level_count if bodies.levels[0, i] >= 0 else 1):
-        other_low, other_high = box_level(state, level, i, before, after)
-        for k in range(len(low)):
-            low = replace(low, k, min(item(low, k), item(other_low, k)))
-            high = replace(high, k, max(item(high, k), item(other_high, k)))
-    bodies.lower[i], bodies.upper[i] = low, high
+def add_level(state, i, low, high):
+    """Let the box of a body hold that of a further level."""
+    lower, upper = state.bodies.lower[i], state.bodies.upper[i]
+    for k in range(len(low)):
+        lower = replace(lower, k, min(item(lower, k), item(low, k)))
+        upper = replace(upper, k, max(item(upper, k), item(high, k)))
+    state.bodies.lower[i], state.bodies.upper[i] = lower, upper
 
 
 @part
-def open_frame(state):
-    """Before the first of the moving bodies' boxes is added."""
-    frame = state.frame
-    for k in range(3):
-        frame[LOWEST + k], frame[HIGHEST + k] = math.inf, -math.inf
-    frame[LARGEST] = 0.0
-
-
-@part
-def add_to_frame(state, i):
-    """Let the frame hold the box of a moving body; one of nan leaves it as it is."""
-    frame, low, high = state.frame, state.bodies.lower[i], state.bodies.upper[i]
-    for k in range(len(low)):  # comparisons with nan are false
-        frame[LOWEST + k] = item(low, k) if item(low, k) < frame[LOWEST + k] else frame[LOWEST + k]
-        frame[HIGHEST + k] = item(high, k) if item(high, k) > frame[HIGHEST + k] else frame[HIGHEST + k]
-        edge = item(high, k) - item(low, k)
-        frame[LARGEST] = edge if edge > frame[LARGEST] else frame[LARGEST]
+def measure_frame(state):
+    """The frame holds the boxes of all moving bodies; those of nan count for nothing."""
+    frame, bodies, lowest, highest, largest = state.frame, state.bodies, zero_of(state), zero_of(state), 0.0
+    for k in range(len(lowest)):
+        lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
+    for i in range(state.moving):
+        low, high = bodies.lower[i], bodies.upper[i]
+        for k in range(len(low)):  # comparisons with nan are false
+            lowest = replace(lowest, k, item(low, k) if item(low, k) < item(lowest, k) else item(lowest, k))
+            highest = replace(highest, k, item(high, k) if item(high, k) > item(highest, k) else item(highest, k))
+            edge = item(high, k) - item(low, k)
+            largest = edge if edge > largest else largest
+    for k in range(len(lowest)):
+        frame[LOWEST + k], frame[HIGHEST + k] = item(lowest, k), item(highest, k)
+    frame[LARGEST] = largest
 
 
 @part
@@ -120,19 +120,25 @@ STANDING, MOVING, SEARCHING = range(3)
 
 def box_rows(state, start, stop, motion):
     """Boxes of rows start..stop-1: of bodies that stand, around their motion, or from search_lower to search_upper; the
-    frame holds those of what moves."""
-    bodies = state.bodies
-    if motion != STANDING:
-        open_frame(state)
+    frame holds those of what moves.
+
+    A box holds every level, so that what the first one meets is looked at.
+    """
+    bodies, starts, ends = state.bodies, state.bodies.position, state.bodies.position
+    if motion == MOVING and state.moved:
+        starts = bodies.previous_position
+    if motion == SEARCHING:
+        starts, ends = bodies.search_lower, bodies.search_upper
+    find_extents(state, 0, start, stop)
     for i in range(start, stop):
-        before, after = bodies.position[i], bodies.position[i]
-        if motion == MOVING and state.moved:
-            before = bodies.previous_position[i]
-        if motion == SEARCHING:
-            before, after = bodies.search_lower[i], bodies.search_upper[i]
-        box_body(state, i, before, after)
-        if motion != STANDING:
-            add_to_frame(state, i)
+        bodies.lower[i], bodies.upper[i] = box_level(state, 0, i, starts[i], ends[i])
+    for level in range(1, state.level_count):
+        find_extents(state, level, start, stop)
+        for i in range(start, stop):
+            low, high = box_level(state, level, i, starts[i], ends[i])
+            add_level(state, i, low, high)
+    if motion != STANDING:
+        measure_frame(state)
     return 0
 
 
@@ -191,7 +197,7 @@ def bound_searches(state, now, dt):
             high = replace(high, k, max(item(before, k), item(after, k)) + give)
         bodies.lower[i], bodies.upper[i] = lower, upper
         bodies.search_lower[i], bodies.search_upper[i] = low, high
-        add_to_frame(state, i)
+    measure_frame(state)
     return 0
 
 

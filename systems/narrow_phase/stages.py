@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
-from ...framework.vectors import length, sub
+from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
 from ..shapes.dispatch import evaluate_batch
 from ..shapes.tolerances import contact_margin
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
 BODIES_PER_CANDIDATE = 64
+SURE = 1.0 - 1e-12  # factor that makes a number less than the exact one, whatever the rounding
 
 
 @part
@@ -141,11 +142,18 @@ def find_hasty(state, dt):
     """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
     no pair is swept, the two may have passed through each other."""
     bodies, farthest, thinnest = state.bodies, 0.0, state.thinnest_static
-    state.hasty = False
-    for i in range(state.moving if state.moved and not state.sweeping else 0):
+    state.hasty, any_fast = False, False
+    if state.sweeping or not state.moved:
+        return
+    for i in range(state.moving):
+        extent = bodies.min_extent[i]
+        thinnest = min(thinnest, extent if extent > 0.0 and bodies.shape[i] >= 0 else math.inf)
+    for i in range(state.moving):  # seldom; squares, so that no roots are drawn
+        v, room = bodies.start_velocity[i], SURE * (bodies.min_extent[i] + thinnest) / dt
+        any_fast |= not dot(v, v) <= room * room
+    for i in range(state.moving if any_fast else 0):
         if bodies.shape[i] >= 0:
             extent = bodies.min_extent[i]
-            thinnest = min(thinnest, extent if extent > 0.0 else math.inf)
             beyond = length(bodies.start_velocity[i]) * dt - extent
             if beyond > farthest:
                 farthest, state.hasty_row = beyond, i
@@ -159,8 +167,9 @@ def select_pairs(state, dt):
         state.needed = candidates.count
         return NEED_PAIRS
     velocity, start = bodies.linear_velocity, bodies.start_velocity
+    changed = state.moved and (state.limits_speed or not state.drifted)
     for i in range(state.moving):  # that of static bodies is always 0
-        bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if state.moved else 0.0
+        bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
     find_hasty(state, dt)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):
