@@ -154,7 +154,7 @@ class Program:
                 raise
             if not code:
                 break
-            start = int(self._words[self._stage])
+            start = self._words[self._stage]
             self._handle(start, code, dt)
             if code >= self._afterwards:
                 start += 1
@@ -235,7 +235,7 @@ class PythonPart:
 class Check:
     """A Python part that runs only if a word of a record is not 0."""
 
-    words: np.ndarray
+    words: memoryview
     index: int
     part: PythonPart
 

@@ -57,14 +57,20 @@ def phi3(z):
 
 
 def keep_start(state, dt):
-    """previous_position and start_velocity are the state at the start of the step."""
+    """previous_position and start_velocity are the state at the start of the step; for going back, kept_previous is the
+    start of the one before."""
     bodies = state.bodies
     state.path_degree, state.drifted = state.usual_path_degree, False
     state.started = True  # before anything is overwritten: previous_position then is what a failed step goes back to
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
-    for i in range(state.count):
-        previous[i] = position[i]
+    if state.others_write:  # every column is kept
+        for i in range(state.count):
+            previous[i] = position[i]
+    else:
+        for i in range(state.count):
+            bodies.kept_previous[i] = previous[i]
+            previous[i] = position[i]
     if state.limits_speed:  # systems may have pushed since the forces were summed
         for i in range(state.dynamic):
             if not bodies.quarantined[i]:
@@ -297,6 +303,7 @@ def check_flight(state, dt):
         x, v = position[i], velocity[i]
         for k in range(len(x)):  # one comparison, which is false if either is nan
             usual &= abs(item(x, k)) + abs(item(v, k)) <= NEAR
+    state.flight_usual = usual
     if state.quarantining or (state.others_write and not are_columns_sound(state)):
         return CHECK_FLIGHT
     for i in range(0 if usual else state.moving):

@@ -53,8 +53,8 @@ class Integration(StagedSystem):
     writes = ("position", "linear_velocity", "previous_position")
     STAGES = (
         Stage(
-            keep_start, "keeps where the step starts", MOTION,
-            ("previous_position", "start_velocity", "linear_velocity"),
+            keep_start, "keeps where the step starts, and the step before", (*MOTION, "previous_position"),
+            ("kept_previous", "previous_position", "start_velocity", "linear_velocity"),
         ),
         Stage(
             drift, "no force acts: position + dt velocity, unless a body is damped", MOTION, ("position",), "standard",

@@ -69,9 +69,9 @@ class Record:
         return self.schema.layout[name] // WORD
 
     @property
-    def words(self) -> np.ndarray:
-        """The memory as integers, for reading scalars in a hurry."""
-        return self._words
+    def words(self) -> memoryview:
+        """The memory as integers, for reading scalars in a hurry: faster than an array."""
+        return memoryview(self._words)  # type: ignore[arg-type]
 
 
 @cache
