@@ -200,6 +200,7 @@ IMPACTS = Schema(
     linked=flag(),
     last_pair=integer(),
     cluster=integer(),
+    may_sink=flag(),  # through something thin, at the speed of contacts at rest
     sunk_pair=integer(),  # the last one of whose bodies landings were searched
     sunk_by=number(),  # the time of its impact while they are searched, else 0
     now=number(),

@@ -28,7 +28,7 @@ from .codes import (
     RUN_BROAD,
     RUN_NARROW,
 )
-from .impacts.stages import ALL
+from .impacts.stages import FRESH
 from .records import IMPACTS
 from .scene import Scene
 
@@ -171,7 +171,7 @@ class Room:
         program.run_one("merge_pairs", dt)
         state.pairs, state.merged = state.merged, state.pairs
         impacts = state.impacts
-        impacts.waiting, impacts.last_pair, impacts.linked = 0, ALL, False
+        impacts.last_pair, impacts.linked = FRESH, False
         impacts.sunk_pair, impacts.sunk_by = -1, 0.0
         impacts.now, impacts.until = now, state.neighbours_known_until
 

@@ -30,7 +30,7 @@ from .records import BODIES, COLLIDERS, STATE
 from .scene import TABLE_COLUMNS
 
 OPENING = (
-    Stage(keep_state, "keeps what a failed step puts back", ("previous_position", "linear_velocity"), ("kept",)),
+    Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
     Stage(
         check_columns, "takes out bodies with values that cannot be",
         ("mass", "gravity_scale", "constant_force", "rotation", "restitution", "friction"), ("quarantined",),
@@ -45,7 +45,10 @@ ON_DEMAND = (
     Stage(
         box_rest_of_step, "boxes around the rest of the paths", ("path_velocity",), ("lower", "upper"), "swept bodies",
     ),
-    Stage(merge_pairs, "the pairs of the rest of the step", ("pairs", "candidates"), ("merged",), "swept bodies"),
+    Stage(
+        merge_pairs, "the pairs of the rest of the step, and the queue that is left", ("pairs", "candidates"),
+        ("merged", "impacts"), "swept bodies",
+    ),
     *Integration.ON_DEMAND,
 )
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.

@@ -3,30 +3,35 @@
 The boxes of the broad phase hold each body's foreseen motion and a margin for what impacts make of it. The event loop
 stops when a body leaves its bounds. Then candidates are made for the rest of the step from the paths as they are now,
 and the loop goes on. In most scenes that never happens; where everything is fast, a step takes several searches.
+
+What the queue holds of pairs that are candidates again stays: their paths are the same. Only the others are looked at.
 """
 
 from __future__ import annotations
 
 from ...framework.compilation import part
 from ..codes import NEED_MERGED, OK
+from ..impacts.heap import heap_push
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
+
+KEPT, GONE, NEW = -1, -2, -3  # in ``pairs.place``; from 0 on it is the place in the other list
 
 
 @part
 def mark_kept(state):
-    """place[c] = 0 for the pairs that something has come of in this step, -1 for the others."""
+    """place[c] = KEPT for the pairs that something has come of in this step, GONE for the others."""
     pairs = state.pairs
     for c in range(pairs.count):
-        pairs.place[c] = 0 if pairs.crossed[c] or pairs.impulse[c] > 0.0 else -1
+        pairs.place[c] = KEPT if pairs.crossed[c] or pairs.impulse[c] > 0.0 else GONE
     for h in range(pairs.found):
-        pairs.place[pairs.hits[h]] = 0
+        pairs.place[pairs.hits[h]] = KEPT
 
 
 @part
 def keep_pair(state, j, found):
     """Pair j of the list until now becomes pair ``found`` of the new one."""
     old, new = state.pairs, state.merged
-    old.place[j] = found
+    old.place[j], new.place[found] = found, KEPT
     new.a[found], new.b[found] = old.a[j], old.b[j]
     new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
     new.crossed[found] = old.crossed[j]
@@ -36,8 +41,9 @@ def keep_pair(state, j, found):
 
 @part
 def add_pair(state, a, b, found):
-    """A new candidate becomes pair ``found``; how it stands at the end is not known yet."""
+    """A candidate becomes pair ``found``; how it stands at the end is not known yet."""
     new = state.merged
+    new.place[found] = NEW
     new.a[found], new.b[found] = a, b
     new.is_solid[found] = is_solid_pair(state, a, b)
     new.near_contact[found], new.crossed[found] = True, False
@@ -58,6 +64,22 @@ def renumber(state):
     new.resting_count = new.touching_count = 0
 
 
+@part
+def keep_events(state):
+    """The queue again, without the events of pairs that are gone, and those that do not hold any more."""
+    old, impacts, count = state.pairs, state.impacts, state.bodies.impact_count
+    waiting, impacts.waiting = impacts.waiting, 0
+    for k in range(waiting):
+        event = impacts.heap[k]
+        c = impacts.event_pair[event]
+        holds = impacts.event_count_a[event] == count[old.a[c]] and impacts.event_count_b[event] == count[old.b[c]]
+        if holds and old.place[c] >= 0:
+            impacts.event_pair[event] = old.place[c]
+            place = impacts.waiting
+            impacts.heap[k], impacts.heap[place] = impacts.heap[place], event
+            heap_push(impacts)
+
+
 def merge_pairs(state, dt):
     """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of."""
     candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
@@ -75,10 +97,13 @@ def merge_pairs(state, dt):
         if j < old.count:
             old_key = rank[old.a[j]] * n + rank[old.b[j]]
         if old_key <= new_key:
-            if old.place[j] >= 0:
+            if old.place[j] == KEPT:
                 keep_pair(state, j, found)
-                found += 1
-                i += 1 if old_key == new_key else 0
+            elif old_key == new_key:
+                add_pair(state, old.a[j], old.b[j], found)
+                old.place[j], new.place[found] = found, KEPT
+            found += 1 if old.place[j] >= 0 else 0
+            i += 1 if old_key == new_key else 0
             j += 1
             continue
         a, b = candidates.sorted_a[i], candidates.sorted_b[i]
@@ -88,5 +113,6 @@ def merge_pairs(state, dt):
             found += 1
     new.count = found
     renumber(state)
+    keep_events(state)
     state.refreshes_counted += 1
     return OK

@@ -26,13 +26,13 @@ from ..integration.trajectory import (
 )
 from ..linked_parts import FIRST_TOUCH, call_first_touch
 from ..shapes.tolerances import contact_margin, smaller_extent
-from .time_of_impact import APART
+from .time_of_impact import APART, stays_apart
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
 MODES = {"discrete": DISCRETE, "continuous": CONTINUOUS, "event_driven": EVENT_DRIVEN}
 FAST = 0.2  # of the smaller body's extent
 SPREAD = 2.0  # times the speed at which a body has its share of the energy: few are ever faster after an impact
-CROWD = 0.5  # neighbours that the search bounds of a body may hold, on average
+CROWD = 0.25  # neighbours that the search bounds of a body may hold, on average
 ALL_PAIRS = 32  # bodies: so few may all be each other's neighbours
 MOST_SEARCHES = 64  # in a step, without those after impacts
 GIVE = 0.05  # of the extent: that much farther than its search bounds a body may go
@@ -171,7 +171,7 @@ def find_margins(state, now, span):
         if shape[i] >= 0 and speed * span > largest:
             speeds += speed
             fast += 1
-    crossing = SPREAD * largest * fast / speeds if fast > 0 else math.inf
+    crossing = largest * fast / speeds if fast > 0 else math.inf
     if crossing < (now + span) / MOST_SEARCHES:  # rather more neighbours than more searches
         largest *= (now + span) / (MOST_SEARCHES * crossing)
         crossing = (now + span) / MOST_SEARCHES
@@ -198,7 +198,7 @@ def sweep_pairs(state, dt):
         if not pairs.near_contact[c]:
             path = relative_path(state, a, b)
             travel = travel_of(path, dt)
-            if not is_swept(state, a, b, travel):
+            if not is_swept(state, a, b, travel) or stays_apart(state, a, b, path, 0.0, dt):
                 continue
             small = FAST * smaller_extent(bodies, a, b)
             limits = min(contact_margin(state, dt, a, b), small), small / travel * dt, 0.0

@@ -17,13 +17,35 @@ import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import dot, length, sub
-from ..integration.trajectory import ROUNDING, along, first_root, rate_along
+from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
+from ..integration.trajectory import ROUNDING, along, bend_of, first_root, rate_along
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 
 MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
+GENEROUS, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
 APART, TOUCHES, AT_CORNER = range(3)
+
+
+@part
+def stays_apart(state, a, b, path, since, until):
+    """Whether the boxes around the two are surely apart between two times, as those of most pairs are.
+
+    Either along one axis, or the way does not lead through the ball around both.
+    """
+    bodies, start, end = state.bodies, along(path, since), along(path, until)
+    bend = bend_of(path[2], path[3], until) if state.path_degree > 1 else 0.0
+    far = add(absolute(bodies.origin[a]), absolute(bodies.origin[b]))
+    reach = add_scaled(scale(add(bodies.half_extents[a], bodies.half_extents[b]), GENEROUS), far, FAR_ROUNDING)
+    apart = False
+    for k in range(len(end)):
+        room = item(reach, k) + bend
+        apart |= (max(item(start, k), item(end, k)) < -room) | (min(item(start, k), item(end, k)) > room)
+    if apart or bend > 0.0:
+        return apart
+    v = sub(end, start)
+    ahead, way = dot(start, v), dot(v, v)
+    return dot(start, start) * way - ahead * ahead > GENEROUS * dot(reach, reach) * way
 
 
 def first_touch(state, a, b, path, straight, since, until, limits):

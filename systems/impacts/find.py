@@ -9,7 +9,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept
-from ..ccd.time_of_impact import APART, AT_CORNER
+from ..ccd.time_of_impact import APART, AT_CORNER, stays_apart
 from ..integration.trajectory import (
     ROUNDING,
     along,
@@ -259,7 +259,10 @@ def consider(state, c, dt):
     """
     pairs, bodies, impacts = state.pairs, state.bodies, state.impacts
     a, b, passive = pairs.a[c], pairs.b[c], not pairs.is_solid[c]
-    path, slot, restitutions = relative_path(state, a, b), bodies.collider_slot, state.colliders.restitution
+    path = relative_path(state, a, b)
+    if impacts.sweeps and stays_apart(state, a, b, path, impacts.now, dt):
+        return
+    slot, restitutions = bodies.collider_slot, state.colliders.restitution
     e = mix(state, state.restitution_rule, restitutions[slot[a], a], restitutions[slot[b], b])
     kind, touch, end_normal = find_touch(state, c, a, b, path, e, dt)
     if kind == NO_TOUCH:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import part
+from ...framework.jit.records.record_type import request
+from ..ccd.refresh_pairs import NEW
 from ..ccd.search_bounds import FAST, leaves_bounds_at
 from ..codes import NEED_EVENTS, OK, REFRESH_PAIRS
 from ..linked_parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
@@ -14,7 +16,8 @@ from .heap import heap_pop
 from .impulses import CROSS, LAND, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
 
 # In place of a pair in ``last_pair``: what is searched next.
-HITS, ALL, NONE, MEMBERS, LANDINGS = -1, -2, -3, -4, -5
+AHEAD = 4  # looks between the request of a body's rows and their use
+HITS, FRESH, NONE, MEMBERS, LANDINGS = -1, -2, -3, -4, -5
 
 
 @part
@@ -25,6 +28,17 @@ def any_restitution(state):
         for i in range(state.count):
             bounces |= restitution[slot, i] != 0.0
     return bounces
+
+
+@part
+def may_sink(state, dt):
+    """Whether some approach that is too slow to bounce may lead through the thinnest of all within the step."""
+    bodies, fastest, thinnest = state.bodies, max(0.0, state.restitution_threshold), state.thinnest_static
+    for i in range(state.moving):
+        extent = bodies.min_extent[i]
+        thinnest = min(thinnest, extent if extent > 0.0 else math.inf)
+        fastest = max(fastest, 2.0 * bodies.force_speed_change[i])
+    return fastest * dt > FAST * thinnest
 
 
 def begin_impacts(state, dt):
@@ -42,6 +56,7 @@ def begin_impacts(state, dt):
     if pairs.found == 0 and not state.any_support and not (impacts.sweeps and state.neighbours_known_until < dt):
         return OK
     impacts.active = impacts.sweeps or any_restitution(state)
+    impacts.may_sink = impacts.sweeps and may_sink(state, dt)
     for i in range(state.count if impacts.sweeps else 0):
         bodies.caught[i] = 0
         bodies.last_impact[i], bodies.cluster_inverse_mass[i] = -1.0, bodies.inverse_mass[i]
@@ -90,6 +105,16 @@ def look_at_hits(state):
         if not (supported[pairs.a[c]] or supported[pairs.b[c]]):
             looks[wanted] = c
             wanted += 1
+    return wanted
+
+
+@part
+def look_at_fresh(state):
+    """The pairs that have become candidates within the step; returns how many."""
+    pairs, looks, wanted = state.pairs, state.impacts.looks, 0
+    for c in range(pairs.count):
+        looks[wanted] = c
+        wanted += pairs.place[c] == NEW
     return wanted
 
 
@@ -150,14 +175,12 @@ def look_at_landings(state, c, now):
 @part
 def choose_looks(state):
     """Which pairs are searched now: at first what may have met, later the pairs of the two bodies of an impact."""
-    impacts, pairs = state.impacts, state.pairs
+    impacts = state.impacts
     c = impacts.last_pair
     if c == HITS:
         return look_at_hits(state)
-    if c == ALL:
-        for p in range(pairs.count):
-            impacts.looks[p] = p
-        return pairs.count
+    if c == FRESH:
+        return look_at_fresh(state)
     if c == NONE:
         return 0
     if not impacts.linked:
@@ -238,7 +261,7 @@ def lands_first(state, event):
     impacts = state.impacts
     c, kind, now = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
     looked, impacts.sunk_by = impacts.sunk_pair == c, 0.0
-    if looked or not impacts.sweeps or kind in (LAND, CROSS):
+    if looked or not impacts.may_sink or kind in (LAND, CROSS):
         return False
     if not impacts.linked:
         link_pairs(state)
@@ -268,6 +291,26 @@ def take_event(state, event, dt):
             watch_again(state, i, dt)
 
 
+@part
+def request_bodies(state, c):
+    """The bodies of pair c will be looked at soon: in large worlds each column of each is far away in memory."""
+    bodies, pairs = state.bodies, state.pairs
+    for side in range(2):
+        i = pairs.a[c] if side == 0 else pairs.b[c]
+        request(bodies.origin, i)
+        request(bodies.path_velocity, i)
+        request(bodies.offset, i)
+        request(bodies.min_extent, i)
+        request(bodies.force_speed_change, i)
+        request(bodies.start_velocity, i)
+        request(bodies.position, i)
+        request(bodies.linear_velocity, i)
+        request(bodies.inverse_mass, i)
+        request(bodies.rank, i)
+        request(bodies.impact_count, i)
+        request(bodies.counted_impacts, i)
+
+
 def resolve_impacts(state, dt):
     """Bounce every pair that touches in its motion and approaches faster than the threshold."""
     impacts, pairs = state.impacts, state.pairs
@@ -281,8 +324,11 @@ def resolve_impacts(state, dt):
         if impacts.waiting + wanted > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
             state.needed = impacts.waiting + wanted
             return NEED_EVENTS
+        state.looks_counted += wanted
         for q in range(wanted):
             c = impacts.looks[q]
+            if q + AHEAD < wanted:
+                request_bodies(state, impacts.looks[q + AHEAD])
             if pairs.is_solid[c] or impacts.sweeps:
                 consider(state, c, dt)
         event = next_event(state)

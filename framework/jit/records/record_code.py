@@ -352,6 +352,25 @@ def compiled_rows(typing_context: Any, column: Any, start: Any, stop: Any) -> An
     return kind(column, types.intp, types.intp), emit
 
 
+@intrinsic
+def compiled_request(typing_context: Any, column: Any, index: Any) -> Any:
+    if not isinstance(column, ColumnType) or column.field.stacked or not isinstance(index, types.Integer):
+        return None
+
+    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        made = cgutils.create_struct_proxy(column)(context, builder, values[0])
+        number = builder.mul(values[1], _WORD(column.width))
+        place = builder.bitcast(builder.gep(made.data, [number]), _BYTE_POINTER)
+        flag = ir.IntType(32)
+        prefetch = builder.module.declare_intrinsic(
+            "llvm.prefetch", [_BYTE_POINTER], ir.FunctionType(ir.VoidType(), [_BYTE_POINTER, flag, flag, flag])
+        )
+        builder.call(prefetch, [place, flag(0), flag(3), flag(1)])  # to be read, soon, data
+        return context.get_dummy_value()
+
+    return types.none(column, types.intp), emit
+
+
 def record_at(kind: RecordType) -> Any:
     """The function (address) -> record of that type."""
 

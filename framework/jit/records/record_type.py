@@ -44,6 +44,20 @@ def _plain_rows(column: Any, start: int, stop: int) -> Any:
 rows_of: Any = Late(_make_rows, _plain_rows) if JIT else _plain_rows
 
 
+def _make_request() -> Any:
+    from .record_code import compiled_request
+
+    return compiled_request.made
+
+
+def _plain_request(column: Any, index: int) -> None:
+    return None
+
+
+# request(column, i): row i of the column will be read soon; the processor may fetch it meanwhile. It never fails.
+request: Any = Late(_make_request, _plain_request) if JIT else _plain_request
+
+
 def _make_zero() -> Any:
     from .record_code import compiled_zero
 

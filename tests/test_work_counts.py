@@ -1,0 +1,105 @@
+"""How much work a step does, counted: looks for impacts, memory, copies. No times."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from carom import scenes
+from carom.components import RigidBody, Transform
+from carom.framework import Settings, StepError, World
+from carom.framework.jit.records.schema import Column
+from carom.plugins import Physics
+from carom.systems.codes import CHECK_FLIGHT
+
+
+def test_looks_for_impacts_of_fast_bodies():
+    """Each impact is followed by a look at the pairs of two bodies, and a new search by one at the pairs that are new:
+    13 looks an impact; where each search looked at all pairs again it was 37."""
+    with scenes.get("fastgas").build(Settings(collision="continuous"), 1, n=300) as world:
+        state = world.physics.state
+        for _ in range(30):
+            world.step()
+        assert state.refreshes_counted > 100
+        assert state.impacts_counted > 10_000
+        assert state.looks_counted < 17 * state.impacts_counted
+
+
+def test_looks_of_a_slow_gas():
+    """A look at each contact, and after its impact at the pairs of both bodies."""
+    with scenes.get("gas2d").build(Settings(), 1, n=1000) as world:
+        for _ in range(30):
+            world.step()
+        state = world.physics.state
+        assert state.impacts_counted > 1000
+        assert state.looks_counted < 4 * state.impacts_counted
+
+
+def columns_of(*records):
+    """Where the columns of some records stand in memory."""
+    return {
+        getattr(record, name).ctypes.data
+        for record in records
+        for name, field in record.schema.fields.items()
+        if isinstance(field, Column) and len(getattr(record, name))
+    }
+
+
+@pytest.mark.parametrize("scene", ["gas2d", "fastgas"])
+def test_a_steady_state_makes_no_columns(scene):
+    with scenes.get(scene).build(Settings(collision="continuous"), 1, n=300) as world:
+        state = world.physics.state
+        for _ in range(60):
+            world.step()
+        records = (state.bodies, state.candidates, state.pairs, state.merged, state.impacts, state.grid)
+        before = columns_of(*records)
+        for _ in range(30):
+            world.step()
+        assert columns_of(*records) == before
+
+
+def free_world():
+    world = World(Physics(gravity=(0, -10)))
+    for k in range(5):
+        world.create_entity(Transform((k, 0)), RigidBody(linear_velocity=(k, 1)))
+    world.step()
+    return world
+
+
+def test_a_world_without_colliders_keeps_its_velocities_once():
+    with free_world() as world:
+        state = world.physics.state
+        state.bodies.kept_velocity[:] = 7.0
+        world.step()
+        assert (state.bodies.kept_velocity == 7.0).all()
+        assert not state.velocity_kept
+
+
+def test_a_failed_step_without_colliders_is_put_back():
+    """It fails after the flight, when positions and velocities are those of the end of the step."""
+    with free_world() as world:
+        world.bodies.position[0], world.bodies.linear_velocity[0] = (1e20, 0), (5, 1)  # so far out it cannot move
+        before = {name: np.array(getattr(world.bodies, name)) for name in ("position", "linear_velocity")}
+        previous = world.physics.state.bodies.previous_position[:5].copy()
+
+        def fail(dt):
+            raise RuntimeError("as asked")
+
+        world.physics.program.handlers[CHECK_FLIGHT] = fail
+        with pytest.raises(StepError, match="as asked"):
+            world.step()
+        for name, values in before.items():
+            np.testing.assert_array_equal(getattr(world.bodies, name), values)
+        np.testing.assert_array_equal(world.physics.state.bodies.previous_position[:5], previous)
+
+
+def test_what_the_check_of_the_flight_has_seen_is_not_looked_for_again():
+    """And what goes wrong is seen all the same."""
+    with free_world() as world:
+        state = world.physics.state
+        assert state.flight_usual
+        assert state.finite
+        world.bodies.position[0] = (1e12, 0)
+        world.step()
+        assert not state.flight_usual
+        assert state.finite
