@@ -236,14 +236,14 @@ class Simulation(PhysicsServices):
 
     def _put_back(self, bodies: Any) -> None:
         """What keep_state and keep_start have kept; without the latter the step has written velocities at most."""
-        state, count, moving, dynamic = self.state, self.state.count, self.state.moving, self.state.dynamic
+        state, moving, dynamic, rows = self.state, self.state.moving, self.state.dynamic, self.state.kept_rows
         if state.velocity_kept:
             bodies.linear_velocity[:moving] = bodies.kept_velocity[:moving]
         elif state.started:
             bodies.linear_velocity[:moving] = bodies.start_velocity[:moving]
         if state.started:
-            bodies.position[:count] = bodies.previous_position[:count]
-            bodies.previous_position[:count] = bodies.kept_previous[:count]
+            bodies.position[:rows] = bodies.previous_position[:rows]
+            bodies.previous_position[:rows] = bodies.kept_previous[:rows]
         if state.step_force_kept:
             bodies.step_force[:dynamic] = bodies.kept_step_force[:dynamic]
 

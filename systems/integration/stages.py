@@ -64,11 +64,12 @@ def keep_start(state, dt):
     state.started = True  # before anything is overwritten: previous_position then is what a failed step goes back to
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
+    # Of static bodies the two are equal, see box_statics.
     if state.others_write:  # every column is kept
-        for i in range(state.count):
+        for i in range(state.kept_rows):
             previous[i] = position[i]
     else:
-        for i in range(state.count):
+        for i in range(state.kept_rows):
             bodies.kept_previous[i] = previous[i]
             previous[i] = position[i]
     if state.limits_speed:  # systems may have pushed since the forces were summed
