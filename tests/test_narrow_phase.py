@@ -331,3 +331,14 @@ def test_unread_contacts_outlast_the_start_of_a_step_that_fails():
         world.step()
     assert (world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist()) == ([a], [b])
     np.testing.assert_allclose(world.contacts.depth, 0.1, atol=EPS)
+
+
+def test_a_second_shape_among_no_candidates_finds_room():
+    """The counts of pairs by shapes grow with the number of shapes, also where nothing else does."""
+    world = make_world()
+    for x in range(3):
+        world.create_entity(Transform((9.0 * x, 0.0)), RigidBody(), SphereCollider(0.5))
+    world.step()
+    world.add_component(world.create_entity(Transform((50.0, 0.0))), AABBCollider((1.0, 1.0)))
+    world.step()
+    assert len(world.physics.state.candidates.bucket_starts) >= 6

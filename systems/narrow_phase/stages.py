@@ -37,10 +37,11 @@ def rank_rows(state):
 
 def order_candidates(state, dt):
     """Candidates by the smaller entity id, then by the larger, the row of the smaller id first."""
-    candidates, count = state.candidates, state.candidates.count
+    candidates, count, kinds = state.candidates, state.candidates.count, state.shapes.count * state.shapes.count
     if not state.candidates_ready:
         return RUN_BROAD
-    if count > len(candidates.sorted_a) or state.count + 1 > len(candidates.starts):
+    too_small = count > len(candidates.sorted_a) or state.count + 1 > len(candidates.starts)
+    if too_small or kinds + 2 > len(candidates.bucket_starts):
         state.needed = count
         return NEED_ORDER
     state.candidates_counted += count
