@@ -17,7 +17,7 @@ from carom.scenes import conveyor, gas, jump, player
 from carom.scenes.random_numbers import uniform
 
 WITHOUT_CHANCE = {  # any seed gives the same world
-    "jump", "pyramid", "stack", "lift", "cradle", "galperin", "shots",
+    "few", "jump", "pyramid", "stack", "lift", "cradle", "galperin", "shots",
     "spring", "orbit", "bouncing", "oblique", "drops",
 }  # fmt: skip
 
