@@ -133,9 +133,9 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
     waited = log.waited
     if repeat == 0:
         with contextlib.closing(CaromWorld(case.build(REHEARSAL_SEED))) as rehearsal:
-            engines = [rehearsal, *([PymunkSpace(rehearsal.world)] if peer else [])]
-            for engine in engines:
-                engine.step(REHEARSAL_STEPS)
+            rehearsal.step(REHEARSAL_STEPS)
+            if peer:
+                PymunkSpace(rehearsal.world).step(REHEARSAL_STEPS)
     with contextlib.ExitStack() as stack:
         world = case.build(repeat)
         engines: dict[str, Any] = {CAROM: stack.enter_context(contextlib.closing(CaromWorld(world)))}
