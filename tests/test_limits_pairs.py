@@ -220,3 +220,14 @@ def test_the_command_refuses_in_one_line(arguments, message):
     assert result.exit_code == 2
     assert message in result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(("number", "why"), [
+    (2738, "a falling stack, whose rigid contacts also push against each other"),
+    (7634, "a box that passes beyond a corner of its room in the step in which it touches the wall"),
+    (3602, "a grain that falls through a thin wall before something strikes it"),
+])  # fmt: skip
+def test_scenes_that_went_wrong(number, why):
+    """Within the valid range, and wrong before their cause was found."""
+    draw = Draw.of(0, number)
+    assert played(draw).failures == [], why
