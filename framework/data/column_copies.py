@@ -22,11 +22,13 @@ _blocks_at = record_at(BLOCKS, 2)
 
 
 @intrinsic
-def _copy_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
+def move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
+    """Copy so many bytes from one address to another; the two may overlap."""
+
     def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         byte = ir.IntType(8).as_pointer()
         places = [builder.inttoptr(value, byte) for value in values[:2]]
-        cgutils.raw_memcpy(builder, places[0], places[1], values[2], 1)
+        cgutils.raw_memmove(builder, places[0], places[1], values[2], 1)
         return context.get_dummy_value()
 
     return types.none(types.int64, types.int64, types.int64), emit
@@ -37,7 +39,7 @@ def copy_blocks(address):
     """Copy every block of the record at that address from its source to its target."""
     blocks = _blocks_at(address)
     for k in range(len(blocks.sizes)):
-        _copy_bytes(blocks.targets[k], blocks.sources[k], blocks.sizes[k])
+        move_bytes(blocks.targets[k], blocks.sources[k], blocks.sizes[k])
 
 
 COPY_BLOCKS = Called(copy_blocks, int)

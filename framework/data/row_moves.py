@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from ..compilation import kernel, part
-from ..jit.late import JIT, cgutils, intrinsic, ir, types
+from ..jit.late import JIT
 from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at
 from ..jit.records.schema import Schema, integer, ints
+from .column_copies import move_bytes
 
 ROW_PLAN = Schema(
     "RowPlan",
@@ -42,20 +43,9 @@ _plan_at = record_at(ROW_PLAN, 2)
 _columns_at = record_at(MOVED_COLUMNS, 2)
 
 
-@intrinsic
-def _move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
-    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        byte = ir.IntType(8).as_pointer()
-        places = [builder.inttoptr(value, byte) for value in values[:2]]
-        cgutils.raw_memmove(builder, places[0], places[1], values[2], 1)
-        return context.get_dummy_value()
-
-    return types.none(types.int64, types.int64, types.int64), emit
-
-
 @part
 def place_of(ids, start, stop, entity):
-    """The first of these rows whose id is larger; most come behind all there are."""
+    """The first of these rows whose id is not smaller; most come behind all there are."""
     if start == stop or ids[stop - 1] < entity:
         return stop
     while start < stop:
@@ -111,12 +101,12 @@ def move_rows_of(plan, columns, column):
     source, target, length = plan.source, plan.target, plan.length
     for k in range(plan.runs):
         if target[k] < source[k]:
-            _move_bytes(address + target[k] * size, address + source[k] * size, length[k] * size)
+            move_bytes(address + target[k] * size, address + source[k] * size, length[k] * size)
     for k in range(plan.runs - 1, -1, -1):
         if target[k] > source[k]:
-            _move_bytes(address + target[k] * size, address + source[k] * size, length[k] * size)
+            move_bytes(address + target[k] * size, address + source[k] * size, length[k] * size)
     for k in range(plan.coming if default != 0 else 0):
-        _move_bytes(address + plan.fresh[k] * size, default, size)
+        move_bytes(address + plan.fresh[k] * size, default, size)
 
 
 @kernel

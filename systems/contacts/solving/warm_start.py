@@ -7,6 +7,7 @@ over the step (total).
 from __future__ import annotations
 
 from ....framework.compilation import part
+from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, scale
 from ...codes import NEED_WARM_START, OK
@@ -37,15 +38,9 @@ def row_of(state, wanted):
     for kind in range(3):
         low = 0 if kind == 0 else (state.dynamic if kind == 1 else state.moving)
         high = state.dynamic if kind == 0 else (state.moving if kind == 1 else state.count)
-        stop = high
-        while low < high:
-            middle = (low + high) // 2
-            if entity[middle] < wanted:
-                low = middle + 1
-            else:
-                high = middle
-        if low < stop and entity[low] == wanted:
-            return low
+        row = place_of(entity, low, high, wanted)
+        if row < high and entity[row] == wanted:
+            return row
     return -1
 
 
