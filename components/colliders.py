@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypedDict, Unpack
 
 import numpy as np
 
-from ..framework.data.columns import REQUIRED, Column, column, on_demand
+from ..framework.data.columns import REQUIRED, Column, special_column
 from ..framework.data.component import Component
+from ..framework.typing import Vector, VectorField
 from ..framework.vectors import item, replace, scale
 
 ALL_LAYERS = -1  # every bit set
 # Arguments, checked like fields.
 LOWER = Column(item="vector", owner="AABBCollider", name="from_bounds lower")
 UPPER = Column(item="vector", owner="AABBCollider", name="from_bounds upper")
+
+
+class ColliderFields(TypedDict, total=False):
+    """The fields of every collider, for functions that make one and pass them on."""
+
+    offset: Vector | float
+    restitution: float
+    friction: float | None
+    sensor: bool
+    layer: int
+    mask: int
 
 
 class Collider(Component, abstract=True):
@@ -33,15 +45,18 @@ class Collider(Component, abstract=True):
 
     __slots__ = ()
 
+    makes_body: ClassVar[bool] = True
     stack: ClassVar[str] = "collider"
     stacked_columns: ClassVar[tuple[str, ...]] = ("offset", "restitution", "friction", "sensor", "layer", "mask")
 
-    offset = on_demand(column(0.0, item="vector"))
-    restitution = on_demand(column(0.0, minimum=0.0))
-    friction = on_demand(column(None, optional=True, minimum=0.0))
-    sensor = on_demand(column(False, dtype=bool))
-    layer = on_demand(column(1, dtype=int))
-    mask = on_demand(column(ALL_LAYERS, dtype=int))
+    offset: VectorField = special_column(default=0.0, item="vector", kw_only=True, on_demand=True, also=("centre",))
+    restitution: float = special_column(
+        default=0.0, minimum=0.0, kw_only=True, on_demand=True, also=("bounce", "bounciness", "elasticity")
+    )
+    friction: float | None = special_column(default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True)
+    sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
+    layer: int = special_column(default=1, dtype=int, kw_only=True, on_demand=True, also=("category", "group"))
+    mask: int = special_column(default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",))
 
     rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``
     dimensions: ClassVar[tuple[int, ...]] = (2, 3)  # dimensions of the worlds that support it
@@ -62,21 +77,7 @@ class SphereCollider(Collider):
 
     __slots__ = ()
 
-    radius = column(minimum=0.0)
-
-    def __init__(
-        self,
-        radius: float,
-        *,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
-    ) -> None:
-        common = {"offset": offset, "restitution": restitution, "friction": friction}
-        self._fill({"radius": radius, **common, "sensor": sensor, "layer": layer, "mask": mask})
+    radius: float = special_column(minimum=0.0, also=("size",))
 
     @staticmethod
     def bounds(shape, dimensions):
@@ -103,24 +104,10 @@ class AABBCollider(Collider):
 
     __slots__ = ()
 
-    half_extents = column(item="vector", minimum=0.0)
-
-    def __init__(
-        self,
-        half_extents: Any,
-        *,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
-    ) -> None:
-        common = {"offset": offset, "restitution": restitution, "friction": friction}
-        self._fill({"half_extents": half_extents, **common, "sensor": sensor, "layer": layer, "mask": mask})
+    half_extents: VectorField = special_column(item="vector", minimum=0.0, also=("size", "extents", "half_size"))
 
     @classmethod
-    def from_bounds(cls, lower: Any, upper: Any, **common: Any) -> Self:
+    def from_bounds(cls, lower: Vector, upper: Vector, **common: Unpack[ColliderFields]) -> Self:
         """The box from its minimum and maximum point, relative to the Transform's position.
 
         ValueError if a minimum exceeds its maximum.

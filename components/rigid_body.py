@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from ..framework.data import esper_bridge
-from ..framework.data.columns import Column, column, on_demand
+from ..framework.data.columns import Column, special_column
 from ..framework.data.component import Component
 from ..framework.data.table import KINDS
+from ..framework.typing import Vector, VectorField
 
 FASTEST = 1e307  # m/s along each axis: differences of two such velocities, and their lengths, are finite
 Kind = Literal["dynamic", "kinematic", "static"]
@@ -52,49 +52,37 @@ class RigidBody(Component, flat=True):
 
     __slots__ = ()
 
-    mass = column(1.0, positive=True)
-    linear_velocity = dataclasses.replace(column(0.0, item="vector"), largest=FASTEST)
-    constant_force = on_demand(column(0.0, item="vector"))
-    gravity_scale = on_demand(column(1.0))
-    linear_damping = on_demand(column(0.0, minimum=0.0))
-    kind = dataclasses.replace(column("dynamic", choices=KINDS), on_write=_kind_written)
-    max_linear_speed = on_demand(column(None, optional=True, minimum=0.0))
-    ccd = on_demand(column(False, dtype=bool))
-    applied_force = dataclasses.replace(on_demand(column(0.0, item="vector")), constructor=False)  # till the frame ends
-    applied_frame = dataclasses.replace(on_demand(column(-1, dtype=int)), constructor=False, on_write=_force_applied)
-    step_force = dataclasses.replace(on_demand(column(0.0, item="vector")), constructor=False)  # for one step
+    makes_body: ClassVar[bool] = True
 
-    def __init__(
-        self,
-        mass: float = 1.0,
-        linear_velocity: Any = 0.0,
-        *,
-        constant_force: Any = 0.0,
-        gravity_scale: float = 1.0,
-        linear_damping: float = 0.0,
-        kind: Kind = "dynamic",
-        max_linear_speed: float | None = None,
-        ccd: bool = False,
-    ) -> None:
-        self._fill(
-            {
-                "mass": mass,
-                "linear_velocity": linear_velocity,
-                "constant_force": constant_force,
-                "gravity_scale": gravity_scale,
-                "linear_damping": linear_damping,
-                "kind": kind,
-                "max_linear_speed": max_linear_speed,
-                "ccd": ccd,
-            }
-        )
+    mass: float = special_column(default=1.0, positive=True)
+    linear_velocity: VectorField = special_column(
+        default=0.0, item="vector", largest=FASTEST, also=("velocity", "speed")
+    )
+    constant_force: VectorField = special_column(
+        default=0.0, item="vector", kw_only=True, on_demand=True, also=("force",)
+    )
+    gravity_scale: float = special_column(default=1.0, kw_only=True, on_demand=True, also=("gravity",))
+    linear_damping: float = special_column(
+        default=0.0, minimum=0.0, kw_only=True, on_demand=True, also=("damping", "drag")
+    )
+    kind: Kind = special_column(
+        default="dynamic", choices=KINDS, kw_only=True, on_write=_kind_written, also=("type", "body_type")
+    )
+    max_linear_speed: float | None = special_column(
+        default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True, also=("max_speed",)
+    )
+    ccd: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("bullet", "continuous"))
+    # Not for the constructor: pushes until the frame ends, the frame they are of, and pushes for one step.
+    applied_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
+    applied_frame: int = special_column(default=-1, dtype=int, on_demand=True, init=False, on_write=_force_applied)
+    step_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
 
-    def apply_impulse(self, impulse: Any) -> None:
+    def apply_impulse(self, impulse: Vector | float) -> None:
         """Change the velocity at once by impulse / mass; (d,) N s. Kinematic and static bodies do not react."""
         if self.kind == "dynamic":
             self.linear_velocity = self.linear_velocity + self._vector(IMPULSE, impulse) / self.mass
 
-    def apply_force(self, force: Any) -> None:
+    def apply_force(self, force: Vector | float) -> None:
         """Push with ``force``, (d,) N.
 
         Inside a system: for that step, or for the next one if this step has moved the bodies already. Outside: in

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ..framework.data.columns import column, on_demand
+from ..framework.data.columns import special_column
 from ..framework.data.component import Component
+from ..framework.typing import RotationField, VectorField
 
 
 def _teleport(table: Any, row: int) -> None:
@@ -26,13 +27,14 @@ class Transform(Component, flat=True):
 
     __slots__ = ()
 
-    position = dataclasses.replace(column(item="vector"), on_write=_teleport)
-    rotation = on_demand(column(0.0, item="rotation"))
+    position: VectorField = special_column(item="vector", on_write=_teleport, also=("pos", "location"))
+    rotation: RotationField = special_column(default=0.0, item="rotation", on_demand=True, also=("angle",))
 
-    def __init__(self, position: Any, rotation: Any = 0.0) -> None:
+    def _fill(self, given: Mapping[str, Any]) -> None:
+        position = given.get("position", ())
         if type(position) is not tuple and np.ndim(position) == 0:
             raise ValueError(f"Transform.position must be 2 or 3 numbers, got {position!r}")
-        self._fill({"position": position, "rotation": rotation})
+        super()._fill(given)
 
     @property
     def x(self) -> float:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import math
 from dataclasses import dataclass
 from typing import Any, Self
+
+from .names import did_you_mean
 
 MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
 COLLISION_MODES = ("discrete", "continuous", "event_driven")
@@ -129,9 +130,7 @@ def _refuse_unknown(values: dict[str, Any]) -> None:
     known = [field.name for field in dataclasses.fields(Settings)]
     for name in values:
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
-            raise TypeError(f"Settings has no field {name!r}{hint}; it has {', '.join(known)}")
+            raise TypeError(f"Settings has no field {name!r}{did_you_mean(name, known)}; it has {', '.join(known)}")
 
 
 _generated = Settings.__init__

@@ -7,9 +7,8 @@ form: two capsules are two segments, and their distance is that of the segments 
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from ..components import ALL_LAYERS, AABBCollider, Collider, SphereCollider
+from ..components import AABBCollider, Collider, SphereCollider
 from ..framework import Plugin, column
 from ..framework.vectors import absolute, add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
 from .segment_box import box_gap, box_overlap, place_along
@@ -34,24 +33,8 @@ class CapsuleCollider(Collider):
     __slots__ = ()
 
     rotates = True
-    radius = column(minimum=0.0)
-    half_height = column(minimum=0.0)
-
-    def __init__(
-        self,
-        radius: float,
-        half_height: float,
-        *,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
-    ) -> None:
-        common = {"offset": offset, "restitution": restitution, "friction": friction}
-        common |= {"sensor": sensor, "layer": layer, "mask": mask}
-        self._fill({"radius": radius, "half_height": half_height, **common})
+    radius: float = column(minimum=0.0)
+    half_height: float = column(minimum=0.0)
 
     @staticmethod
     def bounds(shape, dimensions):

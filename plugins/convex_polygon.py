@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..components.colliders import ALL_LAYERS, Collider
+from ..components.colliders import Collider
 from ..framework import Plugin, array_column, column
+from ..framework.typing import ArrayField
 from ..framework.vectors import add_scaled, dot, scale
 
 STRAIGHT = 1e-12  # sine of the turn at a corner; below it the corner counts as straight
@@ -78,24 +79,8 @@ class ConvexPolygonCollider(Collider):
     dimensions: ClassVar[tuple[int, ...]] = (2,)
     rotates: ClassVar[bool] = True
 
-    vertices = array_column(2, rows=(3, 2**31), check=wrong_with)
-    corner_radius = column(0.0, minimum=0.0)
-
-    def __init__(
-        self,
-        vertices: Any,
-        *,
-        corner_radius: float = 0.0,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
-    ) -> None:
-        shape = {"vertices": _counter_clockwise(vertices), "corner_radius": corner_radius, "offset": offset}
-        material = {"restitution": restitution, "friction": friction}
-        self._fill({**shape, **material, "sensor": sensor, "layer": layer, "mask": mask})
+    vertices: ArrayField = array_column(2, rows=(3, 2**31), check=wrong_with, convert=_counter_clockwise)
+    corner_radius: float = column(default=0.0, minimum=0.0, kw_only=True)
 
     @classmethod
     def box(cls, half_extents: Any, **common: Any) -> Self:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..components import ALL_LAYERS, Collider
+from ..components import Collider
 from ..framework import Column, Convex, Plugin
+from ..framework.typing import VectorField
 from ..framework.vectors import add, add_scaled, divided, dot, item, length, negative, replace, scale, sub
 
 plugin = Plugin("half_space", version="1.0")
@@ -42,21 +43,7 @@ class HalfSpaceCollider(Collider):
     __slots__ = ()
 
     rotates = True
-    normal = DirectionColumn(item="vector")
-
-    def __init__(
-        self,
-        normal: Any,
-        *,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
-    ) -> None:
-        common = {"offset": offset, "restitution": restitution, "friction": friction}
-        self._fill({"normal": normal, **common, "sensor": sensor, "layer": layer, "mask": mask})
+    normal: VectorField = DirectionColumn(item="vector")  # type: ignore[assignment]
 
     @staticmethod
     def bounds(shape, dimensions):

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import collections
 import weakref
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 
-from ..components import ALL_LAYERS, AABBCollider, Collider, SphereCollider
+from ..components import AABBCollider, Collider, SphereCollider
 from ..framework import Phase, Plugin, System, World, column
+from ..framework.typing import VectorField
 from ..framework.vectors import add_scaled, dot, item, scale
 
 plugin = Plugin("one_way_segment", version="1.0")
@@ -45,28 +47,14 @@ class OneWaySegmentCollider(Collider):
 
     rotates = True
     dimensions = (2,)
-    start = column(item="vector")
-    end = column(item="vector")
-    front = column("left", choices=FRONTS)
+    start: VectorField = column(item="vector")
+    end: VectorField = column(item="vector")
+    front: Literal["left", "right"] = column(default="left", choices=FRONTS)
 
-    def __init__(
-        self,
-        start: Any,
-        end: Any,
-        front: str = "left",
-        *,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
-    ) -> None:
-        common = {"offset": offset, "restitution": restitution, "friction": friction}
-        common |= {"sensor": sensor, "layer": layer, "mask": mask}
-        self._fill({"start": start, "end": end, "front": front, **common})
+    def _fill(self, given: Mapping[str, Any]) -> None:
+        super()._fill(given)
         if np.array_equal(self.start, self.end):
-            raise ValueError(f"OneWaySegmentCollider: start and end must differ, both are {start!r}")
+            raise ValueError(f"OneWaySegmentCollider: start and end must differ, both are {self.start!r}")
 
     @classmethod
     def sample(cls, **common: Any) -> Self:

@@ -158,6 +158,7 @@ class Springs(Plugin):
         if self.world is not None and not self.world.closed:
             raise ValueError(f"these springs belong to world {self.world.name!r}: each world takes its own Springs()")
         self.world = world
+        world.events.define("spring_lost")
         self._springs.clear()
         self._changed()
         super().install(world)

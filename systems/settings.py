@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from typing import Any
 
 import numpy as np
 
 from ..framework.jit.records.record import Record
+from ..framework.names import did_you_mean
 from ..framework.plugins.registry import Registry
 from ..framework.settings import AUTOMATIC, MIXING_RULES, Settings
 from .ccd.search_bounds import MODES
@@ -25,8 +25,7 @@ def check_settings(settings: Settings, registry: Registry) -> None:
     ):
         value = getattr(settings, name)
         if value not in known:
-            near = difflib.get_close_matches(value, known, 1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            hint = did_you_mean(value, known)
             raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {value!r}{hint}")
 
 

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..components import Collider, RigidBody, Transform
+from ..components import RigidBody, Transform
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
-from ..framework.data.component import Component
 from ..framework.data.esper_bridge import Membership
 from ..framework.data.table import Table
 from ..framework.jit.records.record import make_record
@@ -60,7 +59,7 @@ class Simulation(PhysicsServices):
         self.table.forces_are_summed = lambda: self.state.forces_summed
         self.set_gravity(gravity)
         self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
-        self.adoption = Adoption(self.table, Transform, _makes_body, LevelCheck(self.table, world.registry))
+        self.adoption = Adoption(self.table, Transform, LevelCheck(self.table, world.registry))
         self.bodies = Bodies(self.table)
         lookup = EntityLookup(self._membership)
         source = RecordedContacts(self.state)
@@ -356,8 +355,3 @@ def _make_table(dimensions: int) -> Table:
     table.add_array("force", "vector", on_demand=True)
     table.add_array("inverse_mass")
     return table
-
-
-def _makes_body(component: type[Component]) -> bool:
-    """A Transform together with one of these is a body."""
-    return component is RigidBody or issubclass(component, Collider)

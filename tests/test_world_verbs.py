@@ -159,6 +159,7 @@ def test_two_processors_of_one_type_can_be_removed_one_by_one():
 
 def test_handlers_are_held_strongly_and_called_in_order():
     world, log = World(), []
+    world.events.define("hit")
     for label in "abc":
         world.on("hit", lambda label=label: log.append(label))
     gc.collect()
@@ -178,6 +179,7 @@ def test_handlers_are_held_strongly_and_called_in_order():
 
 def test_handlers_may_be_removed_while_an_event_is_on_its_way():
     world, log = World(), []
+    world.events.define("hit")
 
     def once():
         log.append("once")

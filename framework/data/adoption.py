@@ -7,7 +7,7 @@ Entities that were created in bulk (batches) come as arrays and have no handles.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Set
+from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -64,19 +64,17 @@ class TogetherCheck:
 
 
 class Adoption:
-    """Adopts the components of entities that form a body: those with ``anchor`` and any of the partners."""
+    """Adopts the components of entities that form a body: those with ``anchor`` and any that ``makes_body``."""
 
     def __init__(
         self,
         table: Table,
         anchor: type[Component],
-        is_partner: Callable[[type[Any]], bool],
         check_together: TogetherCheck | None = None,
     ) -> None:
         self.table = table
         self.anchor = anchor
         self._check_together = check_together or TogetherCheck()
-        self._is_partner = is_partner  # component type -> whether it makes a body together with the anchor
         self._roles: dict[Any, int] = {}  # by component type
         # Handles of the bodies in the table, but for those of batches that nobody has asked for.
         self._members: dict[type[Component], Handles] = {}
@@ -130,7 +128,7 @@ class Adoption:
         role = self._roles.get(component)
         if role is None:
             ours = isinstance(component, type) and issubclass(component, Component)
-            role = self._roles[component] = OTHER if not ours else PARTNER if self._is_partner(component) else OURS
+            role = self._roles[component] = OTHER if not ours else PARTNER if component.makes_body else OURS
         return role
 
     def _find_changes(self) -> Changes:

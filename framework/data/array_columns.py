@@ -57,6 +57,7 @@ class ArrayColumn(Column):
     width: int = 1
     rows: tuple[int, int] = (1, 2**31)
     check: Callable[[np.ndarray], str | None] | None = None
+    convert: Callable[[Any], Any] | None = None
     lengths: bool = True
     pool: Pool = field(default_factory=lambda: Pool(1))
 
@@ -69,6 +70,8 @@ class ArrayColumn(Column):
         return 1, len(self.pool.digests) - 1
 
     def checked(self, value: Any, entity: int | None = None) -> Any:
+        if self.convert is not None:
+            value = self.convert(value)
         array = Column(item="vector", name=self.name, owner=self.owner)._as_numbers(value, entity)
         if array.ndim == 1 and self.width == 1:
             array = array[:, None]
@@ -104,7 +107,7 @@ class ArrayColumn(Column):
 
 def array_column(
     width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None,
-    lengths: bool = True,
+    convert: Callable[[Any], Any] | None = None, lengths: bool = True, kw_only: bool = False,
 ) -> Any:  # fmt: skip
     """A field of a component that is an array (n, width) of floats, with its own n on every entity.
 
@@ -112,14 +115,18 @@ def array_column(
         the fewest and the most rows it may have
     check
         gets the array; returns what is wrong with it ("must be convex"), or None
+    convert
+        gets what a user gives, and returns the array to check and store
     lengths
         whether its numbers are lengths, which checks of the shape at other sizes multiply
+    kw_only
+        whether the constructor takes it by name only
 
     Pair functions see the array itself, and cannot write to it. To change it, assign another.
     """
     return ArrayColumn(
-        item="array", dtype=np.int64, width=width, rows=rows, check=check, lengths=lengths, pool=Pool(width),
-        on_write=_array_changed,
+        item="array", dtype=np.int64, width=width, rows=rows, check=check, convert=convert, lengths=lengths,
+        kw_only=kw_only, pool=Pool(width), on_write=_array_changed,
     )
 
 

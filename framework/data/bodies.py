@@ -111,10 +111,19 @@ class SelectedBodies:
     def __init__(self, table: Table, rows: np.ndarray) -> None:
         self._table = table
         self._rows = rows
-        self.force = table.values("force", rows)
+        self._force = table.values("force", rows)
 
     def __len__(self) -> int:
         return len(self._rows)
+
+    @property
+    def force(self) -> np.ndarray:
+        """(n, d) N; what is assigned is written into it."""
+        return self._force
+
+    @force.setter
+    def force(self, force: Any) -> None:
+        _write(self._force, force, "force")
 
     def __getattr__(self, name: str) -> Any:
         if self._table.has_column(name):
@@ -127,11 +136,16 @@ class SelectedBodies:
         raise AttributeError(f"bodies have no column {name!r}")
 
     def scatter_force(self) -> None:
-        self._table.make("force")[self._rows] = self.force
+        self._table.make("force")[self._rows] = self._force
 
 
 def _write(view: Any, value: Any, name: str) -> None:
     if not isinstance(view, np.ndarray):
         raise AttributeError(f"bodies.{name} is no column that could be assigned")
     if view is not value:
-        view[...] = value
+        try:
+            view[...] = value
+        except ValueError as error:
+            if np.shape(value) == view.shape or not view.flags.writeable:
+                raise
+            raise ValueError(f"bodies.{name} has shape {view.shape}, got shape {np.shape(value)}") from error

@@ -32,6 +32,8 @@ class Column:
     optional: bool = False  # None is allowed and stored as nan
     choices: tuple[str, ...] = ()  # stored as the index into it
     constructor: bool = True  # whether it is an argument of the constructor
+    kw_only: bool = False  # and whether only by name
+    also: tuple[str, ...] = ()  # what others call it; only for messages about a wrong name
     on_write: Callable[[Any, int], None] | None = None  # called with (table, row) after a handle has written
     on_demand: bool = False  # no memory in a table while all rows hold the default and nothing can write in place
     name: str = ""
@@ -293,11 +295,6 @@ def _lengths(array: np.ndarray) -> np.ndarray:
     return scale * np.sqrt(((array / scale) ** 2).sum(axis=-1, keepdims=True))
 
 
-def on_demand(field: Any) -> Any:
-    """The same field as a column on demand: most worlds leave it at its default in every row."""
-    return replace(field, on_demand=True)
-
-
 def column(
     default: Any = REQUIRED,
     *,
@@ -307,6 +304,7 @@ def column(
     minimum: float | None = None,
     optional: bool = False,
     choices: tuple[str, ...] = (),
+    kw_only: bool = False,
 ) -> Any:
     """A field of a component: one number per entity (or one vector: ``item="vector"``), stored as a column.
 
@@ -318,6 +316,8 @@ def column(
         ``float``, ``int`` or ``bool``
     positive, minimum, optional, choices
         checks: above zero; not below; None allowed; one of these strings
+    kw_only
+        whether the constructor takes it by name only
     """
     if item not in ("scalar", "vector", "rotation"):
         raise ValueError(f"column item must be scalar, vector or rotation, got {item!r}")
@@ -328,5 +328,24 @@ def column(
     elif dtype not in (float, bool, np.int64):
         raise ValueError(f"column dtype must be float, int or bool, got {dtype!r}")
     return Column(
-        default=default, item=item, dtype=dtype, positive=positive, minimum=minimum, optional=optional, choices=choices
-    )
+        default=default, item=item, dtype=dtype, positive=positive, minimum=minimum, optional=optional, choices=choices,
+        kw_only=kw_only,
+    )  # fmt: skip
+
+
+def special_column(
+    default: Any = REQUIRED,
+    *,
+    init: bool = True,
+    kw_only: bool = False,
+    on_demand: bool = False,
+    on_write: Callable[[Any, int], None] | None = None,
+    largest: float = LARGEST,
+    also: tuple[str, ...] = (),
+    **options: Any,
+) -> Any:
+    """A column with what only the built-in components use, see :class:`Column`; ``init``: ``Column.constructor``."""
+    return replace(
+        column(default, kw_only=kw_only, **options),
+        constructor=init, on_demand=on_demand, on_write=on_write, largest=largest, also=also,
+    )  # fmt: skip

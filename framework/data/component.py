@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import re
-from typing import Any, ClassVar, Self
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
 
-from .columns import REQUIRED, Column
+from ..names import did_you_mean, near_names
+from .array_columns import array_column
+from .columns import REQUIRED, Column, special_column
+from .columns import column as plain_column
 
 
+@dataclass_transform(field_specifiers=(plain_column, array_column, special_column), eq_default=False)
 class Component:
     """Base of all components whose fields are columns.
 
@@ -24,8 +28,13 @@ class Component:
     columns: ClassVar[dict[str, Column]] = {}
     fields: ClassVar[tuple[tuple[str, str], ...]] = ()  # name and key in a table of each
     prefix: ClassVar[str] = ""  # of the columns' names in a table
+    makes_body: ClassVar[bool] = False  # an entity that has it together with a Transform is a body
     _abstract: ClassVar[bool] = True
     _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
+    _arguments: ClassVar[dict[str, Column]] = {}  # of the constructor
+    _positional: ClassVar[tuple[str, ...]] = ()  # those that need no name
+    _required: ClassVar[tuple[str, ...]] = ()
+    _defaults: ClassVar[dict[str, Any]] = {}  # what a component holds that has been given nothing
 
     def __init_subclass__(cls, *, abstract: bool = False, flat: bool = False, **kwargs: Any) -> None:
         """``abstract`` bases may be derived from; ``flat`` columns carry no prefix in the table."""
@@ -40,6 +49,7 @@ class Component:
         for name in own:
             if hasattr(Component, name):
                 raise TypeError(f"{cls.__name__}: a column cannot be named {name!r}, every component has that already")
+        _refuse_plain_values(cls)
         if abstract:
             cls.columns = {**cls.columns, **own}
             return
@@ -57,36 +67,50 @@ class Component:
         if "__slots__" not in vars(cls):
             cls.__setattr__ = _set_field  # type: ignore[method-assign]
         cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
+        cls._arguments = {name: field for name, field in fields.items() if field.constructor}
+        cls._positional = tuple(name for name, field in cls._arguments.items() if not field.kw_only)
+        cls._required = tuple(name for name, field in cls._arguments.items() if field.default is REQUIRED)
+        cls._defaults = {name: field.stored_default for name, field in fields.items()}  # ValueError for a wrong one
 
     def __init__(self, *args: Any, **values: Any) -> None:
-        names = [name for name, column in self.columns.items() if column.constructor]
-        if len(args) > len(names):
-            raise TypeError(f"{type(self).__name__} takes {len(names)} values ({', '.join(names)}), got {len(args)}")
-        given = dict(zip(names, args, strict=False))
-        for name, value in values.items():
-            if name not in names:
-                raise TypeError(f"{type(self).__name__} has no field {name!r}; it has {', '.join(names) or 'none'}")
-            if name in given:
-                raise TypeError(f"{type(self).__name__} got {name!r} twice")
-            given[name] = value
-        self._fill(given)
+        self._fill({**self._named(args, values), **values} if args else values)
 
-    def _fill(self, given: dict[str, Any]) -> None:
-        """Set every column: the given value, else its default."""
+    @classmethod
+    def _named(cls, args: tuple[Any, ...], values: Mapping[str, Any]) -> dict[str, Any]:
+        """Positional arguments by their names; TypeError if they are too many, or among those given by name."""
+        names = cls._positional
+        if len(args) > len(names):
+            more = ", others by name" if len(names) < len(cls._arguments) else ""
+            raise TypeError(f"{cls.__name__} takes {len(names)} values ({', '.join(names)}{more}), got {len(args)}")
+        given = dict(zip(names, args, strict=False))
+        for name in given.keys() & values.keys():
+            raise TypeError(f"{cls.__name__} got {name!r} twice")
+        return given
+
+    @classmethod
+    def _unknown(cls, name: str) -> TypeError:
+        also = {word: known for known, field in cls._arguments.items() for word in field.also}
+        near = did_you_mean(name, cls._arguments, also)
+        return TypeError(f"{cls.__name__} has no field {name!r}{near}; it has {', '.join(cls._arguments) or 'none'}")
+
+    def _fill(self, given: Mapping[str, Any]) -> None:
+        """Set every column: the given value, else its default; TypeError for a name that is no argument."""
         self._store = None
         self._entity = None
         self._row = -1
         self._version = -1
-        stored: dict[str, Any] = {}
-        for name, column in self.columns.items():
-            value = given.get(name, column.default)
-            if value is not column.default:
-                stored[name] = column.checked(value)
-                continue
-            value = column.stored_default
-            if value is REQUIRED:
+        arguments, stored = self._arguments, self._defaults.copy()
+        for name, value in given.items():
+            field = arguments.get(name)
+            if field is None:
+                raise self._unknown(name)
+            stored[name] = field.checked(value)
+        for name in self._required:
+            if name not in given:
                 raise TypeError(f"{type(self).__name__} needs a value for {name!r}")
-            stored[name] = value.copy() if type(value) is np.ndarray else value
+        for field in self._shaped:
+            if type(stored[field.name]) is np.ndarray and field.name not in given:
+                stored[field.name] = stored[field.name].copy()
         self._values = stored
 
     # -- being adopted and let go -----------------------------------------------------------------
@@ -151,18 +175,12 @@ class Component:
     @classmethod
     def many(cls, *args: Any, **values: Any) -> Many:
         """Values for many entities at once, for ``world.create_entities``: each one value for all, or one per row."""
-        names = [name for name, column in cls.columns.items() if column.constructor]
-        given = dict(zip(names, args, strict=False))
-        twice = [name for name in values if name in given]
-        if twice:
-            raise TypeError(f"{cls.__name__}.many got {', '.join(twice)} twice")
-        unknown = [name for name in values if name not in names]
-        if unknown or len(args) > len(names):
-            got = ", ".join(unknown) or "too many values"
-            raise TypeError(f"{cls.__name__}.many takes {', '.join(names)}; got {got}")
-        given.update(values)
-        for name in names:
-            if name not in given and cls.columns[name].default is REQUIRED:
+        given = {**cls._named(args, values), **values}
+        for name in given:
+            if name not in cls._arguments:
+                raise cls._unknown(name)
+        for name in cls._required:
+            if name not in given:
                 raise TypeError(f"{cls.__name__}.many needs a value for {name!r}")
         return Many(cls, given)
 
@@ -243,10 +261,27 @@ def _copy_of(column: Column) -> Column:
     return dataclasses.replace(column)
 
 
+def _refuse_plain_values(cls: type[Component]) -> None:
+    """TypeError if a class has values that look like fields of its entities and are none."""
+    annotations = {name: str(of) for name, of in vars(cls).get("__annotations__", {}).items()}
+    values = {name: value for name, value in vars(cls).items() if not hasattr(type(value), "__get__")}
+    if "__init__" not in vars(cls) and not vars(cls).get("__slots__"):  # which may set what is annotated
+        values = {**dict.fromkeys(annotations, ...), **values}
+    for name, value in values.items():
+        constant = name.isupper() or "ClassVar" in annotations.get(name, "") or isinstance(value, type)
+        known = any(hasattr(base, name) for base in cls.__mro__[1:])
+        if not (name.startswith("_") or constant or known or isinstance(vars(cls).get(name), Column)):
+            given, default = ("", "") if value is ... else (f" = {value!r}", repr(value))
+            raise TypeError(
+                f"{cls.__name__}.{name}{given} is no column: write {name} = column({default}), or annotate it as "
+                f"ClassVar if it is the same for all"
+            )
+
+
 def _set_field(component: Component, name: str, value: Any) -> None:
     """A class of one's own may keep more than columns; but what is nearly a column's name is a slip of the pen."""
     if not hasattr(type(component), name) and name not in vars(component):
-        near = difflib.get_close_matches(name, component.columns, 1, cutoff=0.75)
+        near = near_names(name, component.columns, cutoff=0.75)
         if near:
             raise AttributeError(f"{type(component).__name__} has no field {name!r}: did you mean {near[0]!r}?")
     object.__setattr__(component, name, value)

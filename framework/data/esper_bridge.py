@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -76,15 +77,18 @@ class Contents:
 
     entities, dead
         esper's own dict of all entities' components, and its set of those whose deletion is pending: do not change them
+    members
+        esper's own dict of the entities that have each component: do not change it
     log
         what has changed
     """
 
-    __slots__ = ("dead", "entities", "log")
+    __slots__ = ("dead", "entities", "log", "members")
 
     def __init__(self) -> None:
         self.entities: Entities = esper._entities  # type: ignore[assignment]
         self.dead: set[int] = esper._dead_entities
+        self.members: Mapping[type[Any], Any] = esper._components
         self.log: ChangeLog = esper._components.log  # type: ignore[attr-defined]
 
     def components_of(self, entity: int) -> Mapping[type[Any], Any]:
@@ -244,6 +248,7 @@ def event_registry() -> dict[str, Any]:
 # -- steps ---------------------------------------------------------------------------------------
 
 running: set[str] = set()  # the contexts that are inside a step
+stepping = threading.RLock()  # the thread that takes a step: esper's current context is one for all threads
 
 
 def step_is_running() -> bool:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from ..compilation import inlined, pasted
 from ..data.component import Component
@@ -18,6 +19,26 @@ if TYPE_CHECKING:
     from ..world.world import World
 
 Thing = TypeVar("Thing")
+P = ParamSpec("P")
+
+
+def _called_first(example: str) -> Callable[[Callable[P, Thing]], Callable[P, Thing]]:
+    """For decorators with arguments: PluginError if one is put on a class or a function without them."""
+
+    def wrap(method: Callable[P, Thing]) -> Callable[P, Thing]:
+        @functools.wraps(method)
+        def checked(*args: P.args, **values: P.kwargs) -> Thing:
+            if len(args) == 2 and not values and (inspect.isclass(args[1]) or inspect.isfunction(args[1])):
+                plugin, thing = args
+                raise PluginError(
+                    f"plugin {plugin.name}: {method.__name__} on {thing.__name__} takes arguments: "  # type: ignore[attr-defined]
+                    f"@plugin.{method.__name__}({example})"
+                )
+            return method(*args, **values)
+
+        return checked
+
+    return wrap
 
 
 class Plugin:
@@ -55,6 +76,7 @@ class Plugin:
             raise PluginError(f"plugin {self.name}: kernel takes a function, got {function!r}")
         return inlined(function)
 
+    @_called_first("cost=2")
     def shape(self, *, cost: float) -> Callable[[type[Component]], type[Component]]:
         """Register a collider class as a shape.
 
@@ -81,6 +103,7 @@ class Plugin:
 
         return register
 
+    @_called_first("First, Second")
     def pair(
         self, first: type[Any], second: type[Any], *, corner: Any | None = None
     ) -> Callable[[Thing], Thing]:
@@ -110,6 +133,7 @@ class Plugin:
 
         return register
 
+    @_called_first("First, Second")
     def sweep(self, first: type[Any], second: type[Any]) -> Callable[[Thing], Thing]:
         """Register ``function(a, b, d, v) -> (hit, time)`` for a pair: b moves by v relative to a, from d on; time,
         from 0 to 1, is the part of v after which they touch. Without it the time is found from the pair's depth.
@@ -126,6 +150,7 @@ class Plugin:
 
     # -- other things -----------------------------------------------------------------------------
 
+    @_called_first("'name'")
     def integrator(self, name: str) -> Callable[[Thing], Thing]:
         """Register an integrator under the name that ``Settings.integrator`` uses."""
 
@@ -136,6 +161,7 @@ class Plugin:
 
         return register
 
+    @_called_first("'name'")
     def broad_phase(self, name: str) -> Callable[[Thing], Thing]:
         """Register a broad phase under the name that ``Settings.broad_phase`` uses: a class, one instance per world.
 
@@ -151,6 +177,7 @@ class Plugin:
 
         return register
 
+    @_called_first("'name'")
     def mixing_rule(self, name: str) -> Callable[[Thing], Thing]:
         """Register ``function(x, y)``, how the restitutions or frictions of two bodies become the contact's, under the
         name that ``Settings`` uses. Compiled, symmetric, not negative."""

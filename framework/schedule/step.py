@@ -9,7 +9,7 @@ import esper
 
 from ..compilation import log
 from ..data import esper_bridge
-from ..errors import CaromError, StepError
+from ..errors import CaromError, NoPhysicsError, StepError
 from .clock import Clock
 from .phases import FIRST_PRIORITY, Phase, System
 from .profiler import Profiler
@@ -81,7 +81,22 @@ class Pipeline:
                 system.process(seconds)
         return steps
 
+    def _claim(self) -> None:
+        """The step is this thread's; CaromError while another thread takes one, of this world or another."""
+        if not esper_bridge.stepping.acquire(blocking=False):
+            raise CaromError(
+                f"world {self.world.name!r} cannot be stepped while another thread steps a world: esper has one "
+                f"current context for all threads, so step all worlds of a process in one thread, or use processes"
+            )
+
     def _take(self, steps: int) -> None:
+        self._claim()
+        try:
+            self._take_steps(steps)
+        finally:
+            esper_bridge.stepping.release()
+
+    def _take_steps(self, steps: int) -> None:
         """Some steps whose events are gathered together."""
         self._open_window()
         if not steps:  # new bodies are adopted all the same, so that they know which frame it is
@@ -113,20 +128,26 @@ class Pipeline:
                 f"esper.process({', '.join(map(repr, args))}): this world's step is fixed, settings.dt = {dt!r}; "
                 f"for frames of any length use world.advance(seconds)"
             )
-        alone = not self._in_window
-        if alone:
-            self._open_window()
-        if self.processors.changed:
-            self.order.reconcile()
-        self._run(dt, self.others_write())
-        self.processors.step_done = True
-        if alone:
-            self._close_window()
+        self._claim()
+        try:
+            alone = not self._in_window
+            if alone:
+                self._open_window()
+            if self.processors.changed:
+                self.order.reconcile()
+            self._run(dt, self.others_write())
+            self.processors.step_done = True
+            if alone:
+                self._close_window()
+        finally:
+            esper_bridge.stepping.release()
 
     def _run(self, dt: float, others_write: bool) -> None:
         """Open the step, run its parts, close it."""
         physics = self.world.physics
-        if physics is not None and not physics.adoption.settled():
+        if physics is None:
+            self._refuse_bodies()
+        elif not physics.adoption.settled():
             self.synchronize()
         waited, order = log.waited, self.order
         self._begin(others_write)
@@ -145,6 +166,15 @@ class Pipeline:
         if order.changed:
             with esper_bridge.context(self.world.name):
                 order.apply()
+
+    def _refuse_bodies(self) -> None:
+        """NoPhysicsError if there is something that only physics can move."""
+        for component, entities in self.contents.members.items() if self.contents.log.dirty else ():
+            if entities and isinstance(component, type) and getattr(component, "makes_body", False):
+                raise NoPhysicsError(
+                    f"entity {next(iter(entities))} has {component.__name__}, and there is no physics in this world: "
+                    f"World(Physics(dimensions=2))"
+                )
 
     def _run_parts(self, parts: list[Any], dt: float) -> None:
         try:

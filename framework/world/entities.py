@@ -35,9 +35,14 @@ class EntityVerbs:
     def create_entity(self, *components: Any) -> int:
         """A new entity with these components; its id.
 
-        ValueError if a component's vectors do not fit the world's dimensions; nothing is created then.
+        ValueError if a component's vectors do not fit the world's dimensions, or if there are two of a type; nothing is
+        created then.
         """
         self._check(components, None)
+        if len(set(map(type, components))) < len(components):
+            types = [type(component).__name__ for component in components]
+            twice = next(name for name in types if types.count(name) > 1)
+            raise ValueError(f"create_entity: one component of each type, got {types.count(twice)} {twice}")
         with self._context():
             return esper.create_entity(*components)
 

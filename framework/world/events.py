@@ -6,14 +6,18 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from ..data import esper_bridge
+from ..names import did_you_mean
 
 Handler = Callable[..., None]
+CONTACT_EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact")
+ALSO = {"contact_start": "contact_begin", "collision": "contact_begin", "contact_stop": "contact_end"}
 
 
 class Events:
     """Named events. Handlers set with ``esper.set_handler`` in the same context get them too."""
 
     def __init__(self) -> None:
+        self._known: dict[str, None] = dict.fromkeys(CONTACT_EVENTS)  # in the order in which they were defined
         self._handlers: dict[str, list[Handler]] = {}
         self._of_esper: dict[str, Any] = {}
 
@@ -21,8 +25,28 @@ class Events:
         """Note esper's own handlers; called in the world's context."""
         self._of_esper = esper_bridge.event_registry()
 
+    def define(self, *names: str) -> None:
+        """Declare events of your own, so that ``on`` takes them; ``dispatch`` declares its event too."""
+        for name in names:
+            if not isinstance(name, str) or not name:
+                raise TypeError(f"the name of an event is text, got {name!r}")
+            self._known[name] = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The events that there are: those of contacts, and those that have been defined."""
+        return tuple(self._known)
+
     def on(self, name: str, handler: Handler) -> Handler:
-        """Call ``handler`` on every event of that name from now on; returns it, so it serves as a decorator's core."""
+        """Call ``handler`` on every event of that name from now on; returns it, so it serves as a decorator's core.
+
+        ValueError for an event that nobody has defined.
+        """
+        if name not in self._known:
+            raise ValueError(
+                f"no event {name!r}{did_you_mean(str(name), self._known, ALSO)}: there are {', '.join(self._known)}; "
+                f"declare one of your own with world.events.define({name!r})"
+            )
         if not callable(handler):
             raise TypeError(f"a handler for {name!r} must be callable, got {handler!r}")
         self._handlers.setdefault(name, []).append(handler)
@@ -59,6 +83,8 @@ class Events:
 
     def dispatch(self, name: str, *args: Any) -> None:
         """Call the handlers that were set when the event began and have not been removed since."""
+        if name not in self._known:
+            self.define(name)
         for handler in tuple(self._handlers.get(name, ())):
             if handler in self._handlers.get(name, ()):
                 _call(name, handler, args)

@@ -16,6 +16,7 @@ from ..data import esper_bridge
 from ..data.bodies import Bodies
 from ..data.component import Component
 from ..errors import CaromError, NoPhysicsError, PluginError
+from ..names import near_names
 from ..plugins.plugin import Plugin
 from ..plugins.registry import Registry
 from ..schedule.clock import Clock
@@ -45,7 +46,15 @@ class World(EntityVerbs, QueryVerbs):
         of the esper context, unique by default; ``"default"`` takes over esper's default context
 
     Inside ``with world:`` plain esper calls work on this world.
+
+    Attributes of your own go into a class derived from World, which declares them: ``score: int``.
     """
+
+    name: str
+    closed: bool
+    registry: Registry
+    physics: PhysicsServices | None
+    plugins: tuple[Plugin, ...]
 
     def __init__(self, *plugins: Plugin, settings: Settings | None = None, name: str | None = None) -> None:
         if settings is not None and not isinstance(settings, Settings):
@@ -63,7 +72,7 @@ class World(EntityVerbs, QueryVerbs):
         self.name = name
         self.closed = False
         self.registry = Registry()
-        self.physics: PhysicsServices | None = None
+        self.physics = None
         self.plugins = plugins
         self._settings = settings or Settings()
         self._events = Events()
@@ -87,6 +96,22 @@ class World(EntityVerbs, QueryVerbs):
         except BaseException:
             self._give_back()
             raise
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not (name.startswith("_") or hasattr(type(self), name) or self._declared(name)):
+            own = type(self) is not World
+            near = near_names(name, [n for n in dir(World) if n[0] != "_"], cutoff=0.75 if own else 0.6)
+            if near or not own:
+                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                raise AttributeError(
+                    f"{type(self).__name__} has no attribute {name!r}{hint}: attributes of your own go into a class "
+                    f"derived from World that declares them"
+                )
+        object.__setattr__(self, name, value)
+
+    @classmethod
+    def _declared(cls, name: str) -> bool:
+        return any(name in vars(base).get("__annotations__", ()) for base in cls.__mro__)
 
     # -- being an esper context -------------------------------------------------------------------
 
@@ -333,7 +358,10 @@ class World(EntityVerbs, QueryVerbs):
     # -- events -----------------------------------------------------------------------------------
 
     def on(self, name: str, handler: Callable[..., None]) -> Callable[..., None]:
-        """Call ``handler(contact)`` on contact_begin, contact_stay, contact_end or impact; or on events of your own."""
+        """Call ``handler(contact)`` on contact_begin, contact_stay, contact_end or impact; or on events of your own.
+
+        Those are declared by ``world.events.define(name)``, or have been dispatched: ValueError for another.
+        """
         return self._events.on(name, handler)
 
     def off(self, name: str, handler: Callable[..., None]) -> None:
@@ -341,7 +369,7 @@ class World(EntityVerbs, QueryVerbs):
         self._events.off(name, handler)
 
     def dispatch_event(self, name: str, *args: Any) -> None:
-        """Call the handlers of that event, esper's own included."""
+        """Call the handlers of that event, esper's own included; it is declared by that."""
         with self._context():
             self._events.dispatch(name, *args)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 import click
@@ -18,17 +17,18 @@ class Problem(click.ClickException):
 
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:
     """`; did you mean 'gas2d'?` for a near miss, else the known names (as many as fit in a line)."""
+    from ...framework.names import near_names  # only here: the command's help needs nothing of the framework
+
     names = list(known)
-    by_lower_case = {name.lower(): name for name in names}
-    near = difflib.get_close_matches(wrong.lower(), by_lower_case, n=3, cutoff=0.55)
+    near = near_names(wrong, names, count=3, cutoff=0.55)
     if near:
-        return f"; did you mean {' or '.join(repr(by_lower_case[name]) for name in near)}?"
+        return f"; did you mean {' or '.join(map(repr, near))}?"
     return f"; there are: {', '.join(names)}" if names else ""
 
 
 def one_line(error: BaseException) -> str:
     """The error's message in one line, with its type if the message alone is unclear."""
-    from ...framework import CaromError  # only here: the command's help needs nothing of the framework
+    from ...framework import CaromError  # only here, for the same reason
 
     text = _shortened(" ".join(str(error).split()))
     if isinstance(error, KeyError) and len(error.args) == 1 and isinstance(error.args[0], str):

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self, Unpack
 
 import numpy as np
 
-from ...components.colliders import ALL_LAYERS, Collider
+from ...components.colliders import Collider, ColliderFields
 from ...framework import Plugin, array_column, column
 from ...framework.data.columns import Column
+from ...framework.typing import ArrayField, Vector
 from .cells import sums_of, tiles_of, tiles_of_sums, wrong_with
 
 plugin = Plugin("tile_grid", version="1.0")
 
+Faces = Literal["all", "floors", "walls"]
 FACES = ("all", "floors", "walls")
 ALL, FLOORS, WALLS = range(3)
 
@@ -41,35 +43,31 @@ class TileGridCollider(Collider):
     dimensions: ClassVar[tuple[int, ...]] = (2,)
     convex: ClassVar[bool] = False
 
-    sums = array_column(1, rows=(5, 2**31), check=wrong_with, lengths=False)
-    tile_size = column(positive=True)
-    faces = column("all", choices=FACES)
+    sums: ArrayField = array_column(1, rows=(5, 2**31), check=wrong_with, lengths=False)
+    tile_size: float = column(positive=True)
+    faces: Faces = column(default="all", choices=FACES)
 
     def __init__(
         self,
         cells: Any,
         tile_size: float,
         *,
-        faces: str = "all",
-        lower: Any = None,
-        offset: Any = 0.0,
-        restitution: float = 0.0,
-        friction: float | None = None,
-        sensor: bool = False,
-        layer: int = 1,
-        mask: int = ALL_LAYERS,
+        faces: Faces = "all",
+        lower: Vector | None = None,
+        **common: Unpack[ColliderFields],
     ) -> None:
         tiles = tiles_of(cells)
-        size = type(self).tile_size.checked(tile_size)
+        size = self.columns["tile_size"].checked(tile_size)
         if lower is not None:
-            if np.any(offset):
-                raise ValueError(f"TileGridCollider: lower says where the map lies, and offset too, got {offset!r}")
-            offset = np.broadcast_to(LOWER.checked(lower), 2) + 0.5 * size * np.array(tiles.shape[::-1])
-        common = {"offset": offset, "restitution": restitution, "friction": friction, "sensor": sensor}
-        self._fill({"sums": sums_of(tiles), "tile_size": size, "faces": faces, **common, "layer": layer, "mask": mask})
+            if np.any(common.get("offset", 0.0)):
+                raise ValueError(
+                    f"TileGridCollider: lower says where the map lies, and offset too, got {common.get('offset')!r}"
+                )
+            common["offset"] = np.broadcast_to(LOWER.checked(lower), 2) + 0.5 * size * np.array(tiles.shape[::-1])
+        self._fill({"sums": sums_of(tiles), "tile_size": size, "faces": faces, **common})
 
     @classmethod
-    def floors_and_walls(cls, cells: Any, tile_size: float, **common: Any) -> tuple[Self, Self]:
+    def floors_and_walls(cls, cells: Any, tile_size: float, **common: Unpack[ColliderFields]) -> tuple[Self, Self]:
         """The map as two colliders, for two entities: its floors and ceilings, and its walls.
 
         Two bodies have only one contact. A body that is pushed against a wall and stands on the floor needs two, so

@@ -12,11 +12,11 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Check, Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import ContactRows, Contacts, ContactSource, EntityLookup
+from ...framework.world.events import CONTACT_EVENTS
 from ..staged import StagedSystem
 from .event_stages import compare_contacts
 
 Columns = dict[str, np.ndarray]
-EVENTS = ("contact_begin", "contact_stay", "contact_end", "impact")
 
 
 class RecordedContacts(ContactSource):
@@ -198,12 +198,12 @@ class ContactEvents(StagedSystem):
         end = source.ended() if events.wanted("contact_end") else None
         stay = source.stay_columns() if events.wanted("contact_stay") else None
         impacts = source.impacts() if events.wanted("impact") else None
-        for columns, event in zip((begin, stay, end, impacts), EVENTS, strict=True):
+        for columns, event in zip((begin, stay, end, impacts), CONTACT_EVENTS, strict=True):
             if columns is not None and len(columns["entity_a"]) and events.wanted(event):
                 events.dispatch_many(event, ContactRows(columns, self._lookup))
 
     def reason(self) -> str:
         if not self._state.collides:
             return "no colliders: nothing to do"
-        wanted = [event for event in EVENTS if self.world.events.wanted(event)]
+        wanted = [event for event in CONTACT_EVENTS if self.world.events.wanted(event)]
         return f"handlers of {', '.join(wanted)}" if wanted else "begin, stay, end; no event has a handler"

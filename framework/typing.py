@@ -1,0 +1,40 @@
+"""Types of what users give and get, for checkers and editors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+Vector: TypeAlias = Sequence[float] | NDArray[Any]  # d numbers, in whatever holds them
+
+if TYPE_CHECKING:
+
+    class VectorField:
+        """A field of a component that takes d numbers, or one for all of them, and gives an array (d,)."""
+
+        def __get__(self, component: object, owner: type[Any] | None = None) -> Array: ...
+
+        def __set__(self, component: object, value: Vector | float) -> None: ...
+
+    class RotationField:
+        """Takes an angle in 2D or four numbers in 3D; gives a float in 2D, an array (4,) in 3D."""
+
+        def __get__(self, component: object, owner: type[Any] | None = None) -> Any: ...
+
+        def __set__(self, component: object, value: Vector | float) -> None: ...
+
+    class ArrayField:
+        """Takes what becomes an array (n, width); gives that array, which cannot be written to."""
+
+        def __get__(self, component: object, owner: type[Any] | None = None) -> Array: ...
+
+        def __set__(self, component: object, value: Sequence[Vector] | Vector) -> None: ...
+
+else:
+    VectorField = RotationField = ArrayField = Any
+
+__all__ = ["Array", "ArrayField", "RotationField", "Vector", "VectorField"]
