@@ -6,8 +6,10 @@ from .data.columns import Column, column
 from .data.component import Component
 from .errors import (
     CaromError,
+    FaultError,
     MissingComponentError,
     NoPhysicsError,
+    PhysicsWarning,
     PluginError,
     ScheduleError,
     StepError,
@@ -19,6 +21,7 @@ from .schedule.phases import ForceSystem, Phase, System
 from .schedule.plan import Plan
 from .schedule.profile_report import Stats
 from .settings import Settings
+from .typing import Vector
 from .world.contacts import Contact, Contacts, ContactsBetween
 from .world.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
 from .world.world import World
@@ -34,6 +37,7 @@ __all__ = [
     "Contacts",
     "ContactsBetween",
     "Convex",
+    "FaultError",
     "ForceSystem",
     "Hits",
     "MissingComponentError",
@@ -42,6 +46,7 @@ __all__ = [
     "Neighbours",
     "NoPhysicsError",
     "Phase",
+    "PhysicsWarning",
     "Plan",
     "Plugin",
     "PluginError",
@@ -51,6 +56,7 @@ __all__ = [
     "StepError",
     "System",
     "UnhandledPairError",
+    "Vector",
     "World",
     "array_column",
     "column",

@@ -17,6 +17,14 @@ class StepError(CaromError):
     """A system raised inside a step; carom's columns and clock are back at the start of that step."""
 
 
+class FaultError(CaromError):
+    """A step has found a fault, and ``Settings.on_fault`` is "raise"; the step is complete."""
+
+
+class PhysicsWarning(UserWarning):
+    """A fault, see ``world.faults``: once for each kind and body, if ``Settings.on_fault`` is "warn"."""
+
+
 class UnhandledPairError(CaromError):
     """Two shapes can meet in this world and no plugin says how."""
 

@@ -13,6 +13,7 @@ from .names import did_you_mean
 MIXING_RULES = ("average", "geometric_mean", "max", "min", "multiply")
 COLLISION_MODES = ("discrete", "continuous", "event_driven")
 GEOMETRY_MODES = ("precise", "bounds")
+FAULT_MODES = ("warn", "raise", "ignore")
 DISCRETE_CAP = 8  # impacts of a body in a step: where many overlap at its end, more cost much and change little
 SWEPT_CAP = 64  # a fast body may well cross a narrow gap so often
 AUTOMATIC = "automatic"  # the broad phase that suits the scene
@@ -53,6 +54,9 @@ class Settings:
         automatic: what suits the scene, see ``world.plan()``; or one that a plugin brings
     debug
         check the bodies' state for non-finite values at every system, not only at the end of the step
+    on_fault
+        warn: PhysicsWarning and a line of the logger ``carom``, once for each kind of fault and body; raise: FaultError
+        at the end of the step that found it, which is complete; ignore: nothing. All are in ``world.faults``
     """
 
     dt: float = 1 / 60
@@ -68,6 +72,7 @@ class Settings:
     friction_mixing: str = "geometric_mean"
     broad_phase: str = "automatic"
     debug: bool = False
+    on_fault: str = "warn"
 
     def __post_init__(self) -> None:
         self._number("dt", above=0.0)
@@ -88,6 +93,7 @@ class Settings:
         for name, known in (
             ("collision", COLLISION_MODES),
             ("geometry", GEOMETRY_MODES),
+            ("on_fault", FAULT_MODES),
         ):
             if getattr(self, name) not in known:
                 raise ValueError(f"Settings.{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 
 import click
 
 from .. import __version__
 from ..framework.compilation import log
+from ..framework.errors import PhysicsWarning
 from .commands.group import LateCommand, LateCommands
 
 # By name: where it is, and its line in the help.
@@ -52,4 +54,5 @@ def cli(context: click.Context) -> None:
 def main() -> None:
     """The entry point of the ``carom`` script and of ``python -m carom``."""
     log.processes, log.background = os.cpu_count() or 1, False
+    warnings.simplefilter("ignore", PhysicsWarning)  # commands show world.faults in their results
     cli()

@@ -355,8 +355,10 @@ class LostSprings(System):
             longest = 4.0 / (damped + math.sqrt(damped * damped + 4.0 * stiff))
             self.world.report_fault(
                 f"springs: dt = {dt:.3g} s is too long for springs this stiff on bodies this light (highest frequency "
-                f"{math.sqrt(stiff):.4g} rad/s, damping rate {damped:.4g} /s); they hold up to dt = {longest:.3g} s"
-            )
+                f"{math.sqrt(stiff):.4g} rad/s, damping rate {damped:.4g} /s); they hold up to dt = {longest:.3g} s: "
+                f"use smaller steps, softer springs or heavier bodies",
+                kind="springs",
+            )  # fmt: skip
 
     def reason(self) -> str:
         return f"{len(self._springs)} springs: removes those whose bodies are gone"

@@ -29,6 +29,11 @@ LONG = (
 )  # fmt: skip
 
 
+def pytest_configure(config):
+    """Tests look at world.faults; those of warnings set filters of their own."""
+    config.addinivalue_line("filterwarnings", "ignore::carom.framework.PhysicsWarning")
+
+
 def pytest_collection_modifyitems(items):
     """All workers collect in the same order."""
     items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))

@@ -11,6 +11,7 @@ from ..compilation import log
 from ..data import esper_bridge
 from ..errors import CaromError, NoPhysicsError, StepError
 from .clock import Clock
+from .faults import Faults
 from .phases import FIRST_PRIORITY, Phase, System
 from .profiler import Profiler
 from .stages import PythonPart, Segment, merged
@@ -41,7 +42,7 @@ class Pipeline:
         self.order = SystemOrder(self)
         self.in_step = False
         self.profiler = Profiler(self)
-        self.faults: list[str] = []
+        self.faults = Faults(lambda: world.settings)
         self._events = world.events
         self._in_window = False
         self._parts: list[Any] = []  # what a step runs, in order
@@ -114,6 +115,8 @@ class Pipeline:
                         esper.process(self.clock.dt)
                 else:
                     self._run(self.clock.dt, False)
+                if self.faults.pending and self.faults.stopping:
+                    break
         finally:
             self._in_window = False
         self._close_window()
@@ -264,6 +267,11 @@ class Pipeline:
     def _close_window(self) -> None:
         if self.world.physics is not None:
             self.world.physics.end_window()
+        if self.faults.pending:
+            self._tell_faults()
+
+    def _tell_faults(self) -> None:
+        self.faults.tell(f"step {self.clock.step_count - 1} of world {self.world.name!r}")
 
     def synchronize(self) -> None:
         """Bring the table in step with esper, unless a step is running: its rows stand still."""
@@ -295,6 +303,8 @@ class Pipeline:
             if physics is not None:
                 physics.table.in_step = False
             self.order.apply()
+        if self.faults.pending:
+            self._tell_faults()
 
     # -- when something raises --------------------------------------------------------------------
 

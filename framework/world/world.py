@@ -397,13 +397,15 @@ class World(EntityVerbs, QueryVerbs):
     @property
     def faults(self) -> list[str]:
         """What went wrong without stopping the world: bodies whose state is no longer finite, limits reached."""
-        return self._pipeline.faults
+        return self._pipeline.faults.texts
 
-    def report_fault(self, text: str) -> None:
-        """Add to :attr:`faults`, which hold the last 100 different ones."""
-        if text not in self._pipeline.faults:
-            self._pipeline.faults.append(text)
-        del self._pipeline.faults[:-100]
+    def report_fault(self, text: str, *, kind: str | None = None, entity: int | None = None) -> None:
+        """Add to :attr:`faults`, which hold the last 100 different ones, and tell it as ``settings.on_fault`` says.
+
+        Faults of one kind and of one entity are told once; without a kind, those of the same text. Inside a step they
+        are told at its end, outside at the end of the next.
+        """
+        self._pipeline.faults.report(text, kind, entity)
 
     def plan(self) -> Plan:
         """What a step of the bodies there are now runs, in order, with which kernels, on which columns, and why."""

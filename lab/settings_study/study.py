@@ -196,6 +196,10 @@ VARIED: tuple[Varied, ...] = (
         "debug", "jump", at.scene_of("jump"), (False, True), at.same_as(debug=False), SAME,
         "bodies that end elsewhere than without, in a world of one body, whose steps cost least", 1.0, 1.0,
     ),
+    Varied(
+        "on_fault", "jump", at.scene_of("jump"), ("warn", "raise", "ignore"), at.same_as(on_fault="warn"), SAME,
+        "bodies that end elsewhere than with the default, in a world without faults", 1.0, 1.0,
+    ),
 )  # fmt: skip
 
 

@@ -166,19 +166,26 @@ class ContactEvents(StagedSystem):
     def _report_faults(self) -> None:
         state, solver, bodies = self._state, self._state.solver, self._state.bodies
         if state.hasty:
+            entity = int(bodies.entity[state.hasty_row])
             self.world.report_fault(
-                f"entity {bodies.entity[state.hasty_row]}: so fast that discrete collisions may miss what it passes"
-            )
+                f"entity {entity}: so fast that discrete collisions may miss what it passes: set its ccd, or "
+                f"Settings.collision = 'continuous', or use smaller steps",
+                kind="hasty", entity=entity,
+            )  # fmt: skip
         if solver.squeezed:
+            entity = int(bodies.entity[solver.squeezed_row])
             self.world.report_fault(
                 f"step {self.world.step_count}: no room for {solver.squeezed} squeezed bodies, the first is entity "
-                f"{bodies.entity[solver.squeezed_row]}"
-            )
+                f"{entity}: stop earlier what squeezes them, or use masses that differ less",
+                kind="squeezed", entity=entity,
+            )  # fmt: skip
         if self._impacts.capped:
             self.world.report_fault(
                 f"step {self.world.step_count}: {self._impacts.capped} impacts beyond {self._settings().impact_cap} "
-                f"of a body in one step"
-            )
+                f"of a body in one step: raise Settings.max_impacts_per_step or use smaller steps; the rest was solved "
+                f"as contact at rest",
+                kind="impacts",
+            )  # fmt: skip
 
     def _record(self) -> None:
         """Record what has begun, ended and bounced."""

@@ -66,7 +66,7 @@ class Quarantine:
         by entity, the field that was named in a fault; until the body takes part again
     """
 
-    def __init__(self, state: Record, table: Table, scene: Scene, report_fault: Callable[[str], None]) -> None:
+    def __init__(self, state: Record, table: Table, scene: Scene, report_fault: Callable[..., None]) -> None:
         self._state, self._table, self._scene, self.report_fault = state, table, scene, report_fault
         self.told: dict[int, str] = {}
         self._far: set[int] = set()  # who has been told to be too far from the origin
@@ -170,8 +170,9 @@ class Quarantine:
         self.told[entity] = field
         self._state.quarantining = True
         self.report_fault(
-            f"{prefix}entity {entity}: {field} is {value}; until it is mended the body takes no part in the simulation"
-        )
+            f"{prefix}entity {entity}: {field} is {value}; until it is mended the body takes no part in the simulation",
+            kind="quarantine", entity=entity,
+        )  # fmt: skip
 
     def out_now(self) -> np.ndarray:
         """(count,) mask of the bodies that are out."""
@@ -217,8 +218,9 @@ class Quarantine:
                 apart = float(np.spacing(np.abs(position[k][stuck[k]]).max()))
                 self.report_fault(
                     f"entity {entity}: too far from the origin to move: at {position[k].tolist()} numbers are "
-                    f"{apart:.3g} m apart; bring the scene nearer to the origin, or take longer steps"
-                )
+                    f"{apart:.3g} m apart; bring the scene nearer to the origin, or take longer steps",
+                    kind="far", entity=entity,
+                )  # fmt: skip
 
     def _forget_contacts(self, out: np.ndarray) -> None:
         """Contacts at rest of the last step with these bodies count as those with bodies that are gone."""

@@ -1,0 +1,72 @@
+"""Faults: what went wrong without stopping the world, and how it is told."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import warnings
+from collections.abc import Callable
+
+from ..errors import FaultError, PhysicsWarning
+from ..settings import Settings
+
+KEPT = 100  # different texts
+TOLD_AT_ONCE = 10  # in one step; a world that breaks as a whole does not fill the screen
+REMEMBERED = 10_000  # kinds and bodies; beyond it everything may be told once more
+
+logger = logging.getLogger("carom")
+
+
+class Faults:
+    """The faults of one world.
+
+    texts
+        the last 100 that differ
+    pending
+        those that the step has found and that are to be told at its end
+    """
+
+    def __init__(self, settings: Callable[[], Settings]) -> None:
+        self.texts: list[str] = []
+        self.pending: list[str] = []
+        self._settings = settings
+        self._told: set[tuple[str, int | None]] = set()  # kinds and bodies
+
+    def report(self, text: str, kind: str | None, entity: int | None) -> None:
+        """Note a fault; ``kind`` and ``entity`` say which others it is like (None: only those with the same text)."""
+        if text not in self.texts:
+            self.texts.append(text)
+        del self.texts[:-KEPT]
+        how, key = self._settings().on_fault, (text if kind is None else kind, entity)
+        if how == "raise" or (how == "warn" and key not in self._told):
+            if len(self._told) >= REMEMBERED:
+                self._told.clear()
+            self._told.add(key)
+            self.pending.append(text)
+
+    @property
+    def stopping(self) -> bool:
+        """Whether there is something to raise."""
+        return bool(self.pending) and self._settings().on_fault == "raise"
+
+    def tell(self, where: str) -> None:
+        """Warn of what is pending, or raise it; between two steps."""
+        texts, self.pending = self.pending, []
+        if len(texts) > TOLD_AT_ONCE:
+            more = len(texts) - TOLD_AT_ONCE + 1
+            texts[TOLD_AT_ONCE - 1 :] = [f"and {more} more faults like these, the last of them in world.faults"]
+        if logger.hasHandlers():  # else Python would print them a second time
+            for text in texts:
+                logger.warning(text)
+        if self._settings().on_fault == "raise":
+            raise FaultError(f"{where}: {'; '.join(texts)} (the step is complete)")
+        for text in texts:
+            warnings.warn(text, PhysicsWarning, stacklevel=_depth_of_caller())
+
+
+def _depth_of_caller() -> int:
+    """The stack level of the code that has called carom, or called it through esper."""
+    frame, depth = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in ("carom", "esper"):
+        frame, depth = frame.f_back, depth + 1
+    return depth
