@@ -98,9 +98,7 @@ def prepare(simulation: Simulation, world: World, components: tuple[type[Any], .
     wanted = {c for c in components if issubclass(c, Collider)}
     wanted.update(c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[: table.count].any())
     in_order(registry, wanted)
-    for component in sorted(wanted, key=lambda c: c.__name__):
-        table.check_component_type(component)
-        table.add_component_type(component)
+    simulation.adoption.register(sorted({*wanted, *components}, key=lambda c: c.__name__))
     scene.prepared |= wanted
     scene.forget()
     with simulation.attribute_errors():

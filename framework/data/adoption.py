@@ -7,7 +7,7 @@ Entities that were created in bulk (batches) come as arrays and have no handles.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Set
+from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -107,6 +107,12 @@ class Adoption:
         cleared = self._cleared
         self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
         return self._apply(changes, cleared)
+
+    def register(self, components: Iterable[type[Component]]) -> None:
+        """Columns of these types exist from now on, whether a body has them or not; ValueError for taken names."""
+        for component in components:
+            self.table.check_component_type(component)
+            self.table.add_component_type(component)
 
     def release(self) -> None:
         """Let all handles go: the world closes, they keep their last values."""

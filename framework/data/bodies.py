@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..names import did_you_mean
 from .component import Component
 from .table import DYNAMIC, KINEMATIC, STATIC, Table
 
@@ -67,7 +68,7 @@ class Bodies:
         prefix = name + "."
         if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):
             return Fields(self, prefix)
-        raise AttributeError(f"bodies have no column {name!r}; they have {', '.join(self.column_names())}")
+        raise _no_column(name, self.column_names())
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name in Bodies.__slots__:
@@ -133,10 +134,17 @@ class SelectedBodies:
         prefix = name + "."
         if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):
             return Fields(self, prefix)
-        raise AttributeError(f"bodies have no column {name!r}")
+        raise _no_column(name, Bodies(self._table).column_names())
 
     def scatter_force(self) -> None:
         self._table.make("force")[self._rows] = self._force
+
+
+def _no_column(name: str, known: list[str]) -> AttributeError:
+    return AttributeError(
+        f"bodies have no column {name!r}{did_you_mean(name, known)}; they have {', '.join(known)}; those of a component "
+        f"that no body has had yet are there after world.register(...) with its class"
+    )
 
 
 def _write(view: Any, value: Any, name: str) -> None:

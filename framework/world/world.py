@@ -346,11 +346,22 @@ class World(EntityVerbs, QueryVerbs):
         self._open()
         self._pipeline.run(Phase(phase))
 
+    def register(self, *component_types: type[Component]) -> None:
+        """Columns of these components are in ``bodies`` from now on, before a body has one; between two steps.
+
+        A component is registered by itself when the first body has it. TypeError for what is no Component.
+        """
+        self._pipeline.must_be_between_steps("components can be registered")
+        for component in component_types:
+            if not (isinstance(component, type) and issubclass(component, Component)):
+                raise TypeError(f"register takes component types, got {component!r}")
+        self._synchronized().adoption.register(component_types)
+
     def prepare(self, *component_types: type[Any]) -> None:
         """Compile ahead what bodies of these component types, and those there are, will need; between two steps.
 
         All of it: impacts and rest, trees for hundreds of bodies, queries, what force systems call. Whatever of these
-        types comes and goes later, nothing compiles in mid-game.
+        types comes and goes later, nothing compiles in mid-game. It registers them too.
         """
         self._pipeline.must_be_between_steps("a world can be prepared")
         self._synchronized().prepare(component_types)
