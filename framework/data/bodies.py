@@ -142,8 +142,8 @@ class SelectedBodies:
 
 def _no_column(name: str, known: list[str]) -> AttributeError:
     return AttributeError(
-        f"bodies have no column {name!r}{did_you_mean(name, known)}; they have {', '.join(known)}; those of a component "
-        f"that no body has had yet are there after world.register(...) with its class"
+        f"bodies have no column {name!r}{did_you_mean(name, known)}; they have {', '.join(known)}; those of a "
+        f"component that no body has had yet are there after world.register(...) with its class"
     )
 
 
