@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from ...framework.compilation import part
 from ..codes import NEED_CONTACTS, OK
 
 
-def publish_contacts(state, dt):
-    """The contacts at the end of the step, in canonical order; disabled pairs count as not touching."""
+@part
+def write_contacts(state):
+    """The touching pairs as the contacts of the step, in canonical order; disabled pairs count as not touching."""
     pairs, contacts, entity = state.pairs, state.contacts, state.bodies.entity
     if pairs.touching_count > len(contacts.began):
         state.needed = pairs.touching_count
@@ -30,8 +32,33 @@ def publish_contacts(state, dt):
     return OK
 
 
+def publish_contacts(state, dt):
+    """The contacts at the end of the step."""
+    return write_contacts(state)
+
+
+@part
+def publish_found(state):
+    """What overlaps where free flight leads, as the contacts of a step in which no response has looked at its end."""
+    pairs, count = state.pairs, 0
+    for h in range(pairs.found):
+        c = pairs.hits[h]
+        if pairs.hit[c]:
+            pairs.impulse[c], pairs.touching[count] = 0.0, c
+            count += 1
+    pairs.touching_count = count
+    code = write_contacts(state)
+    if code == OK:
+        state.contacts_counted += count
+    return code
+
+
 def compare_contacts(state, dt):
     """Rows of the contacts that ceased, began and stayed; both lists are in canonical order."""
+    if state.found_current:
+        code = publish_found(state)
+        if code != OK:
+            return code
     contacts = state.contacts
     now = contacts.now
     old, i, j, ends, begins, stays = 1 - now, 0, 0, 0, 0, 0

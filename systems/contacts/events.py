@@ -114,8 +114,22 @@ def _repeated(number: int, count: int) -> np.ndarray:
     return column
 
 
+def disabled_pairs(state: Record, contacts: Contacts) -> np.ndarray:
+    """The pairs found by the narrow phase whose contact a system has disabled; noted in the state too."""
+    pairs, enabled = state.pairs, contacts.enabled_now()
+    if not state.found_current or enabled is None or enabled.all():
+        return np.empty(0, np.int64)
+    disabled = pairs.hits[: pairs.found][~enabled]
+    pairs.reserve(len(disabled), "disabled")
+    pairs.disabled[: len(disabled)] = disabled
+    pairs.disabled_count = len(disabled)
+    return disabled
+
+
 class ContactEvents(StagedSystem):
     """Compares the pairs that touch with those of the step before; an end is always delivered.
+
+    In a step without the built-in response these are the pairs that the narrow phase has found.
 
     Reads the contacts; writes ``contacts.begin``, ``stay``, ``end``; calls the handlers of contact_begin,
     contact_stay, contact_end and impact, in canonical order.
@@ -154,8 +168,11 @@ class ContactEvents(StagedSystem):
 
     def _take_disabled(self, dt: float) -> None:
         """Contacts that a system has disabled after RESPONSE count as not touching."""
+        if self._state.found_current:  # no response has run
+            disabled_pairs(self._state, self._contacts)
+            return
         enabled, contacts = self._contacts.enabled_now(), self._state.contacts
-        if enabled is not None and not self._state.found_current:
+        if enabled is not None:
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
     def _defer(self, dt: float) -> None:

@@ -15,6 +15,7 @@ from ..impacts.stages import begin_impacts, resolve_impacts
 from ..staged import StagedSystem
 from .bodies import gather, put_back
 from .event_stages import publish_contacts
+from .events import disabled_pairs
 from .last_word import obey_statics
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
@@ -79,13 +80,7 @@ class Response(StagedSystem):
 
     def _take_disabled(self, dt: float) -> None:
         """Pairs whose contact a system has disabled push no more in this step."""
-        pairs, enabled = self._state.pairs, self._contacts.enabled_now()
-        if not self._state.found_current or enabled is None or enabled.all():
-            return
-        disabled = pairs.hits[: pairs.found][~enabled]
-        pairs.reserve(len(disabled), "disabled")
-        pairs.disabled[: len(disabled)] = disabled
-        pairs.disabled_count = len(disabled)
+        pairs, disabled = self._state.pairs, disabled_pairs(self._state, self._contacts)
         pairs.is_solid[disabled] = False
 
     def reason(self) -> str:
