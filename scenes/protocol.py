@@ -7,6 +7,8 @@ from typing import Protocol
 
 from ..framework import Settings, World
 
+USUAL = Settings()
+
 
 class Build(Protocol):
     """``build(settings, seed=0) -> World``: the same settings and seed give the same world, bit for bit."""
@@ -19,7 +21,7 @@ class Scene:
     """One scene of the library.
 
     ``seconds`` is the recommended simulated time; ``view`` is the part of space to draw, as its lower and upper
-    corner (one number per dimension each).
+    corner (one number per dimension each); ``settings`` are those that ``build(None)`` takes.
     """
 
     name: str
@@ -27,6 +29,7 @@ class Scene:
     build: Build
     seconds: float
     view: tuple[tuple[float, ...], tuple[float, ...]]
+    settings: Settings = USUAL
 
     @property
     def dimensions(self) -> int:

@@ -127,7 +127,7 @@ def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
         for path in python_files(floor):
             expected.add("/".join((*package_of(path.parent).split("."), path.name)))
     assert names == expected
-    assert "carom = carom.lab.cli:main" in entry_points
+    assert "carom = carom.__main__:main" in entry_points
 
 
 def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):

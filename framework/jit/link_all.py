@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import signal
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -82,6 +83,7 @@ def _taken(following: Any, count: int) -> Iterator[int]:
 
 def _help(functions: Sequence[Linkable], following: Any, compiled: Any) -> None:
     """What another process does; a function that cannot be compiled raises in the first process when that links it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches both; the first process ends this one
     log.listeners, log.announced, log.processes = [], True, 1
     for number in _taken(following, len(functions)):
         known = len(log.compiled)

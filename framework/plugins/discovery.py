@@ -56,7 +56,7 @@ def _load(point: importlib.metadata.EntryPoint, twice: bool) -> Offer:
         plugin = loaded if isinstance(loaded, Plugin) else loaded()
         if not isinstance(plugin, Plugin):
             plugin, problem = None, f"{point.value} is no Plugin and makes none"
-    except Exception as error:  # somebody else's code: whatever is wrong with it is said in the list
+    except (Exception, SystemExit) as error:  # somebody else's code: whatever is wrong with it is said in the list
         problem = f"{type(error).__name__}: {error}"
     if twice:
         problem = f"several packages offer this name{f'; {problem}' if problem else ''}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ..data.component import Component
-from ..errors import PluginError, UnhandledPairError
+from ..errors import PluginError
 from ..settings import AUTOMATIC, MIXING_RULES
 
 if TYPE_CHECKING:
@@ -186,13 +186,6 @@ class Registry:
             return None
         sides = {"first": convex} if first is Convex else {"second": convex}
         return replace(pair, **sides, helpers=(shape.support, shape.rounding))
-
-    def require_pairs(self, components: list[type[Component]]) -> None:
-        """UnhandledPairError if two of these shapes can meet and no plugin says how."""
-        for index, first in enumerate(components):
-            for second in components[index:]:
-                if self.pair(first, second) is None:
-                    raise UnhandledPairError(self.unhandled(first, second))
 
     def unhandled(self, first: type[Component], second: type[Component], where: str = "") -> str:
         """What to say of a pair that no plugin handles."""

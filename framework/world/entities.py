@@ -84,6 +84,11 @@ class EntityVerbs:
         contents = self._contents()
         return entity in contents.entities and entity not in contents.dead
 
+    def get_entities(self) -> list[int]:
+        """The ids of all entities but those marked for deletion, ascending."""
+        contents = self._contents()
+        return sorted(entity for entity in contents.entities if entity not in contents.dead)
+
     def add_component(self, entity: int, component: Any, type_alias: type[Any] | None = None) -> None:
         """Add a component, or replace the one of its type; seen by the next step.
 
@@ -103,6 +108,12 @@ class EntityVerbs:
             if not esper.has_component(entity, component_type):
                 raise KeyError(f"entity {entity} has no {component_type.__name__}")
             return esper.remove_component(entity, component_type)
+
+    def try_remove_component(self, entity: int, component_type: type[C]) -> C | None:
+        """Remove and return a component; None if the entity or the component does not exist."""
+        if component_type not in self._contents().entities.types_of(entity):
+            return None
+        return self.remove_component(entity, component_type)
 
     def has_component(self, entity: int, component_type: type[Any]) -> bool:
         return component_type in self._types_of(entity)

@@ -7,7 +7,7 @@ import math
 import numbers
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import esper
 import numpy as np
@@ -31,6 +31,8 @@ from .entities import EntityVerbs
 from .events import Events
 from .queries import QueryVerbs
 from .services import PhysicsServices
+
+P = TypeVar("P", bound=esper.Processor)
 
 _numbers = itertools.count(1)
 
@@ -292,6 +294,12 @@ class World(EntityVerbs, QueryVerbs):
         """esper's verb: by type, the last one added of it; an instance is taken too."""
         self._open()
         self._pipeline.order.remove_processor(processor)
+
+    def get_processor(self, processor_type: type[P]) -> P | None:
+        """esper's verb: the last one added of that type, carom's systems too; None if there is none."""
+        self._open()
+        processors = self._pipeline.order.in_esper_order()
+        return next((one for one in reversed(processors) if type(one) is processor_type), None)
 
     @property
     def force_systems(self) -> list[ForceSystem]:

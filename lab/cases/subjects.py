@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import hashlib
 import importlib.metadata
@@ -51,7 +52,7 @@ class Subject:
         loaded = _load_once(self.target)
         if not self.options:
             return loaded
-        return Loaded(loaded.name, functools.partial(loaded.function, **dict(self.options)), loaded.file)
+        return dataclasses.replace(loaded, function=functools.partial(loaded.function, **dict(self.options)))
 
     @property
     def recommended(self) -> tuple[float, Any]:
@@ -78,15 +79,17 @@ class Subject:
         if self.build is not None:
             text += _source_of(self.build)
         elif self.target not in scenes.names():
-            text += _text_around(_load_once(self.target).file)
+            text += _text_around(_load_once(self.target))
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def _text_around(file: Path | None) -> str:
+def _text_around(loaded: Loaded) -> str:
     """The text of the file and of the modules it has imported from its folder."""
-    if file is None:
+    file = loaded.file
+    if file is None or loaded.siblings is None:
         return ""
-    places = {Path(found) for module in list(sys.modules.values()) if (found := getattr(module, "__file__", None))}
+    modules = list(sys.modules.values())
+    places = {Path(found) for module in modules if (found := getattr(module, "__file__", None))} | loaded.siblings.files
     near = {place for place in places if place.is_relative_to(file.parent) and "site-packages" not in place.parts}
     sources = [place for place in sorted({file, *near}) if place.suffix == ".py" and place.is_file()]
     return "".join(place.read_text(encoding="utf-8", errors="replace") for place in sources)

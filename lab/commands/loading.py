@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import hashlib
 import importlib.machinery
 import importlib.util
 import inspect
@@ -21,6 +22,7 @@ import numpy as np
 from ... import scenes
 from ...framework import Plugin, Settings, World
 from .choices import apply
+from .siblings import Siblings
 from .usage_errors import Problem, did_you_mean, one_line
 
 Bounds = tuple[tuple[float, ...], tuple[float, ...]]
@@ -28,34 +30,45 @@ Bounds = tuple[tuple[float, ...], tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Loaded:
-    """Something that builds worlds; ``seconds`` and ``view`` are None if not defined."""
+    """Something that builds worlds; ``seconds`` and ``view`` are None if not defined.
+
+    settings
+        those that it recommends; None: not known before a world is built
+    """
 
     name: str
     function: Any
     file: Path | None = None
     seconds: float | None = None
     view: Bounds | None = None
+    settings: Settings | None = None
+    siblings: Siblings | None = None
 
     def build(
         self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
     ) -> World:
         """A world with ``settings`` (None: the scene's own; for a file the default ones) and with additional plugins;
         Problem if it fails."""
-        if settings is None and self.file is not None:
-            settings = Settings()
+        if settings is None:
+            settings = self.settings
         brought = {name for plugin in plugins for name in _names_for_settings(plugin)}
         late = {field: value for field, value in changes.items() if value in brought}
         early = {field: value for field, value in changes.items() if field not in late}
+        if early:
+            settings = apply(settings or Settings(), early)
         world = self._call(settings, seed)
-        if early:  # the scene's own settings are known only once it is built
-            changed = apply(world.settings, early)
-            world.close()
-            world = self._call(changed, seed)
+        for field, value in early.items():
+            if getattr(world.settings, field) != value:
+                world.close()
+                raise Problem(
+                    f"{self.name}: build ignores its settings, so --set {field}={value} has no effect: give them to "
+                    f"the world, World(..., settings=settings)"
+                )
         for plugin in plugins:
             try:
                 with stdout_kept_clean():
                     world.add_plugin(plugin)
-            except Exception as error:  # runs third-party code that creates systems
+            except (Exception, SystemExit) as error:  # runs third-party code that creates systems
                 raise Problem(f"--plugin {plugin.name}: {one_line(error)}") from error
         if late:
             with self.attribute_errors():
@@ -73,9 +86,13 @@ class Loaded:
 
     @contextmanager
     def attribute_errors(self) -> Iterator[None]:
-        """Convert exceptions raised inside to a Problem that names the line of the user's file."""
+        """Convert exceptions raised inside to a Problem that names the line of the user's file.
+
+        Imports inside find the modules beside that file.
+        """
         try:
-            yield
+            with self.siblings.at_hand() if self.siblings is not None else contextlib.nullcontext():
+                yield
         except (Exception, SystemExit) as error:
             if isinstance(error, Problem):
                 raise
@@ -96,7 +113,7 @@ def load(target: str) -> Loaded:
     """The scene named ``target``, or the file at that path; Problem if neither exists."""
     if target in scenes.names():
         scene = scenes.get(target)
-        return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view)
+        return Loaded(scene.name, scene.build, seconds=scene.seconds, view=scene.view, settings=scene.settings)
     path = Path(target)
     if path.is_dir():
         raise Problem(f"{target!r} is a folder, not a scene or a file")
@@ -114,7 +131,7 @@ def load(target: str) -> Loaded:
 def import_file(path: Path) -> ModuleType:
     """Import the module in that file; Problem if it does not exist or raises."""
     _must_exist(path)
-    return _execute(path)
+    return _execute(path, Siblings(path))
 
 
 def _must_exist(path: Path) -> None:
@@ -129,12 +146,14 @@ def _must_exist(path: Path) -> None:
 def _load_file(path: Path) -> Loaded:
     _must_exist(path)
     _check_source(path)
-    module = _execute(path)
+    siblings = Siblings(path)
+    module = _execute(path, siblings)
     function = getattr(module, "build", None)
     if not callable(function):
         raise Problem(f"{path.name} defines no build(settings, seed=0)")
     _check_signature(path, function)
-    return Loaded(path.name, function, path.resolve(), _seconds_of(path, module), _view_of(path, module))
+    seconds, view = _seconds_of(path, module), _view_of(path, module)
+    return Loaded(path.name, function, path.resolve(), seconds, view, Settings(), siblings)
 
 
 def _check_source(path: Path) -> None:
@@ -194,18 +213,16 @@ def _view_of(path: Path, module: Any) -> Bounds | None:
     return lower, upper
 
 
-def _execute(path: Path) -> Any:
-    """Import the file under a unique name; its folder is added to the path for its sibling modules."""
-    name = f"carom_file_{path.stem}"
+def _execute(path: Path, siblings: Siblings) -> Any:
+    """Import the file under a name of its own."""
+    folder = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
+    name = f"carom_file_{path.stem}_{folder}"
     loader = _SourceLoader(name, str(path))
     module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
-    module.__file__ = str(path)
+    module.__file__, module.__siblings__ = str(path), siblings  # type: ignore[attr-defined]
     sys.modules[name] = module  # dataclasses and pickle look here
-    folder = str(path.resolve().parent)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
     try:
-        with stdout_kept_clean():
+        with siblings.at_hand(), stdout_kept_clean():
             loader.exec_module(module)
     except SyntaxError as error:
         file = Path(error.filename).name if error.filename else path.name

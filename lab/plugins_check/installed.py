@@ -12,6 +12,7 @@ from typing import Any
 from ...framework import Plugin, PluginError
 from ...framework.plugins.discovery import GROUP, find
 from ..commands.loading import import_file, stdout_kept_clean
+from ..commands.siblings import module_of
 from ..commands.usage_errors import Problem, did_you_mean, one_line
 
 
@@ -57,7 +58,7 @@ def _plugins_in(module: ModuleType, target: str) -> list[Plugin]:
         own = [maker for maker in makers if maker.__module__ == module.__name__]
         try:
             found = [maker() for maker in own]
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise Problem(f"{target}: {one_line(error)}") from error
     if not found:
         raise Problem(f"{target} defines no plugin: plugin = Plugin('name')")
@@ -68,7 +69,7 @@ def needed_by(plugin: Plugin) -> list[Plugin]:
     """Other plugins whose shapes its pairs use: those in the modules of these shapes."""
     needed: dict[Plugin, None] = {}
     for component in {component for pair in plugin.pairs for component in pair}:
-        module: Any = sys.modules.get(component.__module__)
+        module = module_of(component)
         for value in vars(module).values() if module is not None else ():
             if isinstance(value, Plugin) and value is not plugin and component in value.shapes:
                 needed[value] = None

@@ -26,6 +26,8 @@ ETA = 0.3
 RADIUS = 0.5
 THICKNESS = 10.0  # of the walls: enough for large steps of a discrete world
 
+SETTINGS = Settings.balanced().replace(collision="continuous")
+
 
 def side(n: int, eta: float) -> float:
     """The side of the box, metres: ``n`` discs of diameter 1 fill ``eta`` of its area."""
@@ -54,7 +56,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, n: int = BODIES, e
         raise ValueError(f"n must be a square number, got {n}")
     if eta > math.pi / 4:
         raise ValueError(f"eta must be at most pi / 4, where the discs of the lattice touch, got {eta!r}")
-    settings = settings or Settings.balanced().replace(collision="continuous")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
     length = side(n, eta)
     enclose(world, (0.0, 0.0), (length, length), thickness=THICKNESS, restitution=1.0)
@@ -74,4 +76,5 @@ SCENE = Scene(
     build=build,
     seconds=100.0,
     view=((-1.0, -1.0), (side(BODIES, ETA) + 1.0, side(BODIES, ETA) + 1.0)),
+    settings=SETTINGS,
 )

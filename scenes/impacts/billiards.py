@@ -8,7 +8,6 @@ its own radius in 1/280 s, hence the small time step.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +26,8 @@ CLOTH = 0.35  # 1/s
 BREAK_SPEED = 8.0
 GAP = 2e-4  # a real rack is never perfectly tight
 
+SETTINGS = Settings.balanced().replace(dt=1 / 960)
+
 
 def rack(seed: int = 0) -> np.ndarray:
     """The fifteen centres, (15, 2), from the foot spot on; ``seed`` shifts each by up to GAP / 2."""
@@ -43,7 +44,7 @@ def build(settings: Settings | None = None, seed: int = 0) -> World:
     """Sixteen balls at the moment of the break; ``seed`` varies the rack by a tenth of a millimetre."""
     world = World(
         Physics(dimensions=2, gravity=(0.0, 0.0)),
-        settings=settings or replace(Settings.balanced(), dt=1 / 960),
+        settings=settings or SETTINGS,
     )
     enclose(world, (0.0, 0.0), (LENGTH, WIDTH), thickness=CUSHION, restitution=RESTITUTION)
     cue = np.array([[0.25 * LENGTH, WIDTH / 2 + 0.004]])  # a little off centre, as in a real break
@@ -64,4 +65,5 @@ SCENE = Scene(
     build=build,
     seconds=2.0,
     view=((-CUSHION, -CUSHION), (LENGTH + CUSHION, WIDTH + CUSHION)),
+    settings=SETTINGS,
 )

@@ -24,11 +24,13 @@ HEIGHT = 5.0
 GRAVITY = 9.81
 MARGIN = 10.0  # of the ground beyond the row, and its depth
 
+SETTINGS = Settings.balanced().replace(integrator="velocity_verlet", collision="continuous")
+
 
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = BALLS, height: float = HEIGHT) -> World:
     """``n`` balls in a row, centres ``height`` metres above the ground, whose top is at 0. ``seed`` changes nothing."""
     n, height = whole(n, "n"), real(height, "height", RADIUS)
-    settings = settings or Settings.balanced().replace(integrator="velocity_verlet", collision="continuous")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     reach = SPACING * (n - 1) / 2
     block(world, (-reach - MARGIN, -MARGIN), (reach + MARGIN, 0.0), restitution=1.0)
@@ -45,4 +47,5 @@ SCENE = Scene(
     build=build,
     seconds=20.0,
     view=((-8.0, -1.0), (8.0, 6.0)),
+    settings=SETTINGS,
 )

@@ -32,6 +32,8 @@ PILLAR_RADIUS = 0.5
 FREE = 1.0  # from a pillar's axis: bullets nearer than this start there instead, on the same side of it
 MARGIN = 5.0  # shown around the box
 
+SETTINGS = Settings.balanced().replace(collision="continuous")
+
 
 def lattice(n: int, dimensions: int) -> NDArray[np.float64]:
     """The centres of the first ``n`` cells of a lattice that fills the box, (n, dimensions)."""
@@ -55,7 +57,7 @@ def build(
     settings: Settings | None = None, seed: int = 0, *, n: int = BULLETS, dimensions: int = 2
 ) -> World:
     """``n`` bullets in a square or a cube. The walls come first, then the pillars, then the bullets."""
-    settings = settings or Settings.balanced().replace(collision="continuous")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=dimensions, gravity=np.zeros(dimensions)), settings=settings)
     enclose(world, [0.0] * dimensions, [SIDE] * dimensions, thickness=WALL, restitution=1.0)
     feet = lattice(PILLARS, 2)
@@ -88,4 +90,5 @@ SCENE = Scene(
     build=build,
     seconds=0.5,
     view=((-MARGIN, -MARGIN), (SIDE + MARGIN, SIDE + MARGIN)),
+    settings=SETTINGS,
 )

@@ -20,6 +20,8 @@ RADIUS = 0.1
 RESTITUTION = 0.8
 GRAVITY = 9.81
 
+SETTINGS = Settings.balanced().replace(integrator="velocity_verlet", collision="continuous")
+
 
 def impact_times(restitution: float, count: int) -> list[float]:
     """The times of the first ``count`` impacts, seconds."""
@@ -33,7 +35,7 @@ def impact_times(restitution: float, count: int) -> list[float]:
 def build(settings: Settings | None = None, seed: int = 0, *, restitution: float = RESTITUTION) -> World:
     """A ball of 1 kg, initially at rest; ``restitution`` applies to ball and floor; ``seed`` changes nothing."""
     restitution = real(restitution, "restitution")
-    settings = settings or Settings.balanced().replace(integrator="velocity_verlet", collision="continuous")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     block(world, (-5.0, -5.0), (5.0, 0.0), restitution=restitution)
     world.create_entity(
@@ -48,4 +50,5 @@ SCENE = Scene(
     build=build,
     seconds=5.0,
     view=((-2.5, -0.5), (2.5, 5.5)),
+    settings=SETTINGS,
 )

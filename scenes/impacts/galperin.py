@@ -22,6 +22,8 @@ GAP = 1.0
 SPEED = 1.0
 SMALL, LARGE = 0.5, 1.0  # half the blocks' widths
 
+SETTINGS = Settings.balanced().replace(dt=1 / 240, max_impacts_per_step=1000)
+
 
 class ImpactCounter(System):
     """Counts impacts in ``count``."""
@@ -44,7 +46,7 @@ def impacts(digits: int) -> int:
 def build(settings: Settings | None = None, seed: int = 0, *, digits: int = DIGITS) -> World:
     """The wall ends at x = 0; small block first, then the large one; ``seed`` changes nothing."""
     digits = whole(digits, "digits", 0)
-    settings = settings or Settings.balanced().replace(dt=1 / 240, max_impacts_per_step=1000)
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
     block(world, (-1.0, -2.0), (0.0, 2.0), restitution=1.0)
     world.create_entity(
@@ -65,4 +67,5 @@ SCENE = Scene(
     build=build,
     seconds=9.0,
     view=((-1.0, -2.0), (11.5, 2.0)),
+    settings=SETTINGS,
 )

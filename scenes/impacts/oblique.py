@@ -17,11 +17,13 @@ RADIUS = 0.5
 START = (-3.0, 0.6)
 SPEED = 1.0
 
+SETTINGS = Settings.balanced().replace(collision="continuous")
+
 
 def build(settings: Settings | None = None, seed: int = 0, *, mass: float = 1.0, restitution: float = 1.0) -> World:
     """A disc of 1 kg hits one of ``mass`` kg; ``restitution`` of both. ``seed`` changes nothing."""
     mass, restitution = real(mass, "mass", above=True), real(restitution, "restitution")
-    settings = settings or Settings.balanced().replace(collision="continuous")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
     for position, speed, kilograms in ((START, SPEED, 1.0), ((0.0, 0.0), 0.0, mass)):
         world.create_entity(
@@ -38,4 +40,5 @@ SCENE = Scene(
     build=build,
     seconds=3.0,
     view=((-4.0, -2.0), (2.0, 2.0)),
+    settings=SETTINGS,
 )

@@ -36,10 +36,12 @@ REACH = 0.6  # extent of walls and shields above and below the lane
 APART = 1.5  # distance of the plates
 END = 16.0
 
+SETTINGS = Settings.balanced().replace(collision="continuous")
+
 
 def build(settings: Settings | None = None, seed: int = 0) -> World:
     """Lanes from the top, in each the static shapes first, then the balls from the left; ``seed`` changes nothing."""
-    settings = settings or Settings.balanced().replace(collision="continuous")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
 
     def ball(x: float, y: float, *velocity: float, radius: float = RADIUS) -> None:
@@ -71,4 +73,5 @@ SCENE = Scene(
     build=build,
     seconds=0.1,
     view=((0.0, -1.2), (END, 12.9)),
+    settings=SETTINGS,
 )

@@ -35,6 +35,8 @@ DRIFT = 6.0  # metres/s, at most, to either side
 FRICTION, RESTITUTION, GRAVITY = 0.15, 0.3, 9.81
 IMPACTS = 32  # per crate and step, at most: a crate between two others may bounce to and fro many times
 
+SETTINGS = Settings.balanced().replace(max_impacts_per_step=IMPACTS)
+
 
 def _top(n: int) -> float:
     """Height of the walls: above the highest crate."""
@@ -44,7 +46,7 @@ def _top(n: int) -> float:
 def build(settings: Settings | None = None, seed: int = 0, *, n: int = CRATES) -> World:
     """``n`` crates in rows above the platforms; ``seed`` chooses their sizes, places and velocities."""
     n = whole(n, "n")
-    settings = settings or Settings.balanced().replace(max_impacts_per_step=IMPACTS)
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     top = _top(n)
     enclose(world, (0.0, 0.0), (WIDTH, top), friction=FRICTION, open_top=True)
@@ -73,4 +75,5 @@ SCENE = Scene(
     build=build,
     seconds=6.0,
     view=((-1.0, -1.0), (WIDTH + 1.0, _top(CRATES))),
+    settings=SETTINGS,
 )

@@ -8,8 +8,6 @@ velocity Verlet 64), so try ``--set integrator=explicit_euler`` and ``--set dt=1
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ...components import AABBCollider, RigidBody, Transform
 from ...framework import Settings, World
 from ...plugins import Physics
@@ -21,10 +19,12 @@ GRAVITY = 0.125 * 60**2  # pixels/s^2
 RUN_SPEED = 1.5 * 60  # pixels/s: 96 pixels during the 64 frames of the jump
 HALF_WIDTH, HALF_HEIGHT = 6.0, 8.0
 
+SETTINGS = Settings.balanced().replace(integrator="velocity_verlet")
+
 
 def build(settings: Settings | None = None, seed: int = 0) -> World:
     """The hero has just left the ground, feet at height 0, centre at (0, 8); ``seed`` changes nothing."""
-    settings = settings or replace(Settings.balanced(), integrator="velocity_verlet")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     world.create_entity(Transform((6 * TILE, -TILE / 2)), AABBCollider(half_extents=(10 * TILE, TILE / 2)))
     for height in range(3):
@@ -45,4 +45,5 @@ SCENE = Scene(
     build=build,
     seconds=1.25,
     view=((-2 * TILE, -TILE), (9 * TILE, 6 * TILE)),
+    settings=SETTINGS,
 )

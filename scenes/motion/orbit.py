@@ -21,6 +21,8 @@ PERIOD = 2 * math.pi
 STEPS_PER_PERIOD = 1000
 PERIODS = 10
 
+SETTINGS = Settings.balanced().replace(dt=PERIOD / STEPS_PER_PERIOD, integrator="velocity_verlet")
+
 
 class Sun(ForceSystem):
     """Attracts every dynamic body to the origin by m / r^2: GM = 1."""
@@ -41,7 +43,7 @@ def build(settings: Settings | None = None, seed: int = 0, *, eccentricity: floa
     e = real(eccentricity, "eccentricity")
     if e >= 1:
         raise ValueError(f"eccentricity must be below 1, got {eccentricity!r}")
-    settings = settings or Settings.balanced().replace(dt=PERIOD / STEPS_PER_PERIOD, integrator="velocity_verlet")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
     speed = math.sqrt((1 + e) / (1 - e))
     world.create_entity(Transform((1 - e, 0.0)), RigidBody(mass=1.0, linear_velocity=(0.0, speed)))
@@ -55,4 +57,5 @@ SCENE = Scene(
     build=build,
     seconds=PERIODS * PERIOD,
     view=((-2.2, -1.2), (1.2, 1.2)),
+    settings=SETTINGS,
 )

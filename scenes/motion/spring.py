@@ -20,6 +20,8 @@ MASS = 1.0
 STIFFNESS = (2 * math.pi) ** 2  # N/m: omega = 2 pi
 START = (1.0, 0.0)
 
+SETTINGS = Settings.balanced().replace(integrator="velocity_verlet")
+
 
 class SpringToOrigin(ForceSystem):
     """-stiffness x - damping m v on every dynamic body: stiffness in N/m, damping in 1/s."""
@@ -42,7 +44,7 @@ def build(
 ) -> World:
     """1 kg on a spring of ``stiffness`` N/m; ``damping``, 1/s, is a drag of -damping m v. ``seed`` changes nothing."""
     force = SpringToOrigin(real(stiffness, "stiffness"), real(damping, "damping"))
-    settings = settings or Settings.balanced().replace(integrator="velocity_verlet")
+    settings = settings or SETTINGS
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
     world.create_entity(Transform(START), RigidBody(mass=MASS))
     world.add_system(force)
@@ -55,4 +57,5 @@ SCENE = Scene(
     build=build,
     seconds=5.0,
     view=((-1.5, -1.0), (1.5, 1.0)),
+    settings=SETTINGS,
 )

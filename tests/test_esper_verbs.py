@@ -1,0 +1,77 @@
+"""The verbs of a World against those of the esper that is installed."""
+
+from __future__ import annotations
+
+import inspect
+
+import esper
+import pytest
+from worlds import ball, make_world
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import System, World
+from carom.systems import Response
+
+LEFT_OUT = {
+    "clear_cache": "esper's own affair",
+    "clear_database": "with world: esper.clear_database()",
+    "clear_dead_entities": "each step does it",
+    "delete_world": "world.close()",
+    "list_worlds": "no matter of one world",
+    "process": "world.step(), world.advance()",
+    "process_times": "world.stats()",
+    "remove_handler": "world.off()",
+    "set_handler": "world.on(), which holds handlers strongly",
+    "switch_world": "with world:",
+    "timed_process": "world.step(), and world.stats() for the times",
+}
+
+
+def public_functions():
+    return {name: value for name, value in vars(esper).items() if inspect.isfunction(value) and name[0] != "_"}
+
+
+def test_a_world_has_every_verb_of_esper_or_says_why_not():
+    verbs = public_functions()
+    missing = {name for name in verbs if not hasattr(World, name)}
+    assert missing <= LEFT_OUT.keys(), f"new in esper: {missing - LEFT_OUT.keys()}"
+    assert not {name for name in LEFT_OUT if hasattr(World, name)}
+    for name in verbs.keys() - missing:
+        theirs = list(inspect.signature(verbs[name]).parameters.values())
+        ours = list(inspect.signature(getattr(World, name)).parameters.values())[1:]
+        assert len(ours) == len(theirs), name
+        assert [p.kind for p in ours] == [p.kind for p in theirs], name
+        assert [p.default for p in ours] == [p.default for p in theirs], name
+
+
+def test_newer_verbs_do_what_esper_does():
+    world = make_world(2)
+    first, second = ball(world, (0, 0)), ball(world, (9, 0))
+    batch = world.create_entities(2, Transform.many((5, 5)), RigidBody.many())
+    assert world.get_entities() == [first, second, *batch]
+    world.delete_entity(second)
+    with world:
+        assert sorted(entity for entity in esper.get_entities() if esper.entity_exists(entity)) == world.get_entities()
+    collider = world.component_for_entity(first, SphereCollider)
+    assert world.try_remove_component(first, SphereCollider) is collider
+    assert world.try_remove_component(first, SphereCollider) is None
+    assert world.try_remove_component(12345, RigidBody) is None
+    with world:  # esper's own, on an entity that has no objects yet
+        esper.try_remove_component(batch[0], RigidBody)
+        esper.try_remove_component(batch[1], SphereCollider)
+    world.step()
+    assert world.bodies.entity.tolist() == [first, batch[1]]
+    assert world.get_entities() == [first, *batch]
+
+    class Counts(System):
+        def process(self, dt):
+            pass
+
+    assert world.get_processor(Counts) is None
+    counts = Counts()
+    world.add_system(counts)
+    assert world.get_processor(Counts) is counts
+    assert isinstance(world.get_processor(Response), Response)
+    world.close()
+    with pytest.raises(Exception, match="is closed"):
+        world.get_entities()
