@@ -17,15 +17,20 @@ LOWER = Column(item="vector", owner="AABBCollider", name="from_bounds lower")
 UPPER = Column(item="vector", owner="AABBCollider", name="from_bounds upper")
 
 
-class ColliderFields(TypedDict, total=False):
-    """The fields of every collider, for functions that make one and pass them on."""
+class MaterialFields(TypedDict, total=False):
+    """The fields of every collider but ``offset``, for functions that make one and pass them on."""
 
-    offset: Vector | float
     restitution: float
     friction: float | None
     sensor: bool
     layer: int
     mask: int
+
+
+class ColliderFields(MaterialFields, total=False):
+    """The fields of every collider."""
+
+    offset: Vector | float
 
 
 class Collider(Component, abstract=True):
@@ -107,7 +112,7 @@ class AABBCollider(Collider):
     half_extents: VectorField = special_column(item="vector", minimum=0.0, also=("size", "extents", "half_size"))
 
     @classmethod
-    def from_bounds(cls, lower: Vector, upper: Vector, **common: Unpack[ColliderFields]) -> Self:
+    def from_bounds(cls, lower: Vector, upper: Vector, **common: Unpack[MaterialFields]) -> Self:
         """The box from its minimum and maximum point, relative to the Transform's position.
 
         ValueError if a minimum exceeds its maximum.

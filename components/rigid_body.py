@@ -90,18 +90,18 @@ class RigidBody(Component, flat=True):
         that took no step give way to the next frame's, so a push held down is the same at any frame rate. Kinematic
         and static bodies do not react.
         """
-        force = self._vector(FORCE, force)
+        push = self._vector(FORCE, force)
         store: Any = self._store
         if self.kind != "dynamic":
             return
         if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
             if hasattr(store, "in_step") and store.forces_are_summed():
-                store.make("force")[store.find(self._entity)] += force
+                store.make("force")[store.find(self._entity)] += push
             else:
-                self.step_force = self.step_force + force
+                self.step_force = self.step_force + push
             return
         frame = getattr(store, "frame", 0)
-        self.applied_force = self.applied_force + force if self.applied_frame == frame else 0.0 + force
+        self.applied_force = self.applied_force + push if self.applied_frame == frame else 0.0 + push
         self.applied_frame = frame
 
     def _vector(self, argument: Column, value: Any) -> Any:

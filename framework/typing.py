@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
 Vector: TypeAlias = Sequence[float] | NDArray[Any]  # d numbers, in whatever holds them
+Vectors: TypeAlias = Sequence[Vector] | NDArray[Any]  # m of them
+Numbers: TypeAlias = float | Sequence[float] | NDArray[Any]  # m numbers, or one for all
+Entities: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
 
 if TYPE_CHECKING:
 
@@ -34,7 +38,17 @@ if TYPE_CHECKING:
 
         def __set__(self, component: object, value: Sequence[Vector] | Vector) -> None: ...
 
-else:
-    VectorField = RotationField = ArrayField = Any
+    class BodiesColumn:
+        """A column of the bodies: an array (n, ...); what is assigned is written into it."""
 
-__all__ = ["Array", "ArrayField", "RotationField", "Vector", "VectorField"]
+        def __get__(self, bodies: object, owner: type[Any] | None = None) -> Array: ...
+
+        def __set__(self, bodies: object, value: Numbers | Vectors) -> None: ...
+
+else:
+    VectorField = RotationField = ArrayField = BodiesColumn = Any
+
+__all__ = [
+    "Array", "ArrayField", "BodiesColumn", "Entities", "Integers", "Numbers", "RotationField", "Vector", "VectorField",
+    "Vectors",
+]  # fmt: skip

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..framework.plugins.plugin import Plugin
+from ..framework.typing import Vector
 from ..systems.integration.integrators import STANDARD_INTEGRATORS
 from ..systems.simulation import Simulation
 from .standard_shapes import standard_shapes
@@ -22,7 +23,7 @@ class Physics(Plugin):
         (d,) m/s^2; 0 for none
     """
 
-    def __init__(self, dimensions: int = 2, gravity: Any = 0) -> None:
+    def __init__(self, dimensions: int = 2, gravity: Vector | float = 0) -> None:
         super().__init__("physics")
         if dimensions not in (2, 3):
             raise ValueError(f"Physics: dimensions must be 2 or 3, got {dimensions!r}")

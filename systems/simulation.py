@@ -55,7 +55,7 @@ class Simulation(PhysicsServices):
         self._world, self.dimensions = world, dimensions
         self.state = make_record(STATE, dimensions)
         self.table = _make_table(dimensions)
-        self.table.clock = world.clock  # type: ignore[attr-defined]
+        self.table.clock = world.clock
         self.table.forces_are_summed = lambda: self.state.forces_summed
         self.set_gravity(gravity)
         self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..names import did_you_mean
+from ..typing import BodiesColumn, Integers
 from .component import Component
-from .table import DYNAMIC, KINEMATIC, STATIC, Table
+from .table import DYNAMIC, KINDS, KINEMATIC, STATIC, Table
 
 
 class Bodies:
@@ -20,6 +22,21 @@ class Bodies:
     """
 
     __slots__ = ("_kind", "_table")
+
+    if TYPE_CHECKING:  # the columns that every world with physics has
+        entity: Integers
+        kind: NDArray[np.int8]
+        position: BodiesColumn
+        previous_position: BodiesColumn
+        linear_velocity: BodiesColumn
+        rotation: BodiesColumn
+        mass: BodiesColumn
+        inverse_mass: BodiesColumn
+        force: BodiesColumn
+        constant_force: BodiesColumn
+        gravity_scale: BodiesColumn
+        linear_damping: BodiesColumn
+        max_linear_speed: BodiesColumn
 
     def __init__(self, table: Table, kind: int | None = None) -> None:
         self._table = table
@@ -83,7 +100,17 @@ class Bodies:
         return [*super().__dir__(), *{key.split(".")[0] for key in self.column_names()}]
 
     def __repr__(self) -> str:
-        return f"<{len(self)} bodies, columns {', '.join(self.column_names())}>"
+        table, names = self._table, ", ".join(self.column_names())
+        kind = "" if self._kind is None else KINDS[self._kind] + " "
+        counts = f": {counts_by_kind(table)}" if self._kind is None else ""
+        time = f"; {table.clock.time:.6g} s" if table.clock is not None else ""
+        return f"<{len(self)} {kind}bodies in {table.dimensions}D{counts}{time}; columns {names}>"
+
+
+def counts_by_kind(table: Table) -> str:
+    """As in ``3 dynamic, 0 kinematic, 1 static``."""
+    numbers = np.diff((0, *table.stops)).tolist()
+    return ", ".join(f"{number} {kind}" for number, kind in zip(numbers, KINDS, strict=True))
 
 
 class Fields:

@@ -29,6 +29,7 @@ class Table:
 
     def __init__(self, dimensions: int) -> None:
         self.dimensions = dimensions
+        self.clock: Any = None  # of the world
         self.count = 0
         self.capacity = 64
         self.version = 1  # changes whenever rows move

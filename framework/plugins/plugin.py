@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Thing = TypeVar("Thing")
 P = ParamSpec("P")
+ShapeClass = TypeVar("ShapeClass", bound=type[Component])
 
 
 def _called_first(example: str) -> Callable[[Callable[P, Thing]], Callable[P, Thing]]:
@@ -77,7 +78,7 @@ class Plugin:
         return inlined(function)
 
     @_called_first("cost=2")
-    def shape(self, *, cost: float) -> Callable[[type[Component]], type[Component]]:
+    def shape(self, *, cost: float) -> Callable[[ShapeClass], ShapeClass]:
         """Register a collider class as a shape.
 
         cost
@@ -90,7 +91,7 @@ class Plugin:
         ``dimensions = (2,)`` makes it a shape of 2D worlds only.
         """
 
-        def register(component: type[Component]) -> type[Component]:
+        def register(component: ShapeClass) -> ShapeClass:
             checks.check_shape(self, component, cost)
             bounds, support, rounding, turned = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
             shape = Shape(

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..data.component import Component, Many
 from ..plugins.registry import Registry
+from ..typing import Entities, Numbers, Vector, Vectors
 from . import query_arguments as check
 from .hits import CastHit, CastHits
 from .services import PhysicsServices
@@ -25,8 +26,8 @@ class CastVerbs:
 
     def ray_cast(
         self,
-        origin: Any,
-        direction: Any,
+        origin: Vector,
+        direction: Vector,
         max_distance: float = math.inf,
         mask: int = -1,
         *,
@@ -52,7 +53,13 @@ class CastVerbs:
         return _listed(hits)
 
     def ray_casts(
-        self, origins: Any, directions: Any, max_distances: Any = math.inf, mask: int = -1, *, exclude: Any = None
+        self,
+        origins: Vectors,
+        directions: Vectors | Vector,
+        max_distances: Numbers = math.inf,
+        mask: int = -1,
+        *,
+        exclude: int | Entities | None = None,
     ) -> CastHits:
         """The nearest hit of each of m rays, as columns.
 
@@ -73,8 +80,8 @@ class CastVerbs:
     def shape_cast(
         self,
         shape: Component,
-        position: Any,
-        displacement: Any,
+        position: Vector,
+        displacement: Vector,
         mask: int = -1,
         *,
         exclude: int | None = None,
@@ -99,7 +106,13 @@ class CastVerbs:
         return _listed(hits)
 
     def shape_casts(
-        self, shapes: Component | Many, positions: Any, displacements: Any, mask: int = -1, *, exclude: Any = None
+        self,
+        shapes: Component | Many,
+        positions: Vectors,
+        displacements: Vectors | Vector,
+        mask: int = -1,
+        *,
+        exclude: int | Entities | None = None,
     ) -> CastHits:
         """The first hit of each of m moving shapes, as columns.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
+from ..typing import Entities, Numbers, Vector, Vectors
 from . import query_arguments as check
 from .casts import CastVerbs
 from .hits import Hits, NearestHit, NearestHits, Neighbours
@@ -18,13 +18,13 @@ class QueryVerbs(CastVerbs):
     All of them find static bodies and sensors too; ``mask`` has a bit for each layer that is asked for.
     """
 
-    def query_point(self, point: Any, mask: int = -1) -> list[int]:
+    def query_point(self, point: Vector, mask: int = -1) -> list[int]:
         """Entities whose collider contains the point, by id."""
         services = self._synchronized()
         centre = check.point(point, "query_point: point", services.dimensions)
         return services.queries.sphere(centre, 0.0, check.mask(mask, "query_point: mask"))
 
-    def query_aabb(self, lower: Any, upper: Any, mask: int = -1) -> list[int]:
+    def query_aabb(self, lower: Vector, upper: Vector, mask: int = -1) -> list[int]:
         """Entities whose collider touches the box, by id."""
         services = self._synchronized()
         low = check.point(lower, "query_aabb: lower", services.dimensions)
@@ -33,21 +33,21 @@ class QueryVerbs(CastVerbs):
             raise ValueError(f"query_aabb: lower {list(low)} exceeds upper {list(high)}")
         return services.queries.box(low, high, check.mask(mask, "query_aabb: mask"))
 
-    def query_sphere(self, centre: Any, radius: float, mask: int = -1) -> list[int]:
+    def query_sphere(self, centre: Vector, radius: float, mask: int = -1) -> list[int]:
         """Entities whose collider touches the sphere, by id."""
         services = self._synchronized()
         place = check.point(centre, "query_sphere: centre", services.dimensions)
         size = check.distance(radius, "query_sphere: radius")
         return services.queries.sphere(place, size, check.mask(mask, "query_sphere: mask"))
 
-    def query_spheres(self, centres: Any, radii: Any, mask: int = -1) -> Hits:
+    def query_spheres(self, centres: Vectors, radii: Numbers, mask: int = -1) -> Hits:
         """For each of m spheres (centres (m, d), radii one or (m,)) the ids of the entities it touches, ascending."""
         services = self._synchronized()
         places = check.points(centres, "query_spheres: centres", services.dimensions)
         sizes = check.distances(radii, "query_spheres: radii", len(places))
         return services.queries.spheres(places, sizes, check.mask(mask, "query_spheres: mask"))
 
-    def query_aabbs(self, lower: Any, upper: Any, mask: int = -1) -> Hits:
+    def query_aabbs(self, lower: Vectors, upper: Vectors, mask: int = -1) -> Hits:
         """For each of m boxes (corners (m, d)) the ids of the entities it touches, ascending."""
         services = self._synchronized()
         low = check.points(lower, "query_aabbs: lower", services.dimensions)
@@ -58,7 +58,7 @@ class QueryVerbs(CastVerbs):
         return services.queries.boxes(low, high, check.mask(mask, "query_aabbs: mask"))
 
     def query_nearest(
-        self, point: Any, mask: int = -1, *, max_distance: float = math.inf, exclude: int | None = None
+        self, point: Vector, mask: int = -1, *, max_distance: float = math.inf, exclude: int | None = None
     ) -> NearestHit | None:
         """The collider whose surface is nearest to the point, at most ``max_distance`` away; None if there is none.
 
@@ -76,7 +76,12 @@ class QueryVerbs(CastVerbs):
         return NearestHit(int(hits.entity[0]), float(hits.distance[0]), hits.point[0], hits.normal[0])
 
     def query_nearests(
-        self, points: Any, mask: int = -1, *, max_distances: Any = math.inf, exclude: Any = None
+        self,
+        points: Vectors,
+        mask: int = -1,
+        *,
+        max_distances: Numbers = math.inf,
+        exclude: int | Entities | None = None,
     ) -> NearestHits:
         """:meth:`query_nearest` for m points (m, d), as columns. max_distances, exclude: one for all or (m,)."""
         services = self._synchronized()
@@ -86,7 +91,7 @@ class QueryVerbs(CastVerbs):
         others = check.excluded(exclude, "query_nearests: exclude", len(places))
         return services.queries.nearest(places, limits, bits, others)
 
-    def neighbours(self, radius: float, mask: int = -1, *, of: Any = None) -> Neighbours:
+    def neighbours(self, radius: float, mask: int = -1, *, of: Entities | None = None) -> Neighbours:
         """For every body the others whose position is within ``radius`` of its own, by id.
 
         Distances are between the positions of the Transforms, so it needs no collider, and whoever is a neighbour has

@@ -10,10 +10,9 @@ from contextlib import AbstractContextManager
 from typing import Any, Self, TypeVar
 
 import esper
-import numpy as np
 
 from ..data import esper_bridge
-from ..data.bodies import Bodies
+from ..data.bodies import Bodies, counts_by_kind
 from ..data.component import Component
 from ..errors import CaromError, NoPhysicsError, PluginError
 from ..names import near_names
@@ -25,6 +24,7 @@ from ..schedule.plan import Plan
 from ..schedule.profile_report import Stats
 from ..schedule.step import Pipeline
 from ..settings import Settings
+from ..typing import Array, Vector
 from . import snapshots
 from .contacts import Contacts
 from .entities import EntityVerbs
@@ -126,6 +126,14 @@ class World(EntityVerbs, QueryVerbs):
     def __exit__(self, *_: object) -> None:
         esper_bridge.leave(self._depth.pop())
 
+    def __repr__(self) -> str:
+        name, physics = f"{type(self).__name__} {self.name!r}", self.physics
+        if self.closed:
+            return f"<{name}, closed>"
+        bodies = "no physics" if physics is None else f"{physics.dimensions}D, bodies: {counts_by_kind(physics.table)}"
+        entities, clock = len(self._pipeline.contents.entities), self._pipeline.clock
+        return f"<{name}, {bodies}; {entities} entities; step {clock.step_count}, {clock.time:.6g} s>"
+
     def close(self) -> None:
         """Give the esper context back; the world cannot be used afterwards. Closing twice is fine.
 
@@ -216,12 +224,12 @@ class World(EntityVerbs, QueryVerbs):
         return self.physics
 
     @property
-    def gravity(self) -> np.ndarray:
+    def gravity(self) -> Array:
         """(d,) m/s^2; assign between steps."""
         return self._services.gravity
 
     @gravity.setter
-    def gravity(self, gravity: Any) -> None:
+    def gravity(self, gravity: Vector | float) -> None:
         self._pipeline.must_be_between_steps("gravity can be replaced")
         self._services.set_gravity(gravity)
 
@@ -246,7 +254,7 @@ class World(EntityVerbs, QueryVerbs):
         self._synchronized()
         return self._services.potential_energy()
 
-    def momentum(self) -> np.ndarray:
+    def momentum(self) -> Array:
         """(d,) kg m/s of the dynamic bodies."""
         self._synchronized()
         return self._services.momentum()

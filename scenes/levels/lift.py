@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...components import AABBCollider, RigidBody, Transform
 from ...framework import Component, Phase, Settings, System, World, column
+from ...framework.typing import VectorField
 from ...plugins import Physics
 from ..protocol import Scene
 from ..sizes import whole
@@ -28,9 +29,9 @@ FERRY_WIDTH, FERRY_PERIOD = 10.0, 8.0  # peak acceleration 3.1 m/s^2; friction p
 class Shuttle(Component):
     """Goes from ``start`` by ``travel`` metres and back, smoothly, in ``period`` seconds."""
 
-    start = column(0.0, item="vector")
-    travel = column(0.0, item="vector")
-    period = column(1.0, positive=True)
+    start: VectorField = column(default=0.0, item="vector")
+    travel: VectorField = column(default=0.0, item="vector")
+    period: float = column(default=1.0, positive=True)
 
     def place(self, time: float) -> NDArray[np.float64]:
         """Its position at ``time``."""

@@ -55,7 +55,7 @@ plugin = Plugin("bench pairs")
 class DiscCollider(Collider):
     """A copy of the sphere collider, as a plugin author would write it."""
 
-    reach = column(positive=True)
+    reach: float = column(positive=True)
 
     @staticmethod
     def bounds(shape, dimensions):
