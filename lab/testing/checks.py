@@ -8,40 +8,87 @@ from typing import Any
 
 import numpy as np
 
-from ...framework import Contact, World
+from ...framework import Contact, Phase, System, World
+from ...framework.typing import Integers
 from ..measure.body_shapes import Floats, shapes_of
 
 
 class Conserved:
-    """The state at construction, to be compared later: energy, momentum, the number of bodies, finite numbers.
+    """The state at construction, to be compared later: energy, momentum, the bodies, finite numbers.
 
     Energy is kinetic plus potential energy. ``relative`` is relative to the energy at the start, and for momentum to
     sum(m |v|); rounding stays below 1e-12.
+
+    following
+        for games in which bodies come and go: what they bring and take is added to what is expected. Two systems of
+        the world look at the start and at the end of each step; ``close`` removes them
     """
 
-    def __init__(self, world: World, relative: float = 1e-12) -> None:
-        self.world, self.relative = world, relative
+    def __init__(self, world: World, relative: float = 1e-12, *, following: bool = False) -> None:
+        self.world, self.relative, self.following = world, relative, following
         self.bodies = len(world.bodies)
         self.momentum = world.momentum()
         self.energy = energy(world)
         self.kinetic = world.kinetic_energy()
         self.momentum_scale = self._sum_of_momenta()
+        self._entities = self._start = _ids(world)
+        self._last = self.momentum, self.energy  # where the bodies were last known to be the same
+        self._systems: list[System] = [_Before(self), _After(self)] if following else []
+        for system in self._systems:
+            world.add_system(system)
+
+    def close(self) -> None:
+        """Stop following."""
+        for system in self._systems:
+            self.world.remove_system(system)
+        self._systems = []
 
     def _sum_of_momenta(self) -> float:
         moving = self.world.bodies.dynamic
         return float(np.abs(moving.mass[:, None] * moving.linear_velocity).sum())
 
+    def note(self) -> None:
+        """At the end of a step."""
+        self._last = self.world.momentum(), energy(self.world)
+
+    def account(self) -> None:
+        """Expect what bodies have brought that came, and not what those took that went, since the last step."""
+        entities = _ids(self.world)
+        if np.array_equal(entities, self._entities):
+            return
+        if not self.following:
+            came, gone = np.setdiff1d(entities, self._entities), np.setdiff1d(self._entities, entities)
+            raise AssertionError(
+                f"step {self.world.step_count}: bodies came ({_some(came)}) or went ({_some(gone)}): "
+                f"Conserved(world, following=True) takes account of what they bring and take"
+            )
+        now = self.world.momentum(), energy(self.world)
+        self.momentum = self.momentum + now[0] - self._last[0]
+        self.energy += now[1] - self._last[1]
+        self.kinetic = max(self.kinetic, self.world.kinetic_energy())
+        self.momentum_scale = max(self.momentum_scale, self._sum_of_momenta())
+        self._entities, self._last = entities, now
+
     def assert_finite(self) -> None:
-        """No body is missing; every position and velocity is finite."""
+        """Every position and velocity is finite."""
         bodies, step = self.world.bodies, self.world.step_count
-        assert len(bodies) == self.bodies, f"step {step}: {len(bodies)} bodies, there were {self.bodies}"
         for name in ("position", "linear_velocity"):
             column = getattr(bodies, name)
             for row in np.flatnonzero(~np.isfinite(column).all(axis=1))[:1]:
                 raise AssertionError(f"entity {bodies.entity[row]}, step {step}: {name} is {column[row].tolist()}")
 
+    def assert_same_bodies(self) -> None:
+        """The bodies are those of the beginning."""
+        entities = _ids(self.world)
+        came, gone = np.setdiff1d(entities, self._start), np.setdiff1d(self._start, entities)
+        assert not len(came) + len(gone), (
+            f"step {self.world.step_count}: {len(entities)} bodies, there were {self.bodies}; came: {_some(came)}; "
+            f"gone: {_some(gone)}"
+        )
+
     def assert_momentum(self) -> None:
         """Momentum is unchanged: valid without external forces and without immovable bodies."""
+        self.account()
         off = float(np.abs(self.world.momentum() - self.momentum).max())
         limit = self.relative * max(self.momentum_scale, self._sum_of_momenta())
         assert off <= limit, (
@@ -58,12 +105,48 @@ class Conserved:
         self._energy(float)
 
     def _energy(self, measure: Callable[[float], float]) -> None:
+        self.account()
         now = energy(self.world)
         limit = self.relative * max(abs(self.energy), self.kinetic)
         assert measure(now - self.energy) <= limit, (
             f"step {self.world.step_count}: energy is {now:.12g} J, it was {self.energy:.12g} J: "
             f"{now - self.energy:+.3g} J, limit {limit:.3g}"
         )
+
+
+class _Before(System):
+    """Before anything else of the step."""
+
+    phase = Phase.START
+
+    def __init__(self, kept: Conserved) -> None:
+        self.kept = kept
+
+    def process(self, dt: float) -> None:
+        self.kept.account()
+
+
+class _After(System):
+    """After all that was there when following began."""
+
+    phase = Phase.END
+
+    def __init__(self, kept: Conserved) -> None:
+        self.kept = kept
+
+    def process(self, dt: float) -> None:
+        self.kept.note()
+
+
+def _ids(world: World) -> Integers:
+    """Of all bodies, ascending."""
+    return np.sort(world.bodies.entity)
+
+
+def _some(entities: Integers) -> str:
+    """The first of these ids."""
+    shown = ", ".join(map(str, entities[:5].tolist()))
+    return f"{shown} and {len(entities) - 5} more" if len(entities) > 5 else shown or "none"
 
 
 def energy(world: World) -> float:
@@ -85,6 +168,7 @@ def assert_velocity(world: World, entity: int, expected: Any, within: float = 1e
 
 
 def _assert_vector(world: World, entity: int, name: str, unit: str, expected: Any, within: float) -> None:
+    assert entity in world.bodies.entity, f"entity {entity}, step {world.step_count}: it is no body, or no more"
     got = np.asarray(getattr(world.bodies, name)[world.bodies.row_of(entity)])
     off = float(np.abs(got - np.asarray(expected, float)).max())
     assert off <= within, (
@@ -107,17 +191,26 @@ def assert_inside(world: World, lower: Any, upper: Any) -> None:
 def assert_at_rest(world: World, steps: int = 60, speed: float = 1e-3, drift: float = 1e-3) -> None:
     """Take that many steps: no dynamic body ever moves faster than ``speed`` sizes per second or by ``drift`` sizes.
 
-    The size of a body is the smallest extent of its collider; 1 m without a collider.
+    The size of a body is the smallest extent of its collider; 1 m without a collider. Bodies may come and go; the drift
+    of one that comes is that from where it is at the end of its first step.
     """
-    sizes = _sizes(world)
-    start = np.array(world.bodies.dynamic.position)
+    entities, sizes, start = _moving_ids(world), _sizes(world), np.array(world.bodies.dynamic.position)
     for _ in range(steps):
         world.step()
-        moving = world.bodies.dynamic
+        moving, now = world.bodies.dynamic, _moving_ids(world)
+        if not np.array_equal(now, entities):
+            _, new, old = np.intersect1d(now, entities, return_indices=True)
+            places = np.array(moving.position)
+            places[new] = start[old]
+            entities, sizes, start = now, _sizes(world), places
         speeds = np.linalg.norm(moving.linear_velocity, axis=1) / sizes
         _assert_largest(world, speeds, speed, "moves at", "sizes per second")
         moved = np.linalg.norm(moving.position - start, axis=1) / sizes
         _assert_largest(world, moved, drift, "has drifted by", "sizes")
+
+
+def _moving_ids(world: World) -> Integers:
+    return np.array(world.bodies.dynamic.entity)
 
 
 def _sizes(world: World) -> Floats:

@@ -277,6 +277,9 @@ def assert_agrees(world: World, oracle: Oracle, tolerance: float = 1e-9) -> None
     assert steps[0] == steps[1], f"the world is at step {steps[0]}, its oracle at {steps[1]}"
     at, dt = f"step {world.step_count}", oracle.settings.dt
     bodies = world.bodies
+    assert sorted(bodies.entity.tolist()) == sorted(body.entity for body in oracle.bodies), (
+        f"{at}: the world has other bodies than its oracle: take a new Oracle(world) when bodies come or go"
+    )
     moving = [body for body in oracle.bodies if body.kind != "static"]
     speed_scale = max([*(float(np.abs(b.velocity).max()) + b.gained for b in moving), 1e-300])
     place_scale = max([*(float(np.abs(b.position).max()) + b.size for b in moving), speed_scale * dt])
