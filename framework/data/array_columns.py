@@ -1,53 +1,20 @@
 """Columns whose value is an array of any length: the corners of a polygon, the cells of a map.
 
 A table holds a number per row, the arrays themselves stand in a pool that all worlds share: equal arrays once, never
-changed, never moved out. A snapshot stays a copy of the numbers, and a prefab of a thousand polygons costs one.
+changed. A snapshot stays a copy of the numbers, and a prefab of a thousand polygons costs one.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..compilation import pasted
+from .array_pool import Pool
 from .columns import Column
-
-
-class Pool:
-    """Arrays (k, width), end to end in ``data``; number i is rows starts[i] to starts[i + 1]."""
-
-    def __init__(self, width: int) -> None:
-        self.data = np.empty((64, width))
-        self.starts = np.zeros(2, np.int64)  # number 0 is empty: what rows hold that lack the component
-        self.digests = np.zeros(1, np.int64)  # of the contents: hashes must not depend on who came first
-        self._known: dict[bytes, int] = {b"": 0}
-
-    def number_of(self, array: np.ndarray) -> int:
-        """The array's number, a new one if it is not here yet."""
-        content = (array + 0.0).tobytes()  # 0.0 and -0.0 are the same
-        if content not in self._known:
-            start = int(self.starts[-1])
-            stop = start + len(array)
-            if stop > len(self.data):
-                grown = np.empty((max(stop, 2 * len(self.data)), self.data.shape[1]))
-                grown[:start] = self.data[:start]
-                self.data = grown
-            self.data[start:stop] = array + 0.0
-            digest = int.from_bytes(hashlib.sha256(content).digest()[:8], "little", signed=True)
-            self._known[content] = len(self.digests)
-            self.starts = np.append(self.starts, stop)
-            self.digests = np.append(self.digests, digest)
-        return self._known[content]
-
-    def array(self, number: int) -> np.ndarray:
-        """A copy nobody can write to."""
-        array = self.data[self.starts[number] : self.starts[number + 1]].copy()
-        array.flags.writeable = False
-        return array
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +56,15 @@ class ArrayColumn(Column):
     def checked_many(self, values: Any, count: int, dimensions: int) -> np.ndarray:
         """One array for all, or a list with one per row."""
         if isinstance(values, list) and len(values) == count and all(np.ndim(v) == 2 for v in values):
-            return np.array([self.checked(value) for value in values], np.int64)
+            with self.pool.kept():
+                return np.array([self.checked(value) for value in values], np.int64)
         return np.full(count, self.checked(values), np.int64)
+
+    def __set__(self, handle: Any, value: Any) -> None:
+        store = handle._store
+        if getattr(store, "in_step", False):
+            self.pool.replaced(store, int(store.values(self.key, store.find(handle._entity))))
+        super().__set__(handle, value)
 
     def empty_value(self, dimensions: int) -> Any:
         return 0
@@ -103,6 +77,13 @@ class ArrayColumn(Column):
 
     def hashable(self, values: np.ndarray) -> np.ndarray:
         return self.pool.digests[values]
+
+
+def hold_arrays(holder: Any, columns: Iterable[Column]) -> None:
+    """The holder may have numbers of these columns, as its ``numbers_in`` says."""
+    for column in columns:
+        if isinstance(column, ArrayColumn):
+            column.pool.holders.add(holder)
 
 
 def array_column(

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self, dataclass_transform
 import numpy as np
 
 from ..names import did_you_mean, near_names
-from .array_columns import array_column
+from .array_columns import ArrayColumn, array_column, hold_arrays
 from .columns import REQUIRED, Column, special_column
 from .columns import column as plain_column
 
@@ -35,6 +35,7 @@ class Component:
     _positional: ClassVar[tuple[str, ...]] = ()  # those that need no name
     _required: ClassVar[tuple[str, ...]] = ()
     _defaults: ClassVar[dict[str, Any]] = {}  # what a component holds that has been given nothing
+    _pooled: ClassVar[tuple[ArrayColumn, ...]] = ()  # columns whose values stand in a pool
 
     def __init_subclass__(cls, *, abstract: bool = False, flat: bool = False, **kwargs: Any) -> None:
         """``abstract`` bases may be derived from; ``flat`` columns carry no prefix in the table."""
@@ -70,6 +71,7 @@ class Component:
         cls._arguments = {name: field for name, field in fields.items() if field.constructor}
         cls._positional = tuple(name for name, field in cls._arguments.items() if not field.kw_only)
         cls._required = tuple(name for name, field in cls._arguments.items() if field.default is REQUIRED)
+        cls._pooled = tuple(field for field in fields.values() if isinstance(field, ArrayColumn))
         cls._defaults = {name: field.stored_default for name, field in fields.items()}  # ValueError for a wrong one
 
     def __init__(self, *args: Any, **values: Any) -> None:
@@ -112,6 +114,8 @@ class Component:
             if type(stored[field.name]) is np.ndarray and field.name not in given:
                 stored[field.name] = stored[field.name].copy()
         self._values = stored
+        if self._pooled:
+            hold_arrays(self, self._pooled)
 
     # -- being adopted and let go -----------------------------------------------------------------
 
@@ -159,7 +163,13 @@ class Component:
             vars(other).update(vars(self))  # what a class without __slots__ keeps besides its columns
         other._bind(None, None)
         other._values = {name: column.unshared(column.value_of(self)) for name, column in self.columns.items()}
+        hold_arrays(other, self._pooled)
         return other
+
+    def numbers_in(self, pool: Any) -> list[int]:
+        """The numbers of arrays that it holds itself."""
+        values = self._values or {}
+        return [values[column.name] for column in self._pooled if column.pool is pool and column.name in values]
 
     def __copy__(self) -> Self:
         return self.copy()
@@ -204,7 +214,9 @@ class Many:
                 constants[column.key] = column, array[0].copy() if array.ndim > 1 else array[0].item()
             else:
                 arrays[column.key] = np.require(array, requirements=("C", "W"))
-        return RowStore(arrays, dimensions, constants, count)
+        store = RowStore(arrays, dimensions, constants, count)
+        hold_arrays(store, self.component._pooled)
+        return store
 
     def arrays(self, count: int, dimensions: int) -> dict[str, np.ndarray]:
         """The same, all of it as arrays (count, ...)."""
@@ -234,6 +246,11 @@ class RowStore:
             column, value = self.constants[key]
             array = np.broadcast_to(np.asarray(value, column.dtype), (self._count, *column.item_shape(self.dimensions)))
         return array[rows]
+
+    def numbers_in(self, pool: Any) -> list[np.ndarray]:
+        """The numbers of arrays in it; those of other pools do no harm."""
+        whole = [array for array in self.arrays.values() if array.dtype == np.int64]
+        return [*whole, *(value for column, value in self.constants.values() if isinstance(column, ArrayColumn))]
 
     def default_of(self, key: str) -> Any:
         """What all rows of a column without an array hold."""

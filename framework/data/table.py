@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .array_columns import hold_arrays
+from .array_pool import Held
 from .columns import Column
 from .component import Component, RowStore
 from .row_moves import MovedColumns, RowPlan
@@ -92,6 +94,7 @@ class Table:
             self._stacked_types[stack].append(component)
         if "kind" in component.columns and not component.prefix:
             self.kind_carrier = component
+        hold_arrays(self, component._pooled)
         self._mask_names[component] = self.mask_name(component)
         self.add_array(self.mask_name(component), dtype=bool, fill=False)
         self.component_types.append(component)
@@ -372,7 +375,19 @@ class Table:
         columns = {column.key: column for column in component.columns.values()}
         made = {key: self.arrays[key][rows] for key in columns if key in self.arrays}
         constants = {key: (column, self._fills[key]) for key, column in columns.items() if key not in made}
-        return RowStore(made, self.dimensions, constants, len(rows))
+        store = RowStore(made, self.dimensions, constants, len(rows))
+        hold_arrays(store, component._pooled)
+        return store
+
+    def numbers_in(self, pool: Any) -> list[np.ndarray]:
+        """The numbers of that pool's arrays in its rows."""
+        pooled = [column for component in self.component_types for column in component._pooled]
+        return [self.column(column.key) for column in pooled if column.pool is pool]
+
+    def held_arrays(self) -> Held:
+        """Keeps all arrays that rows have now, as long as it lives."""
+        pools = {column.pool for component in self.component_types for column in component._pooled}
+        return Held({pool: np.concatenate(self.numbers_in(pool)) for pool in pools})
 
     # -- written through handles ------------------------------------------------------------------
 

@@ -22,13 +22,15 @@ class StepState:
     clock: tuple[float, ...]
     contacts: Any
     tracking: Any
+    arrays: Any  # keeps those that columns have numbers of
 
 
 def snapshot(physics: PhysicsServices, clock: Clock) -> StepState:
     """A copy that shares nothing with the world."""
     columns = physics.table.copy_columns()
     contacts, tracking = copy.deepcopy((physics.contacts.state(), physics.tracking_state()))
-    return StepState(columns.pop("entity"), columns, clock.state(), contacts, tracking)
+    arrays = physics.table.held_arrays()
+    return StepState(columns.pop("entity"), columns, clock.state(), contacts, tracking, arrays)
 
 
 def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
