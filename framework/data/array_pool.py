@@ -20,6 +20,7 @@ class Holder(Protocol):
 
     def numbers_in(self, pool: Pool) -> Iterable[Any]:
         """Arrays of numbers, or single ones."""
+        ...
 
 
 class Pool:

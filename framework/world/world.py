@@ -15,7 +15,6 @@ from ..data import esper_bridge
 from ..data.bodies import Bodies, counts_by_kind
 from ..data.component import Component
 from ..errors import CaromError, NoPhysicsError, PluginError
-from ..names import near_names
 from ..plugins.plugin import Plugin
 from ..plugins.registry import Registry
 from ..schedule.clock import Clock
@@ -26,6 +25,7 @@ from ..schedule.step import Pipeline
 from ..settings import Settings
 from ..typing import Array, Vector
 from . import snapshots
+from .attributes import KnownAttributes
 from .contacts import Contacts
 from .entities import EntityVerbs
 from .events import Events
@@ -37,7 +37,7 @@ P = TypeVar("P", bound=esper.Processor)
 _numbers = itertools.count(1)
 
 
-class World(EntityVerbs, QueryVerbs):
+class World(KnownAttributes, EntityVerbs, QueryVerbs):
     """A world of entities, stepped by systems in a fixed step.
 
     plugins
@@ -98,22 +98,6 @@ class World(EntityVerbs, QueryVerbs):
         except BaseException:
             self._give_back()
             raise
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name.startswith("_") or hasattr(type(self), name) or self._declared(name)):
-            own = type(self) is not World
-            near = near_names(name, [n for n in dir(World) if n[0] != "_"], cutoff=0.75 if own else 0.6)
-            if near or not own:
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
-                raise AttributeError(
-                    f"{type(self).__name__} has no attribute {name!r}{hint}: attributes of your own go into a class "
-                    f"derived from World that declares them"
-                )
-        object.__setattr__(self, name, value)
-
-    @classmethod
-    def _declared(cls, name: str) -> bool:
-        return any(name in vars(base).get("__annotations__", ()) for base in cls.__mro__)
 
     # -- being an esper context -------------------------------------------------------------------
 
