@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.components.colliders import Collider, column
-from carom.framework import ForceSystem, Phase, Plugin, System, World
+from carom.components.colliders import Collider
+from carom.framework import ForceSystem, Phase, Plugin, System, World, column
 from carom.framework.compilation import kernel
 from carom.framework.schedule.plan import PlannedKernel
 from carom.framework.vectors import divided, length, scale
