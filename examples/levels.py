@@ -25,7 +25,7 @@ class RockCollider(Collider):
     """Twelve circles on a ring, within a circle of that radius."""
 
     dimensions = (2,)
-    radius = column(positive=True)
+    radius: float = column(positive=True)
 
     @staticmethod
     def bounds(shape, dimensions):

@@ -23,7 +23,7 @@ class Platform(Component):
 class Drops(Component):
     """Lets its entity fall through platforms until that time of the world."""
 
-    until = column(0.0)
+    until: float = column(default=0.0)
 
 
 class OneWay(System):

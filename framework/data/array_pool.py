@@ -11,6 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..errors import CaromError
+
 ROOM = 64  # rows, and numbers, of a new pool
 IN_FLIGHT = 16  # more than one component takes; who asks for many at once uses ``kept``
 
@@ -63,7 +65,9 @@ class Pool:
         return number
 
     def array(self, number: int) -> np.ndarray:
-        """A copy nobody can write to."""
+        """A copy nobody can write to; CaromError if it has been forgotten."""
+        if number and self._starts[number] == self._starts[number + 1]:
+            raise CaromError(f"array {number} is forgotten: what keeps its number must be among the pool's holders")
         array = self.data[self._starts[number] : self._starts[number + 1]].copy()
         array.flags.writeable = False
         return array

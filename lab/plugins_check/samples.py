@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...components import Collider
-from ...framework.data.array_columns import ArrayColumn
+from ...framework.data.array_columns import ArrayColumn, hold_arrays
 from ...framework.data.columns import REQUIRED, Column
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Shape
@@ -29,7 +30,7 @@ KINDS = (
 )  # fmt: skip
 
 
-@dataclass
+@dataclass(eq=False)
 class Rows:
     """Parameters of n colliders of one shape, as kernels take them, with the half extents of their boxes."""
 
@@ -37,6 +38,13 @@ class Rows:
     arrays: dict[str, np.ndarray]
     axes: np.ndarray
     half: np.ndarray
+
+    def __post_init__(self) -> None:
+        hold_arrays(self, self.shape.component.columns.values())
+
+    def numbers_in(self, pool: Any) -> list[np.ndarray]:
+        """The numbers of arrays in it; those of other pools do no harm."""
+        return [array for array in self.arrays.values() if array.dtype == np.int64]
 
     def parameters(self) -> Record:
         """The record through which linked functions see them."""
@@ -95,6 +103,14 @@ def poses(first: Shape, second: Shape, dimensions: int, seed: int) -> Poses:
 
 def rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, rng: np.random.Generator) -> Rows:
     """Colliders of that shape with lengths around ``scale`` (n,); ``upright`` ones are not rotated."""
+    pools = [column.pool for column in shape.component.columns.values() if isinstance(column, ArrayColumn)]
+    with contextlib.ExitStack() as made:
+        for pool in pools:  # the rows hold the arrays as soon as they are there
+            made.enter_context(pool.kept())
+        return _rows(shape, scale, upright, dimensions, rng)
+
+
+def _rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int, rng: np.random.Generator) -> Rows:
     count = len(scale)
     own_sample = shape.component.sample.__func__ is not Collider.sample.__func__  # type: ignore[attr-defined]
     sample = shape.component.sample()  # type: ignore[attr-defined]
