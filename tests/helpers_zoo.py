@@ -233,7 +233,7 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
     for mode in MODES:
         yield f"platformer {mode}", lambda mode=mode: play(platformer(mode))
     for d, mode, sizes, moving in (
-        (2, MODES[0], 0.5, 200), (3, MODES[1], 0.5, 20), (3, MODES[0], 6.0, 200), (2, MODES[2], 0.5, 20),
+        (2, MODES[0], 0.5, 200), (3, MODES[1], 0.5, 20), (3, MODES[0], 6.0, 194), (2, MODES[2], 0.5, 20),
     ):  # fmt: skip
         name = f"crowd {d}D {mode} {sizes} {moving}"
         yield name, lambda d=d, mode=mode, sizes=sizes, moving=moving: play(crowd(d, mode, sizes, moving), 1)

@@ -158,6 +158,7 @@ def test_what_a_system_of_the_game_writes(mode):
         assert len(told(broken)) == 1
 
 
+@pytest.mark.compiled
 def test_static_and_kinematic_bodies():
     for kind in ("static", "kinematic"):
         for name in ("position", "aabb_collider.half_extents", "aabb_collider.restitution"):
@@ -227,6 +228,7 @@ def test_it_stands_still_until_it_is_mended():
     assert len(told(world)) == 1  # it is told anew after it was right
 
 
+@pytest.mark.compiled
 def test_bodies_that_come_and_go_meanwhile():
     """Rows move; who is out stays out."""
     broken, healthy = pile(), pile()

@@ -17,6 +17,7 @@ from ..engines.body_arrays import NotPlainError
 from ..measure.norms import NORMS, errors_of, failure_of
 from ..measure.observation import Seen, observe
 from ..measure.survey import NUDGE, nudge
+from ..measure.told_in_results import faults_in_results
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
 
 FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds than the runs compared with them
@@ -49,6 +50,7 @@ class Task:
         return self.case.seconds / self.cell.dt
 
 
+@faults_in_results()
 def perform(task: Task) -> dict[str, Any]:
     """Perform the run and return its observation as plain data. A run stopped by an error is a result too."""
     case, cell = task.case, task.cell

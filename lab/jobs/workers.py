@@ -15,7 +15,6 @@ import signal
 import sys
 import threading
 import traceback
-import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -25,7 +24,6 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from ...framework.compilation import log
-from ...framework.errors import PhysicsWarning
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -251,7 +249,6 @@ def _main_hidden() -> Iterator[None]:
 def _serve(pipe: Connection, pickled: bytes, listened: bool) -> None:
     """The main loop of a worker: perform tasks until the pipe ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    warnings.simplefilter("ignore", PhysicsWarning)  # results have world.faults
     threading.Thread(target=_end_with_parent, daemon=True).start()
     os.dup2(2, 1)
     sys.stdout = sys.stderr

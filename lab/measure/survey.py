@@ -18,6 +18,7 @@ from ..commands.usage_errors import Problem
 from ..engines.adapters import CaromEngine
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 from .observation import Seen, observe
+from .told_in_results import faults_in_results
 
 NUDGE = 1e-10  # of the smallest body: the difference between the two starts
 CHAOS = 1e7  # a growth beyond this makes a nudge a thousandth of a body: chaotic
@@ -77,6 +78,7 @@ class Survey:
         return grown if self.kind == CHAOTIC else f"bodies meet; {grown}, which is no chaos"
 
 
+@faults_in_results()
 def survey(subject: Subject, seconds: float) -> Survey:
     """Run the scene twice, with all impacts at their true times; Problem for one that cannot be measured."""
     with_recommended = subject.world(None)
