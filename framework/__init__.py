@@ -24,6 +24,7 @@ from .settings import Settings
 from .typing import Vector
 from .world.contacts import Contact, Contacts, ContactsBetween
 from .world.hits import CastHit, CastHits, Hits, NearestHit, NearestHits, Neighbours
+from .world.snapshots import Snapshot
 from .world.world import World
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "PluginError",
     "ScheduleError",
     "Settings",
+    "Snapshot",
     "Stats",
     "StepError",
     "System",

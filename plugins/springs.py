@@ -7,10 +7,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import numbers
 from collections.abc import Iterator
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -35,13 +37,16 @@ class Spring:
         a rope: slack below its rest length, never pushes
     """
 
-    __slots__ = ("_a", "_b", "_damping", "_only_pulls", "_rest_length", "_springs", "_stiffness")
+    __slots__ = (
+        "__weakref__", "_a", "_b", "_damping", "_number", "_only_pulls", "_rest_length", "_springs", "_stiffness",
+    )  # fmt: skip
 
     def __init__(
         self, springs: Springs, a: int, b: int, rest_length: float, stiffness: float, damping: float, only_pulls: bool
     ) -> None:
         self._springs: Springs | None = None
         self._a, self._b = a, b
+        self._number = 0  # in its Springs, which never gives a number twice
         self.rest_length = rest_length
         self.stiffness = stiffness
         self.damping = damping
@@ -134,7 +139,8 @@ class Springs(Plugin):
     Verlet; somewhat less with damping). If springs are too stiff for the step, ``world.faults`` says so.
 
     When a body is deleted, its springs are removed at the start of the next step, and the event ``spring_lost`` is sent
-    for each. Springs are not part of a snapshot, like settings: they have no state besides their fields.
+    for each. Springs are part of a snapshot: a spring that has been removed since is connected again when it is
+    restored, the same object if anything still has it.
     """
 
     def __init__(self) -> None:
@@ -142,6 +148,8 @@ class Springs(Plugin):
         self.world: World | None = None
         self._springs: dict[Spring, None] = {}
         self._columns: _Columns | None = None  # of the present springs
+        self._numbers = itertools.count(1)
+        self._by_number: WeakValueDictionary[int, Spring] = WeakValueDictionary()  # removed ones too
 
         def spring_forces() -> ForceSystem:
             return SpringForces(self)
@@ -193,6 +201,7 @@ class Springs(Plugin):
             raise ValueError(f"springs.connect: a spring needs two bodies, got entity {a} twice")
         rest = _distance(world.bodies, a, b) if rest_length is None else rest_length
         spring = Spring(self, int(a), int(b), rest, stiffness, damping, only_pulls)
+        self._give_number(spring)
         self._springs[spring] = None
         self._changed()
         return spring
@@ -216,6 +225,25 @@ class Springs(Plugin):
         bodies = self._world().bodies
         return math.sqrt(self._current(bodies).rates(bodies)[0])
 
+    # -- snapshots --------------------------------------------------------------------------------
+
+    def saved(self, world: World) -> Any:
+        """(n, 7) number, a, b and the fields of all springs, in order of their creation."""
+        return [[s._number, s.a, s.b, s.rest_length, s.stiffness, s.damping, s.only_pulls] for s in self._springs]
+
+    def take_back(self, world: World, saved: Any) -> None:
+        """Connect these springs and no others."""
+        self._springs.clear()
+        for number, a, b, *fields in saved:
+            spring = self._by_number.get(number)
+            if spring is None or (spring.a, spring.b) != (a, b):
+                spring = Spring(self, a, b, *fields)
+                self._give_number(spring, number)
+            else:
+                spring.rest_length, spring.stiffness, spring.damping, spring.only_pulls = fields
+            self._springs[spring] = None
+        self._changed()
+
     def __len__(self) -> int:
         return len(self._springs)
 
@@ -231,6 +259,13 @@ class Springs(Plugin):
         if self.world is None:
             raise CaromError("these springs are in no world yet: World(Physics(...), springs)")
         return self.world
+
+    def _give_number(self, spring: Spring, number: int | None = None) -> None:
+        """Give it a number that no other has, or the one that it has had in another process."""
+        if number is None:
+            number = next(n for n in self._numbers if n not in self._by_number)
+        spring._number = number
+        self._by_number[number] = spring
 
     def _remove(self, spring: Spring) -> None:
         self._springs.pop(spring, None)

@@ -145,14 +145,24 @@ class Room:
             solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *SOLVER_BODIES)
 
     def _grow_warm_start(self, dt: float) -> None:
-        memory = self._state.warm_start
-        _grow_stacked(memory, _with_spare(self._state.needed))
-        memory.reserve(memory.entity_a.shape[1], "work")
+        self.reserve_warm_start(self._state.needed)
 
     def _grow_contacts(self, dt: float) -> None:
+        self.reserve_contacts(self._state.needed)
+
+    def reserve_warm_start(self, rows: int) -> None:
+        """Room for the impulses of so many contacts, if there is less."""
+        memory = self._state.warm_start
+        if rows > memory.entity_a.shape[1]:
+            _grow_stacked(memory, _with_spare(rows))
+            memory.reserve(memory.entity_a.shape[1], "work")
+
+    def reserve_contacts(self, rows: int) -> None:
+        """Room for so many contacts, if there is less."""
         contacts = self._state.contacts
-        _grow_stacked(contacts, _with_spare(self._state.needed))
-        contacts.reserve(contacts.entity_a.shape[1], "began", "ended")
+        if rows > contacts.entity_a.shape[1]:
+            _grow_stacked(contacts, _with_spare(rows))
+            contacts.reserve(contacts.entity_a.shape[1], "began", "ended")
 
     def _find_candidates(self, simulation: Any, dt: float) -> None:
         """Trees, which from now on hold whole motions, or the broad phase of a plugin."""

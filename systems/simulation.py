@@ -25,7 +25,7 @@ from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
-from .inspection.counters import counters_of, reset
+from .inspection.counters import counters_of, reset, set_counters
 from .inspection.energies import kinetic_energy, momentum, potential_energy
 from .inspection.planned_columns import planned_columns
 from .inspection.planned_kernels import planned_kernels
@@ -44,6 +44,7 @@ from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .stage_list import CLOSING, OPENING, STAGES, SYSTEM_OF_STAGE
 from .step_links import StepLinks
+from .tracking import CONTACTS, WARM_START, put_rows_back, saved_rows
 
 if TYPE_CHECKING:
     from ..framework.world.world import World
@@ -275,26 +276,36 @@ class Simulation(PhysicsServices):
 
     # -- snapshots --------------------------------------------------------------------------------
 
-    def tracking_state(self) -> Any:
+    def saved(self) -> dict[str, Any]:
         state = self.state
-        kept = {}
-        for name in ("warm_start", "contacts"):
-            record = getattr(state, name)
-            numbers = {field: getattr(record, field) for field in record.schema.fields if field == "now"}
-            kept[name] = numbers, {key: array.copy() for key, array in record.columns().items()}
-        return kept
+        if state.found_current:  # contacts of a narrow phase that no RESPONSE has followed are in no history
+            self.contacts.columns_now()
+        return {
+            "gravity": self.gravity,
+            "warm_start": saved_rows(state.warm_start, WARM_START),
+            "contacts": saved_rows(state.contacts, CONTACTS),
+            "ids_changed": state.ids_changed or self.table.generation != self._generation,
+            "quarantine": self.quarantine.saved(),
+            "counters": counters_of(state),
+        }
 
-    def restore_tracking(self, kept: Any) -> None:
+    def take_back(self, saved: dict[str, Any], moved: bool) -> None:
         state = self.state
-        for name, (numbers, columns) in kept.items():
-            record = getattr(state, name)
-            for key, array in columns.items():
-                setattr(record, key, array)
-            for field, number in numbers.items():
-                setattr(record, field, number)
+        self.set_gravity(saved["gravity"])
+        self._room.reserve_warm_start(saved["warm_start"]["counts"])
+        self._room.reserve_contacts(saved["contacts"]["counts"])
+        put_rows_back(state.warm_start, saved["warm_start"])
+        put_rows_back(state.contacts, saved["contacts"])
         state.warm_start.rows_version[:] = -1
-        state.found_current = False
+        self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]
+        if self.quarantine.take_back(saved["quarantine"]) or moved:
+            self.scene.forget()
+        set_counters(state, saved["counters"])
+        state.impacts.logged = 0
+        state.found_current = state.moved = False
         state.contacts_version += 1
+        state.motion_version += 1
+        self.queries.forget()
 
     # -- looking inside ---------------------------------------------------------------------------
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-import pytest
 from helpers_determinism import Charge, settled, state
 from worlds import ball, floor, make_world
 
@@ -71,28 +70,6 @@ def test_a_snapshot_holds_kinds_and_components_of_ones_own():
     world.step()
     assert world.bodies.position[:, 0].tolist() == [1.0, 10.0]
     assert world.component_for_entity(b, Charge).value == 3.0
-
-
-def test_a_snapshot_of_other_bodies_is_refused_and_nothing_is_disturbed():
-    world = make_world()
-    a = ball(world, 0.0)
-    snapshot = world.snapshot()
-    b = ball(world, 9.0)
-    digest = world.state_hash()
-    with pytest.raises(ValueError, match="other bodies"):
-        world.restore(snapshot)
-    assert world.state_hash() == digest
-    world.delete_entity(b, immediate=True)
-    world.restore(snapshot)
-    for change in (
-        lambda: world.add_component(a, Charge(1.0)),
-        lambda: (world.remove_component(a, Charge), world.remove_component(a, SphereCollider)),
-    ):
-        change()
-        with pytest.raises(ValueError, match=rf"entity {a}: \w+ was added or removed"):
-            world.restore(snapshot)
-    world.add_component(a, SphereCollider(0.5))
-    world.restore(snapshot)
 
 
 def test_settings_stay_when_a_snapshot_is_restored():

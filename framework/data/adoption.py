@@ -119,6 +119,52 @@ class Adoption:
         for component, members in self._members.items():
             self._let_go(component, set(members))
 
+    # -- going back to what was -------------------------------------------------------------------
+
+    def know(self, component: type[Component]) -> None:
+        """There are columns for that type from now on."""
+        if component not in self._members:
+            self.table.add_component_type(component)
+            self.table.members_version += 1
+            self._members[component] = {}
+
+    def loose(self, component: type[Component], listed: Ids) -> Collection[int]:
+        """Those of the entities with handles of a component that are no bodies."""
+        adopted = self._members.get(component, {})
+        return () if len(adopted) == len(listed) else listed - adopted.keys()
+
+    def pending(self, log: ChangeLog) -> Ids:
+        """Entities that have changed since the last synchronize."""
+        if log.cleared or self._cleared:
+            return set().union(*self._members.values(), self._touched, log.touched)
+        return self._touched | log.touched
+
+    def forget_pending(self, log: ChangeLog) -> None:
+        """What has changed since the last synchronize does not count."""
+        log.take()
+        self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
+
+    def keep_only(self, wanted: Mapping[int, Mapping[type[Any], Any] | None]) -> None:
+        """Let go of all other handles of these entities; the rows stay as they are."""
+        for component, members in self._members.items():
+            gone = {e for e, kept in wanted.items() if e in members and (kept or {}).get(component) is not members[e]}
+            if gone:
+                self._let_go(component, gone, gone)
+
+    def adopt_again(self, wanted: Mapping[int, Mapping[type[Any], Any] | None]) -> None:
+        """Bind the handles of those of these entities that are bodies: the table has their rows."""
+        types = {component for components in wanted.values() for component in components or ()}
+        roles = {component: self._role(component) for component in types}
+        partners = {component for component in types if roles[component] == PARTNER}
+        ours = {component: self._members[component] for component in types if roles[component] != OTHER}
+        for entity, components in wanted.items():
+            if components and not partners.isdisjoint(components):
+                for component, handle in components.items():
+                    if component in ours:
+                        ours[component][entity] = handle
+                        if handle._store is not self.table or handle._entity != entity:
+                            handle._bind(self.table, entity)
+
     # -- what has changed -------------------------------------------------------------------------
 
     def _gather(self, log: ChangeLog) -> None:
@@ -243,10 +289,7 @@ class Adoption:
     def _apply(self, changes: Changes, cleared: bool) -> bool:
         table, fresh, gone, batches = self.table, changes.fresh, changes.gone, changes.batches
         for component in (*fresh, *(component for batch in batches for component in batch.types)):
-            if component not in self._members:
-                table.add_component_type(component)
-                table.members_version += 1
-                self._members[component] = {}
+            self.know(component)
         leaving = set().union(*gone.values()) if cleared else set(changes.left)
         for component, entities in gone.items():
             self._let_go(component, entities, leaving)
@@ -356,9 +399,9 @@ class Adoption:
             table.has_mask(component)[rows] = True
         if self.anchor in batch.types and "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
-        batch.adopted(self._make_handle)
+        batch.adopted(self.make_handle)
 
-    def _make_handle(self, component: type[Component], entity: int) -> Component:
+    def make_handle(self, component: type[Component], entity: int) -> Component:
         """A handle of a body in the table that has had none."""
         handle = self._members[component][entity] = component.__new__(component)
         handle._bind(self.table, entity)

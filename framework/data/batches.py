@@ -101,6 +101,11 @@ class Batches:
         self._firsts = [one.first for one in self.all]
         self.stop = batch.first + batch.count
 
+    def put(self, batches: list[Batch]) -> None:
+        """These instead of all there are."""
+        self.all, self._firsts = batches, [one.first for one in batches]
+        self.stop = batches[-1].first + batches[-1].count if batches else 0
+
     def of(self, entity: Any) -> Batch | None:
         """The batch that an entity is inside of; None for whatever else."""
         try:

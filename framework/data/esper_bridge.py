@@ -111,6 +111,7 @@ def create_many(stores: Stores, count: int) -> range:
     batch = Batch(first, count, stores)
     contents = Contents()
     entities, log = contents.entities, contents.log
+    entities.saved = None
     entities.batches.add(batch)
     log.batches.append(batch)
     log.dirty = True
@@ -141,6 +142,19 @@ class Membership:
         return mask
 
 
+def next_id() -> int:
+    """The id that the next entity of the current context gets."""
+    number = next(esper._entity_count)
+    esper._entity_count = itertools.count(number)
+    return number
+
+
+def go_on_from(number: int) -> None:
+    """Give the next entity of the current context that id; what esper has looked up before no longer holds."""
+    esper._entity_count = itertools.count(number)
+    esper.clear_cache()
+
+
 def forget_death(entity: int) -> None:
     """Take back a deferred deletion: after an immediate one esper would fail on it in every later process."""
     esper._dead_entities.discard(entity)
@@ -153,6 +167,7 @@ def clear_dead() -> None:
         return
     contents = Contents()
     entities, log = contents.entities, contents.log
+    entities.saved = None
     own = [entity for entity in dead if dict.__contains__(entities, entity)]
     if len(own) < len(dead) and entities.batches:
         ids = np.array([int(entity) for entity in dead if hasattr(entity, "__index__")], np.int64)

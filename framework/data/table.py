@@ -349,6 +349,13 @@ class Table:
         if not np.array_equal(np.searchsorted(self.stops, rows, side="right"), kinds):
             self.kind_changed = True
 
+    def resize(self, stops: tuple[int, ...]) -> None:
+        """Rows for so many bodies, whatever they hold: all of them are about to be written."""
+        self.reserve(stops[2])
+        self.stops, self.count = stops, stops[2]
+        self._plan.record.stops[:] = stops
+        self.version += 1
+
     def reserve(self, count: int) -> None:
         """Make room for that many rows; capacity doubles, views taken before keep the old arrays."""
         if count <= self.capacity:
@@ -400,9 +407,3 @@ class Table:
             self.static_version += 1
         if column.on_write is not None:
             column.on_write(self, row)
-
-    # -- copies -----------------------------------------------------------------------------------
-
-    def copy_columns(self) -> dict[str, np.ndarray]:
-        """Copies of the rows in use, of all columns that have an array."""
-        return {key: self.column(key).copy() for key in self.arrays}

@@ -58,23 +58,28 @@ class Members:
             log.touch(self.listed)
 
     def add(self, entity: int) -> None:
-        log = self._log
+        log, entities = self._log, self._entities
         if log is not None:
             log.dirty = True
             log.touched.add(entity)
-        if entity < self._entities.batches.stop:
-            self._entities.take_out(entity)
+        if entity < entities.batches.stop:
+            entities.take_out(entity)
+        if entities.unshared is not None:
+            entities.unshare(entity)
         self.listed.add(entity)
 
     def discard(self, entity: int) -> None:
+        entities = self._entities
         if self._log is not None:
             self._log.touch((entity,))
-        if entity < self._entities.batches.stop:
-            self._entities.take_out(entity)
+        if entity < entities.batches.stop:
+            entities.take_out(entity)
+        if entities.unshared is not None:
+            entities.unshare(entity)
         self.listed.discard(entity)
 
     def discard_many(self, entities: list[int]) -> None:
-        """Entities that are listed."""
+        """Entities that are listed and have gone."""
         if self._log is not None:
             self._log.touch(entities)
         self.listed.difference_update(entities)
@@ -101,10 +106,15 @@ class Members:
         return bool(self.listed) or bool(self._batches())
 
     def __iter__(self) -> Iterator[int]:
-        """As they are now: walking through them may take them out of their batches."""
+        """By ascending id, as they are now: walking through them may take them out of their batches.
+
+        In the order of the set it would depend on what has come and gone before, and a restored world may have another
+        history than the one it repeats.
+        """
         ids = list(self.listed)
         for batch in self._batches():
             ids += batch.ids().tolist()
+        ids.sort()
         return iter(ids)
 
     def mask(self, entities: np.ndarray) -> np.ndarray:
@@ -136,12 +146,41 @@ class WatchedComponents(dict[type[Any], Members]):
 
 
 class Entities(dict[int, dict[type[Any], Any]]):
-    """esper's dict of the components of each entity; those of an entity in a batch are made when they are looked up."""
+    """esper's dict of the components of each entity; those of an entity in a batch are made when they are looked up.
+
+    saved
+        what snapshots hold of it, while nothing has come or gone since; else None
+    unshared
+        whose dict of components no snapshot holds too, so that it may be changed; None while there are no snapshots
+    """
 
     def __init__(self, content: dict[int, dict[type[Any], Any]]) -> None:
         super().__init__(content)
         self.batches = Batches()
         self.members: dict[type[Any], Members] = {}
+        self.saved: Any = None
+        self.unshared: set[int] | None = None
+
+    def share(self, saved: Any) -> None:
+        """A snapshot holds all dicts of components that there are now."""
+        self.saved, self.unshared = saved, set()
+
+    def unshare(self, entity: int) -> None:
+        """An entity is about to gain or lose a component: what a snapshot holds stays as it is."""
+        self.saved = None
+        if entity not in self.unshared:  # type: ignore[operator]
+            self.unshared.add(entity)  # type: ignore[union-attr]
+            components = dict.get(self, entity)
+            if components is not None:
+                dict.__setitem__(self, entity, components.copy())
+
+    def __setitem__(self, entity: int, components: dict[type[Any], Any]) -> None:
+        self.saved = None
+        dict.__setitem__(self, entity, components)
+
+    def __delitem__(self, entity: int) -> None:
+        self.saved = None
+        dict.__delitem__(self, entity)
 
     def __missing__(self, entity: Any) -> dict[type[Any], Any]:
         batch = self.batches.of(entity)
@@ -149,7 +188,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
             raise KeyError(entity)
         number = int(entity)
         components: dict[type[Any], Any] = batch.take_out(number)
-        self[number] = components
+        dict.__setitem__(self, number, components)  # nothing has come or gone
         for component in batch.types:
             self.members[component].settle(number, batch.make_handle is None)
         return components
@@ -198,6 +237,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
         return ItemsView(self)
 
     def clear(self) -> None:
+        self.saved = None
         self.batches.clear()
         super().clear()
 

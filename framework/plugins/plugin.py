@@ -216,6 +216,18 @@ class Plugin:
         """Called by the world after all its plugins are registered; all of it, or an error and nothing."""
         self._add_systems(world, self.systems)
 
+    # -- snapshots --------------------------------------------------------------------------------
+
+    def saved(self, world: World) -> Any:
+        """What the plugin knows of that world and will need to go on, for snapshots and saved worlds; None: nothing.
+
+        A copy, of arrays, numbers, texts, and lists and dicts (by text) of these.
+        """
+        return None
+
+    def take_back(self, world: World, saved: Any) -> None:
+        """Go on from what :meth:`saved` has returned, here or in another process; the world has its bodies again."""
+
     def _add_systems(self, world: World, factories: list[Any]) -> None:
         added: list[Any] = []
         try:

@@ -353,17 +353,20 @@ class Contacts(ContactRows):
         """Show these columns until the source has others."""
         self._own_columns, self._columns_of = columns, self._source.version
 
-    def state(self) -> Any:
-        """The contacts and the events of the window, for a snapshot."""
+    def saved(self) -> dict[str, Any]:
+        """The events of the window, for a snapshot; the contacts too if they have been read, and so may be changed."""
         self.take_deferred()
-        return self._columns, {name: list(chunks) for name, chunks in self._chunks.items()}
+        self._source.record_impacts()
+        columns = _copied(self._own_columns) if self._columns_of == self._source.version else None
+        histories = {name: [_copied(chunk) for chunk in chunks] for name, chunks in self._chunks.items()}
+        return {"window": self._window, "columns": columns, "histories": histories}
 
-    def restore_state(self, state: Any) -> None:
-        columns, histories = state
-        self._deferred = None
-        self.show(columns)
-        self._chunks = {name: list(rows) for name, rows in histories.items()}
-        self._recorded, self._window = True, -1
+    def take_back(self, saved: dict[str, Any]) -> None:
+        """Show them again; the source has the contacts of that time."""
+        self._deferred, self._recorded, self._window = None, True, saved["window"]
+        self._chunks = {name: [_copied(chunk) for chunk in chunks] for name, chunks in saved["histories"].items()}
+        if saved["columns"] is not None:
+            self.show(_copied(saved["columns"]))
 
     def _history(self, name: str) -> ContactRows:
         self.take_deferred()
@@ -378,6 +381,10 @@ class Contacts(ContactRows):
                 return ContactRows(joined, self._lookup)
             chunks[:] = [joined]
         return ContactRows(chunks[0], self._lookup)
+
+
+def _copied(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: column.copy() for name, column in columns.items()}
 
 
 def empty_columns(dimensions: int, enabled: bool = False, impact: bool = False) -> dict[str, np.ndarray]:

@@ -166,9 +166,15 @@ class PhysicsServices(ABC):
     def prepare(self, components: tuple[type[Any], ...]) -> None:
         """Compile what bodies of these component types need; of those there are, if none are given."""
 
-    @abstractmethod
-    def tracking_state(self) -> Any:
-        """Which pairs touched at the end of the last step, with their impulses: a copy."""
+    # -- snapshots --------------------------------------------------------------------------------
 
     @abstractmethod
-    def restore_tracking(self, state: Any) -> None: ...
+    def saved(self) -> dict[str, Any]:
+        """What goes on from step to step beside the table, the contacts that users see, and the clock: a copy.
+
+        Arrays, numbers, texts, and lists and dicts (by text) of these.
+        """
+
+    @abstractmethod
+    def take_back(self, saved: dict[str, Any], moved: bool) -> None:
+        """Go on from that; the table is what it was then. moved: it has had other rows, or other components."""

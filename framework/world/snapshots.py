@@ -1,65 +1,127 @@
-"""Copies of a world's state, and a hash to compare by."""
+"""Copies of a world's state, going back to them, and a hash to compare by.
+
+What a world's state is stands here, once: a snapshot, ``restore`` and a saved file are made of the same parts. Each
+part is copied and put back by its owner.
+"""
 
 from __future__ import annotations
 
-import copy
 import hashlib
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..schedule.clock import Clock
+from ..data import esper_bridge
+from ..data.population import LooseValues, Population, Return
+from ..data.saved_table import SavedTable
+from ..errors import CaromError
 from .services import PhysicsServices
+
+if TYPE_CHECKING:
+    from .world import World
 
 
 @dataclass
-class StepState:
-    """A copy of what a step may change: columns, clock, contacts, which pairs touch; entities: ids by row."""
+class Snapshot:
+    """A world between two steps: what ``world.snapshot()`` returns and ``world.restore(snapshot)`` goes back to.
 
-    entities: np.ndarray
-    columns: dict[str, np.ndarray]
-    clock: tuple[float, ...]
-    contacts: Any
-    tracking: Any
-    arrays: Any  # keeps those that columns have numbers of
+    It can be pickled, for another process or to keep: then components that are not carom's are pickled along.
 
-
-def snapshot(physics: PhysicsServices, clock: Clock) -> StepState:
-    """A copy that shares nothing with the world."""
-    columns = physics.table.copy_columns()
-    contacts, tracking = copy.deepcopy((physics.contacts.state(), physics.tracking_state()))
-    arrays = physics.table.held_arrays()
-    return StepState(columns.pop("entity"), columns, clock.state(), contacts, tracking, arrays)
-
-
-def restore(state: StepState, physics: PhysicsServices, clock: Clock) -> None:
-    """Make the world what it was; ValueError if bodies or their components have come or gone since.
-
-    The settings stay as they are now, dt too.
+    owner
+        the physics of the world it was taken from; None after pickling
+    dimensions, plugins
+        of that world; the plugins' versions by name
+    population, loose
+        the entities and their components, and the values of those that are in no table
+    dead, next_id
+        entities whose deletion is pending; the id of the next one
+    table, contacts, physics, kept, clock, steps
+        the bodies' columns; the contacts as users see them; what physics, plugins (by name), clock and stats go on from
     """
-    table = physics.table
-    rows = table.rows_of(state.entities)
-    if len(state.entities) != table.count or (rows < 0).any():
-        raise ValueError("this snapshot holds other bodies than the world has now: some were created or deleted since")
-    for component in table.component_types:
-        mask = table.has_mask(component)[rows]
-        was = state.columns.get(table.mask_name(component), np.zeros(len(rows), bool))
-        if not np.array_equal(mask, was):
-            entity = int(state.entities[np.flatnonzero(mask != was)[0]])
-            raise ValueError(f"entity {entity}: {component.__name__} was added or removed since this snapshot")
-    for key, column in state.columns.items():
-        table.make(key)[rows] = column
-    table.reset(table.on_demand.keys() - state.columns.keys())
-    table.set_kinds(rows, state.columns["kind"])
-    table.static_version += 1
-    table.frames_applied = True
-    dt = clock.dt
-    clock.restore(state.clock)
+
+    owner: PhysicsServices | None
+    dimensions: int
+    plugins: dict[str, str]
+    population: Population
+    loose: LooseValues
+    dead: list[int]
+    next_id: int
+    table: SavedTable
+    contacts: dict[str, Any]
+    physics: dict[str, Any]
+    kept: dict[str, Any]
+    clock: tuple[float, ...]
+    steps: int
+
+    @classmethod
+    def of(cls, world: World, physics: PhysicsServices) -> Snapshot:
+        """Of a world whose table is up to date with esper; shares with it what is not carom's."""
+        contents = world._contents()
+        population = Population.of(contents.entities, physics.adoption)
+        with world._context():
+            next_id = esper_bridge.next_id()
+        kept = {plugin.name: plugin.saved(world) for plugin in world.plugins}
+        saved = physics.saved()
+        return cls(
+            owner=physics, dimensions=physics.dimensions, plugins={p.name: p.version for p in world.plugins},
+            population=population, loose=LooseValues.of(population, contents.entities), dead=list(contents.dead),
+            next_id=next_id, table=SavedTable.of(physics.table), contacts=physics.contacts.saved(), physics=saved,
+            kept={name: state for name, state in kept.items() if state is not None}, clock=world.clock.state(),
+            steps=world._pipeline.profiler.steps,
+        )  # fmt: skip
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "owner": None, "population": self.population.without_handles()}
+
+
+def restore(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
+    """Make the world what it was, whatever has come or gone since; its settings stay, dt too.
+
+    CaromError, and nothing is changed, if the snapshot is of another kind of world.
+    """
+    _check(snapshot, world, physics)
+    if snapshot.owner is not physics:
+        snapshot = replace(snapshot, population=snapshot.population.without_handles())
+    population, table, adoption = snapshot.population, physics.table, physics.adoption
+    contents = world._contents()
+    for component in (*snapshot.table.types, *population.types):
+        adoption.know(component)
+    for key in snapshot.table.columns:
+        table.make(key)
+    going = Return(population, contents, adoption)
+    going.let_go()
+    moved = snapshot.table.put_back(table)
+    snapshot.loose.put_into_batches(population, table.dimensions)
+    with world._context():
+        going.arrive()
+        esper_bridge.go_on_from(snapshot.next_id)
+    snapshot.loose.put_into_handles(population, contents.entities)
+    contents.dead.clear()
+    contents.dead.update(snapshot.dead)
+    clock, dt = world.clock, world.clock.dt
+    clock.restore(snapshot.clock)
     clock.set_dt(dt)
-    physics.restore_tracking(copy.deepcopy(state.tracking))
-    physics.contacts.restore_state(copy.deepcopy(state.contacts))
-    physics.queries.forget()
+    world._pipeline.profiler.steps = snapshot.steps
+    physics.take_back(snapshot.physics, moved)
+    physics.contacts.take_back(snapshot.contacts)
+    for plugin in world.plugins:
+        if plugin.name in snapshot.kept:
+            plugin.take_back(world, snapshot.kept[plugin.name])
+
+
+def _check(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
+    if snapshot.dimensions != physics.dimensions:
+        raise CaromError(
+            f"this snapshot is of a world of {snapshot.dimensions} dimensions; world {world.name!r} has "
+            f"{physics.dimensions}"
+        )
+    here = {plugin.name for plugin in world.plugins}
+    missing = [name for name in snapshot.plugins if name not in here]
+    if missing:
+        raise CaromError(f"this snapshot needs plugins that world {world.name!r} does not have: {', '.join(missing)}")
+    for component in (*snapshot.table.types, *snapshot.population.types):
+        physics.table.check_component_type(component)
 
 
 def state_hash(physics: PhysicsServices) -> str:

@@ -24,20 +24,20 @@ from ..schedule.profile_report import Stats
 from ..schedule.step import Pipeline
 from ..settings import Settings
 from ..typing import Array, Vector
-from . import snapshots
 from .attributes import KnownAttributes
 from .contacts import Contacts
 from .entities import EntityVerbs
 from .events import Events
 from .queries import QueryVerbs
 from .services import PhysicsServices
+from .state_verbs import StateVerbs
 
 P = TypeVar("P", bound=esper.Processor)
 
 _numbers = itertools.count(1)
 
 
-class World(KnownAttributes, EntityVerbs, QueryVerbs):
+class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
     """A world of entities, stepped by systems in a fixed step.
 
     plugins
@@ -425,20 +425,3 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs):
                 self._pipeline.order.reconcile()
             self._pipeline.look_ahead()
             return Plan.of(self)
-
-    def snapshot(self) -> snapshots.StepState:
-        """A copy of the state: columns, clock, contacts."""
-        self._pipeline.must_be_between_steps("a snapshot can be taken")
-        return snapshots.snapshot(self._synchronized(), self._pipeline.clock)
-
-    def restore(self, snapshot: snapshots.StepState) -> None:
-        """Go back to a snapshot of this world; settings and gravity stay as they are.
-
-        ValueError if bodies, or components of bodies, were added or removed since.
-        """
-        self._pipeline.must_be_between_steps("a snapshot can be restored")
-        snapshots.restore(snapshot, self._synchronized(), self._pipeline.clock)
-
-    def state_hash(self) -> str:
-        """A hash of every body's state, in order of the ids: equal bits, equal hash."""
-        return snapshots.state_hash(self._synchronized())

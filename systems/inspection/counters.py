@@ -25,7 +25,12 @@ def counters_of(state: Record) -> dict[str, int]:
     return {name: getattr(state, field) for name, field in COUNTERS.items()}
 
 
+def set_counters(state: Record, counters: dict[str, int]) -> None:
+    """Count on from these."""
+    for name, count in counters.items():
+        setattr(state, COUNTERS[name], count)
+
+
 def reset(state: Record) -> None:
     """Count from 0 again."""
-    for field in COUNTERS.values():
-        setattr(state, field, 0)
+    set_counters(state, dict.fromkeys(COUNTERS, 0))

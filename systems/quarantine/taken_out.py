@@ -74,6 +74,19 @@ class Quarantine:
         self._bound: Any = None  # what the list was made for
         self._generation = table.generation
 
+    # -- snapshots --------------------------------------------------------------------------------
+
+    def saved(self) -> dict[str, Any]:
+        return {"told": [list(pair) for pair in self.told.items()], "far": sorted(self._far)}
+
+    def take_back(self, saved: dict[str, Any]) -> bool:
+        """True if some body may have been out, or is: the scene has to be made again."""
+        out = len(self._state.bodies.quarantined) > 0 or bool(self.told or saved["told"])
+        self.told = dict(saved["told"])
+        self._far, self._generation = set(saved["far"]), self._table.generation
+        self._state.quarantining = bool(self.told)
+        return out
+
     # -- what is looked at ------------------------------------------------------------------------
 
     def bind(self) -> None:

@@ -1,0 +1,37 @@
+"""What the records carry from step to step besides the bodies' columns, as snapshots hold it: contacts and impulses.
+
+Both are kept for the last step and the one before (``[now, i]`` and ``[1 - now, i]``); a step reads the former only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..framework.jit.records.record import Record
+from ..framework.jit.records.schema import Column
+
+WARM_START = ("step", "substep")  # numbers of which there are two, beside the counts
+CONTACTS = ("steps", "stays")
+
+
+def saved_rows(record: Record, numbers: tuple[str, ...]) -> dict[str, Any]:
+    """Copies of what the record has of the last step."""
+    now, count = record.now, int(record.counts[record.now])
+    rows = {name: getattr(record, name)[now, :count].copy() for name in _stacked(record)}
+    return {**rows, **{name: getattr(record, name)[now].item() for name in ("counts", *numbers)}}
+
+
+def put_rows_back(record: Record, saved: dict[str, Any]) -> None:
+    """Write them into a record that has room for so many rows."""
+    now, count = record.now, saved["counts"]
+    for name, value in saved.items():
+        if isinstance(value, np.ndarray):
+            getattr(record, name)[now, :count] = value
+        else:
+            getattr(record, name)[now] = value
+
+
+def _stacked(record: Record) -> list[str]:
+    return [name for name, field in record.schema.fields.items() if isinstance(field, Column) and field.stacked]
