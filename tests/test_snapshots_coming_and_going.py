@@ -14,7 +14,7 @@ from helpers_snapshots import Bullet, Tag, fill, log_events, make, springs_of
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, System, World
+from carom.framework import CaromError, Component, ForceSystem, System, World, column
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
 
@@ -280,3 +280,51 @@ def test_two_peers_with_delayed_inputs_end_with_the_same_world(capsys):
     assert min(peer.replayed for peer in late) > 8 * 70
     runpy.run_path(str(ROOT / "examples" / "rollback.py"), run_name="__main__")
     assert "both worlds" in capsys.readouterr().out
+
+
+class Pointed(Component):
+    size = column(default=1.0)
+
+    def __init__(self, **values):
+        super().__init__(**values)
+        self.names = ["a"]
+        self.itself = self
+
+
+def test_a_deep_copy_of_a_component_shares_nothing():
+    world = make_world()
+    one = Pointed(size=2.0)
+    world.add_component(ball(world, 0.0), one)
+    world.step()
+    shallow, deep = copy.copy(one), copy.deepcopy(one)
+    one.names.append("b")
+    one.size = 3.0
+    assert (shallow.names, deep.names) == (["a", "b"], ["a"])
+    assert (shallow.size, deep.size) == (2.0, 2.0)
+    assert deep.itself is deep
+
+
+class Wind(ForceSystem):
+    def __init__(self):
+        self.strength = [1.0]
+
+
+class Counts(System):
+    def __init__(self):
+        self.seen = []
+
+    def process(self, dt):
+        self.seen.append(dt)
+
+
+@pytest.mark.parametrize("do", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+@pytest.mark.parametrize("make_one", [Wind, Counts])
+def test_a_copy_of_a_system_is_in_no_world(make_one, do):
+    world, one = make_world(), make_one()
+    world.add_system(one)
+    other = do(one)
+    assert not hasattr(other, "world")
+    assert vars(other) == {name: value for name, value in vars(one).items() if name != "world"}
+    assert one.world is world
+    world.add_system(other)
+    assert other.world is world

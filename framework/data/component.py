@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import re
 from collections.abc import Mapping
@@ -174,8 +175,11 @@ class Component:
     def __copy__(self) -> Self:
         return self.copy()
 
-    def __deepcopy__(self, memo: Any) -> Self:
-        return self.copy()
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        other = memo[id(self)] = self.copy()
+        for name in getattr(other, "__dict__", {}).keys() - set(Component.__slots__):
+            vars(other)[name] = copy.deepcopy(vars(self)[name], memo)
+        return other
 
     def __repr__(self) -> str:
         shown = ((n, c.value_of(self)) for n, c in self.columns.items() if c.constructor)

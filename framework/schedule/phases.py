@@ -39,7 +39,19 @@ class Phase(IntEnum):
 FIRST_PRIORITY = 1_000_000  # the processor that runs the step
 
 
-class System(esper.Processor):
+class OfOneWorld:
+    """What gets a ``world`` when it is added to one: a copy of it is in none."""
+
+    world: World
+
+    def __getstate__(self) -> object:
+        state = super().__getstate__()
+        if isinstance(state, dict):
+            return {name: value for name, value in state.items() if name != "world"}
+        return state
+
+
+class System(OfOneWorld, esper.Processor):
     """A piece of a step. Derive from it, set ``phase`` and write ``process``; ``world.add_system`` puts it in order.
 
     phase
@@ -54,7 +66,6 @@ class System(esper.Processor):
     before: Sequence[Any] = ()
     after: Sequence[Any] = ()
     writes: Sequence[str] = ()
-    world: World
 
     @property
     def name(self) -> str:
@@ -69,7 +80,7 @@ class System(esper.Processor):
         return None
 
 
-class ForceSystem:
+class ForceSystem(OfOneWorld):
     """Adds forces; pure, because it is called once per stage of the integrator, at that stage's state.
 
     requires
@@ -77,7 +88,6 @@ class ForceSystem:
     """
 
     requires: ClassVar[Sequence[type[Component]]] = ()
-    world: World
 
     @property
     def name(self) -> str:

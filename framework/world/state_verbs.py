@@ -1,4 +1,4 @@
-"""The state of a world as a whole: snapshots and going back to them, a hash, files."""
+"""The state of a world as a whole: snapshots and going back to them, a hash."""
 
 from __future__ import annotations
 
@@ -51,6 +51,5 @@ class StateVerbs:
 
 
 NO_COPY = (
-    "a world cannot be copied or pickled: world.snapshot() is a copy of its state, which can be pickled and restored; "
-    "world.save(path) and World.load(path, ...) keep it in a file"
+    "a world cannot be copied or pickled: world.snapshot() is a copy of its state, which can be pickled and restored"
 )
