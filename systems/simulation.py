@@ -128,8 +128,7 @@ class Simulation(PhysicsServices):
         table, scene, words = self.table, self.scene, self._words
         words[self._step_number] = self.table.clock.step_count
         self._contacts_before = self.contacts.columns_now() if words[self._found_current] else None
-        structure = table.version + table.members_version + self._world.registry.version
-        if structure != scene.structure or table.static_version != scene.static_version:
+        if self._structure() != scene.structure or table.static_version != scene.static_version:
             self._refresh()
         if self._must_check:
             self._check()
@@ -137,6 +136,10 @@ class Simulation(PhysicsServices):
             self._link()
         if others_write or words[self._others_write]:
             self._take_care(others_write)
+
+    def _structure(self) -> int:
+        """Another number whenever bodies, their components or plugins come or go."""
+        return self.table.version + self.table.members_version + self._world.registry.version
 
     def _take_care(self, others_write: bool) -> None:
         """Code of the game runs in this step, or did in the last one."""
@@ -284,6 +287,7 @@ class Simulation(PhysicsServices):
             "gravity": self.gravity,
             "warm_start": saved_rows(state.warm_start, WARM_START),
             "contacts": saved_rows(state.contacts, CONTACTS),
+            "followed": self._structure() == self.scene.structure,
             "ids_changed": state.ids_changed or self.table.generation != self._generation,
             "quarantine": self.quarantine.saved(),
             "counters": counters_of(state),
@@ -298,7 +302,7 @@ class Simulation(PhysicsServices):
         put_rows_back(state.contacts, saved["contacts"])
         state.warm_start.rows_version[:] = -1
         self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]
-        if self.quarantine.take_back(saved["quarantine"]) or moved:
+        if self.quarantine.take_back(saved["quarantine"]) or moved or not saved["followed"]:
             self.scene.forget()
         set_counters(state, saved["counters"])
         state.impacts.logged = 0

@@ -182,6 +182,20 @@ def test_arrays_of_array_columns_outlive_what_had_them():
         world.step()
 
 
+def test_what_the_next_step_would_have_followed_is_followed_again():
+    """A body that has just become static has a velocity until the next step."""
+    world = make_world()
+    entity = ball(world, 0.0, 1.0)
+    world.step()
+    world.component_for_entity(entity, RigidBody).kind = "static"
+    snapshot, hashes = world.snapshot(), []
+    for _ in range(3):
+        world.step()
+        hashes.append(world.state_hash())
+        world.restore(snapshot)
+    assert len(set(hashes)) == 1
+
+
 def test_a_search_and_a_query_see_the_restored_bodies():
     world = make_world()
     a = ball(world, (0.0, 0.0))
