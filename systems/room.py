@@ -153,15 +153,15 @@ class Room:
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""
         memory = self._state.warm_start
-        if rows > memory.entity_a.shape[1]:
-            _grow_stacked(memory, _with_spare(rows))
+        if rows > len(memory.work):
+            _grow_stacked(memory, max(_with_spare(rows), memory.entity_a.shape[1]))
             memory.reserve(memory.entity_a.shape[1], "work")
 
     def reserve_contacts(self, rows: int) -> None:
         """Room for so many contacts, if there is less."""
         contacts = self._state.contacts
-        if rows > contacts.entity_a.shape[1]:
-            _grow_stacked(contacts, _with_spare(rows))
+        if rows > len(contacts.began):
+            _grow_stacked(contacts, max(_with_spare(rows), contacts.entity_a.shape[1]))
             contacts.reserve(contacts.entity_a.shape[1], "began", "ended")
 
     def _find_candidates(self, simulation: Any, dt: float) -> None:

@@ -7,6 +7,8 @@ import pytest
 from helpers_modes import each_mode
 from worlds import ball, both_dimensions, box, make_world, velocity
 
+from carom.components import SphereCollider, Transform
+
 DT = 1 / 60
 MODES = ("discrete", "continuous", "event_driven")
 
@@ -92,3 +94,24 @@ def test_a_falling_grain_lands_before_it_is_struck(d, mode, e):
         world.step()
         height = world.bodies.position[world.bodies.row_of(grain), 1]
         assert height == pytest.approx(0.01, abs=2e-4), world.step_count  # 1 % of the size
+
+
+@each_mode
+def test_a_body_in_a_stack_that_loses_its_collider_falls_free(mode):
+    """And nothing looks for the shape that it no longer has, which the checked build would see."""
+    for place in range(4):
+        world = make_world(gravity=(0.0, -9.81), collision=mode, dt=DT)
+        box(world, (0.0, -0.5), half=(50.0, 0.5), kind="static")
+        stack = [ball(world, (0.1 * (k % 2), 0.5 + k)) for k in range(5)]
+        for _ in range(60):
+            world.step()
+        start = world.component_for_entity(stack[place], Transform).position[1]
+        speed = velocity(world, stack[place])[1]
+        world.remove_component(stack[place], SphereCollider)
+        for _ in range(30):
+            world.step()
+        steps = 30 * 30 if mode == "event_driven" else 30 * 31  # on the parabola; by semi-implicit Euler
+        fallen = start + 30 * DT * speed - 9.81 * DT**2 * steps / 2
+        assert world.component_for_entity(stack[place], Transform).position[1] == pytest.approx(fallen, abs=1e-9)
+        heights = [world.component_for_entity(e, Transform).position[1] for e in stack if e != stack[place]]
+        assert min(heights) > 0.4

@@ -114,7 +114,7 @@ def obey_statics(state, dt):
         if not moved:
             break
     for i in range(state.dynamic if not state.pairs_filtered else 0):
-        if is_led(state, i) and is_astray(state, i, dt):
+        if state.bodies.shape[i] >= 0 and is_led(state, i) and is_astray(state, i, dt):
             for _ in range(ROUNDS):
                 if not keep_out_of_all(state, i):
                     break
