@@ -38,9 +38,9 @@ ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
 EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = (
-    "body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled", "velocity_before",
-    "velocity_way", "heaviest", "fastest", "island", "size", "open", "going", "across", "along", "far", "worst",
-    "stopper",
+    "body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled", "newest", "reach",
+    "velocity_before", "velocity_way", "heaviest", "fastest", "island", "size", "open", "going", "across", "along",
+    "far", "worst", "stopper",
 )  # fmt: skip
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {

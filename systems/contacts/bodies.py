@@ -146,7 +146,7 @@ def put_back(state, dt):
         bound_throws(state, dt)
     for r in range(solver.contacts):
         k = solver.slot[r]
-        pairs.impulse[pairs.resting[r]] += solver.total[k]
+        pairs.impulse[pairs.resting[r]] += solver.total[k] + solver.shock[k]
         if solver.worked[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True

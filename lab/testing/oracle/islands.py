@@ -26,10 +26,10 @@ SINGULAR = 1e-12  # of a diagonal of 1: what is smaller is rounding
 ZERO = 1e-11  # of the largest speed: contacts that neither push nor open
 
 
-def choose_rigid(contacts: Sequence[Resting], bodies: dict[Body, Moving], h: float, shock: float) -> None:
+def choose_rigid(contacts: Sequence[Resting], bodies: dict[Body, Moving], h: float) -> None:
     """Decide which contacts are rigid, and number the islands that have some; others have the island -1."""
     islands = _connected(contacts)
-    uneven = [] if shock > 0.0 else [island for island in islands if any(map(_is_uneven, island))]
+    uneven = [island for island in islands if any(map(_is_uneven, island))]
     for contact in (contact for island in uneven for contact in island):
         sag = SAG * contact.impulse * h / contact.pair.mass
         most = (MOST_DEEP_SAG if contact.deep else MOST_SAG) * contact.pair.size

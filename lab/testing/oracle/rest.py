@@ -43,6 +43,7 @@ class Resting:
     tangent: Floats
     impulse: float = 0.0
     total: float = 0.0
+    shock: float = 0.0  # N s, of all shocks in the step: not remembered
     pushed: bool = False
     in_block: bool = False
     rigid: bool = False  # does not sag under its load

@@ -13,8 +13,8 @@ from ...measure.body_shapes import Floats
 from .bodies import Body, Pair
 from .islands import agree, choose_rigid, islands_of
 from .rest import OPPOSED, RATIO, ROUNDING, Kept, Moving, Resting
+from .shocks import stop_shocks
 
-SHOCK, SHOCK_PASSES, SHOCK_LEFT = 0.01, 16, 0.02  # sizes per step; passes at most; fraction of the largest, to stop
 SHOT = 4.0  # times the fastest closing speed: no light body between heavy ones leaves them faster
 DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap corrected in position, its fraction, limit per step
 
@@ -39,18 +39,17 @@ def solve(
     soft = omega / damping, stiff / (1.0 + stiff), 1.0 / (1.0 + stiff)
     sweep = Sweep(contacts, blocks, bodies, h, soft)
     sweep.measure()
-    shock = detect_shock(contacts, bodies, dt) if plastic else 0.0
+    if plastic:
+        stop_shocks(contacts, bodies, dt)
     for substep in range(substeps):
-        choose_rigid(contacts, bodies, h, shock)
+        choose_rigid(contacts, bodies, h)
         for body in bodies.values():
             body.velocity = body.velocity + h * body.acceleration
         for contact in contacts:
             if contact.impulse > 0.0:
                 sweep.push(contact, contact.tangent + contact.impulse * contact.normal)
-        for _ in range(SHOCK_PASSES if shock else 4 if any_unsettled and substep == 0 else 0):
+        for _ in range(4 if any_unsettled and substep == 0 else 0):
             sweep.over(propagate(contacts, bodies), biased=False)
-            if sweep.largest < SHOCK_LEFT * shock:
-                break
         sweep.all_over(biased=True)
         for contact in contacts:
             contact.pushed = contact.pushed or contact.impulse > 0.0
@@ -59,6 +58,8 @@ def solve(
         sweep.measure()
         push_out(contacts, bodies, substeps)
         sweep.measure()
+        if plastic:
+            stop_shocks(contacts, bodies, dt)
         for _ in range(4 if substep == substeps - 1 else 2):
             sweep.all_over(biased=False)
         for contact in contacts:
@@ -66,7 +67,7 @@ def solve(
             contact.pushed = contact.pushed or contact.impulse > 0.0
     hold_light(contacts, bodies, dt)
     for contact in contacts:
-        contact.pair.impulse += contact.total
+        contact.pair.impulse += contact.total + contact.shock
         if contact.pushed:
             for body in contact.pair.bodies:
                 bodies[body].held = True
@@ -105,20 +106,6 @@ def warm_start(contacts: Sequence[Resting], bodies: dict[Body, Moving], memory: 
             if entity in by_entity:
                 by_entity[entity].unsettled = True
     return any(moving.unsettled for moving in bodies.values())
-
-
-def detect_shock(contacts: Sequence[Resting], bodies: dict[Body, Moving], dt: float) -> float:
-    """Mark the bodies of fast closing contacts as unsettled; returns the largest such speed, 0 if there is none."""
-    largest = 0.0
-    for contact in contacts:
-        a, b = (bodies[body] for body in contact.pair.bodies)
-        speed = float((a.velocity - b.velocity) @ contact.normal)
-        least = max(SHOCK * contact.pair.size, contact.gap)
-        contact.doubtful |= abs(speed * dt - least) <= ROUNDING * contact.pair.size
-        if speed * dt > least:
-            largest = max(largest, speed)
-            a.unsettled = b.unsettled = True
-    return largest
 
 
 def propagate(contacts: Sequence[Resting], bodies: dict[Body, Moving]) -> list[Resting]:
@@ -218,11 +205,9 @@ class Sweep:
     bodies: dict[Body, Moving]
     h: float
     soft: tuple[float, float, float]
-    largest: float = 0.0  # largest change of a relative velocity in the last pass
 
     def over(self, chosen: Sequence[Resting], biased: bool) -> None:
         """Solve the normal impulse of each chosen contact, then friction; ``biased``: overlap is corrected too."""
-        self.largest = 0.0
         for contact in chosen:
             if not contact.in_block:
                 self._stop(contact, biased)
@@ -285,7 +270,6 @@ class Sweep:
             wanted = self.soft[1] * wanted + self.soft[2] * old
         contact.impulse = max(0.0, old - wanted)
         contact.doubtful |= old > 0.0 and abs(old - wanted) <= ROUNDING * old
-        self.largest = max(self.largest, abs(contact.impulse - old) / contact.pair.mass)
         self.push(contact, (contact.impulse - old) * contact.normal)
 
     def _solve_friction(self, contact: Resting) -> None:

@@ -29,7 +29,7 @@ def solve_friction(solver, chosen):
 
 @part
 def solve_normals(solver, bias, softness, pushes, chosen):
-    """One pass over the contacts, those in blocks left out; returns the largest change of speed.
+    """One pass over the contacts, those in blocks left out.
 
     softness: (share of the speed asked for that a soft contact takes, share of its impulse that it gives back), where
     this pass ``pushes``. chosen: only active contacts.
@@ -38,7 +38,6 @@ def solve_normals(solver, bias, softness, pushes, chosen):
     first, second, normal = solver.first, solver.second, solver.normal
     in_block, active, soft = solver.in_block, solver.active, solver.soft
     mass_scale, impulse_scale = softness
-    largest = 0.0
     for k in range(solver.contacts):
         if in_block[k] or (chosen and not active[k]):
             continue
@@ -48,11 +47,9 @@ def solve_normals(solver, bias, softness, pushes, chosen):
         if pushes and soft[k]:
             wanted = mass_scale * wanted + impulse_scale * old
         new = max(0.0, old - wanted)
-        largest = max(largest, abs(new - old) / mass[k])
         impulse[k] = new
         # Storing what stays as it is would make contacts with one floor wait for each other.
         if inverse_mass[a] > 0.0:
             velocity[a] = add_scaled(v_a, n, (old - new) * inverse_mass[a])
         if inverse_mass[b] > 0.0:
             velocity[b] = add_scaled(v_b, n, (new - old) * inverse_mass[b])
-    return largest

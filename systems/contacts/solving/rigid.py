@@ -115,14 +115,14 @@ def harden_loaded(solver, h):
 
 
 @part
-def choose_rigid(solver, h, shock):
+def choose_rigid(solver, h):
     """Which contacts are rigid, and what they may be wrong by; returns whether there are any. ``converging``: those of
     their islands."""
     any_rigid = any_uneven = False
     for k in range(solver.contacts):
         any_rigid |= solver.rigid[k]
         any_uneven |= bears_heavy(solver, k)
-    if any_uneven and not shock > 0.0:  # in a shock, what contacts bear is no load
+    if any_uneven:
         any_rigid |= harden_loaded(solver, h)
     if not any_rigid:
         return False

@@ -19,34 +19,15 @@ from ...codes import OK
 from .heavy_light_blocks import hold_light, solve_blocks
 from .passes import solve_friction, solve_normals
 from .rigid import choose_rigid, converge, leave_out_rigid
+from .shocks import solve_shocks
 from .softness import DAMPING_RATIO, FREQUENCY
 
 RELAX_PASSES = 2
 LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
 LET_GO_PASSES = 4  # once, after contacts have been lost
-SHOCK = 0.01  # of the extent, per step: a contact that closes faster is a shock
-SHOCK_PASSES = 16  # at most, in each substep of a step with shocks
-SETTLED = 0.02  # of the largest shock's speed: corrections below it are left to the other passes
 DEEP = 0.02  # of the extent: overlap beyond it is pushed out in position only, for a speed given to many adds up
 PUSH_RATE = 0.2  # of the deep overlap, per step
 PUSH_LIMIT = 0.05  # of the extent, per step
-
-
-@part
-def detect_shock(solver, dt):
-    """Mark the bodies of contacts that close fast as unsettled; returns the largest such speed, 0 if there is none.
-
-    A shock has to travel through all that touches before anything is pushed apart: what one pass leaves undone would
-    become overlap, and the push against that a bounce.
-    """
-    largest = 0.0
-    for k in range(solver.contacts):
-        a, b = solver.first[k], solver.second[k]
-        speed = dot(sub(solver.velocity[a], solver.velocity[b]), solver.normal[k])
-        if speed * dt > SHOCK * solver.extent[k] and speed * dt > solver.gap[k]:
-            largest = max(largest, speed)
-            solver.unsettled[a] = solver.unsettled[b] = True
-    return largest
 
 
 @part
@@ -117,14 +98,14 @@ def apply_warm_start(solver, h):
 
 
 @part
-def solve_substep(solver, h, substeps, passes, shock):
+def solve_substep(solver, h, substeps, passes, plastic):
     """One substep; passes: (how many before the one that pushes, how many after it)."""
     omega = 2.0 * math.pi * FREQUENCY / h
     damping = 2.0 * DAMPING_RATIO + h * omega
     stiffness = h * omega * damping
     bias_rate = omega / damping
     softness = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
-    any_rigid = choose_rigid(solver, h, shock)
+    any_rigid = choose_rigid(solver, h)
     apply_warm_start(solver, h)
     turn, last = -passes[0], passes[1]
     while turn <= last:
@@ -134,7 +115,8 @@ def solve_substep(solver, h, substeps, passes, shock):
             leave_out_rigid(solver)
         chosen = turn < 0 or any_rigid
         bias = solver.pushing if turn == 0 else solver.opening
-        largest = solve_normals(solver, bias, softness, turn == 0, chosen)
+        solver.visits += solver.contacts
+        solve_normals(solver, bias, softness, turn == 0, chosen)
         solve_blocks(solver, bias, chosen)
         if solver.has_friction:
             solve_friction(solver, chosen)
@@ -150,7 +132,9 @@ def solve_substep(solver, h, substeps, passes, shock):
             if measure(solver, h, bias_rate):
                 push_deep(solver, substeps)
                 measure(solver, h, bias_rate)
-        turn = 0 if turn < 0 and largest < SETTLED * shock else turn + 1
+            if plastic:
+                solve_shocks(solver, h * substeps)
+        turn += 1
     for k in range(solver.contacts):
         solver.total[k] += solver.impulse[k]
         solver.worked[k] |= solver.impulse[k] > 0.0
@@ -168,14 +152,16 @@ def solve_contacts(state, dt):
     h = dt / substeps
     omega = 2.0 * math.pi * FREQUENCY / h
     for k in range(solver.contacts):
-        solver.total[k], solver.worked[k] = 0.0, False
+        solver.total[k], solver.worked[k], solver.shock[k] = 0.0, False, 0.0
     measure(solver, h, omega / (2.0 * DAMPING_RATIO + h * omega))
-    solver.islands_known = False
-    shock = detect_shock(solver, substeps * h) if state.impacts.logged == 0 else 0.0
+    solver.islands_known = solver.linked = False
+    solver.shock_visits = solver.visits = 0
+    plastic = state.impacts.logged == 0
+    if plastic:
+        solve_shocks(solver, dt)
     for step in range(substeps):
         before = LET_GO_PASSES if solver.any_unsettled and step == 0 else 0
-        before = SHOCK_PASSES if shock > 0.0 else before
         after = LAST_RELAX_PASSES if step == substeps - 1 else RELAX_PASSES
-        solve_substep(solver, h, substeps, (before, after), shock)
+        solve_substep(solver, h, substeps, (before, after), plastic)
     hold_light(state, dt)
     return OK
