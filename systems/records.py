@@ -169,6 +169,7 @@ PAIRS = Schema(
     hits=ints("int32"),
     disabled_count=integer(),
     disabled=ints("int32"),
+    looked=integer(),  # pairs that were evaluated once more to tell whether they rest
     resting_count=integer(),
     resting=ints("int32"),
     touching_count=integer(),

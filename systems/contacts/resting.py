@@ -90,6 +90,30 @@ def still_bounces(state, dt, c, depth, normal):
 
 
 @part
+def surely_rests(state, dt, c, d, margin):
+    """Whether a pair that has had no impact rests by what the narrow phase has found at the end of the free flight.
+
+    d: from the centre of a's shape to that of b's. The resting prediction cannot change the depth by more than it
+    moves the two to each other. Pairs that may bounce, or go far, are to be looked at.
+    """
+    pairs, bodies, colliders = state.pairs, state.bodies, state.colliders
+    a, b, slot = pairs.a[c], pairs.b[c], bodies.collider_slot
+    if not pairs.near_contact[c]:
+        return False
+    restitution = colliders.restitution
+    if mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b]) > 0.0:
+        return False
+    least, edge = pairs.depth[c] + margin, FAST * smaller_extent(bodies, a, b)
+    moved, travel = zero_of(state), sub(d, between_at_start(bodies, a, b))
+    if bodies.supported[a]:
+        moved = add_scaled(moved, bodies.support_change[a], state.force_travels * dt)
+    if bodies.supported[b]:
+        moved = add_scaled(moved, bodies.support_change[b], -state.force_travels * dt)
+    pairs.parting[c] = STAYS
+    return least >= 0.0 and dot(moved, moved) <= least * least and dot(travel, travel) <= edge * edge
+
+
+@part
 def is_resting(state, dt, c):
     """Whether a solid pair's gap is below the margin after the impacts and it is not bouncing.
 
@@ -108,6 +132,9 @@ def is_resting(state, dt, c):
     if not near and not hit and not carried:
         return False
     d = between(bodies, a, b)
+    if not hit and surely_rests(state, dt, c, d, margin):
+        return not meets_at_corner(state, a, b, d, slop_of(state, a, b))
+    pairs.looked += 1
     depth, normal, far = deepest(state, dt, a, b, d)
     if depth < -margin:
         if hit or not carried:
@@ -126,6 +153,7 @@ def is_resting(state, dt, c):
 def find_resting(state, dt):
     """The pairs that are contacts at rest, in canonical order."""
     pairs, count = state.pairs, 0
+    pairs.looked = 0
     if not state.response_idle:
         for c in range(pairs.count):
             if pairs.is_solid[c] and is_resting(state, dt, c):

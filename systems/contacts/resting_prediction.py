@@ -59,15 +59,20 @@ def apply_remembered(state):
 
 @part
 def relax_remembered(state, uneven):
-    """Take back what pushes two bodies apart, never more than has pushed; uneven: only of a light and a heavy body."""
+    """Take back what pushes two bodies apart, never more than has pushed; uneven: only of a light and a heavy body.
+
+    Returns whether there are such.
+    """
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
-    velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
+    velocity, inverse_mass, impulse, any_uneven = bodies.linear_velocity, bodies.inverse_mass, memory.work, False
     for m in range(memory.counts[now]):
         a, b, n = memory.first[now, m], memory.second[now, m], memory.normal[now, m]
         if not impulse[m] > 0.0:
             continue
         light, heavy = max(inverse_mass[a], inverse_mass[b]), min(inverse_mass[a], inverse_mass[b])
-        if uneven and not (heavy > 0.0 and light >= RATIO * heavy):
+        is_uneven = heavy > 0.0 and light >= RATIO * heavy
+        any_uneven |= is_uneven
+        if uneven and not is_uneven:
             continue
         parting = dot(sub(velocity[b], velocity[a]), n)
         if parting > 0.0:
@@ -75,6 +80,7 @@ def relax_remembered(state, uneven):
             impulse[m] -= back
             velocity[a] = add_scaled(velocity[a], n, back * inverse_mass[a])
             velocity[b] = add_scaled(velocity[b], n, -back * inverse_mass[b])
+    return any_uneven
 
 
 @part
@@ -100,8 +106,10 @@ def drop_shocks(state):
     for m in range(memory.counts[now]):
         if impulse[m] > 0.0:
             a, b, n = memory.first[now, m], memory.second[now, m], memory.normal[now, m]
-            closing = length(sub(speed_before(bodies, b), speed_before(bodies, a)))
-            fastest = THROWN * max(bodies.force_speed_change[a], bodies.force_speed_change[b]) + closing
+            fastest = THROWN * max(bodies.force_speed_change[a], bodies.force_speed_change[b])
+            if not (is_thrown(bodies, a, fastest) or is_thrown(bodies, b, fastest)):
+                continue  # usual: the speed that they close with need not be known
+            fastest += length(sub(speed_before(bodies, b), speed_before(bodies, a)))
             if is_thrown(bodies, a, fastest) or is_thrown(bodies, b, fastest):
                 velocity[a] = add_scaled(velocity[a], n, impulse[m] * inverse_mass[a])
                 velocity[b] = add_scaled(velocity[b], n, -impulse[m] * inverse_mass[b])
@@ -129,8 +137,8 @@ def predict_rest(state, dt):
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
     apply_remembered(state)
-    relax_remembered(state, False)
-    for _ in range(UNEVEN_PASSES):  # one leaves the more the more the masses differ
+    any_uneven = relax_remembered(state, False)
+    for _ in range(UNEVEN_PASSES if any_uneven else 0):  # one leaves the more the more the masses differ
         relax_remembered(state, True)
     for _ in range(UNEVEN_PASSES):
         if not drop_shocks(state):
