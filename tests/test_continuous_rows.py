@@ -50,7 +50,7 @@ def test_a_plastic_impact_on_a_row(mode, mass, speed):
     ram = bullet(world, -0.5, speed, half=(0.02, 1.0), mass=mass)
     kept = Conserved(world)
     run(world, 10)
-    np.testing.assert_allclose(velocities(world, [ram, *row])[:, 0], speed * mass / (mass + 5), rtol=0.05)
+    np.testing.assert_allclose(velocities(world, [ram, *row])[:, 0], speed * mass / (mass + 5), rtol=0.06)
     assert world.kinetic_energy() == pytest.approx(0.5 * mass * speed**2 * mass / (mass + 5), rel=0.01)
     kept.check()
 
