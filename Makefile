@@ -1,6 +1,7 @@
 # carom: every target works on a fresh clone with python3 (3.11 or newer), pip and make.
 #   make run     install into .venv and run a scene; SCENE=gas2d and ARGS="--seconds 3" choose another
-#   make test    the tests, without the slow ones; make test-slow: those; make test-all: both in one run
+#   make test    the tests, without the slow ones; make test-slow: those; make test-all: both in one run;
+#                test-long: more cases and steps of what the others test, before a release
 #   make coverage: which lines they run
 #   make wheel   a wheel that carries compiled kernels, into dist/
 #   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
@@ -21,7 +22,7 @@ BENCH := .venv/bench-$(HERE)
 TEST := .venv/test-$(HERE)
 DEV := .venv/dev-$(HERE)
 
-.PHONY: run wheel test test-slow test-all install coverage bench figures ide typecheck lint clean
+.PHONY: run wheel test test-slow test-all test-long install coverage bench figures ide typecheck lint clean
 
 run: $(RUN)
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
@@ -40,6 +41,9 @@ test-slow: $(TEST)
 
 test-all: $(TEST)
 	$(BIN)/pytest $(TOGETHER) $(ARGS)
+
+test-long: $(TEST)
+	$(BIN)/pytest $(TOGETHER) -m long $(ARGS)
 
 # All that the checks need, at once.
 install: $(DEV)

@@ -34,8 +34,12 @@ def pytest_configure(config):
     config.addinivalue_line("filterwarnings", "ignore::carom.framework.PhysicsWarning")
 
 
-def pytest_collection_modifyitems(items):
-    """All workers collect in the same order."""
+def pytest_collection_modifyitems(config, items):
+    """What is marked long runs only if it is asked for; all workers collect in the same order."""
+    if "long" not in config.option.markexpr:
+        long = [item for item in items if item.get_closest_marker("long")]
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
     items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
 
 

@@ -38,7 +38,7 @@ def bounce_errors(mode, integrator, dt, d=2):
 @pytest.mark.parametrize(
     ("dt", "d"),
     [(1e-3, 2), (4e-3, 2), (1e-2, 2), (4e-2, 2), (4e-2, 3), (0.1, 2), (0.1, 3)]
-    + [pytest.param(dt, 2, marks=pytest.mark.slow) for dt in (1e-4, 4e-4)],
+    + [pytest.param(dt, 2, marks=pytest.mark.long) for dt in (1e-4, 4e-4)],
 )
 def test_a1_energy_at_every_step(mode, integrator, dt, d):
     """Mean (E - E0)^2 below 1e-16 E0^2, and the right number of bounces, one every 2 sqrt(2 h / g)."""

@@ -138,13 +138,18 @@ def check_against_brute_force(a, b, offsets, eps=EPS):
     return met
 
 
+MARKS = {
+    ("box", "box"): (), ("hull", "segment"): (), ("box", "plate"): pytest.mark.slow, ("hull", "hull"): pytest.mark.slow,
+    ("segment", "segment"): pytest.mark.slow, ("plate", "point"): pytest.mark.slow,
+}  # fmt: skip
+
+
 def pairs_of_families(d):
     return [pair for pair in itertools.combinations_with_replacement(FAMILIES, 2) if set(pair) != {"point"}]
 
 
 @pytest.mark.parametrize(("d", "first", "second"), [
-    pytest.param(d, *pair, marks=() if pair in (("box", "box"), ("hull", "segment")) else pytest.mark.slow)
-    for d in (2, 3) for pair in pairs_of_families(d)
+    pytest.param(d, *pair, marks=MARKS.get(pair, pytest.mark.long)) for d in (2, 3) for pair in pairs_of_families(d)
 ])  # fmt: skip
 def test_hulls_meet_as_brute_force_finds(d, first, second):
     rng = np.random.default_rng(1)

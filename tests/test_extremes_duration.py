@@ -77,7 +77,7 @@ def test_c17_a_spring_drifts_no_more_than_rounding():
     check_invariant(5_000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_c17_a_spring_drifts_no_more_than_rounding_in_many_steps():
     """100,000 steps, where a drift of an eightieth of a rounding error per step would show."""
     check_invariant(100_000, tolerance=4)
@@ -107,7 +107,7 @@ def test_c17_an_orbit_drifts_no_more_than_rounding(method):
     check_orbit(method, 3_000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet"])
 def test_c17_an_orbit_drifts_no_more_than_rounding_in_50_turns(method):
     """50,000 steps: a drift of a fortieth of a rounding error per step would show."""

@@ -27,7 +27,7 @@ def test_pressure_and_rate_of_an_elastic_gas(dt):
     assert RATE * (1 - 2 * dt - noise) < found.rate < RATE * (FINITE_RATE + noise)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("dt", [0.3, 0.1, 0.03, 0.01])
 def test_pressure_and_rate_with_many_collisions(dt):
     """The same over 5 seeds and 100,000 collisions: noise of Z 3 * 2 / sqrt(1e5) = 1.9 %, of the rate less."""

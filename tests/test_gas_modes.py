@@ -26,7 +26,7 @@ def test_pressure_and_rate(mode, dt):
     assert found.deepest < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("mode", "dt"), [
     ("continuous", 0.3), ("event_driven", 0.3), ("event_driven", 0.1), ("continuous", 0.03), ("event_driven", 0.01),
 ])  # fmt: skip

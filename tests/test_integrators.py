@@ -207,7 +207,7 @@ def test_undamped_spring_stays_in_its_energy_band(method):
     check_symplectic_bands(method, steps=2400, tenth=800, tolerance=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet"])
 def test_undamped_spring_stays_in_its_energy_band_for_long(method):
     """B2, C17: 40,000 steps; the tolerance leaves room for a drift of 2.5e-14 a step, 1e-6 in 4e7 steps."""

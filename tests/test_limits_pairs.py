@@ -193,7 +193,7 @@ def test_the_command_fills_a_page(tmp_path):
     assert text.endswith("<!-- end of carom limits --pairs -->\nafter\n")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_quick_sweep():
     result = invoke("--pairs", "--quick", "--json")
     assert result.exit_code == 0, result.output

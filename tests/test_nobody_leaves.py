@@ -86,7 +86,9 @@ def test_nobody_leaves_a_room(d, mode, seed):
 @pytest.mark.slow
 @both_dimensions
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("first", range(4, 104, 10))
+@pytest.mark.parametrize(
+    "first", [4, 14, *(pytest.param(first, marks=pytest.mark.long) for first in range(24, 104, 10))]
+)
 def test_nobody_leaves_a_hundred_rooms(d, mode, first):
     for seed in range(first, first + 10):
         check_room(d, mode, drawn(mode, seed), seed)

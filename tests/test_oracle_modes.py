@@ -141,6 +141,7 @@ def test_random_scenes(mode):
     assert told.crossed > 0
 
 
+@pytest.mark.long
 @each_sweep
 def test_more_random_scenes(mode):
     """The same with up to 40 bodies; a single body with ccd has few impacts, so it takes more scenes."""
@@ -170,6 +171,7 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
     assert told.differ == 0
 
 
+@pytest.mark.long
 @both_dimensions
 @each_sweep
 def test_more_fast_bodies(mode, d):

@@ -84,7 +84,7 @@ def test_circular_orbit_of_a_few_periods(method):
     check_orbit(method, 2)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("method", "periods"), [(method, 30 if method == "velocity_verlet" else 10) for method in ORBIT]
 )
@@ -131,7 +131,7 @@ def test_figure_eight(method):
         assert error < FIGURE_EIGHT["velocity_verlet"][0] / 10  # fourth order against second
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @all_methods
 def test_figure_eight_with_ten_thousand_steps(method):
     """B5."""

@@ -39,7 +39,7 @@ def test_a_pile_of_a_thousand(e):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("e", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("e", [0.3, *(pytest.param(e, marks=pytest.mark.long) for e in (0.0, 0.8))])
 def test_a_pile_of_a_thousand_spheres(e):
     """The requirement on big piles holds at 20 s. Without friction layers of spheres slip now and then: so of three."""
     energies = []

@@ -120,7 +120,7 @@ def test_bounces_at_the_right_height(shape):
     world.close()
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.5, -2.0])
+@pytest.mark.parametrize("angle", [0.5, *(pytest.param(angle, marks=pytest.mark.long) for angle in (0.0, -2.0))])
 def test_ten_thousand_bodies_from_everywhere(angle):
     """Balls that do not meet each other fly at the segment. Compared with their free flight in a world without it: a
     ball that never was wholly in front flies freely, to the bit; one that came from the front never gets behind it."""

@@ -128,6 +128,7 @@ def test_substeps_are_work_where_something_rests():
     assert loops[2] / loops[0] == pytest.approx(7, rel=0.02)
 
 
+@pytest.mark.long
 def test_the_integrators_on_an_orbit():
     names = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
     found = dict(zip(names, errors("integrator", "orbit"), strict=True))
@@ -298,6 +299,7 @@ def test_the_shooter():
     assert "continuous" in shooter.tuned.line
 
 
+@pytest.mark.long
 def test_games_get_what_they_need(monkeypatch):
     """Those with a short search, in short runs; the shooter has its own test."""
     names = ["platformer", "puzzle stacks", "orbits"]

@@ -92,7 +92,7 @@ def test_bounded_just_below_the_limit(method):
     check_stable_run(method, 1000)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @all_methods
 def test_bounded_just_below_the_limit_for_long(method):
     """B6, C16: 10,000 steps, ten times those to the largest amplitude; the eigenvalues cover longer runs."""

@@ -79,8 +79,10 @@ def halves(method, share):
     return sizes[:2000].max(axis=0), sizes[2000:].max(axis=0)
 
 
-@pytest.mark.slow
-@all_methods
+@pytest.mark.parametrize("method", [
+    pytest.param(method, marks=pytest.mark.slow if method in ("semi_implicit_euler", "rk4") else pytest.mark.long)
+    for method in METHODS
+])  # fmt: skip
 def test_runs_stay_bounded_below_the_limit_and_grow_above(method):
     """B6, the runs themselves: 0.999 and 1.01 of the limit that is found."""
     early, late = halves(method, 0.999)

@@ -58,6 +58,14 @@ WANTED = {
 }
 
 
+def quick(scene: str) -> Any:
+    """Mark what is of the gas: until its pressure is known to 1 % takes longer than all the others together."""
+    return pytest.mark.long if scene == "thermal_gas" else ()
+
+
+each_scene = pytest.mark.parametrize("name", [pytest.param(name, marks=quick(name)) for name in WANTED])
+
+
 class Laboratory:
     """Searches each scene once, and keeps the results."""
 
@@ -189,7 +197,7 @@ VERIFY: dict[str, Callable[[Settings], float]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", WANTED)
+@each_scene
 def test_the_choice_meets_its_target_in_runs_of_the_test(laboratory, name):
     tuning = laboratory.tuned(name)
     assert tuning.error <= tuning.target
@@ -210,7 +218,7 @@ def alone(cell: Cell) -> Only:
     return Only((cell.integrator,), (cell.collision,), (cell.substeps,), (cell.geometry,))
 
 
-@pytest.mark.parametrize("name", WANTED)
+@each_scene
 def test_the_choice_costs_little_more_than_the_cheapest_of_the_grid(laboratory, name):
     """Over the same ladder of steps; cells whose number of steps alone costs more than the choice are skipped. The
     others run once, and those that may hold at much less work in all repeats. (If the error is no noisy statistic, one
@@ -291,7 +299,7 @@ HELD_OUT: dict[str, tuple[str, Any, dict[str, Any]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("held_out", HELD_OUT)
+@pytest.mark.parametrize("held_out", [pytest.param(name, marks=quick(HELD_OUT[name][0])) for name in HELD_OUT])
 def test_the_promise_holds_within_a_factor_of_two_elsewhere(laboratory, held_out):
     name, target, options = HELD_OUT[held_out]
     tuning = laboratory.tuned(name)
