@@ -242,7 +242,7 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"thrown {method}", lambda k=k, method=method: play(mixed(3 - k % 2, "discrete", 4, integrator=method), 5)
     for d in (2, 3):
         yield f"buried {d}D", lambda d=d: play(buried(d), 5)
-        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 60)
+        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 60 if d == 3 else 15)
         yield f"asked {d}D", lambda d=d: asked(d)
 
 

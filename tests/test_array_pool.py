@@ -26,6 +26,7 @@ def polygon(number, corners=12):
     return (1.0 + 1e-6 * number) * np.stack((np.cos(angles), np.sin(angles)), axis=1)
 
 
+@pytest.mark.compiled
 def test_a_map_that_changes_in_each_step_takes_no_more_room():
     """A thousand maps of 2,601 numbers each, one after the other."""
     world = make_world(2)

@@ -182,6 +182,7 @@ class OneWay(System):
                 contacts.enabled[row] = bodies.linear_velocity[k, 1] < 0 and bodies.previous_position[k, 1] >= 0.999
 
 
+@pytest.mark.compiled
 def test_one_way_platform():
     """A player jumps up through it, unslowed, and then stands on it."""
     world = make_world(gravity=10.0)

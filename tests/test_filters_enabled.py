@@ -62,6 +62,7 @@ def test_only_the_contact_that_is_disabled_is_out(d):
 
 @both_dimensions
 @pytest.mark.parametrize("shape", [ball, box])
+@pytest.mark.compiled
 def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
     """At rest, disabled for one step: in it the body falls as in free flight (v = -g dt, without warm start from the
     support), the pair ends; enabled again it begins and holds, and the body is at its old position."""

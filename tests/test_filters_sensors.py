@@ -57,6 +57,7 @@ def test_a_sensor_that_falls_or_lies_below_supports_nothing(d, mine):
 
 
 @both_dimensions
+@pytest.mark.compiled
 def test_a_sensor_on_a_body_at_rest(d):
     """In, on and just under the floor: a body at rest is unchanged; a sensor that it does not touch never begins."""
 

@@ -36,6 +36,7 @@ def run(world, seconds):
 
 
 @pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.compiled
 def test_two_masses_swing_as_the_closed_form_says(dimensions):
     """Reduced mass mu = m M / (m + M); the length is L + A cos(w t), w^2 = k / mu. Verlet's phase error over time t is
     w t (w h)^2 / 24: 1.5e-6 here, with a margin of two."""
@@ -60,6 +61,7 @@ def test_two_masses_swing_as_the_closed_form_says(dimensions):
 
 
 @pytest.mark.parametrize(("integrator", "tolerance"), [("velocity_verlet", 2e-5), ("rk4", 1e-9)])
+@pytest.mark.compiled
 def test_a_damped_oscillator_on_a_wall(integrator, tolerance):
     """x'' = -k x - c x' on mass 1: x = A e^(-c t / 2) (cos w t + c / (2 w) sin w t), w^2 = k - c^2 / 4."""
     world, springs = make(integrator=integrator, dt=1 / 500)
@@ -89,6 +91,7 @@ def test_a_chain_of_100_hangs_as_it_should():
     assert [spring.tension for spring in springs][::33] == pytest.approx([10.0, 6.7, 3.4, 0.1], rel=1e-9)
 
 
+@pytest.mark.compiled
 def test_a_rope_only_pulls():
     world, springs = make(integrator="velocity_verlet", dt=1 / 1000)
     post, ball = body(world, 0.0, 0.0, kind="static"), body(world, 1.0, 0.0, velocity=(-1.0, 0.0))
@@ -125,6 +128,7 @@ def test_a_pendulum_on_a_stiff_spring_keeps_its_length():
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
+@pytest.mark.compiled
 def test_the_limit_of_stiffness_is_where_the_page_says(integrator):
     for ratio, holds in ((1.98, True), (2.02, False)):
         world, springs = make(integrator=integrator, dt=1 / 60)
@@ -148,6 +152,7 @@ def test_too_much_damping_is_reported_too():
     assert spring.connected
 
 
+@pytest.mark.compiled
 def test_the_order_of_creation_changes_no_bit():
     def hash_of(order, turned):
         world, springs = make(3, dt=1 / 120)

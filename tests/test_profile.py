@@ -252,6 +252,7 @@ def test_the_command_shows_systems_and_their_kernels(carom):
     assert "evaluate_pairs" not in carom("--steps", "2").stdout
 
 
+@pytest.mark.compiled
 def test_the_command_s_json_adds_up(carom):
     carom("--steps", "40")  # whatever has to be compiled
     result = carom("--steps", "40", "--profile", "--json")

@@ -274,6 +274,7 @@ def test_ids_that_mean_other_entities():
             world.delete_entity(b)
 
 
+@pytest.mark.compiled
 def test_a_failed_step_and_a_snapshot():
     class Failing(System):
         fails = False

@@ -49,6 +49,7 @@ def history_of(world, steps):
     return sorted(heard), sorted(told)
 
 
+@pytest.mark.compiled
 def test_a_response_of_the_game_counts_contacts_and_calls_handlers():
     """Each ball begins to touch the floor in the step in which it meets it, with the built-in response as well."""
     mine, theirs = game(), game()
@@ -112,6 +113,7 @@ def test_a_step_that_fails_afterwards_takes_the_contacts_back():
     assert len(world.contacts.begin) == 0
 
 
+@pytest.mark.compiled
 def test_forces_of_the_game_in_place_of_the_sum():
     """``force`` is set by the game alone; what follows takes it as the built-in sum's."""
 
