@@ -138,6 +138,12 @@ class Component:
         self._version = version
         self._values = None
 
+    def _hold(self, values: Mapping[str, Any]) -> None:
+        """Belong to no entity, and have these values, as they are read from a handle."""
+        self._bind(None, None)
+        self._values = {name: column.unshared(values[name]) for name, column in self.columns.items()}
+        hold_arrays(self, self._pooled)
+
     def check_dimensions(self, dimensions: int, entity: int | None = None) -> None:
         """ValueError if a vector of this component does not fit a world of that many dimensions."""
         if self._store is not None and self._store.dimensions == dimensions:
@@ -162,10 +168,11 @@ class Component:
         other = type(self).__new__(type(self))
         if hasattr(self, "__dict__"):
             vars(other).update(vars(self))  # what a class without __slots__ keeps besides its columns
-        other._bind(None, None)
-        other._values = {name: column.unshared(column.value_of(self)) for name, column in self.columns.items()}
-        hold_arrays(other, self._pooled)
+        other._hold(self._read())
         return other
+
+    def _read(self) -> dict[str, Any]:
+        return {name: column.value_of(self) for name, column in self.columns.items()}
 
     def numbers_in(self, pool: Any) -> list[int]:
         """The numbers of arrays that it holds itself."""
@@ -180,6 +187,10 @@ class Component:
         for name in getattr(other, "__dict__", {}).keys() - set(Component.__slots__):
             vars(other)[name] = copy.deepcopy(vars(self)[name], memo)
         return other
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Pickled with its values, as a component that belongs to no entity."""
+        return _unpickled, (type(self), self._read()), getattr(self, "__dict__", None)
 
     def __repr__(self) -> str:
         shown = ((n, c.value_of(self)) for n, c in self.columns.items() if c.constructor)
@@ -276,6 +287,12 @@ class RowStore:
 
     def written(self, column: Column, row: int) -> None:
         pass
+
+
+def _unpickled(component: type[Component], values: dict[str, Any]) -> Component:
+    handle = component.__new__(component)
+    handle._hold(values)
+    return handle
 
 
 def _copy_of(column: Column) -> Column:

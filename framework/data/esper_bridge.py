@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import threading
+import weakref
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -23,6 +24,63 @@ for _name in _NAMES:
 
 
 # -- contexts ------------------------------------------------------------------------------------
+
+
+class OwnContext:
+    """A world's esper context while it is not the current one; the world owns it, esper's registry does not.
+
+    parts
+        the containers, as esper's registry would hold them
+    """
+
+    __slots__ = ("__weakref__", "parts")
+
+    def __init__(self) -> None:
+        self.parts: Any = None
+
+
+class Contexts(dict[str, Any]):
+    """esper's registry of contexts; it holds those of worlds weakly, so that a world that is dropped is collected and
+    takes its context with it."""
+
+    def __init__(self, content: dict[str, Any]) -> None:
+        super().__init__(content)
+        self._owned: dict[str, weakref.ref[OwnContext]] = {}
+
+    def let_own(self, name: str) -> OwnContext:
+        """From now on that context lives as long as what this returns."""
+        owned = OwnContext()
+        owned.parts = self[name]
+        self._owned[name] = weakref.ref(owned, lambda reference: self._drop(name, reference))
+        dict.__setitem__(self, name, None)
+        return owned
+
+    def _drop(self, name: str, reference: weakref.ref[OwnContext]) -> None:
+        if self._owned.get(name) is reference:
+            del self[name]
+
+    def __getitem__(self, name: str) -> Any:
+        reference = self._owned.get(name)
+        return dict.__getitem__(self, name) if reference is None else reference().parts  # type: ignore[union-attr]
+
+    def __setitem__(self, name: str, parts: Any) -> None:
+        reference = self._owned.get(name)
+        if reference is None:
+            dict.__setitem__(self, name, parts)
+        else:
+            reference().parts = parts  # type: ignore[union-attr]
+
+    def __delitem__(self, name: str) -> None:
+        self._owned.pop(name, None)
+        dict.__delitem__(self, name)
+
+
+_contexts = esper._context_map = Contexts(esper._context_map)
+
+
+def own_context(name: str) -> OwnContext | None:
+    """What keeps that context alive, for its world to hold; None for the default context, which esper always has."""
+    return None if name == "default" else _contexts.let_own(name)
 
 
 def context_exists(name: str) -> bool:

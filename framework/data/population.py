@@ -122,9 +122,7 @@ class LooseValues:
         """Write them into the handles of that population, which the world has."""
         for (entity, component), values in zip(population.loose, self.handles, strict=True):
             handle = entities[entity][component]
-            handle._bind(None, None)
-            handle._values = {name: column.unshared(values[name]) for name, column in component.columns.items()}
-            hold_arrays(handle, component._pooled)
+            handle._hold(values)
 
     def put_into_batches(self, population: Population, dimensions: int) -> None:
         """Write them into the batches of that population, whether the world has them or not."""

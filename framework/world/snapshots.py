@@ -80,6 +80,12 @@ def restore(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
 
     CaromError, and nothing is changed, if the snapshot is of another kind of world.
     """
+    restore_world(snapshot, world, physics)
+    restore_plugins(snapshot, world)
+
+
+def restore_world(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
+    """All but what plugins keep."""
     _check(snapshot, world, physics)
     if snapshot.owner is not physics:
         snapshot = replace(snapshot, population=snapshot.population.without_handles())
@@ -105,6 +111,9 @@ def restore(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
     world._pipeline.profiler.steps = snapshot.steps
     physics.take_back(snapshot.physics, moved)
     physics.contacts.take_back(snapshot.contacts)
+
+
+def restore_plugins(snapshot: Snapshot, world: World) -> None:
     for plugin in world.plugins:
         if plugin.name in snapshot.kept:
             plugin.take_back(world, snapshot.kept[plugin.name])

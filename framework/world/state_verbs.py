@@ -1,11 +1,15 @@
-"""The state of a world as a whole: snapshots and going back to them, a hash."""
+"""The state of a world as a whole: snapshots and going back to them, a hash, files."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NoReturn
+import os
+from collections.abc import Collection, Iterable
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
+from ..data.component import Component
 from ..errors import CaromError
-from . import snapshots
+from ..plugins.plugin import Plugin
+from . import saved_files, snapshots
 from .snapshots import Snapshot
 
 if TYPE_CHECKING:
@@ -38,6 +42,53 @@ class StateVerbs:
         """A hash of every body's state, in order of the ids: equal bits, equal hash."""
         return snapshots.state_hash(self._synchronized())
 
+    # -- files ------------------------------------------------------------------------------------
+
+    def save(self: World, path: str | os.PathLike[str], *, leave_out: Collection[type[Any]] = ()) -> None:  # type: ignore[misc]
+        """Write a snapshot and the settings into a file, for :meth:`load`; one that is there is replaced at once.
+
+        leave_out
+            types of components that are not carom's: no file holds them, and without this they are a CaromError
+
+        Systems and handlers are not in it.
+        """
+        snapshot = self.snapshot()
+        saved_files.write(path, snapshot, self.settings, tuple(leave_out))
+
+    @classmethod
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        *plugins: Plugin,
+        components: Iterable[type[Component]] = (),
+        name: str | None = None,
+    ) -> Self:
+        """A world that goes on where the saved one was, to the bit.
+
+        plugins
+            all that the saved world had, of the same versions or newer
+        components
+            your own component classes that it had
+        name
+            as for a new world
+
+        Add your systems afterwards. CaromError, and no world is made, if the file is damaged, of a newer carom or no
+        saved world, or if it needs a plugin, a component class or dimensions that are not given.
+        """
+        file = saved_files.SavedFile(path)
+        file.check_plugins(plugins)
+        world: Any = cls(*plugins, settings=file.settings(), name=name)  # type: ignore[call-arg]
+        try:
+            physics = world._services
+            known = (*physics.table.component_types, *world.registry.shapes, *components)
+            snapshot = file.snapshot(dict.fromkeys(known))
+            file.whole(lambda: snapshots.restore_world(snapshot, world, physics))
+            snapshots.restore_plugins(snapshot, world)
+        except BaseException:
+            world.close()
+            raise
+        return world
+
     # -- what does not copy a world ---------------------------------------------------------------
 
     def __copy__(self) -> NoReturn:
@@ -51,5 +102,6 @@ class StateVerbs:
 
 
 NO_COPY = (
-    "a world cannot be copied or pickled: world.snapshot() is a copy of its state, which can be pickled and restored"
+    "a world cannot be copied or pickled: world.snapshot() is a copy of its state, which can be pickled and restored; "
+    "world.save(path) and World.load(path, ...) keep it in a file"
 )

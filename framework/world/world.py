@@ -88,6 +88,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             esper_bridge.watch(Component)
             self._pipeline.attach()
             self._events.attach()
+        self._own_context = esper_bridge.own_context(name)
         try:
             for plugin in plugins:
                 plugin.install(self)

@@ -1,0 +1,306 @@
+"""Worlds in files: a snapshot as numpy's npz, without pickle. Reading runs no code of the file.
+
+The entry ``carom`` is JSON; an array in it stands as ``{"#array": name}`` for the entry of that name, and other keys
+that begin with # have another # before it. Component classes stand as numbers of the list ``components``, which names
+them and their fields.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import os
+import zipfile
+from collections.abc import Callable, Collection, Iterable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ..data.component import Component
+from ..data.population import LooseValues, Population, SavedBatch, is_ours
+from ..data.saved_table import SavedTable
+from ..errors import CaromError
+from ..settings import Settings
+from .snapshots import Snapshot
+
+FORMAT = 1  # of the files; a reader refuses others
+KEPT = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
+ARRAY = "#array"
+DAMAGE = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)  # by what is not as written
+
+
+# -- writing -----------------------------------------------------------------------------------------------------------
+
+
+def write(path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, leave_out: Collection[type]) -> None:
+    """A file at that path, whole or not at all; CaromError if a component or a plugin keeps what no file can hold."""
+    population = _without(snapshot.population, leave_out)
+    types = list(dict.fromkeys((*snapshot.table.types, *population.types)))
+    number = {component: index for index, component in enumerate(types)}
+    arrays: dict[str, np.ndarray] = {}
+    contents = {
+        "format": FORMAT,
+        "settings": dataclasses.asdict(settings),
+        "components": [_described(component) for component in types],
+        **{name: getattr(snapshot, name) for name in KEPT},
+        "population": _population(population, number),
+        "loose": _numbered(snapshot.loose.__getstate__(), number),
+        "table": _numbered(snapshot.table.__getstate__(), number),
+    }
+    plain = _plain(contents, arrays)
+    plain["kept"] = {name: _kept_by(name, kept, arrays) for name, kept in snapshot.kept.items()}
+    arrays["carom"] = np.frombuffer(json.dumps(plain).encode(), np.uint8)
+    path = Path(path)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _without(population: Population, leave_out: Collection[type]) -> Population:
+    """Without components that no file can hold, if they may be left out."""
+    for component in leave_out:
+        if is_ours(component):
+            raise TypeError(f"leave_out takes types that no file can hold; {component.__name__} is a Component")
+    entities = {}
+    for entity, components in population.entities.items():
+        for component in components:
+            if not is_ours(component) and component not in leave_out:
+                name = getattr(component, "__name__", repr(component))
+                raise CaromError(
+                    f"entity {entity} has a {name}, which is no carom Component: a file holds components with columns "
+                    f"only. Leave them out with world.save(path, leave_out=[{name}]) and add them again after "
+                    f"World.load"
+                )
+        entities[entity] = {component: None for component in components if is_ours(component)}
+    return dataclasses.replace(population, entities=entities)
+
+
+def _described(component: type[Component]) -> dict[str, Any]:
+    fields = [[name, column.item, np.dtype(column.dtype).str] for name, column in component.columns.items()]
+    return {"name": component.__name__, "module": component.__module__, "fields": fields}
+
+
+def _population(population: Population, number: dict[type, int]) -> dict[str, Any]:
+    """Entities that have the same types share the list of these."""
+    groups: dict[tuple[int, ...], int] = {}
+    types = (tuple(number[component] for component in components) for components in population.entities.values())
+    group = [groups.setdefault(each, len(groups)) for each in types]
+    return {
+        "types": [number[component] for component in population.types],
+        "entities": np.array(list(population.entities), np.int64),
+        "group": np.array(group, np.int64),
+        "groups": list(groups),
+        "batches": [
+            [batch.first, batch.count, [number[c] for c in batch.types], batch.inside, batch.stores is None]
+            for batch in population.batches
+        ],
+        "loose": [[entity, number[component]] for entity, component in population.loose],
+    }
+
+
+def _numbered(value: Any, number: dict[type, int]) -> Any:
+    """Numbers in place of component classes."""
+    if isinstance(value, dict):
+        if value and all(key in number for key in value):
+            return [[number[key], _numbered(item, number)] for key, item in value.items()]
+        return {key: _numbered(item, number) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_numbered(item, number) for item in value]
+    return number[value] if isinstance(value, type) else value
+
+
+def _plain(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """What JSON can hold; the arrays go where they are collected. TypeError for what no file can hold."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (str, int, float)):
+        return value
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        name = f"a{len(arrays)}"
+        arrays[name] = value
+        return {ARRAY: name}
+    if isinstance(value, dict) and all(isinstance(key, str) for key in value):
+        return {f"#{key}" if key[:1] == "#" else key: _plain(item, arrays) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, arrays) for item in value]
+    raise TypeError(f"{value!r}")
+
+
+def _kept_by(plugin: str, kept: Any, arrays: dict[str, np.ndarray]) -> Any:
+    try:
+        return _plain(kept, arrays)
+    except TypeError as error:
+        raise CaromError(
+            f"plugin {plugin!r} keeps what no file can hold: {error}. Plugin.saved returns arrays, numbers, texts, and "
+            f"lists and dicts (by text) of these"
+        ) from None
+
+
+# -- reading -----------------------------------------------------------------------------------------------------------
+
+
+class SavedFile:
+    """What is in a file; CaromError if it is not one, or not whole, or of a newer carom."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        with self.path.open("rb") as file:
+            if file.read(2) != b"PK":
+                raise self._none()
+            try:
+                arrays = _arrays_in(file)
+                contents = json.loads(arrays.pop("carom").tobytes()) if "carom" in arrays else None
+            except Exception as error:  # numpy and zipfile raise many kinds
+                raise self._damaged(error) from error
+        if not isinstance(contents, dict) or not isinstance(contents.get("format"), int):
+            raise self._none()
+        if contents["format"] != FORMAT:
+            other = "a newer" if contents["format"] > FORMAT else "another"
+            raise CaromError(
+                f"{self.path} was saved by {other} carom, in format {contents['format']}; this one reads format "
+                f"{FORMAT}"
+            )
+        self._contents = self.whole(lambda: _with_arrays(contents, arrays))
+        self.dimensions: int = self.whole(lambda: self._contents["dimensions"])
+        self.plugins: dict[str, str] = self.whole(lambda: dict(self._contents["plugins"]))
+
+    def _none(self) -> CaromError:
+        return CaromError(f"{self.path} is no saved world: World.load reads what world.save has written")
+
+    def settings(self) -> Settings:
+        return self.whole(lambda: Settings(**self._contents["settings"]))
+
+    def _damaged(self, error: Exception) -> CaromError:
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        return CaromError(f"{self.path} is damaged or not complete ({said})")
+
+    def whole(self, read: Callable[[], Any]) -> Any:
+        """What that returns; CaromError if something in the file is not as it was written."""
+        try:
+            return read()
+        except CaromError:
+            raise
+        except DAMAGE as error:
+            raise self._damaged(error) from error
+
+    def check_plugins(self, plugins: Iterable[Any]) -> None:
+        """CaromError if one is missing, older than it was, or of other dimensions."""
+        here = {plugin.name: plugin for plugin in plugins}
+        for name, version in self.plugins.items():
+            if name not in here:
+                raise CaromError(
+                    f"{self.path} needs plugin {name!r}{f' {version}' if version else ''}: "
+                    f"World.load(path, *plugins) takes all that the world had: {', '.join(self.plugins)}"
+                )
+            own = here[name].version
+            if is_newer(version, own):
+                raise CaromError(f"{self.path} was saved with plugin {name!r} {version}, this one is {own or 'older'}")
+        for plugin in here.values():
+            dimensions = getattr(plugin, "dimensions", self.dimensions)
+            if dimensions != self.dimensions:
+                raise CaromError(
+                    f"{self.path} holds a world of {self.dimensions} dimensions, and plugin {plugin.name!r} is for "
+                    f"{dimensions}"
+                )
+
+    def snapshot(self, known: Iterable[type[Component]]) -> Snapshot:
+        """What it holds; known: the component classes there are."""
+        types = self.whole(lambda: self._component_types(known))
+        return self.whole(lambda: self._snapshot(types))
+
+    def _component_types(self, known: Iterable[type[Component]]) -> list[type[Component]]:
+        """The classes by their numbers; CaromError if one is missing or has other fields."""
+        by_name: dict[str, type[Component]] = {}
+        for component in known:
+            if by_name.setdefault(component.__name__, component) is not component:
+                raise CaromError(f"two component classes are named {component.__name__}: {self.path} cannot tell them")
+        found = []
+        for described in self._contents["components"]:
+            name = described["name"]
+            if name not in by_name:
+                raise CaromError(
+                    f"{self.path} needs the component class {name} of {described['module']}: "
+                    f"World.load(path, ..., components=[{name}])"
+                )
+            own = {field: rest for field, *rest in _described(by_name[name])["fields"]}
+            saved = {field: rest for field, *rest in described["fields"]}
+            other = sorted(field for field in {*own, *saved} if own.get(field) != saved.get(field))
+            if other:
+                raise CaromError(
+                    f"{self.path}: component {name} had other fields when it was saved: {', '.join(other)}"
+                )
+            found.append(by_name[name])
+        return found
+
+    def _snapshot(self, types: list[type[Component]]) -> Snapshot:
+        contents = self._contents
+        table, loose = SavedTable.__new__(SavedTable), LooseValues.__new__(LooseValues)
+        table.__setstate__({
+            **contents["table"], "types": [types[n] for n in contents["table"]["types"]],
+            "stops": tuple(contents["table"]["stops"]),
+        })  # fmt: skip
+        _check_columns(table, contents["dimensions"])
+        batches = [{types[n]: columns for n, columns in batch or ()} for batch in contents["loose"]["batches"]]
+        loose.__setstate__({**contents["loose"], "batches": batches})
+        population = _population_of(contents["population"], types)
+        return Snapshot(
+            owner=None, population=population, loose=loose, table=table, kept=contents["kept"],
+            **{name: contents[name] for name in KEPT},
+        )  # fmt: skip
+
+
+def _arrays_in(file: BinaryIO) -> dict[str, np.ndarray]:
+    """The entries of an npz file; each is read as a whole, which checks its sum, before numpy looks at it."""
+    with zipfile.ZipFile(file) as archive:
+        whole = {name.removesuffix(".npy"): io.BytesIO(archive.read(name)) for name in archive.namelist()}
+    return {name: np.lib.format.read_array(data, allow_pickle=False) for name, data in whole.items()}
+
+
+def _with_arrays(value: Any, arrays: dict[str, np.ndarray]) -> Any:
+    if isinstance(value, dict):
+        if value.keys() == {ARRAY}:
+            return arrays[value[ARRAY]]
+        return {key.removeprefix("#"): _with_arrays(item, arrays) for key, item in value.items()}
+    return [_with_arrays(item, arrays) for item in value] if isinstance(value, list) else value
+
+
+def _population_of(saved: dict[str, Any], types: list[type[Component]]) -> Population:
+    groups = [[types[n] for n in group] for group in saved["groups"]]
+    entities, group = saved["entities"].tolist(), saved["group"].tolist()
+    batches = [
+        SavedBatch(first, count, tuple(types[n] for n in numbers), inside, None if in_table else {})
+        for first, count, numbers, inside, in_table in saved["batches"]
+    ]
+    return Population(
+        {entity: dict.fromkeys(groups[n]) for entity, n in zip(entities, group, strict=True)}, batches,
+        [(entity, types[n]) for entity, n in saved["loose"]], [types[n] for n in saved["types"]],
+    )  # fmt: skip
+
+
+def _check_columns(table: SavedTable, dimensions: int) -> None:
+    """ValueError if a column of a component has another shape or type than the component says."""
+    count = table.stops[2]
+    for component in table.types:
+        for column in component.columns.values():
+            array, shape = table.columns.get(column.key), (count, *column.item_shape(dimensions))
+            if array is not None and (array.shape, array.dtype) != (shape, column.dtype):
+                raise ValueError(f"column {column.key}")
+    if any(len(array) != count for array in table.columns.values()):
+        raise ValueError("columns of different lengths")
+
+
+def is_newer(version: str, than: str) -> bool:
+    """Whether a version is newer, number by number; what is no list of numbers is older than any."""
+    return _numbers(version) > _numbers(than)
+
+
+def _numbers(version: str) -> list[int]:
+    parts = version.split(".")
+    return [int(part) for part in parts] if all(part.isdecimal() for part in parts) else []
