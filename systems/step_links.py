@@ -62,6 +62,7 @@ class StepLinks:
             state.collides, state.several_levels, state.dynamic > 0, self._search.needs_grids(),
         )  # fmt: skip
         if self._key is not None and usual == self._usual and usual[5]:  # bodies have come or gone, no more
+            self.link_shapes()  # there may have been a query meanwhile, with other shapes
             self._version = scene.version
             return False
         self._usual = usual
@@ -74,9 +75,9 @@ class StepLinks:
             if state.sweeps_ready:
                 scene.reserve(*SWEEPS)
             self._link_stages(conditions)
-            self.link_shapes()
             self._link_possible()
             self._key = key
+        self.link_shapes()
         self._version, self._forces = scene.version, force_systems
         return changed
 

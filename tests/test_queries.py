@@ -10,8 +10,9 @@ from helpers_pairwise import pairwise
 from helpers_queries import directions, scene
 from worlds import ball, both_dimensions, make_world
 
-from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Phase, System
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Phase, System, World
+from carom.plugins import Physics, capsule
 
 
 @pytest.mark.parametrize(("d", "n", "sizes"), pairwise((2, 3), (60, 800), ("even", "power", "clusters")))
@@ -192,6 +193,25 @@ def test_what_is_deleted_and_what_is_written(d):
     assert len(world.neighbours(1.0)) == 0
     assert world.ray_casts(np.empty((0, d)), way).entity.shape == (0,)
     world.close()
+
+
+def test_a_query_between_a_shape_that_came_and_went_changes_no_step():
+    """The query links the functions of other shapes than the steps before and after it."""
+
+    def hashed(asks):
+        world = World(Physics(2), capsule.plugin)
+        world.create_entity(Transform((0, 0)), RigidBody(kind="static"), AABBCollider((30.0, 0.5)))
+        world.create_entity(Transform((0, 3)), RigidBody(linear_velocity=(0, -1)), capsule.CapsuleCollider(0.5, 0.5))
+        world.step()
+        passing = ball(world, (0, 90))
+        if asks:
+            assert world.query_point((0, 90)) == [passing]
+        world.delete_entity(passing, immediate=True)
+        for _ in range(200):
+            world.step()
+        return world.state_hash()
+
+    assert hashed(True) == hashed(False)
 
 
 def test_systems_see_bodies_where_they_are():
