@@ -145,25 +145,25 @@ class Adoption:
         self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
 
     def keep_only(self, wanted: Mapping[int, Mapping[type[Any], Any] | None]) -> None:
-        """Let go of all other handles of these entities; the rows stay as they are."""
+        """Let go of all other handles of these entities, of all if they are to be no bodies; the rows stay."""
+        bodies = {e: components for e, components in wanted.items() if self._makes_body(components)}
         for component, members in self._members.items():
-            gone = {e for e, kept in wanted.items() if e in members and (kept or {}).get(component) is not members[e]}
+            gone = {e for e in wanted if e in members and bodies.get(e, {}).get(component) is not members[e]}
             if gone:
                 self._let_go(component, gone, gone)
 
     def adopt_again(self, wanted: Mapping[int, Mapping[type[Any], Any] | None]) -> None:
         """Bind the handles of those of these entities that are bodies: the table has their rows."""
-        types = {component for components in wanted.values() for component in components or ()}
-        roles = {component: self._role(component) for component in types}
-        partners = {component for component in types if roles[component] == PARTNER}
-        ours = {component: self._members[component] for component in types if roles[component] != OTHER}
         for entity, components in wanted.items():
-            if components and not partners.isdisjoint(components):
+            if components and self._makes_body(components):
                 for component, handle in components.items():
-                    if component in ours:
-                        ours[component][entity] = handle
+                    if self._role(component) != OTHER:
+                        self._members[component][entity] = handle
                         if handle._store is not self.table or handle._entity != entity:
                             handle._bind(self.table, entity)
+
+    def _makes_body(self, components: Collection[type[Any]] | None) -> bool:
+        return any(self._role(component) == PARTNER for component in components or ())
 
     # -- what has changed -------------------------------------------------------------------------
 

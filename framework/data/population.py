@@ -51,7 +51,7 @@ class SavedBatch:
 
 @dataclass
 class Population:
-    """Entities with their components, in esper's order; those in batches, by batch.
+    """Entities with their components; those in batches, by batch.
 
     entities
         the components of each. A handle of one of carom's components may be None: then it is the one that the entity
@@ -171,7 +171,6 @@ class Return:
     def __init__(self, population: Population, contents: Contents, adoption: Adoption) -> None:
         self._population, self._adoption = population, adoption
         self._entities, self._log = contents.entities, contents.log
-        self._back: set[int] = set()  # those that are no entities now
         self._wanted: dict[int, Components | None] = {}
         self._needed = self._entities.saved is not population
         if self._needed:
@@ -182,9 +181,8 @@ class Return:
         own = population.entities
         other = map(operator.is_not, map(own.get, dict.keys(entities)), dict.values(entities))
         changed = list(itertools.compress(dict.keys(entities), other))
-        if dict.__len__(entities) - len(changed) < len(own):
-            self._back = own.keys() - dict.keys(entities)
-        for entity in {*changed, *self._back, *self._adoption.pending(self._log)}:
+        missing = own.keys() - dict.keys(entities) if dict.__len__(entities) - len(changed) < len(own) else ()
+        for entity in {*changed, *missing, *self._adoption.pending(self._log)}:
             if entity in own:
                 self._wanted[entity] = components = own[entity]
                 for component, handle in components.items():
@@ -221,11 +219,6 @@ class Return:
                 dict.__setitem__(entities, entity, components)
             else:
                 dict.pop(entities, entity, None)
-        if self._back:  # esper's order is that of creation
-            now = dict(dict.items(entities))
-            dict.clear(entities)
-            dict.update(entities, self._population.entities)
-            dict.update(entities, now)
         entities.batches.put([self._batch(saved) for saved in self._population.batches])
         members = entities.members
         for batch in self._population.batches:

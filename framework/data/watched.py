@@ -223,8 +223,6 @@ class Entities(dict[int, dict[type[Any], Any]]):
 
     def __iter__(self) -> Iterator[int]:
         """By ascending id, which is the order in which they were created."""
-        if not self.batches:
-            return dict.__iter__(self)
         return iter(sorted(itertools.chain(dict.__iter__(self), *(batch.ids().tolist() for batch in self.batches.all))))
 
     def keys(self) -> Any:
