@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import dataclass, field
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,13 @@ from ..errors import MissingComponentError
 from . import esper_bridge
 from .batches import Batch, Stores
 from .component import Component
-from .handles import write_handles
+from .handles import bind_handles, write_handles
 from .table import STATIC, Table
 from .watched import ChangeLog
 
 Ids = set[int]
 Handles = dict[int, Component]
+ByType = Mapping[type[Any], tuple[list[int], list[Any]]]  # entities that have one of the type, and these
 OTHER, OURS, PARTNER = range(3)  # component types: not carom's; with columns; such that make a body with the anchor
 
 
@@ -144,26 +146,34 @@ class Adoption:
         log.take()
         self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
 
-    def keep_only(self, wanted: Mapping[int, Mapping[type[Any], Any] | None]) -> None:
-        """Let go of all other handles of these entities, of all if they are to be no bodies; the rows stay."""
-        bodies = {e: components for e, components in wanted.items() if self._makes_body(components)}
+    def keep_only(self, by_type: ByType, wanted: Mapping[int, Mapping[type[Any], Any]], others: Ids) -> None:
+        """Let go of all other handles of these entities, of all if they are to be no bodies; the rows stay.
+
+        others: entities of which no handles are wanted.
+        """
+        bodies = self._bodies_of(by_type)
         for component, members in self._members.items():
-            gone = {e for e in wanted if e in members and bodies.get(e, {}).get(component) is not members[e]}
+            gone = members.keys() & others
+            for entity in members.keys() & wanted.keys():
+                if entity not in bodies or wanted[entity].get(component) is not members[entity]:
+                    gone.add(entity)
             if gone:
                 self._let_go(component, gone, gone)
 
-    def adopt_again(self, wanted: Mapping[int, Mapping[type[Any], Any] | None]) -> None:
-        """Bind the handles of those of these entities that are bodies: the table has their rows."""
-        for entity, components in wanted.items():
-            if components and self._makes_body(components):
-                for component, handle in components.items():
-                    if self._role(component) != OTHER:
-                        self._members[component][entity] = handle
-                        if handle._store is not self.table or handle._entity != entity:
-                            handle._bind(self.table, entity)
+    def adopt_again(self, by_type: ByType) -> None:
+        """Bind those of these handles that belong to bodies: the table has their rows."""
+        bodies = self._bodies_of(by_type)
+        for component, (entities, handles) in by_type.items():
+            role = self._role(component)
+            if role == OURS and not bodies.issuperset(entities):
+                are = list(map(bodies.__contains__, entities))
+                entities, handles = list(compress(entities, are)), list(compress(handles, are))
+            if role != OTHER:
+                self._members[component].update(zip(entities, handles, strict=True))
+                bind_handles(self.table, entities, handles)
 
-    def _makes_body(self, components: Collection[type[Any]] | None) -> bool:
-        return any(self._role(component) == PARTNER for component in components or ())
+    def _bodies_of(self, by_type: ByType) -> Ids:
+        return set().union(*(entities for c, (entities, _) in by_type.items() if self._role(c) == PARTNER))
 
     # -- what has changed -------------------------------------------------------------------------
 

@@ -169,7 +169,7 @@ def create_many(stores: Stores, count: int) -> range:
     batch = Batch(first, count, stores)
     contents = Contents()
     entities, log = contents.entities, contents.log
-    entities.saved = None
+    entities.note(())  # not inside of its dict
     entities.batches.add(batch)
     log.batches.append(batch)
     log.dirty = True
@@ -225,8 +225,8 @@ def clear_dead() -> None:
         return
     contents = Contents()
     entities, log = contents.entities, contents.log
-    entities.saved = None
     own = [entity for entity in dead if dict.__contains__(entities, entity)]
+    entities.note(own)
     if len(own) < len(dead) and entities.batches:
         ids = np.array([int(entity) for entity in dead if hasattr(entity, "__index__")], np.int64)
         for batch in entities.batches.all:

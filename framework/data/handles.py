@@ -71,6 +71,15 @@ def write_handles(
             table.write(key, np.array(targets), store.values(key, np.array(sources)))
 
 
+def bind_handles(table: Table, entities: list[int], handles: list[Component]) -> None:
+    """Let each handle read and write the row that the table has for its entity."""
+    for entity, handle in zip(entities, handles, strict=True):  # as ``_bind``, without a call for each
+        handle._store = table
+        handle._entity = entity
+        handle._version = -1
+        handle._values = None
+
+
 def _vectors(values: list[Any], column: Column, dimensions: int) -> np.ndarray:
     """Rows from values of which some may be a single number that stands for all (0: no rotation)."""
     width = column.item_shape(dimensions)[0]

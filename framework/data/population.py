@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -58,14 +58,18 @@ class Population:
         has, or a new one
     loose
         components of carom that belong to no body: their values are not in the table
-    types
-        carom's components that any of the entities has
+    types, others
+        carom's components that any of the entities has; the other types
+    unmade
+        entities some of whose handles are None
     """
 
     entities: dict[int, Components]
     batches: list[SavedBatch]
     loose: list[tuple[int, type[Component]]]
     types: list[type[Component]]
+    others: list[type[Any]]
+    unmade: set[int] = field(default_factory=set)
 
     @classmethod
     def of(cls, entities: Entities, adoption: Adoption) -> Population:
@@ -78,9 +82,11 @@ class Population:
                 for entity in sorted(adoption.loose(component, members.listed))
             ]
             batches = [SavedBatch.of(batch) for batch in entities.batches.all if batch.left]
-            types = [component for component, members in entities.members.items() if is_ours(component) and members]
+            present = [component for component, members in entities.members.items() if members]
+            types = [component for component in present if is_ours(component)]
+            others = [component for component in present if not is_ours(component)]
             # dict.copy() would call entities.keys(), which has those in batches too
-            entities.share(cls(dict(dict.items(entities)), batches, loose, types))
+            entities.share(cls(dict(dict.items(entities)), batches, loose, types, others))
         saved: Population = entities.saved  # type: ignore[assignment]
         return saved
 
@@ -91,7 +97,7 @@ class Population:
             for entity, components in self.entities.items()
         }
         batches = [SavedBatch(b.first, b.count, b.types, b.inside, b.stores and {}) for b in self.batches]
-        return Population(entities, batches, list(self.loose), self.types)
+        return Population(entities, batches, list(self.loose), self.types, self.others, set(entities))
 
 
 def is_ours(component: Any) -> bool:
@@ -165,35 +171,51 @@ class Return:
     """Takes one world back to a population. Between :meth:`let_go` and :meth:`arrive` the table gets its rows.
 
     wanted
-        by entity that has come, gone or changed since, the components it is to have; None: none of its own
+        by entity that has come, gone or changed since, the components it is to have
+    gone
+        those that are to have none of their own: they are no entities, or in a batch
+    out
+        those of ``wanted`` that were in a batch at the snapshot; their components have become objects since
     """
 
     def __init__(self, population: Population, contents: Contents, adoption: Adoption) -> None:
         self._population, self._adoption = population, adoption
         self._entities, self._log = contents.entities, contents.log
-        self._wanted: dict[int, Components | None] = {}
+        self._wanted: dict[int, Components] = {}
+        self._gone: set[int] = set()
+        self._out: dict[int, Components] = {}
+        self._by_type: dict[type[Any], tuple[list[int], list[Any]]] = {}  # of ``wanted``: entities, their handles
         self._needed = self._entities.saved is not population
         if self._needed:
             self._find_wanted()
 
     def _find_wanted(self) -> None:
         entities, population = self._entities, self._population
-        own = population.entities
-        other = map(operator.is_not, map(own.get, dict.keys(entities)), dict.values(entities))
-        changed = list(itertools.compress(dict.keys(entities), other))
-        missing = own.keys() - dict.keys(entities) if dict.__len__(entities) - len(changed) < len(own) else ()
-        for entity in {*changed, *missing, *self._adoption.pending(self._log)}:
-            if entity in own:
-                self._wanted[entity] = components = own[entity]
-                for component, handle in components.items():
-                    if handle is None:
-                        components[component] = self._handle(component, entity)
-                continue
-            batch = next((batch for batch in population.batches if batch.has(entity)), None)
-            if batch is None or not dict.__contains__(entities, entity):
-                self._wanted[entity] = None
-            else:  # its components have become objects since, which somebody may hold
-                self._wanted[entity] = {component: self._handle(component, entity) for component in batch.types}
+        own, unmade = population.entities, population.unmade
+        found = entities.changed_since(population)
+        if found is None:
+            other = map(operator.is_not, map(own.get, dict.keys(entities)), dict.values(entities))
+            found = set(itertools.compress(dict.keys(entities), other))
+            found |= set(own).difference(dict.keys(entities))
+        found |= self._adoption.pending(self._log)
+        back = set(filter(own.__contains__, found))
+        self._gone = found - back
+        self._wanted = wanted = dict(zip(back, map(own.__getitem__, back), strict=True))
+        for entity in unmade & back:
+            components = wanted[entity]
+            components.update({c: self._handle(c, entity) for c, handle in components.items() if handle is None})
+        unmade -= back
+        if population.batches:
+            for entity in [entity for entity in self._gone if dict.__contains__(entities, entity)]:
+                batch = next((batch for batch in population.batches if batch.has(entity)), None)
+                if batch is not None:  # somebody may hold the objects
+                    self._out[entity] = {component: self._handle(component, entity) for component in batch.types}
+            self._gone -= self._out.keys()
+            wanted.update(self._out)
+        for component in (*population.types, *population.others):
+            entities_having, handles = _having(component, wanted)
+            if handles:
+                self._by_type[component] = entities_having, handles
 
     def _handle(self, component: type[Component], entity: int) -> Component:
         """The one that the entity has, else a new one."""
@@ -206,52 +228,36 @@ class Return:
 
     def let_go(self) -> None:
         """Handles that are not wanted keep the values that they have now."""
-        self._adoption.keep_only(self._wanted)
+        self._adoption.keep_only(self._by_type, self._wanted, self._gone)
 
     def arrive(self) -> None:
         """Give esper the entities, and bind the handles; called in the world's context."""
-        entities, wanted = self._entities, self._wanted
+        entities, members = self._entities, self._entities.members
         if not self._needed:
             return
-        self._list_members()
-        for entity, components in wanted.items():
-            if components is not None:
-                dict.__setitem__(entities, entity, components)
-            else:
-                dict.pop(entities, entity, None)
+        for entity in self._gone:
+            dict.pop(entities, entity, None)
+        dict.update(entities, self._wanted)
         entities.batches.put([self._batch(saved) for saved in self._population.batches])
-        members = entities.members
-        for batch in self._population.batches:
-            for component in batch.types:
-                if component not in members:
-                    members[component] = ()  # type: ignore[assignment]
-        for component in [component for component, listed in members.items() if not listed]:
-            del members[component]
-        self._adoption.adopt_again(wanted)
+        for component in (*self._by_type, *(c for batch in self._population.batches for c in batch.types)):
+            if component not in members:
+                members[component] = ()  # type: ignore[assignment]
+        for component, own in list(members.items()):
+            own.listed -= self._gone
+            own.listed -= self._wanted.keys()
+            own.listed.update(self._by_type.get(component, ((), ()))[0])
+            if not own:
+                del members[component]
+        self._adoption.adopt_again(self._by_type)
         self._adoption.forget_pending(self._log)
-        entities.share(self._population)
-
-    def _list_members(self) -> None:
-        """Which entities have which component."""
-        entities, members = self._entities, self._entities.members
-        for entity, components in self._wanted.items():
-            before, after = dict.get(entities, entity, {}), components or {}
-            if before.keys() == after.keys():
-                continue
-            for component in before.keys() - after.keys():
-                members[component].listed.discard(entity)
-            for component in after:
-                if component not in before:
-                    if component not in members:
-                        members[component] = ()  # type: ignore[assignment]
-                    members[component].listed.add(entity)
+        entities.share(self._population, self._gone | self._wanted.keys(), self._out)
 
     def _batch(self, saved: SavedBatch) -> Batch:
         """As it was, but for what has become objects."""
         batch = Batch(saved.first, saved.count, dict.fromkeys(saved.types))  # type: ignore[arg-type]
         batch.inside = saved.inside.copy()
-        for entity, components in self._wanted.items():
-            if components is not None and saved.has(entity):
+        for entity, components in self._out.items():
+            if saved.has(entity):
                 batch.inside[entity - saved.first] = False
                 for component in saved.types if saved.stores else ():
                     components[component]._bind(saved.stores[component], None, entity - saved.first, RowStore.version)  # type: ignore[index]
@@ -261,3 +267,12 @@ class Return:
         else:
             batch.stores = saved.stores
         return batch
+
+
+def _having(component: type[Any], wanted: dict[int, Components]) -> tuple[list[int], list[Any]]:
+    """The entities that have one of that type, and what each has."""
+    try:
+        return list(wanted), list(map(operator.itemgetter(component), wanted.values()))
+    except KeyError:  # not all of them
+        entities = [entity for entity, components in wanted.items() if component in components]
+        return entities, [wanted[entity][component] for entity in entities]

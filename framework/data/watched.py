@@ -7,12 +7,16 @@ watched, so finding what has changed costs as much as there is of it, however ma
 from __future__ import annotations
 
 import itertools
+import weakref
+from collections import deque
 from collections.abc import Collection, ItemsView, Iterable, Iterator, KeysView, ValuesView
 from typing import Any
 
 import numpy as np
 
 from .batches import Batch, Batches
+
+TRAIL = 32  # snapshots: a game over a network goes back by fewer
 
 
 class ChangeLog:
@@ -151,7 +155,8 @@ class Entities(dict[int, dict[type[Any], Any]]):
     saved
         what snapshots hold of it, while nothing has come or gone since; else None
     unshared
-        whose dict of components no snapshot holds too, so that it may be changed; None while there are no snapshots
+        what has come, gone or changed since a snapshot has held all dicts of components: these may be changed; None
+        while there are no snapshots
     """
 
     def __init__(self, content: dict[int, dict[type[Any], Any]]) -> None:
@@ -160,10 +165,27 @@ class Entities(dict[int, dict[type[Any], Any]]):
         self.members: dict[type[Any], Members] = {}
         self.saved: Any = None
         self.unshared: set[int] | None = None
+        self._trail: deque[tuple[Any, set[int]]] = deque(maxlen=TRAIL)  # what was shared, and what changed before it
 
-    def share(self, saved: Any) -> None:
-        """A snapshot holds all dicts of components that there are now."""
-        self.saved, self.unshared = saved, set()
+    # -- snapshots --------------------------------------------------------------------------------
+
+    def share(self, saved: Any, also_changed: Iterable[int] = (), apart: Iterable[int] = ()) -> None:
+        """A snapshot holds all dicts of components that there are now.
+
+        also_changed: entities that have been changed without a word since the last time. apart: those that it has in a
+        batch.
+        """
+        self._trail.append((weakref.ref(saved), (self.unshared or set()).union(also_changed)))
+        self.saved, self.unshared = saved, set(apart)
+
+    def changed_since(self, saved: Any) -> set[int] | None:
+        """What has come, gone or changed since then, and maybe more; None if that is not known."""
+        changed = set(self.unshared or ())
+        for reference, before in reversed(self._trail):
+            if reference() is saved:
+                return changed
+            changed |= before
+        return None
 
     def unshare(self, entity: int) -> None:
         """An entity is about to gain or lose a component: what a snapshot holds stays as it is."""
@@ -174,12 +196,20 @@ class Entities(dict[int, dict[type[Any], Any]]):
             if components is not None:
                 dict.__setitem__(self, entity, components.copy())
 
-    def __setitem__(self, entity: int, components: dict[type[Any], Any]) -> None:
+    def note(self, entities: Iterable[int]) -> None:
+        """These come or go."""
         self.saved = None
+        if self.unshared is not None:
+            self.unshared.update(entities)
+
+    # -- as esper uses it -------------------------------------------------------------------------
+
+    def __setitem__(self, entity: int, components: dict[type[Any], Any]) -> None:
+        self.note((entity,))
         dict.__setitem__(self, entity, components)
 
     def __delitem__(self, entity: int) -> None:
-        self.saved = None
+        self.note((entity,))
         dict.__delitem__(self, entity)
 
     def __missing__(self, entity: Any) -> dict[type[Any], Any]:
@@ -189,6 +219,8 @@ class Entities(dict[int, dict[type[Any], Any]]):
         number = int(entity)
         components: dict[type[Any], Any] = batch.take_out(number)
         dict.__setitem__(self, number, components)  # nothing has come or gone
+        if self.unshared is not None:
+            self.unshared.add(number)
         for component in batch.types:
             self.members[component].settle(number, batch.make_handle is None)
         return components
@@ -236,6 +268,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
 
     def clear(self) -> None:
         self.saved = None
+        self._trail.clear()
         self.batches.clear()
         super().clear()
 

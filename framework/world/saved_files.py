@@ -79,7 +79,7 @@ def _without(population: Population, leave_out: Collection[type]) -> Population:
                     f"World.load"
                 )
         entities[entity] = {component: None for component in components if is_ours(component)}
-    return dataclasses.replace(population, entities=entities)
+    return dataclasses.replace(population, entities=entities, others=[])
 
 
 def _described(component: type[Component]) -> dict[str, Any]:
@@ -280,7 +280,7 @@ def _population_of(saved: dict[str, Any], types: list[type[Component]]) -> Popul
     ]
     return Population(
         {entity: dict.fromkeys(groups[n]) for entity, n in zip(entities, group, strict=True)}, batches,
-        [(entity, types[n]) for entity, n in saved["loose"]], [types[n] for n in saved["types"]],
+        [(entity, types[n]) for entity, n in saved["loose"]], [types[n] for n in saved["types"]], [], set(entities),
     )  # fmt: skip
 
 
