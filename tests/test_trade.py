@@ -134,7 +134,7 @@ def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(orbit, me
     assert found[meets] < 1e-2 <= found[fails]
 
 
-@pytest.mark.parametrize(("turns", "order"), [(2, 2.0), (0.75, 1.0)])
+@pytest.mark.parametrize(("turns", "order"), [(10, 2.0), (0.75, 1.0)])
 def test_semi_implicit_euler_gains_an_order_after_whole_turns(turns, order):
     """It is velocity Verlet shifted by half a step; from the perihelion the shift vanishes after whole orbits."""
     seconds = turns * 2 * math.pi
