@@ -243,9 +243,11 @@ class Return:
             if component not in members:
                 members[component] = ()  # type: ignore[assignment]
         for component, own in list(members.items()):
-            own.listed -= self._gone
-            own.listed -= self._wanted.keys()
-            own.listed.update(self._by_type.get(component, ((), ()))[0])
+            own.listed.difference_update(self._gone)
+            having = self._by_type.get(component, ((), ()))[0]
+            if len(having) < len(self._wanted):
+                own.listed.difference_update(self._wanted)
+            own.listed.update(having)
             if not own:
                 del members[component]
         self._adoption.adopt_again(self._by_type)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ class SavedTable:
 
     @classmethod
     def of(cls, table: Table) -> SavedTable:
+        keep_freed_memory()
         count = table.count
         columns = {key: array[:count].copy() for key, array in table.arrays.items()}
         return cls(list(table.component_types), columns, table.stops, table.frame, [table.held_arrays()])
@@ -80,6 +82,16 @@ class SavedTable:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self.columns, self.held = with_numbers(self.columns, self.types)
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Have malloc keep memory that is freed, up to some tens of MB, for the next snapshot.
+
+    glibc gives it back to the system at once, and fetching it again takes ten times as long as filling it: unless a
+    block has been freed that was larger. This one is never written to, so it takes no memory.
+    """
+    np.empty(16 * 2**20, np.uint8)
 
 
 def array_columns(types: list[type[Component]]) -> dict[str, ArrayColumn]:
