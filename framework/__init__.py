@@ -1,6 +1,6 @@
 """World, settings, tables, schedule, registry: what everything else stands on; knows no physics itself."""
 
-from .data.array_columns import array_column
+from .data.arrays.column import array_column
 from .data.bodies import Bodies
 from .data.columns import Column, column
 from .data.component import Component

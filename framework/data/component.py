@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self, dataclass_transform
 import numpy as np
 
 from ..names import did_you_mean, near_names
-from .array_columns import ArrayColumn, array_column, hold_arrays
+from .arrays.column import ArrayColumn, array_column, hold_arrays
 from .columns import REQUIRED, Column, special_column
 from .columns import column as plain_column
 

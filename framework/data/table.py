@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .array_columns import hold_arrays
-from .array_pool import Held
+from .arrays.column import hold_arrays
+from .arrays.pool import Held
 from .columns import Column
 from .component import Component, RowStore
 from .row_moves import MovedColumns, RowPlan

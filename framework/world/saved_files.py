@@ -19,8 +19,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..data.component import Component
-from ..data.population import LooseValues, Population, SavedBatch, is_ours
-from ..data.saved_table import SavedTable
+from ..data.saved.population import LooseValues, Population, SavedBatch, is_ours
+from ..data.saved.table import SavedTable
 from ..errors import CaromError
 from ..settings import Settings
 from .snapshots import Snapshot

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..data import esper_bridge
-from ..data.population import LooseValues, Population, Return
-from ..data.saved_table import SavedTable
+from ..data.saved.population import LooseValues, Population, Return
+from ..data.saved.table import SavedTable
 from ..errors import CaromError
 from .services import PhysicsServices
 

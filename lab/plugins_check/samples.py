@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...components import Collider
-from ...framework.data.array_columns import ArrayColumn, hold_arrays
+from ...framework.data.arrays.column import ArrayColumn, hold_arrays
 from ...framework.data.columns import REQUIRED, Column
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Shape

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...components import RigidBody, Transform
 from ...components.rigid_body import FASTEST
-from ...framework.data.array_columns import ArrayColumn
+from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.columns import Column
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record, make_record

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....framework.compilation import kernel
-from ....framework.data.array_columns import ArrayColumn
+from ....framework.data.arrays.column import ArrayColumn
 from ....framework.jit.linking import KEPT, Called, Linked
 from ....framework.jit.records.record import make_record
 from ....framework.jit.records.record_type import record_at, rows_of

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....framework.data.array_columns import ArrayColumn
+from ....framework.data.arrays.column import ArrayColumn
 from ....framework.data.component import Component
 from ....framework.jit.linking import KEPT, Linked
 from ....framework.jit.records.record import Record

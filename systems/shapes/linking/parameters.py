@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....framework.compilation import pasted
-from ....framework.data.array_columns import ArrayColumn
+from ....framework.data.arrays.column import ArrayColumn
 from ....framework.jit.linking import KEPT
 from ....framework.jit.records.record import Record, make_record
 from ....framework.jit.records.record_type import rows_of

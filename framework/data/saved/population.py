@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from .adoption import Adoption
-from .array_columns import hold_arrays
-from .array_pool import Held
-from .batches import Batch
-from .component import Component, RowStore
-from .esper_bridge import Contents
-from .saved_table import numbers_of, with_arrays, with_numbers
-from .watched import Entities
+from ..adoption import Adoption
+from ..arrays.column import hold_arrays
+from ..arrays.pool import Held
+from ..batches import Batch
+from ..component import Component, RowStore
+from ..esper_bridge import Contents
+from ..watched import Entities
+from .table import numbers_of, with_arrays, with_numbers
 
 Components = dict[type[Any], Any]
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..compilation import pasted
-from .array_pool import Pool
-from .columns import Column
+from ...compilation import pasted
+from ..columns import Column
+from .pool import Pool
 
 
 @dataclass(frozen=True, eq=False)

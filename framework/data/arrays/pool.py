@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import CaromError
+from ...errors import CaromError
 
 ROOM = 64  # rows, and numbers, of a new pool
 IN_FLIGHT = 16  # more than one component takes; who asks for many at once uses ``kept``

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from .array_columns import ArrayColumn
-from .array_pool import Held
-from .columns import Column
-from .component import Component
-from .table import Table
+from ..arrays.column import ArrayColumn
+from ..arrays.pool import Held
+from ..columns import Column
+from ..component import Component
+from ..table import Table
 
 
 @dataclass
