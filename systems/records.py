@@ -337,7 +337,7 @@ CONTACTS = Schema(
 STATE = Schema(
     "State",
     **PROGRAM_FIELDS,
-    links=ints(),  # addresses of parts of stages, see linked_parts
+    links=ints(),  # addresses of parts of stages, see linking.parts
     needed=integer(),  # rows that a stage asks for
     checked=ints(),  # addresses of records of CHECKED
     quarantining=flag(),  # some body is, or was told of and may be sound again

@@ -30,8 +30,9 @@ from .inspection.energies import kinetic_energy, momentum, potential_energy
 from .inspection.planned_columns import planned_columns
 from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
+from .linking.preparation import prepare
+from .linking.steps import StepLinks
 from .narrow_phase.system import NarrowPhase
-from .preparation import prepare
 from .quarantine.taken_out import Quarantine
 from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
@@ -43,7 +44,6 @@ from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .stage_list import CLOSING, OPENING, STAGES, SYSTEM_OF_STAGE
-from .step_links import StepLinks
 from .tracking import CONTACTS, WARM_START, put_rows_back, saved_rows
 
 if TYPE_CHECKING:
@@ -347,7 +347,7 @@ class Simulation(PhysicsServices):
         return momentum(self.bodies.dynamic, self.dimensions)
 
     def prepare(self, components: tuple[type[Any], ...]) -> None:
-        """See :mod:`preparation`."""
+        """See :mod:`linking.preparation`."""
         prepare(self, self._world, components)
 
     def attribute_errors(self) -> Any:

@@ -14,7 +14,7 @@ from .forces.accumulation import ForceAccumulation
 from .impacts.find import is_held_by_edge, kind_beyond_cap
 from .impacts.stages import take_swept_event, watch_bounds
 from .integration.system import Integration
-from .linked_parts import (
+from .linking.parts import (
     BOUND_SEARCHES,
     BOX_ROWS,
     FIRST_TOUCH,

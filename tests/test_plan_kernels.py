@@ -209,8 +209,8 @@ import sys
 sys.path.insert(0, sys.argv[2])
 from tests import helpers_plan
 from carom.framework.jit.dispatchers import KeptDispatcher
-from carom.systems import step_links
-step_links.link_possible = lambda *_: None  # what later steps may need, if it is kept
+from carom.systems.linking import steps
+steps.link_possible = lambda *_: None  # what later steps may need, if it is kept
 world = helpers_plan.LADDER[sys.argv[1]][0]()
 for _ in range(helpers_plan.STEPS):
     world.step()

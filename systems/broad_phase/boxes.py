@@ -9,7 +9,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, replace, scale
 from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
-from ..linked_parts import BOUND_SEARCHES, BOX_ROWS, call_bound_searches, call_box_rows
+from ..linking.parts import BOUND_SEARCHES, BOX_ROWS, call_bound_searches, call_box_rows
 from ..shapes.dispatch import half_extents, write_rotated
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.

@@ -24,7 +24,7 @@ from ..integration.trajectory import (
     relative_path,
     travel_of,
 )
-from ..linked_parts import FIRST_TOUCH, call_first_touch
+from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..shapes.tolerances import contact_margin, smaller_extent
 from .time_of_impact import APART, stays_apart
 

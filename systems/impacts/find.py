@@ -20,7 +20,7 @@ from ..integration.trajectory import (
     relative_path,
     travel_of,
 )
-from ..linked_parts import (
+from ..linking.parts import (
     FIRST_TOUCH,
     HELD_BY_EDGE,
     KIND_BEYOND_CAP,

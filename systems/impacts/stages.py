@@ -9,7 +9,7 @@ from ...framework.jit.records.record_type import request
 from ..ccd.refresh_pairs import NEW
 from ..ccd.search_bounds import FAST, leaves_bounds_at
 from ..codes import NEED_EVENTS, OK, REFRESH_PAIRS
-from ..linked_parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
+from ..linking.parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
 from ..shapes.tolerances import smaller_extent
 from .find import bounce_threshold, consider
 from .heap import heap_pop

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ..framework.jit.link_all import link_all
-from ..framework.jit.linking import Called, Linked
-from ..framework.schedule.stages import Program, Stage
-from .broad_phase.boxes import box_rows
-from .broad_phase.search import CandidateSearch
-from .ccd.search_bounds import DISCRETE
-from .integration.system import Integration
-from .linked_parts import BOX_ROWS, COUNT, linked_part
+from ...framework.jit.link_all import link_all
+from ...framework.jit.linking import Called, Linked
+from ...framework.schedule.stages import Program, Stage
+from ..broad_phase.boxes import box_rows
+from ..broad_phase.search import CandidateSearch
+from ..ccd.search_bounds import DISCRETE
+from ..integration.system import Integration
+from ..scene import SWEEPS, Scene
+from ..stage_list import LINKED_PARTS
+from .parts import BOX_ROWS, COUNT, linked_part
 from .preparation import kind_of, link_possible
-from .scene import SWEEPS, Scene
-from .stage_list import LINKED_PARTS
 
 NEVER = -1
 

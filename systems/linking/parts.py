@@ -9,11 +9,11 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from ..framework.jit.late import types
-from ..framework.jit.linking import Linked
-from ..framework.jit.records.record_type import record_type
-from .records import STATE
-from .shapes.linking.signatures import call_in_dimension, vector_type
+from ...framework.jit.late import types
+from ...framework.jit.linking import Linked
+from ...framework.jit.records.record_type import record_type
+from ..records import STATE
+from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
 BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS = range(7)

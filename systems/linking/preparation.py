@@ -14,31 +14,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..components import AABBCollider, Collider, SphereCollider
-from ..framework.data.bodies import SelectedBodies
-from ..framework.data.column_copies import COPY_BLOCKS
-from ..framework.data.component import Component
-from ..framework.data.row_moves import MOVE_ROWS
-from ..framework.jit.background import link_in_background
-from ..framework.jit.link_all import link_all
-from ..framework.jit.linking import Called, Linked
-from ..framework.jit.tick_counter import TICKS_NOW
-from ..framework.schedule.stages import RUN_STAGES, linked_stage
-from ..framework.world.world import World
-from .broad_phase.tree.passes import tree_passes
-from .integration.system import Integration
-from .linked_parts import linked_part
-from .queries.kernels import query_kernels
-from .records import STATE
-from .scene import Scene
-from .shapes.geometry_levels import in_order
-from .shapes.linking.linked_shape import half_extents_call
-from .shapes.linking.linked_shapes import LinkedShapes
-from .shapes.query import LinkedQuery, linked_query
-from .stage_list import LINKED_PARTS, STAGES, WITH_COLLIDERS
+from ...components import AABBCollider, Collider, SphereCollider
+from ...framework.data.bodies import SelectedBodies
+from ...framework.data.column_copies import COPY_BLOCKS
+from ...framework.data.component import Component
+from ...framework.data.row_moves import MOVE_ROWS
+from ...framework.jit.background import link_in_background
+from ...framework.jit.link_all import link_all
+from ...framework.jit.linking import Called, Linked
+from ...framework.jit.tick_counter import TICKS_NOW
+from ...framework.schedule.stages import RUN_STAGES, linked_stage
+from ...framework.world.world import World
+from ..broad_phase.tree.passes import tree_passes
+from ..integration.system import Integration
+from ..queries.kernels import query_kernels
+from ..records import STATE
+from ..scene import Scene
+from ..shapes.geometry_levels import in_order
+from ..shapes.linking.linked_shape import half_extents_call
+from ..shapes.linking.linked_shapes import LinkedShapes
+from ..shapes.query import LinkedQuery, linked_query
+from ..stage_list import LINKED_PARTS, STAGES, WITH_COLLIDERS
+from .parts import linked_part
 
 if TYPE_CHECKING:
-    from .simulation import Simulation
+    from ..simulation import Simulation
 
 QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside casts of the shapes of the scene
 
