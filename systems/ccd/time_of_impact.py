@@ -7,6 +7,9 @@ goes on. Convex shapes are never taken past their touch. On a plane one look is 
 the error is squared by each. (B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", 1996, with the rate
 of closing replaced by the path itself.)
 
+Where neither shape has an extent along the normal, as of a point and a box of zero thickness, the side of the touch is
+a matter of rounding. They touch on the side that they come from; what begins there leaves to where it goes.
+
 Between concave shapes there is no such plane, and they may touch in one place while they approach another. These are
 looked at in strides that are short for their extent, for an approach that is fast enough to matter.
 """
@@ -15,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, rate_along
@@ -24,6 +27,7 @@ from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
 MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
 GENEROUS, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
+CLEAR = 64.0 * ROUNDING  # of the distances in a path: farther off a touch rounding does not turn its normal round
 APART, TOUCHES, AT_CORNER = range(3)
 
 
@@ -66,7 +70,7 @@ def first_touch(state, a, b, path, straight, since, until, limits):
     if known and not met:  # most pairs
         zero = zero_of(state)
         return APART, t, zero, zero, zero
-    return advance(state, a, b, path, (straight, known), t, until, limits[0])
+    return advance(state, a, b, path, (straight, known), (since, t), until, limits[0])
 
 
 @part
@@ -94,10 +98,30 @@ def march(state, a, b, path, since, until, limits):
             t = min(since + looks * max(stride, (until - since) / MOST_STRIDES), until)
 
 
+@inlined
+def clear_of_rounding(state, a, b, path, t):
+    """A distance of the two at time t, m, beyond what rounding makes of it."""
+    origin, speed = state.bodies.origin, state.bodies.path_velocity
+    places = length(origin[a]) + length(origin[b]) + length(path[0])
+    return CLEAR * (places + (length(speed[a]) + length(speed[b])) * t)
+
+
 @part
-def advance(state, a, b, path, kind, t, until, slop):
-    """Conservative advancement from ``t`` on; kind: (the path is straight, ``t`` is known to be the first touch)."""
-    straight, known = kind
+def normal_beside(state, a, b, path, t, since, normal):
+    """The normal of a touch at time t, seen from where they come from, or, at ``since``, from where they go: another
+    one only if that is on the other side."""
+    bodies, rate = state.bodies, dot(rate_along(path, t), normal)
+    span = clear_of_rounding(state, a, b, path, t) / abs(rate)
+    beside = max(since, t - span) if t > since else t + span
+    n = evaluate(state, bodies.shape[a], a, bodies.shape[b], b, along(path, beside))[2]
+    return n if dot(n, normal) < 0.0 else normal
+
+
+@part
+def advance(state, a, b, path, kind, times, until, slop):
+    """Conservative advancement; kind: (the path is straight, the first touch is known); times: (since when the pair is
+    looked at, the time to begin with: that of the touch if it is known)."""
+    (straight, known), (since, t) = kind, times
     shape_a, shape_b = state.bodies.shape[a], state.bodies.shape[b]
     normal, point, at = zero_of(state), zero_of(state), zero_of(state)
     found, cornered, time = False, False, t
@@ -111,6 +135,11 @@ def advance(state, a, b, path, kind, t, until, slop):
                 return AT_CORNER, time, normal, point, at
             return TOUCHES, time, n, point, at
         touches = known or hit or abs(depth) <= ROUNDING * length(d) or look == LOOKS - 1
+        if look > 0 and rate > 0.0 and dot(n, normal) < 0.0 and -depth <= clear_of_rounding(state, a, b, path, t):
+            n, rate, touches = normal, dot(w, normal), True
+        elif look == 0 and touches and (rate > 0.0 if t > since else rate < 0.0 and depth == 0.0):
+            n = normal_beside(state, a, b, path, t, since, n)
+            rate = dot(w, n)
         if look == 0 or rate < 0.0 or hit:  # past the touch by a rounding error the normal may turn round
             normal, point = n, p
         found = touches and (straight or rate < 0.0)

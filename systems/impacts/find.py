@@ -9,7 +9,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept
-from ..ccd.time_of_impact import APART, AT_CORNER, stays_apart
+from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, clear_of_rounding, stays_apart
 from ..integration.trajectory import (
     ROUNDING,
     along,
@@ -29,7 +29,7 @@ from ..linking.parts import (
     call_kind_beyond_cap,
 )
 from ..narrow_phase.stages import rank_rows
-from ..shapes.dispatch import evaluate, is_corner_touch, mix, mix_friction
+from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, LAND, SLIDE, STICK, STOP, STOPPED, is_caught, is_deflected
@@ -89,6 +89,20 @@ def rest_edge(state, a, b, dt):
 
 
 @part
+def leaves_touch_at(state, c, path, since, t):
+    """When pair c, that touches at t on the side opposite to its last impact, is clear of the place of that: ``since``,
+    unless it is there still. Things without thickness touch on either side, by rounding, after they have bounced."""
+    impacts, pairs, k = state.impacts, state.pairs, state.impacts.logged - 1
+    while k >= 0 and impacts.log_time[k] >= since:
+        if impacts.log_pair[k] == c:
+            a, b, rate = pairs.a[c], pairs.b[c], dot(rate_along(path, since), pairs.normal[c])
+            clear = since + clear_of_rounding(state, a, b, path, since) / abs(rate)
+            return clear if t < clear and both_convex(state, state.bodies.shape[a], state.bodies.shape[b]) else since
+        k -= 1
+    return since
+
+
+@part
 def find_touch(state, c, a, b, path, restitution, dt):
     """(NO_TOUCH, OVERLAPS_AT_END or SWEPT; (time, normal, point, from a's centre to b's); the normal at the end) of the
     pair's next touch from now on."""
@@ -107,6 +121,14 @@ def find_touch(state, c, a, b, path, restitution, dt):
             found, t, normal, point, apart = call_first_touch(
                 state.links[FIRST_TOUCH], state, a, b, path, straight, since, dt, limits
             )
+            if found == TOUCHES and state.pairs.impulse[c] > 0.0 and dot(normal, state.pairs.normal[c]) < 0.0:
+                clear = leaves_touch_at(state, c, path, since, t)
+                if clear >= dt:
+                    return NO_TOUCH, nothing, zero
+                if clear > since:
+                    found, t, normal, point, apart = call_first_touch(
+                        state.links[FIRST_TOUCH], state, a, b, path, straight, clear, dt, limits
+                    )
             if found == APART:
                 return NO_TOUCH, nothing, zero
             if found != AT_CORNER:
