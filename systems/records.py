@@ -206,6 +206,23 @@ IMPACTS = Schema(
     sunk_by=number(),  # the time of its impact while they are searched, else 0
     now=number(),
     until=number(),
+    # impacts at the same time: the events, by member; lists of the members of each body
+    together=integer(),  # for how many there must be room
+    searching=integer(),  # the one in the log after which pairs are searched, until search_end
+    search_end=integer(),
+    member=ints("int32"),
+    next_member=ints("int32"),
+    group=ints("int32"),
+    is_left=flags(),
+    share=floats(),  # impulses along the normals, N s
+    before=floats(),
+    ahead=floats(),
+    weight=floats(),
+    terms=floats(),
+    rub=vectors(),  # impulses along the surfaces
+    firsts=ints("int32"),
+    searched_with=ints("int32"),  # where the log has the body's first one
+    gained=vectors(),  # change of velocity
     # what has happened in this step
     logged=integer(),
     capped=integer(),

@@ -22,13 +22,14 @@ from .codes import (
     NEED_PAIRS,
     NEED_SOLVER,
     NEED_SWEEPS,
+    NEED_TOGETHER,
     NEED_WARM_START,
     REFRESH_PAIRS,
     ROTATE,
     RUN_BROAD,
     RUN_NARROW,
 )
-from .impacts.stages import FRESH
+from .impacts.looks import FRESH
 from .records import IMPACTS
 from .scene import Scene
 
@@ -36,6 +37,7 @@ COLOURS = 64
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
 EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
+MEMBERS = ("member", "group", "is_left", "share", "before", "ahead", "weight", "terms", "rub")
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = (
     "body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled", "newest", "reach",
@@ -78,6 +80,7 @@ class Room:
             NEED_CELLS: self._named(lambda dt: self._search.grow(NEED_CELLS)),
             NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[self._state.stage].name]),
             NEED_SWEEPS: simulation.make_sweeps_ready,
+            NEED_TOGETHER: lambda dt: simulation.links.link_together(),
             FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
             ROTATE: lambda dt: self._scene.refresh_rotation(),
             RUN_BROAD: lambda dt: simulation.broad_phase.process(dt),
@@ -127,8 +130,15 @@ class Room:
             size = _with_spare(state.needed)
             impacts.reserve(size, "heap", *EVENTS, keep=old)
             impacts.heap[old:size] = np.arange(old, size)
-        if impacts.logged == len(impacts.log_pair):
-            impacts.reserve(_with_spare(impacts.logged), *LOG, keep=impacts.logged)
+        if impacts.logged + impacts.together >= len(impacts.log_pair):
+            impacts.reserve(_with_spare(impacts.logged + impacts.together), *LOG, keep=impacts.logged)
+        if impacts.together > len(impacts.member):
+            rows = _with_spare(impacts.together)
+            impacts.reserve(rows, *MEMBERS)
+            impacts.reserve(2 * rows, "next_member")
+        if impacts.together > 0 and len(impacts.firsts) < state.count:
+            impacts.reserve(self._scene.table.capacity, "firsts", "searched_with", "gained")
+        impacts.together = 0
         impacts.linked = False
 
     def _grow_solver(self, dt: float) -> None:

@@ -12,7 +12,9 @@ from .contacts.events import ContactEvents
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
 from .impacts.find import is_held_by_edge, kind_beyond_cap
-from .impacts.stages import take_swept_event, watch_bounds
+from .impacts.stages import take_swept_event
+from .impacts.together import take_together
+from .impacts.watch import watch_bounds
 from .integration.system import Integration
 from .linking.parts import (
     BOUND_SEARCHES,
@@ -21,6 +23,7 @@ from .linking.parts import (
     HELD_BY_EDGE,
     KIND_BEYOND_CAP,
     TAKE_SWEPT,
+    TAKE_TOGETHER,
     WATCH_BOUNDS,
 )
 from .narrow_phase.system import NarrowPhase
@@ -43,11 +46,18 @@ OPENING = (
 CLOSING = (Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),)
 ON_DEMAND = (
     Stage(
-        box_rest_of_step, "boxes around the rest of the paths", ("path_velocity",), ("lower", "upper"), "swept bodies",
+        box_rest_of_step,
+        "boxes around the rest of the paths",
+        ("path_velocity",),
+        ("lower", "upper"),
+        "swept bodies",
     ),
     Stage(
-        merge_pairs, "the pairs of the rest of the step, and the queue that is left", ("pairs", "candidates"),
-        ("merged", "impacts"), "swept bodies",
+        merge_pairs,
+        "the pairs of the rest of the step, and the queue that is left",
+        ("pairs", "candidates"),
+        ("merged", "impacts"),
+        "swept bodies",
     ),
     *Integration.ON_DEMAND,
 )
@@ -85,6 +95,7 @@ LINKED_PARTS = {
     KIND_BEYOND_CAP: kind_beyond_cap,
     TAKE_SWEPT: take_swept_event,
     WATCH_BOUNDS: watch_bounds,
+    TAKE_TOGETHER: take_together,
 }
 
 # The system of each stage; "" for those that open and close a step.

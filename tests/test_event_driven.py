@@ -128,9 +128,9 @@ def test_impacts_are_reported_in_the_order_of_time(mode, d):
 
 @each_mode
 @pytest.mark.parametrize("upper_first", [False, True])
-def test_simultaneous_impacts_are_taken_one_after_the_other(mode, upper_first):
-    """A ball hits two mirror images at the same moment: first the pair of smaller ids, as if it were alone; then
-    the other with the remaining velocity. n1.n2 = 1/2: the impulses are v cos 30 and half of it."""
+def test_simultaneous_impacts_are_taken_together(mode, upper_first):
+    """A ball hits two mirror images at the same moment, 30 degrees off its way: neither is first. Both get the same
+    impulse, and the ball goes back with a fifth of its speed."""
     world = mode_world(mode)
     cue = bullet(world, -3.0, 300.0, radius=0.5, restitution=1.0)
     up, down = (math.cos(math.pi / 6), 0.5), (math.cos(math.pi / 6), -0.5)
@@ -139,9 +139,8 @@ def test_simultaneous_impacts_are_taken_one_after_the_other(mode, upper_first):
     hits = strikes(world, 1)
     assert hits.entity_b.tolist() == pair
     assert hits.time.tolist() == pytest.approx([0.01, 0.01], rel=1e-12)
-    c = 300 * math.cos(math.pi / 6)
-    expected = [np.array((300.0, 0.0)) - c * np.array(order[0]) - c / 2 * np.array(order[1])]
-    expected += [c * np.array(order[0]), c / 2 * np.array(order[1])]
+    away = 300 * 2 * math.cos(math.pi / 6) / 2.5  # 2 v cos 30 / (1 + 1 + cos 60): along the normals
+    expected = [np.array((-60.0, 0.0)), away * np.array(order[0]), away * np.array(order[1])]
     np.testing.assert_allclose(velocities(world, [cue, *pair]), expected, atol=1e-9)
 
 

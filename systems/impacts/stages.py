@@ -6,18 +6,17 @@ import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import request
-from ..ccd.refresh_pairs import NEW
-from ..ccd.search_bounds import FAST, leaves_bounds_at
-from ..codes import NEED_EVENTS, OK, REFRESH_PAIRS
-from ..linking.parts import TAKE_SWEPT, WATCH_BOUNDS, call_take_swept, call_watch_bounds
-from ..shapes.tolerances import smaller_extent
-from .find import bounce_threshold, consider
+from ..ccd.search_bounds import FAST
+from ..codes import NEED_EVENTS, NEED_TOGETHER, OK, REFRESH_PAIRS
+from ..linking.parts import TAKE_SWEPT, TAKE_TOGETHER, call_take_swept, call_take_together
+from .find import consider
 from .heap import heap_pop
 from .impulses import CROSS, LAND, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
+from .looks import HITS, LANDINGS, MEMBERS, NONE, choose_looks, link_pairs, look_at_landings
+from .together import EQUAL, holds, put_back
+from .watch import watch_again
 
-# In place of a pair in ``last_pair``: what is searched next.
 AHEAD = 4  # looks between the request of a body's rows and their use
-HITS, FRESH, NONE, MEMBERS, LANDINGS = -1, -2, -3, -4, -5
 
 
 @part
@@ -71,156 +70,25 @@ def begin_search(state, last_pair, now):
     impacts = state.impacts
     impacts.waiting, impacts.last_pair, impacts.linked = 0, last_pair, False
     impacts.sunk_pair, impacts.sunk_by = -1, 0.0
+    impacts.searching = impacts.search_end = 0
     impacts.now, impacts.until = now, state.neighbours_known_until if impacts.sweeps else math.inf
-
-
-@part
-def link_pairs(state):
-    """Chain the pairs of each body, ascending: heads[i] is the first of row i, then follows links[it], till -1.
-
-    An entry is twice the pair for its first body, one more for its second.
-    """
-    impacts, pairs = state.impacts, state.pairs
-    heads, links = impacts.heads, impacts.links
-    for i in range(state.count):
-        heads[i] = -1
-    for c in range(pairs.count - 1, -1, -1):
-        for side in range(2):
-            i = pairs.a[c] if side == 0 else pairs.b[c]
-            links[2 * c + side] = heads[i]
-            heads[i] = 2 * c + side
-    impacts.linked = True
-
-
-@part
-def look_at_hits(state):
-    """The pairs of supported bodies, and the contacts of all others; returns how many."""
-    pairs, looks, supported, wanted = state.pairs, state.impacts.looks, state.bodies.supported, 0
-    for c in range(pairs.count if state.any_support else 0):
-        if supported[pairs.a[c]] or supported[pairs.b[c]]:
-            looks[wanted] = c
-            wanted += 1
-    for h in range(pairs.found):
-        c = pairs.hits[h]
-        if not (supported[pairs.a[c]] or supported[pairs.b[c]]):
-            looks[wanted] = c
-            wanted += 1
-    return wanted
-
-
-@part
-def look_at_fresh(state):
-    """The pairs that have become candidates within the step; returns how many."""
-    pairs, looks, wanted = state.pairs, state.impacts.looks, 0
-    for c in range(pairs.count):
-        looks[wanted] = c
-        wanted += pairs.place[c] == NEW
-    return wanted
-
-
-@part
-def look_at_members(state):
-    """The pairs of all bodies of the cluster that has just grown; returns how many."""
-    impacts, i, wanted = state.impacts, state.impacts.cluster, 0
-    while i >= 0:
-        entry = impacts.heads[i]
-        while entry >= 0:
-            impacts.looks[wanted] = entry // 2
-            wanted += 1
-            entry = impacts.links[entry]
-        i = state.bodies.cluster_next[i]
-    return wanted
-
-
-@part
-def look_at_partners(state, c):
-    """The pairs of the two bodies of pair c that can be moved; returns how many."""
-    impacts, pairs, inverse_mass, wanted = state.impacts, state.pairs, state.bodies.inverse_mass, 0
-    for side in range(2):
-        i = pairs.a[c] if side == 0 else pairs.b[c]
-        entry = impacts.heads[i] if inverse_mass[i] > 0.0 else -1
-        while entry >= 0:
-            if side == 0 or entry // 2 != c or inverse_mass[pairs.a[c]] == 0.0:  # once is enough
-                impacts.looks[wanted] = entry // 2
-                wanted += 1
-            entry = impacts.links[entry]
-    return wanted
-
-
-@part
-def may_have_sunk(state, i, k, now):
-    """Whether body i may by now have sunk through k, which cannot be moved, as slowly as a contact at rest lets it."""
-    if state.bodies.inverse_mass[k] > 0.0:
-        return False
-    return bounce_threshold(state, i, k) * now > FAST * smaller_extent(state.bodies, i, k)
-
-
-@part
-def look_at_landings(state, c, now):
-    """The pairs in which a body of pair c may have sunk before its impact, and that pair; returns how many."""
-    impacts, pairs, bodies, wanted = state.impacts, state.pairs, state.bodies, 1
-    impacts.looks[0] = c
-    for side in range(2):
-        i = pairs.a[c] if side == 0 else pairs.b[c]
-        entry = impacts.heads[i] if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] == 0 else -1
-        while entry >= 0:
-            p = entry // 2
-            if p != c and pairs.is_solid[p] and may_have_sunk(state, i, pairs.a[p] + pairs.b[p] - i, now):
-                impacts.looks[wanted] = p
-                wanted += 1
-            entry = impacts.links[entry]
-    return wanted
-
-
-@part
-def choose_looks(state):
-    """Which pairs are searched now: at first what may have met, later the pairs of the two bodies of an impact."""
-    impacts = state.impacts
-    c = impacts.last_pair
-    if c == HITS:
-        return look_at_hits(state)
-    if c == FRESH:
-        return look_at_fresh(state)
-    if c == NONE:
-        return 0
-    if not impacts.linked:
-        link_pairs(state)
-    if c == LANDINGS:
-        return look_at_landings(state, impacts.sunk_pair, impacts.sunk_by)
-    return look_at_members(state) if c == MEMBERS else look_at_partners(state, c)
 
 
 @part
 def next_event(state):
     """Take the earliest event off the queue that still holds, of those that come before the search bounds are left.
 
-    Returns its place, or -1. It holds if neither body has had an impact since it was made.
+    Returns its place, or -1.
     """
-    impacts, pairs, count = state.impacts, state.pairs, state.bodies.impact_count
+    impacts = state.impacts
     while impacts.waiting > 0:
         event = impacts.heap[0]
         if impacts.sweeps and impacts.event_time[event] > impacts.until:
             return -1
-        c = impacts.event_pair[event]
-        holds = impacts.event_count_a[event] == count[pairs.a[c]] and impacts.event_count_b[event] == count[pairs.b[c]]
         heap_pop(impacts)
-        if holds:
+        if holds(state, event):
             return event
     return -1
-
-
-def watch_bounds(state, i, dt):
-    """The body goes on from here: note when it may leave its search bounds."""
-    impacts = state.impacts
-    state.bodies.last_impact[i] = impacts.now
-    impacts.until = min(impacts.until, leaves_bounds_at(state, i, impacts.now, dt))
-    return 0
-
-
-@part
-def watch_again(state, i, dt):
-    """The same from another function."""
-    return call_watch_bounds(state.links[WATCH_BOUNDS], state, i, dt)
 
 
 def take_swept_event(state, event, dt):
@@ -273,15 +141,22 @@ def lands_first(state, event):
 
 @part
 def take_event(state, event, dt):
-    """Carry an event out."""
+    """Carry an event out, with all impacts at the same time; a code if these need something first."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     if lands_first(state, event):
-        return
+        return OK
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.last_pair, impacts.now = c, impacts.event_time[event]
     if kind > LAND:
         call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
-        return
+        return OK
+    if kind != LAND and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
+        if state.links[TAKE_TOGETHER] == 0:
+            put_back(impacts, event)
+            return NEED_TOGETHER
+        taken = call_take_together(state.links[TAKE_TOGETHER], state, event, dt)
+        if taken >= 0:
+            return taken
     bounce(state, event, dt)
     if kind == LAND:
         call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
@@ -289,6 +164,19 @@ def take_event(state, event, dt):
         i = pairs.a[c] if side == 0 else pairs.b[c]
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             watch_again(state, i, dt)
+    return OK
+
+
+@part
+def is_searched(state):
+    """Whether all pairs are searched that the impacts so far have sent elsewhere; else which are next."""
+    impacts = state.impacts
+    if impacts.searching + 1 < impacts.search_end:
+        impacts.searching += 1
+        impacts.last_pair, impacts.now = impacts.log_pair[impacts.searching], impacts.log_time[impacts.searching]
+        return False
+    impacts.searching = impacts.search_end = 0
+    return True
 
 
 @part
@@ -331,9 +219,13 @@ def resolve_impacts(state, dt):
                 request_bodies(state, impacts.looks[q + AHEAD])
             if pairs.is_solid[c] or impacts.sweeps:
                 consider(state, c, dt)
+        if not is_searched(state):
+            continue
         event = next_event(state)
         if event >= 0:
-            take_event(state, event, dt)
+            code = take_event(state, event, dt)
+            if code != OK:
+                return code
         elif impacts.sweeps and impacts.until < dt:
             return REFRESH_PAIRS
         else:

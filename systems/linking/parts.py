@@ -1,6 +1,7 @@
 """Parts of stages that are compiled on their own and called through their address.
 
-Swept bodies need them alone, so that a discrete world does not compile them; or several stages share one.
+Swept bodies need them alone, so that a discrete world does not compile them; or several stages share one; or they are
+needed so seldom that they are linked when that happens first.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from ..records import STATE
 from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
-BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS = range(7)
-COUNT = 7
+BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS, TAKE_TOGETHER = range(8)
+COUNT = 8
+SWEPT = BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS
 
 
 def _int(dimensions: int) -> Any:
@@ -70,6 +72,7 @@ SIGNATURES = {
     KIND_BEYOND_CAP: _signature(_int, _int, _int, path_type, _float, _float, _float, _float),
     TAKE_SWEPT: _signature(_int, _int, _float),
     WATCH_BOUNDS: _signature(_int, _int, _float),
+    TAKE_TOGETHER: _signature(_int, _int, _float),
 }
 
 call_box_rows = call_in_dimension(SIGNATURES[BOX_ROWS])
@@ -79,6 +82,7 @@ call_held_by_edge = call_in_dimension(SIGNATURES[HELD_BY_EDGE])
 call_kind_beyond_cap = call_in_dimension(SIGNATURES[KIND_BEYOND_CAP])
 call_take_swept = call_in_dimension(SIGNATURES[TAKE_SWEPT])
 call_watch_bounds = call_in_dimension(SIGNATURES[WATCH_BOUNDS])
+call_take_together = call_in_dimension(SIGNATURES[TAKE_TOGETHER])
 
 _linked: dict[tuple[Any, int], Linked] = {}
 

@@ -16,7 +16,7 @@ from ..ccd.search_bounds import DISCRETE
 from ..integration.system import Integration
 from ..scene import SWEEPS, Scene
 from ..stage_list import LINKED_PARTS
-from .parts import BOX_ROWS, COUNT, linked_part
+from .parts import BOX_ROWS, COUNT, SWEPT, TAKE_TOGETHER, linked_part
 from .preparation import kind_of, link_possible
 
 NEVER = -1
@@ -116,10 +116,11 @@ class StepLinks:
             yield from linked.all_functions(self._state.sweeps_ready)
 
     def _parts(self) -> dict[int, Linked]:
-        """The parts of stages that are called by address; those of swept bodies only where there are any."""
+        """The parts of stages that are called by address; those of swept bodies only where there are
+        any."""
         if not self._state.collides:
             return {}
-        places = LINKED_PARTS if self._state.sweeps_ready else (BOX_ROWS,)
+        places = (BOX_ROWS, *SWEPT) if self._state.sweeps_ready else (BOX_ROWS,)
         return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
 
     def link_shapes(self) -> None:
@@ -135,6 +136,11 @@ class StepLinks:
         links = self._state.links
         if not links[BOX_ROWS]:
             links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self._state.dimensions).address
+
+    def link_together(self) -> None:
+        """What impacts at the same time need, when there are such for the first time."""
+        part = linked_part(TAKE_TOGETHER, LINKED_PARTS[TAKE_TOGETHER], self._state.dimensions)
+        self._state.links[TAKE_TOGETHER] = part.address
 
     def _link_possible(self) -> None:
         """All that this world can need, when that may be more than before."""

@@ -17,6 +17,7 @@ import numpy as np
 from ....framework import Settings
 from ...measure.body_shapes import Floats
 from .bodies import FAST, Body, Cluster, Pair, Touch, is_corner_touch, touch
+from .groups import groups_of, is_at, solve
 from .sweeps import ROUNDING, Meeting, Way, is_swept, slides_over, sweep, way_of
 
 HALVINGS = 60  # of a step: more than its time resolution
@@ -85,9 +86,52 @@ class Impacts:
                 self.capped += 1
                 moved = self._stick(impact)
             else:
-                self._strike(impact)
-                self.done.append(impact)
+                self._strike_together(impact)
+                continue
             self._look([p for p in self._pairs if p.a in moved or p.b in moved], impact.time)
+
+    def _strike_together(self, first: Impact) -> None:
+        """Apply an impact and all others at its time; then look at the pairs of all their bodies."""
+        together = [first]
+        while self._queue:
+            impact = self._queue[0][-1]
+            if not impact.stale and not is_at(impact, first.time, self._settings):
+                break
+            if not impact.stale and impact.kind not in ("bounce", "free", "cross"):
+                break
+            heapq.heappop(self._queue)
+            if not impact.stale and impact.kind == "cross":
+                impact.pair.crossed = True
+            elif not impact.stale and all(impact.pair is not other.pair for other in together):
+                together.append(impact)
+        begun, searched = len(self.done), set[Body]()
+        for group in groups_of(together):
+            if len(group) == 1:
+                self._strike(group[0])
+                self.done.append(group[0])
+            else:
+                self._strike_group(group)
+        for impact in self.done[begun:]:
+            moved = {body for body in impact.pair.bodies if body.inverse_mass > 0.0} - searched
+            searched |= moved
+            self._look([p for p in self._pairs if p.a in moved or p.b in moved], impact.time)
+
+    def _strike_group(self, group: Sequence[Impact]) -> None:
+        """Apply impacts of one time that share bodies."""
+        now = min(impact.time for impact in group)
+        impulses, gained = solve(group, now, self._settings)
+        struck = set[Body]()
+        for impact, impulse in zip(group, impulses.tolist(), strict=True):
+            if impulse > 0.0:
+                for body in impact.pair.bodies:
+                    struck.add(body)
+                    body.impact_count += body.inverse_mass > 0.0
+                    body.counted_impacts += body.inverse_mass > 0.0 and impact.kind == "bounce"
+                impact = replace(impact, time=now, speed=impulse / impact.pair.mass)
+                self.done.append(impact)
+                _note(impact)
+        for body in struck.intersection(gained):
+            self._deflect(body, gained[body], now)
 
     def _look(self, chosen: Sequence[Pair], since: float) -> None:
         for pair in chosen:
@@ -181,9 +225,12 @@ class Impacts:
     def _push(self, body: Body, dv: Floats, time: float) -> None:
         """Change a body's velocity at ``time``. The damping after it depends on the flight: half of dt if event-driven;
         the rest of the step on parabolas; none on straight paths, which have the end velocity."""
+        body.impact_count += 1
+        self._deflect(body, dv, time)
+
+    def _deflect(self, body: Body, dv: Floats, time: float) -> None:
         dt = self._settings.dt
         fading = 0.5 * dt if self._settings.collision == "event_driven" else dt - time if self._curved else 0.0
-        body.impact_count += 1
         if self._sweeping:
             body.last = time
         body.first_velocity = body.first_velocity + dv

@@ -1,0 +1,204 @@
+"""What a group of impacts at the same time does to its bodies: all its impulses, found and given at once.
+
+Newton's law holds for each of its impacts: they part at e times their approach, or faster if the others push them apart
+(then its impulse is 0). With p the impulses and A what they do to the speeds along the normals, that is p >= 0,
+A p >= (1 + e) approach, one of both equal: the velocities are unique, momentum is kept, and so is energy where e is 1.
+
+The order of bodies is no matter, and mirrored groups stay mirrored, to the bit: each pass improves all impulses at
+once, and sums do not depend on their order. It is a projected gradient with momentum (Y. Nesterov, 1983; restarted as
+by B. O'Donoghue and E. Candes, 2015).
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
+from ..integration.trajectory import rate_along, relative_path
+from ..shapes.dispatch import mix_friction
+from .exact_sum import exact_sum
+from .impulses import FREE, deflect, log_impact, stands_still
+
+PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
+WORK = 1 << 18  # impacts in all passes: a heap of bodies that overlap is not worth more
+AGREED = 8e-16  # of the largest speed
+SAME = 2e-15  # of a sum of energies
+ORTHOGONAL = 1e-12  # cosine of the angle between normals that have nothing to do with each other
+
+
+@part
+def sum_pushes(state, i, rubs):
+    """What the impulses ``ahead`` of its impacts add to body i's velocity; also those of ``rub`` along the surfaces?"""
+    impacts, terms, total = state.impacts, state.impacts.terms, zero_of(state)
+    for k in range(len(total)):
+        count, entry = 0, impacts.firsts[i]
+        while entry >= 0:
+            m = entry // 2
+            push = item(impacts.event_normal[impacts.member[m]], k) * impacts.ahead[m]
+            if rubs:
+                push += item(impacts.rub[m], k)
+            terms[count] = push if entry % 2 == 1 else -push
+            count, entry = count + 1, impacts.next_member[entry]
+        total = replace(total, k, exact_sum(terms, count))
+    return scale(total, state.bodies.inverse_mass[i])
+
+
+@part
+def push_bodies(state, count, rubs):
+    """Write into ``gained`` what the impulses of the group give each of its bodies."""
+    impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
+    for g in range(count):
+        m = impacts.group[g]
+        c = impacts.event_pair[impacts.member[m]]
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            if inverse_mass[i] > 0.0 and impacts.firsts[i] == 2 * m + side:  # once each
+                impacts.gained[i] = sum_pushes(state, i, rubs)
+
+
+@part
+def count_coupled(state, m, i):
+    """Impacts of body i, member m among them, whose normals are not at right angles to that of m."""
+    impacts, entry, count = state.impacts, state.impacts.firsts[i], 0
+    normal = impacts.event_normal[impacts.member[m]]
+    while entry >= 0:
+        count += abs(dot(normal, impacts.event_normal[impacts.member[entry // 2]])) > ORTHOGONAL
+        entry = impacts.next_member[entry]
+    return count
+
+
+@part
+def gained_along(state, m):
+    """The speed along member m's normal that its bodies have gained from each other."""
+    impacts, pairs = state.impacts, state.pairs
+    c = impacts.event_pair[impacts.member[m]]
+    gained = sub(impacts.gained[pairs.b[c]], impacts.gained[pairs.a[c]])
+    return dot(gained, impacts.event_normal[impacts.member[m]])
+
+
+@part
+def solve_group(state, count):
+    """Find the impulses of a group's impacts, into ``ahead``."""
+    impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
+    for g in range(count):
+        m = impacts.group[g]
+        c = impacts.event_pair[impacts.member[m]]
+        a, b, heavy = pairs.a[c], pairs.b[c], 0.0
+        if inverse_mass[a] > 0.0:
+            heavy += inverse_mass[a] * count_coupled(state, m, a)
+        if inverse_mass[b] > 0.0:
+            heavy += inverse_mass[b] * count_coupled(state, m, b)
+        impacts.weight[m] = 1.0 / heavy
+        impacts.share[m] = impacts.ahead[m] = 0.0
+    inertia = 1.0
+    for _ in range(max(LEAST_PASSES, min(PASSES, WORK // count))):
+        push_bodies(state, count, False)
+        worst, largest, back = improve(state, count)
+        if worst <= AGREED * largest:
+            break
+        inertia = 1.0 if back else inertia
+        following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * inertia * inertia))
+        for g in range(count):
+            m = impacts.group[g]
+            swing = 0.0 if back else (inertia - 1.0) / following
+            impacts.ahead[m] = impacts.share[m] + swing * (impacts.share[m] - impacts.before[m])
+        inertia = following
+    for g in range(count):
+        impacts.ahead[impacts.group[g]] = impacts.share[impacts.group[g]]
+    keep_energy(state, count)
+
+
+@part
+def improve(state, count):
+    """A pass over all impacts of a group: (largest change, largest speed in it, whether the momentum leads back)."""
+    impacts, terms = state.impacts, state.impacts.terms
+    worst, largest = 0.0, 0.0
+    for g in range(count):
+        m = impacts.group[g]
+        wanted, weight, ahead = impacts.event_change[impacts.member[m]], impacts.weight[m], impacts.ahead[m]
+        share = max(0.0, ahead + (wanted - gained_along(state, m)) * weight)
+        worst, largest = max(worst, abs(share - ahead) / weight), max(largest, wanted, share / weight)
+        terms[g] = (ahead - share) * (share - impacts.share[m]) / weight
+        impacts.before[m], impacts.share[m] = impacts.share[m], share
+    return worst, largest, exact_sum(terms, count) > 0.0
+
+
+@part
+def keep_energy(state, count):
+    """Scale the impulses so that the group as a whole obeys its law, which they do but for rounding where the passes
+    were enough: then energy is right in any case."""
+    impacts, terms = state.impacts, state.impacts.terms
+    push_bodies(state, count, False)
+    for g in range(count):
+        m = impacts.group[g]
+        terms[g] = impacts.ahead[m] * impacts.event_change[impacts.member[m]]
+    wanted = exact_sum(terms, count)
+    for g in range(count):
+        terms[g] = impacts.ahead[impacts.group[g]] * gained_along(state, impacts.group[g])
+    given = exact_sum(terms, count)
+    if abs(wanted - given) > SAME * wanted:
+        for g in range(count):
+            impacts.ahead[impacts.group[g]] *= wanted / given
+        push_bodies(state, count, False)
+
+
+@part
+def rub_group(state, count):
+    """Find the impulses of friction, into ``rub``; returns whether there are any. Bodies are taken to be split among
+    their impacts, so that these together never do more than stop what slides."""
+    impacts, pairs, rubs = state.impacts, state.pairs, False
+    friction, slot, inverse_mass = state.colliders.friction, state.bodies.collider_slot, state.bodies.inverse_mass
+    for g in range(count):
+        m = impacts.group[g]
+        c = impacts.event_pair[impacts.member[m]]
+        a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
+        mu = mix_friction(state, state.friction_rule, friction[slot[a], a], friction[slot[b], b])
+        impacts.rub[m] = zero_of(state)
+        if mu > 0.0 and impacts.ahead[m] > 0.0:
+            w = rate_along(relative_path(state, a, b), impacts.now)
+            w = add(w, sub(impacts.gained[b], impacts.gained[a]))
+            sliding = add_scaled(w, normal, -dot(w, normal))
+            fast, light = length(sliding), 0.0
+            for side in range(2):
+                i = a if side == 0 else b
+                entry = impacts.firsts[i] if inverse_mass[i] > 0.0 else -1
+                while entry >= 0:
+                    light, entry = light + inverse_mass[i], impacts.next_member[entry]
+            if fast > 0.0:
+                impacts.rub[m] = scale(sliding, -min(1.0 / light, mu * impacts.ahead[m] / fast))
+                rubs = True
+    return rubs
+
+
+@part
+def push_group(state, count, dt):
+    """Give the bodies of a group their impulses, all at once, and note these."""
+    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    inverse_mass, caught = bodies.inverse_mass, bodies.caught
+    if rub_group(state, count):
+        push_bodies(state, count, True)
+    for g in range(count):
+        m = impacts.group[g]
+        event = impacts.member[m]
+        c = impacts.event_pair[event]
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            if inverse_mass[i] > 0.0 and impacts.firsts[i] == 2 * m + side:
+                deflect(state, i, impacts.gained[i], impacts.now, dt)
+            if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
+                bodies.impact_count[i] += 1
+                bodies.counted_impacts[i] += 0 if impacts.event_kind[event] == FREE else 1
+        if impacts.ahead[m] > 0.0:
+            impacts.event_time[event] = impacts.now
+            log_impact(state, event, impacts.ahead[m])
+    for strikes_mover in range(2 if impacts.sweeps else 0):
+        for g in range(count):
+            c = impacts.event_pair[impacts.member[impacts.group[g]]]
+            a, b = pairs.a[c], pairs.b[c]
+            for side in range(2):
+                i = a if side == 0 else b
+                still = stands_still(bodies, a + b - i)
+                if inverse_mass[i] > 0.0 and still == (strikes_mover == 0):
+                    caught[i] = caught[i] + 1 if still else 0

@@ -1,0 +1,198 @@
+"""Impacts at the same time, but for rounding: none of them is first.
+
+Those that share a body which can be moved are a group, and solved together (see group). All groups of one time come
+before what follows from them, so that the order of bodies decides nothing.
+
+A row of balls that touch is no group: its second ball is not struck before the first impact has been.
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import dot
+from ..ccd.time_of_impact import clear_of_rounding
+from ..codes import NEED_EVENTS, OK
+from ..integration.trajectory import rate_along, relative_path
+from .group import push_group, solve_group
+from .heap import heap_pop, heap_push
+from .impulses import BOUNCE, CROSS, FREE, bounce
+from .looks import NONE, link_pairs, look_at_landings
+from .watch import watch_again
+
+EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
+
+
+@part
+def holds(state, event):
+    """Whether neither body has had an impact since the event was made."""
+    impacts, pairs, count = state.impacts, state.pairs, state.bodies.impact_count
+    c = impacts.event_pair[event]
+    return impacts.event_count_a[event] == count[pairs.a[c]] and impacts.event_count_b[event] == count[pairs.b[c]]
+
+
+@part
+def is_at(state, event, now, dt):
+    """Whether an impact's time is ``now`` but for the rounding of places: of these its time is as uncertain as they are
+    over the speed of approach."""
+    impacts, pairs = state.impacts, state.pairs
+    later = impacts.event_time[event] - now
+    if later == 0.0:
+        return True
+    c = impacts.event_pair[event]
+    path = relative_path(state, pairs.a[c], pairs.b[c])
+    speed = abs(dot(rate_along(path, now), impacts.event_normal[event]))
+    return later <= EQUAL * dt and later * speed <= clear_of_rounding(state, pairs.a[c], pairs.b[c], path, now)
+
+
+@part
+def next_at(state, now, dt):
+    """The earliest impact in the queue that holds, if its time is ``now``, else -1; it stays there. Crossings before it
+    are noted, as they change no path."""
+    impacts, pairs = state.impacts, state.pairs
+    while impacts.waiting > 0:
+        event = impacts.heap[0]
+        c, kind, time = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
+        if time - now > EQUAL * dt or (impacts.sweeps and time > impacts.until):
+            return -1
+        if holds(state, event) and kind != CROSS:
+            if kind not in (BOUNCE, FREE) or not is_at(state, event, now, dt):
+                return -1
+            if impacts.may_sink:
+                if not impacts.linked:
+                    link_pairs(state)
+                if look_at_landings(state, c, time) > 1:
+                    return -1
+            return event
+        if kind == CROSS and holds(state, event) and is_at(state, event, now, dt):
+            pairs.crossed[c] = True
+            impacts.crossings += 1
+        elif kind == CROSS and holds(state, event):
+            return -1
+        heap_pop(impacts)
+    return -1
+
+
+@part
+def put_back(impacts, event):
+    """Add an event to the queue again that has been taken off it; all pairs are searched."""
+    heap, place, impacts.last_pair = impacts.heap, impacts.waiting, NONE
+    while heap[place] != event:
+        place += 1
+    heap[place], heap[impacts.waiting] = heap[impacts.waiting], event
+    heap_push(impacts)
+
+
+def take_together(state, event, dt):
+    """Carry out all impacts at the time of ``event``, which has been taken off the queue, if there are others.
+
+    Returns OK; NEED_EVENTS if there is no room, and nothing has changed then; -1 if there is none besides it.
+    """
+    impacts, now = state.impacts, state.impacts.event_time[event]
+    if next_at(state, now, dt) < 0:
+        return -1
+    most = 1
+    for k in range(impacts.waiting):
+        most += impacts.event_time[impacts.heap[k]] - now <= EQUAL * dt
+    if most > len(impacts.member) or impacts.logged + most > len(impacts.log_pair) or state.count > len(impacts.firsts):
+        impacts.together, state.needed = most, 0
+        put_back(impacts, event)
+        return NEED_EVENTS
+    members, following = 0, event
+    while following >= 0:
+        impacts.member[members] = following
+        members += 1
+        following = next_at(state, now, dt)
+        if following >= 0:
+            heap_pop(impacts)
+    link_members(state, members)
+    impacts.searching = impacts.logged
+    for m in range(members):
+        if impacts.is_left[m]:
+            take_group(state, m, dt)
+    impacts.search_end = impacts.logged
+    impacts.last_pair, impacts.now = impacts.log_pair[impacts.searching], impacts.log_time[impacts.searching]
+    return OK
+
+
+@part
+def link_members(state, members):
+    """Chain the impacts of each body that can be moved: firsts[i] is the first of row i, then follows next_member[it],
+    till -1. An entry is twice the member for its first body, one more for its second. A pair that is there twice is
+    left out once."""
+    impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
+    for m in range(members):
+        c = impacts.event_pair[impacts.member[m]]
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            impacts.firsts[i], impacts.searched_with[i], impacts.gained[i] = -1, -1, zero_of(state)
+    for m in range(members):
+        c = impacts.event_pair[impacts.member[m]]
+        a, b = pairs.a[c], pairs.b[c]
+        entry = impacts.firsts[a if inverse_mass[a] > 0.0 else b]
+        while entry >= 0 and impacts.event_pair[impacts.member[entry // 2]] != c:
+            entry = impacts.next_member[entry]
+        impacts.is_left[m] = entry < 0
+        for side in range(2 if entry < 0 else 0):
+            i = a if side == 0 else b
+            if inverse_mass[i] > 0.0:
+                impacts.next_member[2 * m + side] = impacts.firsts[i]
+                impacts.firsts[i] = 2 * m + side
+
+
+@part
+def sort_group(impacts, count):
+    """Canonical order, for the log: Shell's sort."""
+    group, stride = impacts.group, count // 2
+    while stride > 0:
+        for g in range(stride, count):
+            m, place = group[g], g
+            key = impacts.event_key[impacts.member[m]]
+            while place >= stride and impacts.event_key[impacts.member[group[place - stride]]] > key:
+                group[place] = group[place - stride]
+                place -= stride
+            group[place] = m
+        stride //= 2
+
+
+@part
+def find_group(state, m):
+    """Write into ``group`` member m and all that bodies which can be moved connect with it; returns how many."""
+    impacts, pairs, inverse_mass, done, reached = state.impacts, state.pairs, state.bodies.inverse_mass, 0, 1
+    impacts.group[0], impacts.is_left[m] = m, False
+    while done < reached:
+        c = impacts.event_pair[impacts.member[impacts.group[done]]]
+        done += 1
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            entry = impacts.firsts[i] if inverse_mass[i] > 0.0 else -1
+            while entry >= 0:
+                if impacts.is_left[entry // 2]:
+                    impacts.is_left[entry // 2] = False
+                    impacts.group[reached] = entry // 2
+                    reached += 1
+                entry = impacts.next_member[entry]
+    sort_group(impacts, reached)
+    return reached
+
+
+@part
+def take_group(state, m, dt):
+    """Carry out the impact of member m, and those that are connected with it."""
+    impacts, pairs, bodies, logged = state.impacts, state.pairs, state.bodies, state.impacts.logged
+    first = impacts.member[m]
+    impacts.now = impacts.event_time[first]
+    count = find_group(state, m)
+    if count == 1:
+        bounce(state, first, dt)
+    else:
+        solve_group(state, count)
+        push_group(state, count, dt)
+    for k in range(logged, impacts.logged):
+        c = impacts.log_pair[k]
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            if bodies.inverse_mass[i] > 0.0 and impacts.searched_with[i] < 0:
+                impacts.searched_with[i] = k
+                if impacts.sweeps:
+                    watch_again(state, i, dt)

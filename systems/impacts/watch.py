@@ -1,0 +1,21 @@
+"""After an impact: when its bodies may leave their search bounds."""
+
+from __future__ import annotations
+
+from ...framework.compilation import part
+from ..ccd.search_bounds import leaves_bounds_at
+from ..linking.parts import WATCH_BOUNDS, call_watch_bounds
+
+
+def watch_bounds(state, i, dt):
+    """The body goes on from here: note when it may leave its search bounds."""
+    impacts = state.impacts
+    state.bodies.last_impact[i] = impacts.now
+    impacts.until = min(impacts.until, leaves_bounds_at(state, i, impacts.now, dt))
+    return 0
+
+
+@part
+def watch_again(state, i, dt):
+    """The same from another function."""
+    return call_watch_bounds(state.links[WATCH_BOUNDS], state, i, dt)

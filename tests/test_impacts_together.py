@@ -1,0 +1,235 @@
+"""Impacts at the same time: none is first, so mirrored starts stay mirrored and the order of ids decides nothing, to
+the bit; momentum and energy are kept."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from worlds import both_dimensions
+
+from carom.lab import testing as kit
+from carom.systems.impacts.exact_sum import exact_sum
+
+each_collision = pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
+TOUCHING = 0.5 * math.sqrt(3) + 1e-15  # rows of balls that touch, and do not overlap by a rounding error
+
+
+def play(balls, mode, steps, *, d=2, order=None, walls=(), **rules):
+    """(steps, balls, 2, d) positions and velocities of the balls (place, velocity, material), created in ``order``."""
+    world = kit.make_world(d, collision=mode, max_impacts_per_step=1000, **rules)
+    ids = {}
+    for n in order if order is not None else range(len(balls)):
+        place, velocity, material = balls[n]
+        ids[n] = kit.ball(world, tuple(place), tuple(velocity), **material)
+    for place, half in walls:
+        kit.box(world, place, half=half, kind="static", restitution=1.0)
+    states = []
+    for _ in range(steps):
+        world.step()
+        states.append([[kit.position(world, ids[n]), kit.velocity(world, ids[n])] for n in range(len(balls))])
+    assert world.stats().counters["capped_impacts"] == 0
+    world.close()
+    return np.array(states)
+
+
+def line_up(*rows, d=2, **material):
+    """Balls (place, velocity, material) in space or in the plane."""
+    return [((*p, 0.0)[:d], (*v, 0.0)[:d], {"radius": 0.5, **material}) for p, v in rows]
+
+
+def assert_mirrored(states, partners, axis=1):
+    """Each ball's partner is at the mirror image of its place."""
+    flip = np.ones(states.shape[-1])
+    flip[axis] = -1.0
+    np.testing.assert_array_equal(states[:, partners] * flip, states)
+
+
+def assert_kept(states, masses, before, energy):
+    """Momentum, and energy where it is kept, to rounding."""
+    masses = np.asarray(masses)
+    velocity = states[:, :, 1]
+    momentum = (masses[:, None] * velocity).sum(axis=1)
+    scale = np.abs(masses[:, None] * before).sum()
+    assert np.abs(momentum - (masses[:, None] * before).sum(axis=0)).max() <= 1e-15 * scale
+    if energy:
+        kinetic = (masses[:, None] * velocity**2).sum(axis=(1, 2))
+        np.testing.assert_allclose(kinetic, (masses[:, None] * before**2).sum(), rtol=4e-15)
+
+
+@both_dimensions
+@each_collision
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+def test_a_break_shot(mode, d, restitution):
+    """Head-on between two balls that touch: each parts along its normal at e times its approach."""
+    balls = line_up(
+        ((-3.0, 0.0), (7.0, 0.0)), ((0.0, 0.5), (0, 0)), ((0.0, -0.5), (0, 0)), d=d, restitution=restitution
+    )
+    states = play(balls, mode, 60, d=d)
+    assert_mirrored(states, [0, 2, 1])
+    assert_kept(states, [1, 1, 1], np.array([v for _, v, _ in balls]), restitution == 1.0)
+    cosine = math.cos(math.pi / 6)
+    push = (1 + restitution) * 7 * cosine / 2.5
+    cue, upper, _ = states[-1, :, 1]
+    np.testing.assert_allclose(cue[:2], (7 - 2 * push * cosine, 0.0), atol=1e-12)
+    np.testing.assert_allclose(upper[:2], (push * cosine, 0.5 * push), atol=1e-12)
+
+
+@each_collision
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+def test_three_against_one(mode, restitution):
+    """In space: a ball of another mass falls into the middle of three, of which two are mirror images."""
+    angles = np.radians([90, 210, 330])
+    three = [(0.625 * math.cos(a), 0.0, 0.625 * math.sin(a)) for a in angles]
+    three[1] = (-three[2][0], 0.0, three[2][2])
+    three[0] = (0.0, 0.0, 0.625)
+    balls = [((0.0, 3.0, 0.0), (0.0, -9.0, 0.0), {"radius": 0.5, "mass": 3.0, "restitution": restitution})]
+    balls += [(p, (0.0, 0.0, 0.0), {"radius": 0.5, "restitution": restitution}) for p in three]
+    states = play(balls, mode, 60, d=3)
+    assert_mirrored(states, [0, 1, 3, 2], axis=0)
+    assert_kept(states, [3, 1, 1, 1], np.array([v for _, v, _ in balls]), restitution == 1.0)
+    speeds = np.linalg.norm(states[-1, 1:, 1], axis=1)
+    np.testing.assert_allclose(speeds, speeds[0], rtol=1e-12)
+    assert speeds[0] > 1.0
+
+
+@each_collision
+@pytest.mark.parametrize("restitution", [1.0, 0.9, 0.5])
+@pytest.mark.parametrize("gap", [0.0, 1 / 32])
+def test_a_rack_of_fifteen(mode, restitution, gap):
+    """Touching and with gaps: mirrored to the bit as long as it rolls, whatever the order of ids, in every mode."""
+    spots = [(TOUCHING * row * (1 + gap), (k - row / 2) * (1 + gap)) for row in range(5) for k in range(row + 1)]
+    balls = line_up(((-3.0, 0.0), (20.0, 0.0)), *((spot, (0, 0)) for spot in spots), restitution=restitution)
+    states = play(balls, mode, 100)
+    partners = [0, *(1 + spots.index((x, -y)) for x, y in spots)]
+    assert_mirrored(states, partners)
+    assert_kept(states, np.ones(16), np.array([v for _, v, _ in balls]), restitution == 1.0)
+    assert np.abs(states[-1, :, 1]).max(axis=1).min() > 0.0 or restitution == 1.0  # all have been struck
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        again = play(balls, mode, 100, order=rng.permutation(16))
+        np.testing.assert_array_equal(again, states)
+
+
+@both_dimensions
+@each_collision
+def test_any_order_of_ids(mode, d):
+    """Stars of balls of any mass, restitution and friction that strike one in their middle all at once; some from
+    both sides of a row."""
+    rng = np.random.default_rng(d)
+    for _ in range(6):
+        balls = [(np.zeros(d), np.zeros(d), {"radius": 0.5, "restitution": 0.8, "friction": 0.3})]
+        for axis, sign in itertools.product(range(d), (-1.0, 1.0)):
+            way = sign * np.eye(d)[axis]
+            for far in range(1, int(rng.integers(2, 4))):
+                material = {
+                    "radius": 0.5, "mass": float(rng.uniform(0.5, 2)), "friction": float(rng.choice([0.0, 0.5])),
+                    "restitution": float(rng.choice([0.5, 1.0])),
+                }  # fmt: skip
+                balls.append((way * (1.0 + 1.5 * far), -way * 8.0 * far, material))
+        states = play(balls, mode, 60, d=d)
+        for _ in range(2):
+            again = play(balls, mode, 60, d=d, order=rng.permutation(len(balls)))
+            np.testing.assert_array_equal(again, states)
+
+
+@both_dimensions
+@each_collision
+def test_light_and_heavy_keep_their_energy(mode, d):
+    """Masses over six decades: where the passes over a group are not enough, what still approaches strikes again."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        balls = [(np.zeros(d), np.zeros(d), {"radius": 0.5, "mass": 10 ** rng.uniform(-3, 3), "restitution": 1.0})]
+        for axis, sign in itertools.product(range(d), (-1.0, 1.0)):
+            way = sign * np.eye(d)[axis] + rng.normal(size=d) * 0.15
+            way /= np.linalg.norm(way)
+            balls.append((way * 1.5, -way * 8.0, {**balls[0][2], "mass": 10 ** rng.uniform(-3, 3)}))
+        states = play(balls, mode, 12, d=d)
+        assert_kept(states, [m["mass"] for _, _, m in balls], np.array([v for _, v, _ in balls]), energy=False)
+        masses = np.array([m["mass"] for _, _, m in balls])[:, None]
+        kinetic = (masses * states[:, :, 1] ** 2).sum(axis=(1, 2))
+        np.testing.assert_allclose(kinetic, (masses * np.array([v for _, v, _ in balls]) ** 2).sum(), rtol=2e-14)
+
+
+@each_collision
+def test_a_cradle_is_no_group(mode):
+    """Balls in a row that touch are struck one after the other: as many leave as arrive."""
+    for arriving in (1, 2):
+        places = [-4.0 + k for k in range(arriving)] + [float(k) for k in range(5)]
+        speeds = [6.0] * arriving + [0.0] * 5
+        balls = line_up(*(((x, 0.0), (v, 0.0)) for x, v in zip(places, speeds, strict=True)), restitution=1.0)
+        states = play(balls, mode, 90)
+        assert states[-1, :, 1, 0].tolist() == [0.0] * 5 + [6.0] * arriving
+
+
+@each_collision
+def test_into_a_corner_and_onto_a_seam(mode):
+    """Two walls at once: each takes its part; two flush boxes share what one would take."""
+    walls = [((3.0, 0.0), (1.0, 9.0)), ((0.0, 3.0), (9.0, 1.0))]
+    balls = line_up(((0.5, 0.5), (6.0, 6.0)), restitution=1.0)
+    states = play(balls, mode, 30, walls=walls)
+    assert states[-1, 0, 1].tolist() == [-6.0, -6.0]
+    world = kit.make_world(collision=mode)
+    for x in (-1.0, 1.0):
+        kit.box(world, (x, -1.0), half=1.0, kind="static", restitution=1.0)
+    ball = kit.ball(world, (0.0, 2.0), (0.0, -6.0), restitution=1.0)
+    impulses = []
+    for _ in range(30):
+        world.step()
+        impulses += world.contacts.impacts.normal_impulse.tolist()
+    assert kit.velocity(world, ball).tolist() == [0.0, 6.0]
+    assert impulses == [6.0, 6.0]
+
+
+@each_collision
+def test_friction_of_several_takes_no_more_than_there_is(mode):
+    """A ball slides onto a seam of rough boxes: together they stop it, and do not send it back."""
+    world = kit.make_world(collision=mode)
+    for x in (-1.0, 1.0):
+        kit.box(world, (x, -1.0), half=1.0, kind="static", restitution=1.0, friction=5.0)
+    box = kit.box(world, (-0.5, 1.5), (1.0, -1.0), half=0.5, restitution=1.0, friction=5.0)
+    for _ in range(90):
+        world.step()
+    velocity = kit.velocity(world, box)
+    assert abs(velocity[0]) <= 1e-15
+    assert velocity[1] == 1.0
+
+
+@pytest.mark.slow
+@both_dimensions
+@each_collision
+def test_the_oracle_agrees(mode, d):
+    """Several at once onto one, of any mass and material."""
+    rng = np.random.default_rng(5)
+    together = 0
+    for _ in range(8):
+        world = kit.make_world(d, collision=mode)
+        kit.ball(world, np.zeros(d), 0.0, radius=0.5, restitution=0.8, friction=0.3)
+        for axis, sign in itertools.product(range(d), (-1.0, 1.0)):
+            way = sign * np.eye(d)[axis] + rng.normal(size=d) * 0.2
+            way /= np.linalg.norm(way)
+            kit.ball(world, way * 1.0625, -way * 8.0, radius=0.5, mass=float(rng.uniform(0.5, 2)), friction=0.4,
+                     restitution=float(rng.choice([0.5, 1.0])))  # fmt: skip
+        oracle = kit.Oracle(world)
+        for _ in range(3):
+            world.step()
+            oracle.step()
+            kit.assert_agrees(world, oracle)
+            together += len(world.contacts.impacts) > 2
+        world.close()
+    assert together > 4
+
+
+def test_exact_sums():
+    """The same to the bit in any order, odd, and right to the last place."""
+    rng = np.random.default_rng(0)
+    for count in (0, 1, 2, 3, 7, 40, 1000):
+        terms = rng.normal(size=count) * 10.0 ** rng.uniform(-12, 12, count)
+        total = exact_sum(terms, count)
+        assert exact_sum(-terms, count) == -total
+        for _ in range(5):
+            assert exact_sum(rng.permutation(terms), count) == total
+        assert total == pytest.approx(math.fsum(terms), rel=1e-15, abs=1e-300)
+    assert exact_sum(np.array([1e20, 1.0, -1e20]), 3) == 1.0
