@@ -168,7 +168,8 @@ class Simulation(PhysicsServices):
     def _follow_columns(self) -> None:
         """A column on demand has been made."""
         self.scene.bind_columns()
-        self.quarantine.bind()
+        if self.state.version == self.table.version:  # else the next refresh does it, when rows are known
+            self.quarantine.bind()
 
     def _check(self) -> None:
         """Errors of colliders that changes of their columns may bring about in any step."""
