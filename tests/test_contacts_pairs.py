@@ -282,7 +282,7 @@ def test_what_is_no_type():
 @pytest.mark.parametrize("first", [RigidBody, Unused])
 def test_contexts_are_not_switched_row_by_row(first, monkeypatch):
     """To the world's context and back twice at most, however many contacts."""
-    world, _ = crowd(count=150)
+    world, _ = crowd(count=400)
     rows, switches = world.contacts, []
     assert len(rows) > 1000
     switch = esper.switch_world
@@ -295,7 +295,7 @@ def test_contexts_are_not_switched_row_by_row(first, monkeypatch):
 
 def test_records_are_made_of_what_is_found_only(monkeypatch):
     """between makes none; pairs one for each contact among its own, and not all at once."""
-    world, _ = crowd(count=150)
+    world, _ = crowd(count=400)
     made, make = [], contacts.make_contacts
     monkeypatch.setattr(contacts, "make_contacts", lambda count, *columns: made.append(count) or make(count, *columns))
     monkeypatch.setattr(contacts.ContactRows, "row", None)

@@ -60,7 +60,7 @@ def crowded(on_fault):
     world = make_world(2, collision="continuous", max_impacts_per_step=1, on_fault=on_fault)
     for k in range(10):
         world.create_entity(
-            Transform((0.25 * k, 0.0)), RigidBody(linear_velocity=(40.0 * (5 - k), 0.0)),
+            Transform((0.25 * k + 0.001 * k * k, 0.0)), RigidBody(linear_velocity=(40.0 * (5 - k), 0.0)),
             SphereCollider(0.1, restitution=1.0),
         )  # fmt: skip
     return world
