@@ -66,20 +66,21 @@ wheel: $(RUN)
 bench: $(BENCH)
 	$(BIN)/carom bench $(ARGS)
 
+STUDIES := $(BIN)/python -m carom.lab.studies
 ACCURACY := spring orbit jump bouncing stack thermal_gas
 
 figures: $(BENCH)
 	for scene in $(ACCURACY); do \
-	  $(BIN)/carom trade $$scene --against pymunk --out out/$$scene --into docs/accuracy.md --no-pictures || exit 1; \
+	  $(BIN)/carom trade $$scene --against pymunk --out out/$$scene --into docs/accuracy.md || exit 1; \
 	done
-	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md --no-pictures
+	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
-	$(BIN)/carom limits --long --into docs/limits.md --out docs/pictures
-	$(BIN)/carom limits --pairs --into docs/limits.md
-	$(BIN)/carom settings --into docs/settings.md
-	$(BIN)/carom settings --games --into docs/settings.md
-	$(BIN)/carom geometry --into docs/levels.md --out docs/pictures
+	$(STUDIES) limits --long --into docs/limits.md --out docs/pictures
+	$(STUDIES) limits --pairs --into docs/limits.md
+	$(STUDIES) settings --into docs/settings.md
+	$(STUDIES) settings --games --into docs/settings.md
+	$(STUDIES) geometry --into docs/levels.md --out docs/pictures
 
 # Checkers and editors do not follow the import hooks of an editable install; they follow links.
 ide:

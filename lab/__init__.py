@@ -9,9 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .geometry.study import geometry_study
-    from .limits_study.step_length import step_limits, suggest_dt
-    from .limits_study.sweep import limits
+    from .limits.step_length import step_limits, suggest_dt
     from .trading.records import Trade
     from .trading.trade import Only, trade
     from .tuning.check import check
@@ -23,11 +21,9 @@ _MODULES = {
     "Trade": "trading.records",
     "Tuning": "tuning.search",
     "check": "tuning.check",
-    "geometry_study": "geometry.study",
-    "limits": "limits_study.sweep",
     "search": "tuning.search",
-    "step_limits": "limits_study.step_length",
-    "suggest_dt": "limits_study.step_length",
+    "step_limits": "limits.step_length",
+    "suggest_dt": "limits.step_length",
     "trade": "trading.trade",
     "tune": "tuning.search",
 }
@@ -38,8 +34,6 @@ __all__ = [
     "Trade",
     "Tuning",
     "check",
-    "geometry_study",
-    "limits",
     "search",
     "step_limits",
     "suggest_dt",

@@ -15,22 +15,11 @@ from .commands.group import LateCommand, LateCommands
 # By name: where it is, and its line in the help.
 COMMANDS = {
     "bench": LateCommand("bench.command:bench_command", "Time carom on this machine."),
-    "geometry": LateCommand(
-        "geometry.command:geometry_command", "False positives and cost of levels of collision geometry."
-    ),
-    "limits": LateCommand("limits_study.command:limits_command", "Where carom fails; how long a scene's step may be."),
+    "limits": LateCommand("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
     "plan": LateCommand("commands.plan:plan_command", "Show what a step of a scene runs, and why."),
     "plugins": LateCommand("plugins_check.command:plugins_command", "List plugins, or check one."),
     "run": LateCommand("commands.run:run_command", "Run a scene or a file and show what happened."),
     "scenes": LateCommand("commands.scenes:scenes_command", "List the scenes of the library."),
-    "settings": LateCommand(
-        "settings_study.command:settings_command",
-        "What each field of Settings costs and buys; settings for kinds of games.",
-    ),
-    "stages": LateCommand(
-        "commands.stages:stages_command",
-        "List the stages of a step: what each reads and writes, where its code is.",
-    ),
     "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, measured."),
     "tune": LateCommand("tuning.command:tune_command", "The cheapest settings that keep an error."),
     "warm-up": LateCommand("commands.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
@@ -53,6 +42,11 @@ def cli(context: click.Context) -> None:
 
 def main() -> None:
     """The entry point of the ``carom`` script and of ``python -m carom``."""
+    in_command(cli)
+
+
+def in_command(command: click.Command) -> None:
+    """Run the command of this process: kernels compile on all cores, and faults are in the results."""
     log.processes, log.background = os.cpu_count() or 1, False
     warnings.simplefilter("ignore", PhysicsWarning)  # commands show world.faults in their results
-    cli()
+    command()

@@ -12,14 +12,12 @@ import sys
 
 import helpers_cli
 import pytest
+from click.testing import CliRunner
 
 from carom import scenes
 from carom.framework.compilation import CompilationLog
 from carom.lab.bench import report as bench_report
 from carom.lab.bench import results as bench_results
-from carom.lab.bench.benchmarks import (
-    feature_ladder as bench_ladder,
-)
 from carom.lab.bench.benchmarks import (
     scaling as bench_scaling,
 )
@@ -34,6 +32,10 @@ from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.measure import timing as bench_clock
 from carom.lab.measure.timing import Spread
 from carom.lab.reporting.progress_bar import Progress
+from carom.lab.studies.__main__ import cli as studies_cli
+from carom.lab.studies.bench import (
+    feature_ladder as bench_ladder,
+)
 
 carom = helpers_cli.carom  # fixture
 SHORT_GAS = Subject("gas2d", (Window("first", 2, 12), Window("later", 20, 40)), targets={("later", 30): 2.0})
@@ -236,6 +238,14 @@ def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
 
 # -- the command ------------------------------------------------------------------------------------------------
 
+
+@pytest.fixture
+def studies(tmp_path, monkeypatch):
+    """``python -m carom.lab.studies`` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(studies_cli, arguments)
+
+
 TINY = ("bench", "--scenes", "fastgas", "--repeats", "1")
 
 
@@ -297,10 +307,10 @@ def test_the_ladder_measures_each_rung_beside_another():
     assert bench_ladder.Ladder.from_dict(json.loads(json.dumps(found.as_dict()))) == found
 
 
-def test_the_ladder_by_command(carom, tmp_path):
+def test_the_ladder_by_command(studies, tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("<!-- carom bench ladder -->\n<!-- end of carom bench ladder -->\n")
-    done = carom("bench", "ladder", "--bodies", "20", "--repeats", "1", "--into", "page.md")
+    page.write_text("<!-- studies ladder -->\n<!-- end of studies ladder -->\n")
+    done = studies("ladder", "--bodies", "20", "--repeats", "1", "--into", "page.md")
     assert done.exit_code == 0, done.stderr
     assert "| drifting |  | " in page.read_text()
 

@@ -1,4 +1,4 @@
-"""``carom bench modes``: the same bodies in each collision mode; times are left to the benchmark itself."""
+"""The same bodies in each collision mode; times are left to the benchmark itself."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from carom.lab.bench.benchmarks import collision_modes as bench_modes
-from carom.lab.bench.benchmarks.collision_modes import COURSES, KINDS, ONE_SWEPT, Course, Modes, modes
-from carom.lab.cli import cli
 from carom.lab.commands.usage_errors import Problem
+from carom.lab.studies.__main__ import cli
+from carom.lab.studies.bench import collision_modes as bench_modes
+from carom.lab.studies.bench.collision_modes import COURSES, KINDS, ONE_SWEPT, Course, Modes, modes
 
 STEPS, REPEATS = 12, 2
 # With so few bodies the box is small: in 40 steps each of fastgas meets walls many times.
@@ -120,13 +120,13 @@ def test_blocks_in_which_kernels_came_do_not_count(monkeypatch):
         work()
         return (1000.0, False, None) if next(numbers) == 1 else (3.0, True, None)
 
-    monkeypatch.setattr("carom.lab.bench.benchmarks.collision_modes.timed", timed)
+    monkeypatch.setattr("carom.lab.studies.bench.collision_modes.timed", timed)
     course = dataclasses.replace(SMALL[0], kinds=KINDS)
     found = modes(10, 1, courses=[course])
     for cost in found.costs:  # blocks of one step
         assert cost.milliseconds.median == pytest.approx(3000.0)
         assert cost.ratio.median == pytest.approx(1.0)
-    monkeypatch.setattr("carom.lab.bench.benchmarks.collision_modes.timed", lambda work: (1.0, False, None))
+    monkeypatch.setattr("carom.lab.studies.bench.collision_modes.timed", lambda work: (1.0, False, None))
     with pytest.raises(Problem, match="gas2d 60: kernels were compiled"):
         modes(2, 1, courses=[course])
 
@@ -176,8 +176,8 @@ def test_the_command(monkeypatch, result, tmp_path):
 
     monkeypatch.setattr(bench_modes, "modes", measured)
     page = tmp_path / "page.md"
-    page.write_text("<!-- carom bench modes -->\n<!-- end of carom bench modes -->\n", encoding="utf-8")
-    done = CliRunner().invoke(cli, ["bench", "modes", "--steps", "7", "--repeats", "3", "--json", "--into", str(page)])
+    page.write_text("<!-- studies modes -->\n<!-- end of studies modes -->\n", encoding="utf-8")
+    done = CliRunner().invoke(cli, ["modes", "--steps", "7", "--repeats", "3", "--json", "--into", str(page)])
     assert done.exit_code == 0, done.output
     assert asked == [(7, 3)]
     assert Modes.from_dict(json.loads(done.stdout)) == result
@@ -198,7 +198,7 @@ def test_the_command(monkeypatch, result, tmp_path):
     ids=lambda value: " ".join(value) if value and value[0].startswith("mode") else "",
 )
 def test_wrong_values(arguments, words):
-    done = CliRunner().invoke(cli, ["bench", *arguments])
+    done = CliRunner().invoke(cli, list(arguments))
     assert done.exit_code == 2
     (line,) = done.stderr.splitlines()
     for word in words:

@@ -1,4 +1,4 @@
-"""``carom bench pairs``: equal contacts from all kernels, and ratios; their size is left to the benchmark."""
+"""Equal contacts from all kernels, and ratios; their size is left to the benchmark."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 
 from carom.components import SphereCollider
-from carom.lab.bench.benchmarks import plugin_pairs as bench_pairs
-from carom.lab.bench.benchmarks.plugin_pairs import DiscCollider, PairCosts, disc_sphere, pair_costs
-from carom.lab.cli import cli
 from carom.lab.commands.usage_errors import Problem
+from carom.lab.studies.__main__ import cli
+from carom.lab.studies.bench import plugin_pairs as bench_pairs
+from carom.lab.studies.bench.plugin_pairs import DiscCollider, PairCosts, disc_sphere, pair_costs
 from carom.plugins.standard_shapes import sphere_sphere
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
@@ -73,8 +73,8 @@ def test_kernels_take_turns():
 def test_the_command(monkeypatch, result, tmp_path):
     monkeypatch.setattr(bench_pairs, "pair_costs", lambda repeats, progress: result)
     page = tmp_path / "page.md"
-    page.write_text("<!-- carom bench pairs -->\n<!-- end of carom bench pairs -->\n", encoding="utf-8")
-    done = CliRunner().invoke(cli, ["bench", "pairs", "--json", "--into", str(page)])
+    page.write_text("<!-- studies plugin-pairs -->\n<!-- end of studies plugin-pairs -->\n", encoding="utf-8")
+    done = CliRunner().invoke(cli, ["plugin-pairs", "--json", "--into", str(page)])
     assert done.exit_code == 0, done.output
     assert PairCosts.from_dict(json.loads(done.stdout)) == result
     assert "| discs and spheres | 3D |" in page.read_text(encoding="utf-8")

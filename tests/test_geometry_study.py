@@ -13,14 +13,14 @@ from oracles import convex_brute
 
 from carom.lab.commands.group import Commands
 from carom.lab.commands.usage_errors import Problem
-from carom.lab.geometry import command as geometry_command
-from carom.lab.geometry import report as geometry_report
-from carom.lab.geometry import study as geometry_measure
-from carom.lab.geometry.objects import OBJECTS, Object, area, smallest_circle
-from carom.lab.geometry.picture import BY_NAME, EXAMPLES, draw_geometry
-from carom.lab.geometry.records import GeometryStudy
-from carom.lab.geometry.reference import expected_area, overlaps, placed, touching
-from carom.lab.geometry.study import OPTIONS
+from carom.lab.studies.geometry import command as geometry_command
+from carom.lab.studies.geometry import report as geometry_report
+from carom.lab.studies.geometry import study as geometry_measure
+from carom.lab.studies.geometry.objects import OBJECTS, Object, area, smallest_circle
+from carom.lab.studies.geometry.picture import BY_NAME, EXAMPLES, draw_geometry
+from carom.lab.studies.geometry.records import GeometryStudy
+from carom.lab.studies.geometry.reference import expected_area, overlaps, placed, touching
+from carom.lab.studies.geometry.study import OPTIONS
 from carom.plugins.convex_polygon import wrong_with
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
@@ -299,7 +299,7 @@ def carom(monkeypatch, result):
 
 def test_the_command(carom, result, tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("above\n<!-- carom geometry -->\nold\n<!-- end of carom geometry -->\nbelow\n", encoding="utf-8")
+    page.write_text("above\n<!-- studies geometry -->\nold\n<!-- end of studies geometry -->\nbelow\n")
     done = carom("--objects", 50, "--repeats", 3, "--json", "--into", page, "--out", tmp_path / "pictures")
     assert done.exit_code == 0, done.output
     assert done.asked == [(50, 3)]

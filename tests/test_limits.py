@@ -1,20 +1,19 @@
-"""``carom limits``: every axis finds the known limits, and the command shows them."""
+"""The limits study: every axis finds the known limits, and the command shows them."""
 
 from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 
 import click
 import pytest
 from click.testing import CliRunner
 
 from carom.lab.commands.group import Commands
-from carom.lab.limits_study import report as limits_report
-from carom.lab.limits_study.command import NAMES, limits_command
-from carom.lab.limits_study.records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method
-from carom.lab.limits_study.sweep import AXES, limits, measured, sweep
+from carom.lab.studies.limits import report as limits_report
+from carom.lab.studies.limits.command import NAMES, limits_command
+from carom.lab.studies.limits.records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method
+from carom.lab.studies.limits.sweep import AXES, limits, measured, sweep
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
@@ -298,92 +297,20 @@ def test_values_of_a_sweep():
 
 def test_the_command_prints_draws_and_fills_a_page(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("# Page\n\n<!-- carom limits -->\n<!-- end of carom limits -->\nafter\n")
+    page.write_text("# Page\n\n<!-- studies limits -->\n<!-- end of studies limits -->\nafter\n")
     result = invoke("--quick", "--axes", "mass,speed", "--into", str(page), "--out", str(tmp_path / "pictures"))
     assert result.exit_code == 0, result.output
     assert "tunnels" in result.stdout
     assert (tmp_path / "pictures" / "limits.png").read_bytes().startswith(b"\x89PNG")
     text = page.read_text()
     assert "| method | 1 % at | 10 % at | breaks at | worst | how |" in text
-    assert text.endswith("<!-- end of carom limits -->\nafter\n")
+    assert text.endswith("<!-- end of studies limits -->\nafter\n")
 
 
 def test_the_command_prints_json():
     result = invoke("--quick", "--axes", "mass", "--json")
     assert result.exit_code == 0, result.output
     assert Limits.from_dict(json.loads(result.stdout)).axes[0].name == "mass"
-
-
-SPRING = """
-from carom.components import RigidBody, Transform
-from carom.framework import ForceSystem, Settings, World
-from carom.plugins import Physics
-
-seconds = 0.1
-
-
-class Pull(ForceSystem):
-    def add_forces(self, bodies, time):
-        bodies.force -= 2500.0 * bodies.position
-
-
-def build(settings, seed=0):
-    world = World(Physics(dimensions=2), settings=settings)
-    world.create_entity(Transform((1, 0)), RigidBody())
-    world.add_system(Pull())
-    return world
-"""
-
-
-def test_the_command_tells_the_limits_of_a_scene(tmp_path, monkeypatch):
-    """50 rad/s: 2 / 50 s; a third smaller for Yoshida's method, none for explicit Euler."""
-    monkeypatch.chdir(tmp_path)
-    Path("spring.py").write_text(SPRING)
-    result = invoke("spring.py")
-    assert result.exit_code == 0, result.output
-    assert "entity 1 swings at 50 rad/s; semi_implicit_euler holds it up to dt = 0.04 s." in result.stdout
-    assert "Suggested: dt = 0.036 s, 0.9 of the limit. The step of 0.01667 s fits." in result.stdout
-    assert "is too long" in invoke("spring.py", "--set", "dt=0.05").stdout
-    assert "No step is stable" in invoke("spring.py", "--set", "integrator=explicit_euler", "--seconds", "0").stdout
-    plain = json.loads(invoke("spring.py", "--json", "--set", "integrator=yoshida4").stdout)
-    assert plain["scene"] == "spring.py"
-    assert plain["tightest"]["stability"] == pytest.approx(1.5734 / 50, rel=1e-4)
-    assert plain["tightest"]["tunnelling"] is None
-
-
-def test_the_command_watches_a_scene_of_the_library():
-    """Billiards: the cue ball is fast from the start; two balls of 0.05715 m overlap over twice that."""
-    result = invoke("billiards", "--seconds", "0.1")
-    assert result.exit_code == 0, result.output
-    assert "overlap on a way of 0.1143 m" in result.stdout
-
-
-BROKEN_ON_THE_WAY = """
-import numpy as np
-from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import System, World
-from carom.plugins import Physics
-
-class Spoiler(System):
-    def process(self, dt):
-        if self.world.time > 0.5:
-            self.world.bodies.linear_velocity[0] = np.nan
-
-def build(settings, seed=0):
-    world = World(Physics(dimensions=2), settings=settings)
-    world.add_system(Spoiler())
-    world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)), SphereCollider(0.3))
-    return world
-"""
-
-
-def test_the_command_tells_what_broke_while_it_watched(tmp_path):
-    """A world with non-finite numbers must not be reported as one without limits."""
-    file = tmp_path / "broken.py"
-    file.write_text(BROKEN_ON_THE_WAY)
-    result = invoke(str(file), "--seconds", "2")
-    assert result.exit_code == 2
-    assert "broken.py: not finite after 0.6 s: entity 1: linear_velocity is [nan, nan]" in result.output
 
 
 @pytest.mark.parametrize(
@@ -393,11 +320,7 @@ def test_the_command_tells_what_broke_while_it_watched(tmp_path):
         (["--axes", ","], "--axes takes names"),
         (["--quick", "--long"], "--quick and --long exclude each other"),
         (["--json", "--markdown"], "--json and --markdown exclude each other"),
-        (["--set", "dt=1"], "--set needs a scene or a file"),
-        (["--seconds", "1"], "--seconds needs a scene or a file"),
-        (["stack", "--quick"], "--quick is for the sweep, without a scene"),
-        (["stack", "--seconds", "-1"], "--seconds must be a number of at least 0"),
-        (["stak"], "no scene named 'stak'; did you mean 'stack'"),
+        (["--seed", "1"], "--seed needs --pairs"),
         (["--into", "nowhere.md"], "--into nowhere.md"),
     ],
 )

@@ -1,4 +1,4 @@
-"""``carom limits --pairs``: random scenes that cross the axes; a seed and a number draw the same scene again."""
+"""The axes in pairs: random scenes that cross the axes; a seed and a number draw the same scene again."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import pytest
 from click.testing import CliRunner
 
 from carom.lab.commands.group import Commands
-from carom.lab.limits_study.command import limits_command
-from carom.lab.limits_study.pairs import report
-from carom.lab.limits_study.pairs.axes import AXES, KINDS, NAMES, PAIRS, ROUND, Draw
-from carom.lab.limits_study.pairs.scenes import Outcome, build, played
-from carom.lab.limits_study.pairs.sweep import Batch, PairLimits, pair_limits, play_batch
-from carom.lab.limits_study.records import MODES
+from carom.lab.studies.limits.command import limits_command
+from carom.lab.studies.limits.pairs import report
+from carom.lab.studies.limits.pairs.axes import AXES, KINDS, NAMES, PAIRS, ROUND, Draw
+from carom.lab.studies.limits.pairs.scenes import Outcome, build, played
+from carom.lab.studies.limits.pairs.sweep import Batch, PairLimits, pair_limits, play_batch
+from carom.lab.studies.limits.records import MODES
 
 
 @click.group(cls=Commands)
@@ -113,7 +113,7 @@ def shaped(kind, spoil):
     values = dict.fromkeys(NAMES, 0.0) | {"gravity": 2.7e-3, "mass": 1.0, "size": 1.0, "density": 1.0, "height": 3.0}
     values["restitution"] = 1.0
     draw = Draw(0, 0, MODES[1], "velocity_verlet", 2, kind, "ball", "box", 1.0, 1.0, {"mass": 0, "size": 0}, values)
-    from carom.lab.limits_study.pairs import scenes
+    from carom.lab.studies.limits.pairs import scenes
 
     scene, outcome = build(draw), Outcome(0)
     spoil(scene)
@@ -184,21 +184,21 @@ def test_the_command_plays_one_scene():
 
 def test_the_command_fills_a_page(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("# Page\n\n<!-- carom limits --pairs -->\n<!-- end of carom limits --pairs -->\nafter\n")
+    page.write_text("# Page\n\n<!-- studies limits --pairs -->\n<!-- end of studies limits --pairs -->\nafter\n")
     result = invoke("--pairs", "--scenes", "4", "--workers", "1", "--into", str(page))
     assert result.exit_code == 0, result.output
     text = page.read_text()
     assert "| mode | scenes | lost |" in text
     assert "Valid range of discrete:" in text
-    assert text.endswith("<!-- end of carom limits --pairs -->\nafter\n")
+    assert text.endswith("<!-- end of studies limits --pairs -->\nafter\n")
 
 
-@pytest.mark.long
-def test_the_quick_sweep():
-    result = invoke("--pairs", "--quick", "--json")
+@pytest.mark.slow
+def test_a_short_sweep():
+    result = invoke("--pairs", "--scenes", "24", "--json")
     assert result.exit_code == 0, result.output
     found = PairLimits.from_dict(json.loads(result.stdout))
-    assert [outcome.number for outcome in found.outcomes] == list(range(2 * ROUND))
+    assert [outcome.number for outcome in found.outcomes] == list(range(24))
     assert not any(outcome.not_finite for outcome in found.outcomes if not outcome.outside)
 
 
@@ -209,7 +209,6 @@ def test_the_quick_sweep():
         (["--workers", "3"], "--workers needs --pairs"),
         (["--pairs", "--axes", "mass"], "--axes does not go with --pairs or --play"),
         (["--pairs", "--long"], "--long does not go with --pairs or --play"),
-        (["--pairs", "stack"], "--pairs is for the sweep, without a scene"),
         (["--pairs", "--quick", "--scenes", "3"], "--quick and --scenes exclude each other"),
         (["--play", "3", "--scenes", "3"], "--scenes does not go with --play"),
         (["--pairs", "--seed", "x"], "--seed takes a whole number"),

@@ -14,6 +14,7 @@ import itertools
 import numpy as np
 import pytest
 from helpers_modes import SWEPT, each_mode, each_sweep, mode_world
+from oracles.whole_step import Oracle, assert_agrees
 from worlds import both_dimensions
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -52,7 +53,7 @@ class Told:
     def compare(self, world, steps=1):
         """Compare steps, each from the world's own state."""
         for _ in range(steps):
-            oracle, other = kit.Oracle(world), kit.Oracle(world)
+            oracle, other = Oracle(world), Oracle(world)
             before = dict(world.stats().counters)
             world.step()
             oracle.step()
@@ -64,7 +65,7 @@ class Told:
             self.crossed += sum(not c.depth and not c.normal_impulse for c in oracle.contacts.values())
             try:
                 assert (counters["capped_impacts"] > before["capped_impacts"]) == (oracle.capped_impacts > 0)
-                kit.assert_agrees(world, oracle)
+                assert_agrees(world, oracle)
             except AssertionError:
                 if not oracle.doubts and not magnifies(oracle, other):
                     raise
@@ -198,11 +199,11 @@ def test_several_steps_together(mode, d):
     """Without resetting the state: a few elastic balls in a room, ten steps, until rounding has grown by some
     decades."""
     world = scattered(np.random.default_rng(7), mode, d, 4, 0.4, shapes="balls", gravity=9.81, plain=True)
-    oracle = kit.Oracle(world)
+    oracle = Oracle(world)
     for _ in range(10):
         world.step()
         oracle.step()
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)
 
 
 @each_sweep
@@ -240,7 +241,7 @@ def test_beyond_the_cap_what_loses_energy_sticks(mode, cap):
             place = np.array((0.3 - 0.3 * k, 0.2 + 0.25 * k)) + rng.uniform(-0.03, 0.03, 2)
             body = RigidBody(10 ** rng.uniform(-1, 1), (200.0 + 40 * k, -150.0 - 40 * k), ccd=True)
             world.create_entity(Transform(tuple(place)), body, SphereCollider(0.1, restitution=float(k == 2)))
-        oracle = kit.Oracle(world)
+        oracle = Oracle(world)
         oracle.step()
         sticks += sum(impact.kind == "stick" for impact in oracle.impacts)
         told.compare(world)  # only one step: in the next, rounding decides which of them still touch
@@ -340,11 +341,11 @@ def test_neighbours_in_a_discrete_world_do_not_lose_contacts_to_a_crowd_of_bulle
 def test_the_oracle_sees_impacts_that_are_wrong():
     world = mode_world("continuous")
     a, b = kit.ball(world, 0.0, 200.0, restitution=1.0), kit.ball(world, 2.5)
-    oracle = kit.Oracle(world)
+    oracle = Oracle(world)
     oracle.bodies[1].position += (1e-6, 0.0)
     world.step(), oracle.step()
     with pytest.raises(AssertionError, match=rf"impact of {a} and {b}, step 1: time_of_impact is .*, the oracle says"):
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)
     oracle.impacts.clear()
     with pytest.raises(AssertionError, match=rf"step 1: impacts are \[\({a}, {b}\)\], the oracle says \[\]"):
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)

@@ -15,27 +15,27 @@ from click.testing import CliRunner
 from carom.framework import Settings
 from carom.lab.commands.group import Commands
 from carom.lab.measure.timing import Spread
-from carom.lab.settings_study import (
+from carom.lab.studies.settings import (
     clock as settings_clock,
 )
-from carom.lab.settings_study import (
+from carom.lab.studies.settings import (
     command as settings_command,
 )
-from carom.lab.settings_study import (
+from carom.lab.studies.settings import (
     games,
 )
-from carom.lab.settings_study import (
+from carom.lab.studies.settings import (
     report as settings_report,
 )
-from carom.lab.settings_study import (
+from carom.lab.studies.settings import (
     scenes as settings_scenes,
 )
-from carom.lab.settings_study import (
+from carom.lab.studies.settings import (
     study as settings_study,
 )
-from carom.lab.settings_study.clock import costs
-from carom.lab.settings_study.records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
-from carom.lab.settings_study.study import VARIED, measured
+from carom.lab.studies.settings.clock import costs
+from carom.lab.studies.settings.records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
+from carom.lab.studies.settings.study import VARIED, measured
 from carom.scenes import drops, jump, stack
 from carom.systems.contacts.resting import OWN_SAG
 
@@ -302,9 +302,9 @@ def test_the_shooter():
 @pytest.mark.long
 def test_games_get_what_they_need(monkeypatch):
     """Those with a short search, in short runs; the shooter has its own test."""
-    names = ["platformer", "puzzle stacks", "orbits"]
+    names = ["platformer", "orbits"]
     short = {
-        "jump": {"repeats": 8}, "tower of 10": {}, "ten turns, e = 0.6": {"seconds": settings_scenes.TEN_TURNS / 10},
+        "jump": {"repeats": 8}, "ten turns, e = 0.6": {"seconds": settings_scenes.TEN_TURNS / 10},
     }  # fmt: skip
     shorter = [dataclasses.replace(game, **short[game.label]) for game in games.ALL if game.label in short]
     monkeypatch.setattr(games, "ALL", shorter)
@@ -380,7 +380,8 @@ def carom(monkeypatch, study):
 
 def test_the_command(carom, study, tmp_path):
     page = tmp_path / "page.md"
-    marks = [f"<!-- {name} -->\nold\n<!-- end of {name} -->\n" for name in ("carom settings", "carom settings games")]
+    names = "studies settings", "studies settings games"
+    marks = [f"<!-- {name} -->\nold\n<!-- end of {name} -->\n" for name in names]
     page.write_text("".join(marks), encoding="utf-8")
     done = carom("--json", "--repeats", 3, "--into", page)
     assert done.exit_code == 0, done.output
@@ -418,7 +419,7 @@ def test_the_page_has_all_fields_and_all_games():
     text = PAGE.read_text(encoding="utf-8")
     fields, kinds = (
         re.search(f"<!-- {name} -->(.*)<!-- end of {name} -->", text, re.DOTALL)[1]
-        for name in ("carom settings", "carom settings games")
+        for name in ("studies settings", "studies settings games")
     )
     for varied in VARIED:
         assert f"| {varied.field} | {varied.scene} | " in fields

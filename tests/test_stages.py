@@ -14,8 +14,8 @@ from carom.framework import System, World
 from carom.framework.jit.records.record import make_record
 from carom.framework.jit.records.schema import Schema, flags, integer, ints, number, vectors
 from carom.framework.schedule.stages import Program, Stage
-from carom.lab.commands.stages import Stages
 from carom.lab.reporting.text_tables import between_marks
+from carom.lab.studies.stages import Stages
 from carom.plugins import Physics
 from carom.systems import ContactEvents
 from carom.systems.records import STATE
@@ -29,8 +29,8 @@ OUTER = Schema(
 
 
 def test_the_page_shows_the_stages_that_run():
-    """``carom stages --into docs/architecture.md`` writes what the page has to hold."""
-    _, written, _ = between_marks(ROOT / "docs" / "architecture.md", "carom stages")
+    """``studies stages --into docs/architecture.md`` writes what the page has to hold."""
+    _, written, _ = between_marks(ROOT / "docs" / "architecture.md", "studies stages")
     assert written.strip() == Stages().table().markdown()
 
 

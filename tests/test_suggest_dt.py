@@ -14,7 +14,7 @@ from worlds import ball, box, floor, make_world, run
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, NoPhysicsError, Settings, StepError, System, World
-from carom.lab.limits_study.step_length import SAFETY, step_limits, suggest_dt
+from carom.lab.limits.step_length import SAFETY, step_limits, suggest_dt
 from carom.plugins import Physics
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.half_space import plugin as half_space

@@ -13,8 +13,8 @@ from worlds import make_world
 
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem, Plugin, Settings, World
-from carom.lab.limits_study.stability import growth, growth_of_system, stability_limits
-from carom.lab.limits_study.step_length import SAFETY, step_limits, suggest_dt
+from carom.lab.limits.stability import growth, growth_of_system, stability_limits
+from carom.lab.limits.step_length import SAFETY, step_limits, suggest_dt
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
 from carom.systems import Integrator

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles.whole_step import Oracle, assert_agrees
 from worlds import both_dimensions
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -251,22 +252,22 @@ def test_what_depends_on_the_frame_rate_is_seen():
 
 
 def together(world, steps):
-    oracle = kit.Oracle(world)
+    oracle = Oracle(world)
     for _ in range(steps):
         world.step()
         oracle.step()
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)
 
 
 def step_by_step(world, steps):
     """Each step from the world's own state; returns the number of steps that differ where the oracle has doubts."""
     different = 0
     for _ in range(steps):
-        oracle = kit.Oracle(world)
+        oracle = Oracle(world)
         world.step()
         oracle.step()
         try:
-            kit.assert_agrees(world, oracle)
+            assert_agrees(world, oracle)
         except AssertionError:
             if not oracle.doubts:
                 raise
@@ -323,7 +324,7 @@ def test_oracle_of_rigid_contacts(d):
     for k, mass in enumerate((1.0, 3.0, 0.5, 4.0)):
         kit.box(world, v(d, 0.1 * k, 0.51 + 1.01 * k), mass=mass, friction=0.3)
     assert step_by_step(world, 20) == 0
-    oracle = kit.Oracle(world)
+    oracle = Oracle(world)
     oracle.step()
     assert max(oracle.slack.values()) > 0.0
     assert max(oracle.slack.values()) < 0.01 * 1000.0 * world.settings.dt
@@ -367,28 +368,28 @@ def test_the_oracle_sees_a_wrong_step():
     world = kit.make_world(2, G)
     entity = kit.ball(world, (0, 0.6))
     kit.floor(world)
-    oracle = kit.Oracle(world)
+    oracle = Oracle(world)
     world.gravity = (0, -G * (1 + 1e-6))
     world.step(), oracle.step()
     with pytest.raises(AssertionError, match=rf"entity {entity}, step 1: \w+ is .*, the oracle says .* apart, limit"):
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)
     world.step()
     with pytest.raises(AssertionError, match="the world is at step 2, its oracle at 1"):
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)
 
 
 def test_the_oracle_refuses_what_it_does_not_know():
     world = kit.make_world(integrator="rk4")
     with pytest.raises(ValueError, match=r"the oracle knows explicit_euler, .*, got 'rk4'"):
-        kit.Oracle(world)
+        Oracle(world)
     world = kit.make_world()
     world.add_system(Attraction())
     with pytest.raises(ValueError, match="the oracle does not know what this world's systems do: Attraction"):
-        kit.Oracle(world)
+        Oracle(world)
     world = kit.make_world()
     world.create_entity(Transform((0, 0)), RigidBody())
     with pytest.raises(ValueError, match="the oracle takes one collider on each body, got 0"):
-        kit.Oracle(world)
+        Oracle(world)
 
 
 @both_dimensions

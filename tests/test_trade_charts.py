@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from xml.etree import ElementTree
 
 import helpers_trade as made
@@ -12,7 +11,7 @@ from carom.lab.cases import published
 from carom.lab.commands.usage_errors import Problem
 from carom.lab.measure.timing import Spread
 from carom.lab.pictures.curve_styles import FEW, styles
-from carom.lab.trading.charts import TIME, WORK, draw, figure, inline_svg, legend_text, quantities
+from carom.lab.trading.charts import TIME, WORK, draw, figure, legend_text, quantities
 from carom.lab.trading.records import PYMUNK, Cell, Curve, ErrorBar, Point
 
 
@@ -267,20 +266,6 @@ def test_an_unknown_norm_and_a_file_in_the_way_are_problems(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(Problem, match="file"):
         draw(made.trade(made.bouncing()), tmp_path / "file")
-
-
-def test_svg_for_a_page_has_ids_of_its_own_and_no_address():
-    text = inline_svg(made.bouncing(), TIME, None, "here-")
-    assert text.startswith('<svg role="img" aria-label="bouncing: wall time')
-    assert 'viewBox="' in text
-    assert "http" not in text
-    ids = re.findall(r'\bid="([^"]*)"', text)
-    assert ids
-    assert len(ids) == len(set(ids))
-    assert all(name.startswith("here-") for name in ids)
-    used = set(re.findall(r'href="#([^"]*)"', text) + re.findall(r"url\(#([^)]*)\)", text))
-    assert used
-    assert used <= set(ids)
 
 
 def test_one_point_alone_draws():

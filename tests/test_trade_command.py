@@ -23,7 +23,7 @@ from carom.lab.trading import command as trade_command
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
 SHORT = ("--dt", "1/30,1/60", "--repeats", "2", "--no-timing", "--workers", "1")
-WRITTEN = {"results.jsonl", "trade.json", "trade.csv", "trade.html"}
+WRITTEN = {"results.jsonl", "trade.json", "trade.csv"}
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def trade_in(folder: Path) -> Trade:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """(folder, result) for a bullet that discrete collisions miss, with pymunk; timed, with pictures."""
+    """(folder, result) for a bullet that discrete collisions miss, with pymunk; timed."""
     folder = tmp_path_factory.mktemp("made")
     mine = scene_file(folder, BULLET, first_line="A bullet & <a wall>.")
     words = [mine, "--dt", "1/15,1/60", "--repeats", "4", "--workers", "1", "--against", "pymunk"]
@@ -58,7 +58,7 @@ def made(tmp_path_factory):
 def test_the_files_it_writes_are_there_and_named(made):
     folder, result = made
     charts = {f"trade-mine-py-position-{what}.{kind}" for what in ("work", "time") for kind in ("png", "svg")}
-    expected = WRITTEN | charts | {"mine-final.png", "mine-traces.png"}
+    expected = WRITTEN | charts
     assert {path.name for path in folder.iterdir()} == expected
     for name in expected - {"results.jsonl"}:
         assert f"written: {folder / name}" in result.stderr
@@ -84,24 +84,12 @@ def test_json_and_csv_hold_every_point(made):
             assert float(row["work"]) == point.work
 
 
-def test_failures_are_in_the_table_on_the_chart_and_on_the_page(made):
+def test_failures_are_in_the_table_and_on_the_chart(made):
     folder, result = made
     [case] = trade_in(folder).cases
     [kind] = {kind for curve in case.curves for point in curve.points for kind in point.failures}
     assert kind in result.stdout
-    assert kind in (folder / "trade.html").read_text()
     assert kind in (folder / "trade-mine-py-position-work.svg").read_text()
-
-
-def test_the_page_needs_nothing_else_and_tells_what_made_it(made):
-    folder, _ = made
-    page = (folder / "trade.html").read_text()
-    assert not re.search(r'(src|href)="(?!data:|#)', page)
-    assert page.count("<svg") == 2
-    assert page.count("data:image/png;base64,") == 2
-    assert "A bullet &amp; &lt;a wall&gt;." in page
-    assert "Settings(" in page
-    assert "carom trade " in page and "--against pymunk" in page  # noqa: PT018
 
 
 def test_what_it_prints(made):
@@ -115,18 +103,18 @@ def test_what_it_prints(made):
 
 
 def test_json_alone_goes_to_stdout_and_resume_takes_all_over(carom, monkeypatch):
-    first = carom("jump", *SHORT, "--no-pictures")
+    first = carom("jump", *SHORT)
     assert first.exit_code == 0, first.output
     folder = Path("out/trade")
     before = trade_in(folder)
-    assert before.command == f"carom trade jump {' '.join(SHORT)} --no-pictures"
+    assert before.command == f"carom trade jump {' '.join(SHORT)}"
     kept = (folder / "results.jsonl").read_bytes()
     monkeypatch.setattr(trade_runs, "perform", None)  # no task runs
-    again = carom("jump", *SHORT, "--no-pictures", "--resume")
+    again = carom("jump", *SHORT, "--resume")
     assert again.exit_code == 0, again.output
     assert re.search(r"carom: \d+ results in out/trade/results\.jsonl: those that fit are taken over", again.stderr)
     assert trade_in(folder) == before  # the command without --resume in it
-    again = carom("jump", *SHORT, "--no-pictures", "--json", "--resume")
+    again = carom("jump", *SHORT, "--json", "--resume")
     printed = Trade.from_dict(json.loads(again.stdout))
     assert printed.cases == before.cases
     assert (folder / "results.jsonl").read_bytes() == kept
@@ -134,7 +122,7 @@ def test_json_alone_goes_to_stdout_and_resume_takes_all_over(carom, monkeypatch)
 
 def test_several_scenes_one_of_them_refused(carom, tmp_path):
     scene_file(tmp_path, CROWD, "crowd.py")
-    result = carom("crowd.py", "jump", "--norm", "position", *SHORT, "--no-pictures", "--markdown")
+    result = carom("crowd.py", "jump", "--norm", "position", *SHORT, "--markdown")
     assert result.exit_code == 0, result.output
     assert "crowd.py: not measured: " in result.stdout
     assert "**jump: position, and work" in result.stdout
@@ -145,7 +133,7 @@ def test_several_scenes_one_of_them_refused(carom, tmp_path):
 def test_options_reach_the_scene_and_the_grid(carom, tmp_path):
     scene_file(tmp_path, BALL)
     result = carom(
-        "mine.py", *SHORT, "--no-pictures", "--option", "speed=2.5", "--integrators", "velocity_verlet", "--collisions",
+        "mine.py", *SHORT, "--option", "speed=2.5", "--integrators", "velocity_verlet", "--collisions",
         "continuous,event_driven", "--seconds", "1", "--norm", "count", "--norm", "position", "--seed", "3",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
@@ -160,7 +148,7 @@ def test_options_reach_the_scene_and_the_grid(carom, tmp_path):
 
 
 def test_quick_takes_every_second_step_and_few_repeats(carom):
-    few = ("--no-timing", "--no-pictures", "--integrators", "velocity_verlet", "--seconds", "0.6", "--norm", "apex")
+    few = ("--no-timing", "--integrators", "velocity_verlet", "--seconds", "0.6", "--norm", "apex")
     result = carom("jump", "--quick", *few)
     assert result.exit_code == 0, result.output
     [case] = trade_in(Path("out/trade")).cases
@@ -172,12 +160,12 @@ def test_quick_takes_every_second_step_and_few_repeats(carom):
 def test_tables_go_into_a_page(carom, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# Mine\n\n<!-- carom trade jump -->\nold\n<!-- end of carom trade jump -->\nend\n")
-    result = carom("jump", *SHORT, "--no-pictures", "--into", "page.md")
+    result = carom("jump", *SHORT, "--into", "page.md")
     assert result.exit_code == 0, result.output
     text = page.read_text()
     assert "old" not in text
     assert "| velocity verlet |" in text
-    assert f"carom trade jump {' '.join(SHORT)} --no-pictures --into page.md" in text
+    assert f"carom trade jump {' '.join(SHORT)} --into page.md" in text
     assert text.endswith("\nend\n")
 
 
@@ -187,9 +175,8 @@ def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     result = carom("jump", *SHORT)
     assert result.exit_code == 0, result.output
-    assert result.stderr.startswith("carom: no pictures: no charts, matplotlib is missing")
+    assert result.stderr.startswith("carom: no charts, matplotlib is missing")
     assert {path.name for path in Path("out/trade").iterdir()} == WRITTEN
-    assert "<svg" not in Path("out/trade/trade.html").read_text()
 
 
 def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
@@ -207,7 +194,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
     assert result.exit_code == 130
     last = result.stderr.splitlines()[-1]
     assert last == "carom: stopped; 3 results kept in out/trade/results.jsonl, --resume goes on"
-    again = carom("jump", *SHORT, "--no-pictures", "--resume")
+    again = carom("jump", *SHORT, "--resume")
     assert "carom: 3 results in " in again.stderr
     assert again.exit_code == 0
 

@@ -15,8 +15,8 @@ from carom.framework import Settings
 from carom.lab.cases import published
 from carom.lab.commands.usage_errors import Problem
 from carom.lab.reporting.text_tables import TextTable
-from carom.lab.settings_study.code_line import python_line, seconds, settings_line
 from carom.lab.trading import report as trade_report
+from carom.lab.trading.code_line import python_line, seconds, settings_line
 from carom.lab.trading.files import COLUMNS, write_csv, write_json
 from carom.lab.trading.records import PYMUNK, Cell, ErrorBar, Point, Trade
 

@@ -15,21 +15,8 @@ from ..engines.pymunk_space import pymunk_module
 from ..reporting.output import Output
 from ..reporting.progress_bar import Bar
 from . import report as bench_report
-from .benchmarks import (
-    collision_modes as bench_modes,
-)
-from .benchmarks import (
-    feature_ladder as bench_ladder,
-)
-from .benchmarks import (
-    plugin_pairs as bench_pairs,
-)
-from .benchmarks import (
-    scaling as bench_scaling,
-)
-from .benchmarks import (
-    startup as bench_startup,
-)
+from .benchmarks import scaling as bench_scaling
+from .benchmarks import startup as bench_startup
 from .benchmarks.against_pymunk import bench
 from .suite import LARGE, SIZES, SUITE, subjects
 
@@ -126,44 +113,6 @@ def startup_command(names: str, repeats: int, as_json: bool, as_markdown: bool, 
     with Bar(Console(stderr=True)) as bar:
         result = bench_startup.startup(wanted, repeats, bar)
     output.show(result, [bench_startup.table(result)], [])
-
-
-@bench_command.command("pairs", short_help="What a pair of a plugin costs, next to a built-in one and by hand.")
-@repeats_option(15, RUNS)
-@shown_options
-def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
-    """Time the narrow phase with a registered pair, with a built-in one, and with the same maths written by hand."""
-    output = Output.checked("carom bench pairs", as_json, as_markdown, into, None)
-    with Bar(Console(stderr=True)) as bar:
-        result = bench_pairs.pair_costs(repeats, bar)
-    output.show(result, [bench_pairs.table(result)], [])
-
-
-@bench_command.command("ladder", short_help="What each feature costs, switched on alone.")
-@click.option("--bodies", type=click.IntRange(min=1), default=bench_ladder.BODIES, show_default=True)
-@repeats_option(5, RUNS)
-@shown_options
-def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
-    """Time scenes that differ in one feature: nanoseconds per body per step beside the scene without it."""
-    output = Output.checked("carom bench ladder", as_json, as_markdown, into, None)
-    with Bar(Console(stderr=True)) as bar:
-        result = bench_ladder.ladder(bodies, repeats, bar)
-    output.show(result, [bench_ladder.table(result)], [])
-
-
-@bench_command.command("modes", short_help="What each kind of collision costs, and what it buys.")
-@click.option(
-    "--steps", type=click.IntRange(min=1), default=bench_modes.STEPS, show_default=True,
-    help="Steps timed of each scene; of bullets a sixth.",
-)  # fmt: skip
-@repeats_option(bench_modes.REPEATS, RUNS)
-@shown_options
-def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
-    """Time the same bodies with discrete, continuous and event-driven collisions."""
-    output = Output.checked("carom bench modes", as_json, as_markdown, into, None)
-    with Bar(Console(stderr=True)) as bar:
-        result = bench_modes.modes(steps, repeats, bar)
-    output.show(result, bench_modes.tables(result), bench_modes.remarks(result))
 
 
 def _sizes(text: str) -> tuple[int, ...]:

@@ -4,7 +4,6 @@ Worlds: make_world, ball, box, floor, create_in_order; run, run_until; position,
 Predictions in closed form: free_flight, flight_after, fall_time, bounce_heights, collide, sliding_distance and others.
 Assertions: Conserved, ContactLog and the functions whose names begin with assert. They raise AssertionError and need
 no test framework.
-Oracle: the whole step in plain Python for small scenes, and assert_agrees.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from .checks import (
     energy,
     touching,
 )
-from .oracle.step import Oracle, OracleContact, assert_agrees
 from .predict import (
     bounce_heights,
     bounce_times,
@@ -45,9 +43,6 @@ from .worlds import ball, box, create_in_order, floor, make_world, position, run
 __all__ = [
     "Conserved",
     "ContactLog",
-    "Oracle",
-    "OracleContact",
-    "assert_agrees",
     "assert_apart",
     "assert_at_rest",
     "assert_frame_rate_free",

@@ -10,7 +10,6 @@ import math
 import re
 import textwrap
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -92,18 +91,6 @@ def quantities(case: CaseTrade) -> list[str]:
     """WORK, and TIME if a point was timed."""
     timed = any(point.milliseconds for curve in case.curves for point in curve.points)
     return [WORK, TIME] if timed else [WORK]
-
-
-def inline_svg(case: CaseTrade, quantity: str, norm: str | None, prefix: str) -> str:
-    """The chart as an SVG element of a page: without header and links; every id begins with ``prefix``."""
-    text = _saved(figure(case, quantity, norm), "svg").decode("utf-8")
-    head, inside = text[text.index("<svg") :].split(">", 1)
-    box = re.search(r'viewBox="[^"]*"', head)
-    inside = re.sub(r"<metadata>.*?</metadata>\s*", "", inside, flags=re.DOTALL)
-    for before in (r'\bid="', r'href="#', r"url\(#"):
-        inside = re.sub(before, lambda found: found.group() + prefix, inside)
-    label = escape(f"{case.scene}: {AXIS[quantity]}, over the error", quote=True)
-    return f'<svg role="img" aria-label="{label}" {box.group() if box else ""}>{inside}'
 
 
 def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Figure:

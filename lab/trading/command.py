@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import shlex
 from collections.abc import Sequence
 from contextlib import closing
@@ -15,7 +16,6 @@ from rich.console import Console
 from ..cases.grid import ALL_METHODS
 from ..cases.subjects import Subject, subject_of
 from ..commands.group import STOPPED
-from ..commands.loading import stdout_kept_clean
 from ..commands.options import (
     WORDS,
     KeepsWords,
@@ -31,12 +31,10 @@ from ..commands.options import (
 from ..commands.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.result_store import Store
-from ..measure.run import run
 from ..reporting.output import Output
-from ..reporting.progress_bar import Bar, Progress
+from ..reporting.progress_bar import Bar
 from ..reporting.text_tables import TextTable
 from .files import write_csv, write_json
-from .page import chart_module, write_page
 from .records import PYMUNK, Trade
 from .report import COUNTS, cheapest, choice_lines, measured, remarks, tables
 from .summary import summaries
@@ -44,7 +42,6 @@ from .trade import Only, trade
 
 MARK = "carom trade"
 RESULTS = "results.jsonl"
-MOST_STEPS = 3000  # of the run shown in the pictures
 
 
 @click.command("trade", cls=KeepsWords, short_help="What speed costs in accuracy, measured.")
@@ -57,9 +54,8 @@ MOST_STEPS = 3000  # of the run shown in the pictures
     click.option("--quick", is_flag=True, help="Every second step, and 8 repeats at most."),
 )
 @runs_options
-@out_option("Where results, tables, charts and the page go.", Path("out/trade"))
+@out_option("Where results, tables and charts go.", Path("out/trade"))
 @shown_options
-@click.option("--no-pictures", is_flag=True, help="No pictures of the scenes on the page.")
 @click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
 @click.pass_context
 def trade_command(
@@ -84,7 +80,6 @@ def trade_command(
     as_json: bool,
     as_markdown: bool,
     into: Path | None,
-    no_pictures: bool,
     traceback: bool,
 ) -> None:
     """Run scenes with all settings that matter in them: how large is the error, and what does it cost?
@@ -114,13 +109,9 @@ def trade_command(
             with Bar(Console(stderr=True)) as bar:
                 result = trade(*targets, **arguments, store=store, progress=bar)
                 files = _write(result, out)
-                pictures: dict[str, list[Path]] = {}
                 if charts:
                     bar.say("charts")
                     files += [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
-                    pictures = {} if no_pictures else _pictures(result, subjects, out, bar)
-                    files += [path for drawn in pictures.values() for path in drawn]
-                files.append(write_page(result, out / "trade.html", pictures, charts=charts))
         except KeyboardInterrupt:
             click.echo(f"carom: stopped; {_results(store)} kept in {store.path}, --resume goes on", err=True)
             raise click.exceptions.Exit(STOPPED) from None
@@ -146,9 +137,17 @@ def _charts_there() -> bool:
     try:
         chart_module()
     except Problem as problem:
-        click.echo(f"carom: no pictures: {problem.message}", err=True)
+        click.echo(f"carom: {problem.message}", err=True)
         return False
     return True
+
+
+def chart_module() -> Any:
+    """The module carom.lab.trading.charts; Problem, with the name of the extra, if matplotlib is missing."""
+    try:
+        return importlib.import_module(".charts", __package__)
+    except ImportError as error:
+        raise Problem("no charts, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'") from error
 
 
 def _command_line(context: click.Context) -> str:
@@ -166,7 +165,7 @@ def _tables(result: Trade, norms: Sequence[str]) -> list[TextTable]:
 
 
 def _narrow(table: TextTable) -> TextTable:
-    """The table without the single counts, which are on the page and in the CSV file: a terminal is too narrow."""
+    """The table without the single counts, which are in the CSV file: a terminal is too narrow."""
     kept = [place for place, heading in enumerate(table.headings) if heading not in COUNTS.values()]
     rows = [tuple(row[place] for place in kept) for row in table.rows]
     return dataclasses.replace(table, headings=tuple(table.headings[place] for place in kept), rows=rows)
@@ -179,28 +178,3 @@ def _lines(result: Trade) -> list[str]:
 
 def _write(result: Trade, out: Path) -> list[Path]:
     return [write_json(result, out / "trade.json"), write_csv(result, out / "trade.csv")]
-
-
-def _pictures(
-    result: Trade, subjects: Sequence[Subject], out: Path, progress: Progress
-) -> dict[str, list[Path]]:
-    """Pictures of the measured scenes, by scene."""
-    seconds = {case.target: case.seconds for case in measured(result)}
-    found = {}
-    for subject in subjects:
-        if subject.target in seconds:
-            progress.say(f"{subject.name}: pictures")
-            found[subject.name] = draw_scene(subject, seconds[subject.target], out)
-    return found
-
-
-def draw_scene(subject: Subject, seconds: float, out: Path) -> list[Path]:
-    """The pictures of ``carom run``: a run of ``seconds``, if not too long, with the settings that the scene
-    recommends."""
-    from ..pictures.run_pictures import draw_run
-
-    with closing(subject.world(None)) as world:
-        steps = min(max(round(seconds / world.settings.dt), 1), MOST_STEPS)
-        with subject.attribute_errors(), stdout_kept_clean():
-            finished = run(world, steps, scene=subject.name, seed=subject.seed)
-        return draw_run(finished, out, subject.recommended[1])

@@ -10,7 +10,7 @@ from ..cases.published import NORM as ENERGY_SQUARE
 from ..commands.usage_errors import Problem, did_you_mean
 from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
-from ..settings_study.code_line import python_line
+from .code_line import python_line
 from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
 
 NOTHING = "-"

@@ -1,0 +1,36 @@
+"""``python -m carom.lab.studies NAME``: measure again what a table of the docs shows."""
+
+from __future__ import annotations
+
+import click
+
+from ..cli import in_command
+from ..commands.group import LateCommand, LateCommands
+
+COMMANDS = {
+    "geometry": LateCommand(
+        "studies.geometry.command:geometry_command", "False positives and cost of levels of collision geometry."
+    ),
+    "ladder": LateCommand("studies.bench.command:ladder_command", "What each feature costs, switched on alone."),
+    "limits": LateCommand("studies.limits.command:limits_command", "Where carom fails, one axis at a time or two."),
+    "modes": LateCommand("studies.bench.command:modes_command", "What each kind of collision costs, and what it buys."),
+    "plugin-pairs": LateCommand(
+        "studies.bench.command:pairs_command", "What a pair of a plugin costs, next to a built-in one and by hand."
+    ),
+    "settings": LateCommand(
+        "studies.settings.command:settings_command",
+        "What each field of Settings costs and buys; settings for kinds of games.",
+    ),
+    "stages": LateCommand(
+        "studies.stages:stages_command", "List the stages of a step: what each reads and writes, where its code is."
+    ),
+}
+
+
+@click.group(cls=LateCommands, late=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+def cli() -> None:
+    """Studies that regenerate the tables and charts of carom's docs."""
+
+
+if __name__ == "__main__":
+    in_command(cli)

@@ -1,0 +1,54 @@
+"""The benchmarks of single features: measure, then print as requested."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from ...bench.command import RUNS
+from ...commands.options import repeats_option, shown_options
+from ...reporting.output import Output
+from ...reporting.progress_bar import Bar
+from . import collision_modes as bench_modes
+from . import feature_ladder as bench_ladder
+from . import plugin_pairs as bench_pairs
+
+
+@click.command("plugin-pairs", short_help="What a pair of a plugin costs, next to a built-in one and by hand.")
+@repeats_option(15, RUNS)
+@shown_options
+def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time the narrow phase with a registered pair, with a built-in one, and with the same maths written by hand."""
+    output = Output.checked("studies plugin-pairs", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_pairs.pair_costs(repeats, bar)
+    output.show(result, [bench_pairs.table(result)], [])
+
+
+@click.command("ladder", short_help="What each feature costs, switched on alone.")
+@click.option("--bodies", type=click.IntRange(min=1), default=bench_ladder.BODIES, show_default=True)
+@repeats_option(5, RUNS)
+@shown_options
+def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time scenes that differ in one feature: nanoseconds per body per step beside the scene without it."""
+    output = Output.checked("studies ladder", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_ladder.ladder(bodies, repeats, bar)
+    output.show(result, [bench_ladder.table(result)], [])
+
+
+@click.command("modes", short_help="What each kind of collision costs, and what it buys.")
+@click.option(
+    "--steps", type=click.IntRange(min=1), default=bench_modes.STEPS, show_default=True,
+    help="Steps timed of each scene; of bullets a sixth.",
+)  # fmt: skip
+@repeats_option(bench_modes.REPEATS, RUNS)
+@shown_options
+def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time the same bodies with discrete, continuous and event-driven collisions."""
+    output = Output.checked("studies modes", as_json, as_markdown, into, None)
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_modes.modes(steps, repeats, bar)
+    output.show(result, bench_modes.tables(result), bench_modes.remarks(result))

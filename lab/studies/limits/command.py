@@ -1,0 +1,124 @@
+"""Where carom fails, one axis at a time or two."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from ...commands.options import (
+    out_option,
+    seed_number,
+    seed_option,
+    shown_options,
+)
+from ...commands.usage_errors import Problem, did_you_mean
+from ...reporting.output import Output
+from ...reporting.progress_bar import Bar
+from . import report as limits_report
+from .pairs import report as pairs_report
+from .pairs.axes import Draw
+from .pairs.scenes import played
+from .pairs.sweep import QUICK_SCENES, SCENES, pair_limits
+from .sweep import AXES, limits
+
+MARK, PAIRS_MARK = "studies limits", "studies limits --pairs"
+NAMES = tuple(axis.name for axis in AXES)
+
+
+@click.command("limits", short_help="Where carom fails.")
+@click.option("--axes", "axis_names", metavar="NAME,NAME", help=f"Only these of {', '.join(NAMES)}.")
+@click.option("--quick", is_flag=True, help="Fewer values on each axis: about a minute; few scenes of --pairs.")
+@click.option("--long", "long_runs", is_flag=True, help="Runs of a million steps too: about ten minutes more.")
+@click.option("--pairs", is_flag=True, help=f"Cross the axes in pairs: {SCENES:,} short random scenes, some minutes.")
+@click.option("--scenes", type=click.IntRange(min=1), metavar="N", help="With --pairs: so many scenes.")
+@click.option("--play", type=click.IntRange(min=0), metavar="N", help="Play scene N of --pairs alone, and describe it.")
+@click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes of --pairs (default: one a core).")
+@out_option("Draw a picture into this folder.")
+@shown_options
+@seed_option
+@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+def limits_command(
+    axis_names: str | None,
+    quick: bool,
+    long_runs: bool,
+    pairs: bool,
+    scenes: int | None,
+    play: int | None,
+    workers: int | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+    out: Path | None,
+    seed: str,
+    traceback: bool,
+) -> None:
+    """Sweep one thing at a time until carom fails: the step, stiffness, speeds, ratios of masses and sizes, distance
+    from the origin, towers, crowds, duration. Prints where the error passes 1 % and 10 %, and where it breaks.
+
+    With --pairs: random scenes that cross these axes in pairs; prints what went wrong in each mode, and where.
+    """
+    del traceback  # seen by Commands.main
+    crossing = pairs or play is not None
+    if not crossing:
+        _refuse({"--scenes": scenes is not None, "--workers": workers is not None}, "needs --pairs")
+    if crossing:
+        of_others = {
+            "--axes": axis_names is not None, "--long": long_runs, "--out": out is not None,
+        }  # fmt: skip
+        _refuse(of_others, "does not go with --pairs or --play")
+        if play is not None:
+            _refuse({"--scenes": scenes is not None, "--into": into is not None}, "does not go with --play")
+            _play(seed_number(seed), play, as_json)
+            return
+        if quick and scenes is not None:
+            raise Problem("--quick and --scenes exclude each other")
+        wanted = scenes or (QUICK_SCENES if quick else SCENES)
+        output = Output.checked(PAIRS_MARK, as_json, as_markdown, into, None)
+        _cross(wanted, seed_number(seed), workers, output)
+        return
+    _refuse({"--seed": seed != "0"}, "needs --pairs")
+    _sweep(axis_names, quick, long_runs, Output.checked(MARK, as_json, as_markdown, into, out))
+
+
+def _sweep(axis_names: str | None, quick: bool, long_runs: bool, output: Output) -> None:
+    if quick and long_runs:
+        raise Problem("--quick and --long exclude each other")
+    names = None if axis_names is None else [name for name in axis_names.replace(" ", "").split(",") if name]
+    for name in names or ():
+        if name not in NAMES:
+            raise Problem(f"--axes: no axis {name!r}{did_you_mean(name, NAMES)}")
+    if names is not None and not names:
+        raise Problem(f"--axes takes names with commas between them: {', '.join(NAMES)}")
+    if output.charts is not None:
+        output = dataclasses.replace(output, charts=importlib.import_module(".chart", __package__))
+    with Bar(Console(stderr=True)) as bar:
+        result = limits(names, progress=bar, quick=quick, long=long_runs)
+    output.show(result, limits_report.tables(result), limits_report.remarks(result))
+    output.draw("draw_limits", result)
+
+
+def _cross(scenes: int, seed: int, workers: int | None, output: Output) -> None:
+    with Bar(Console(stderr=True)) as bar:
+        result = pair_limits(scenes, seed, workers, bar)
+    output.show(result, pairs_report.tables(result), pairs_report.remarks(result))
+
+
+def _play(seed: int, number: int, as_json: bool) -> None:
+    draw = Draw.of(seed, number)
+    outcome = played(draw)
+    if as_json:
+        plain = {"scene": dataclasses.asdict(draw), "outcome": dataclasses.asdict(outcome)}
+        click.echo(json.dumps(plain, indent=2))
+    else:
+        click.echo(pairs_report.described(draw, outcome))
+
+
+def _refuse(given: dict[str, bool], why: str) -> None:
+    for option, is_given in given.items():
+        if is_given:
+            raise Problem(f"{option} {why}")

@@ -1,0 +1,224 @@
+"""Results of the settings studies, as plain records that convert to JSON and back."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+from ...measure.timing import Spread
+
+INFINITE = "infinite"  # represents infinity in JSON
+
+
+@dataclass
+class Sample:
+    """One value of a field in one scene.
+
+    time
+        processor time per simulated second relative to the default value, within each repeat
+    work
+        the weighted counts, see :mod:`carom.lab.engines.cost`, relative to the default value
+    errors
+        by name: see ``Setting.errors``
+    """
+
+    value: Any
+    time: Spread
+    work: float
+    errors: dict[str, float]
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From the output of ``dataclasses.asdict``, also after JSON."""
+        return cls(**{**plain, "time": Spread.from_dict(plain["time"])})
+
+
+@dataclass
+class Setting:
+    """One field varied in one scene; all other fields keep the scene's values.
+
+    others
+        the fields that are not the default ones in this scene
+    default
+        the value that the ratios are relative to
+    milliseconds
+        processor time per simulated second with that value
+    errors
+        units by name; ``words`` say what the errors are, and the reference
+    """
+
+    field: str
+    scene: str
+    others: dict[str, Any]
+    default: Any
+    seconds: float
+    milliseconds: Spread
+    errors: dict[str, str]
+    words: str
+    samples: list[Sample]
+
+    def sample(self, value: Any) -> Sample:
+        """The sample of that value; KeyError if it was not tried."""
+        for sample in self.samples:
+            if sample.value == value and type(sample.value) is type(value):
+                return sample
+        raise KeyError(f"{self.field}={value!r} was not tried in {self.scene}")
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From the output of ``dataclasses.asdict``, also after JSON."""
+        samples = [Sample.from_dict(sample) for sample in plain["samples"]]
+        return cls(**{**plain, "milliseconds": Spread.from_dict(plain["milliseconds"]), "samples": samples})
+
+
+@dataclass
+class SettingsStudy:
+    """All fields, on one machine."""
+
+    machine: dict[str, str]
+    repeats: int
+    settings: list[Setting]
+
+    @property
+    def fields(self) -> list[str]:
+        """The names of the fields, each once."""
+        return list(dict.fromkeys(setting.field for setting in self.settings))
+
+    def setting(self, field: str, scene: str) -> Setting:
+        """The record of that field and scene; KeyError if there is none."""
+        for setting in self.settings:
+            if (setting.field, setting.scene) == (field, scene):
+                return setting
+        raise KeyError(f"no {field} in {scene!r} in this study")
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return _without_infinities(dataclasses.asdict(self))
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """The inverse of :meth:`as_dict`, also after JSON."""
+        whole = _with_infinities(plain)
+        return cls(**{**whole, "settings": [Setting.from_dict(setting) for setting in whole["settings"]]})
+
+
+@dataclass
+class Choice:
+    """Settings tried in a game's scene.
+
+    name
+        "tuned", a preset, or a description of the candidate
+    line
+        of Python, to paste
+    error
+        the worst of all repeats; inf if one failed, see ``failure``
+    also
+        other figures of interest, by name
+    work
+        per simulated second
+    milliseconds
+        processor time per simulated second; None if it was not timed
+    """
+
+    name: str
+    line: str
+    error: float
+    met: bool
+    work: float
+    milliseconds: Spread | None = None
+    failure: str = ""
+    also: dict[str, float] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From the output of ``dataclasses.asdict``, also after JSON."""
+        spread = plain["milliseconds"]
+        return cls(**{**plain, "milliseconds": None if spread is None else Spread.from_dict(spread)})
+
+
+@dataclass
+class GameChoices:
+    """One kind of game.
+
+    scene
+        the representative scene; ``needs`` describes the game's requirement in words
+    target, unit
+        the largest allowed error
+    how
+        how the choice was found: "search", or "all candidates"
+    tried
+        number of settings tried
+    """
+
+    game: str
+    scene: str
+    needs: str
+    target: float
+    unit: str
+    how: str
+    tried: int
+    choices: list[Choice]
+
+    @property
+    def tuned(self) -> Choice | None:
+        """The cheapest choice that meets the target; None if there is none."""
+        return next((choice for choice in self.choices if choice.name == TUNED), None)
+
+    def choice(self, name: str) -> Choice:
+        """The choice of that name; KeyError if there is none."""
+        for choice in self.choices:
+            if choice.name == name:
+                return choice
+        raise KeyError(f"no choice {name!r} for {self.game}")
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """From the output of ``dataclasses.asdict``, also after JSON."""
+        return cls(**{**plain, "choices": [Choice.from_dict(choice) for choice in plain["choices"]]})
+
+
+@dataclass
+class GamesStudy:
+    """All kinds of games, on one machine."""
+
+    machine: dict[str, str]
+    games: list[GameChoices]
+
+    def game(self, name: str, scene: str = "") -> GameChoices:
+        """The first of that name (and scene); KeyError if there is none."""
+        for game in self.games:
+            if game.game == name and scene in ("", game.scene):
+                return game
+        raise KeyError(f"no game {name!r} in this study")
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return _without_infinities(dataclasses.asdict(self))
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> Self:
+        """The inverse of :meth:`as_dict`, also after JSON."""
+        whole = _with_infinities(plain)
+        return cls(**{**whole, "games": [GameChoices.from_dict(game) for game in whole["games"]]})
+
+
+TUNED = "tuned"
+
+
+def _without_infinities(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_infinities(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_without_infinities(one) for one in value]
+    return INFINITE if isinstance(value, float) and value == math.inf else value
+
+
+def _with_infinities(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _with_infinities(one) for key, one in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_with_infinities(one) for one in value]
+    return math.inf if value == INFINITE else value

@@ -1,0 +1,95 @@
+"""``carom limits``: how long the step of a scene may be."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import helpers_cli
+import pytest
+from helpers_cli import refusal
+
+carom = helpers_cli.carom  # fixture
+
+SPRING = """
+from carom.components import RigidBody, Transform
+from carom.framework import ForceSystem, Settings, World
+from carom.plugins import Physics
+
+seconds = 0.1
+
+
+class Pull(ForceSystem):
+    def add_forces(self, bodies, time):
+        bodies.force -= 2500.0 * bodies.position
+
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2), settings=settings)
+    world.create_entity(Transform((1, 0)), RigidBody())
+    world.add_system(Pull())
+    return world
+"""
+
+
+def test_the_command_tells_the_limits_of_a_scene(carom):
+    """50 rad/s: 2 / 50 s; a third smaller for Yoshida's method, none for explicit Euler."""
+    Path("spring.py").write_text(SPRING)
+    result = carom("limits", "spring.py")
+    assert result.exit_code == 0, result.output
+    assert "entity 1 swings at 50 rad/s; semi_implicit_euler holds it up to dt = 0.04 s." in result.stdout
+    assert "Suggested: dt = 0.036 s, 0.9 of the limit. The step of 0.01667 s fits." in result.stdout
+    assert "is too long" in carom("limits", "spring.py", "--set", "dt=0.05").stdout
+    unstable = carom("limits", "spring.py", "--set", "integrator=explicit_euler", "--seconds", "0")
+    assert "No step is stable" in unstable.stdout
+    plain = json.loads(carom("limits", "spring.py", "--json", "--set", "integrator=yoshida4").stdout)
+    assert plain["scene"] == "spring.py"
+    assert plain["tightest"]["stability"] == pytest.approx(1.5734 / 50, rel=1e-4)
+    assert plain["tightest"]["tunnelling"] is None
+
+
+def test_the_command_watches_a_scene_of_the_library(carom):
+    """Billiards: the cue ball is fast from the start; two balls of 0.05715 m overlap over twice that."""
+    result = carom("limits", "billiards", "--seconds", "0.1")
+    assert result.exit_code == 0, result.output
+    assert "overlap on a way of 0.1143 m" in result.stdout
+
+
+BROKEN_ON_THE_WAY = """
+import numpy as np
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import System, World
+from carom.plugins import Physics
+
+class Spoiler(System):
+    def process(self, dt):
+        if self.world.time > 0.5:
+            self.world.bodies.linear_velocity[0] = np.nan
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2), settings=settings)
+    world.add_system(Spoiler())
+    world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(1, 0)), SphereCollider(0.3))
+    return world
+"""
+
+
+def test_the_command_tells_what_broke_while_it_watched(carom, tmp_path):
+    """A world with non-finite numbers must not be reported as one without limits."""
+    file = tmp_path / "broken.py"
+    file.write_text(BROKEN_ON_THE_WAY)
+    result = carom("limits", str(file), "--seconds", "2")
+    assert result.exit_code == 2
+    assert "broken.py: not finite after 0.6 s: entity 1: linear_velocity is [nan, nan]" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["stack", "--seconds", "-1"], "--seconds must be a number of at least 0"),
+        (["stak"], "no scene named 'stak'; did you mean 'stack'"),
+        ([], "Missing argument"),
+    ],
+)
+def test_the_command_refuses_in_one_line(carom, arguments, message):
+    assert message in refusal(carom("limits", *arguments))
