@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from carom.framework.compilation import log
 from carom.lab.jobs import workers
 
 DEADLINE = 60.0  # s; reached only by failing tests
@@ -21,13 +19,6 @@ class Task(NamedTuple):
     what: str
     folder: str
     number: int
-
-
-class Awkward(Exception):  # noqa: N818
-    """Can be pickled, but not be read again."""
-
-    def __init__(self, one: int, two: int) -> None:
-        super().__init__("awkward")
 
 
 def marks(folder: Path) -> list[str]:
@@ -95,18 +86,6 @@ def fails(task: Task, first: bool) -> None:
     raise ValueError(f"number {task.number}")
 
 
-def fails_awkwardly(task: Task, first: bool) -> None:
-    raise Awkward(1, 2)
-
-
-def fails_by_leaving(task: Task, first: bool) -> None:
-    sys.exit("enough")
-
-
-def gives_what_cannot_be_sent(task: Task, first: bool) -> Any:
-    return lambda: task
-
-
 def process(_: Any) -> int:
     return os.getpid()
 
@@ -115,14 +94,5 @@ def turned(content: bytes) -> bytes:
     return content[::-1]
 
 
-def compiles(kernel: str) -> None:
-    for listener in log.listeners:
-        listener(kernel)
-
-
 def nested(number: int) -> list[tuple[int, int]]:
     return list(workers.in_parallel(process, range(number), workers=2))
-
-
-def dies_at_once(*_: object) -> None:
-    os._exit(7)

@@ -31,7 +31,7 @@ from carom.lab.commands.usage_errors import Problem
 from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.measure import timing as bench_clock
 from carom.lab.measure.timing import Spread
-from carom.lab.reporting.progress_bar import Progress
+from carom.lab.reporting.progress import Progress
 from carom.lab.studies.__main__ import cli as studies_cli
 from carom.lab.studies.bench import (
     feature_ladder as bench_ladder,

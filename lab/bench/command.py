@@ -9,11 +9,11 @@ from rich.console import Console
 
 from ..commands.group import Commands
 from ..commands.loading import load
-from ..commands.options import out_option, repeats_option, shown_options
+from ..commands.options import listed, out_option, repeats_option, shown_options, whole_number
 from ..commands.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..reporting.output import Output
-from ..reporting.progress_bar import Bar
+from ..reporting.progress import Bar
 from . import report as bench_report
 from .benchmarks import scaling as bench_scaling
 from .benchmarks import startup as bench_startup
@@ -29,9 +29,12 @@ chart_option = out_option("Draw a chart into this folder.")
 
 
 @click.group("bench", cls=Commands, invoke_without_command=True, short_help="Time carom on this machine.")
-@click.option("--scenes", "scene_names", metavar="NAME,NAME", help=f"Only these of {NAMES}.")
 @click.option(
-    "--sizes", metavar="N,N",
+    "--scenes", "scene_names", metavar="NAME,NAME", help=f"Only these of {NAMES}.",
+    callback=listed("--scenes", "names", str),
+)  # fmt: skip
+@click.option(
+    "--sizes", metavar="N,N", callback=listed("--sizes", "whole numbers from 1", whole_number),
     help=f"Numbers of bodies (default: {SIZES[0]:,} and {SIZES[1]:,}) of scenes that come in sizes; pyramid, "
     "static_world, fastgas and freefall have their own.",
 )  # fmt: skip
@@ -46,8 +49,8 @@ chart_option = out_option("Draw a chart into this folder.")
 @click.pass_context
 def bench_command(
     context: click.Context,
-    scene_names: str | None,
-    sizes: str | None,
+    scene_names: tuple[str, ...] | None,
+    sizes: tuple[int, ...] | None,
     repeats: int | None,
     large: bool,
     quick: bool,
@@ -65,8 +68,8 @@ def bench_command(
         return
     if quick and (sizes or large):
         raise Problem("--quick chooses the sizes: leave out --sizes and --large")
-    wanted = subjects(filter(None, (scene_names or "").replace(" ", "").split(",")))
-    asked = QUICK_SIZES if quick else _sizes(sizes) if sizes else SIZES
+    wanted = subjects(scene_names or ())
+    asked = QUICK_SIZES if quick else tuple(sorted(sizes)) if sizes else SIZES
     if large:
         asked = tuple(sorted({*asked, LARGE}))
     repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
@@ -79,13 +82,16 @@ def bench_command(
 
 
 @bench_command.command("scaling", short_help="How the time per body grows with their number.")
-@click.option("--sizes", metavar="N,N", help="Numbers of bodies (default: 1,000 to 100,000).")
+@click.option(
+    "--sizes", metavar="N,N", help="Numbers of bodies (default: 1,000 to 100,000).",
+    callback=listed("--sizes", "whole numbers from 1", whole_number),
+)  # fmt: skip
 @click.option("--million", is_flag=True, help=f"{bench_scaling.LARGEST:,} bodies too: needs some gigabytes.")
 @repeats_option(3, RUNS)
 @chart_option
 @shown_options
 def scaling_command(
-    sizes: str | None,
+    sizes: tuple[int, ...] | None,
     million: bool,
     repeats: int,
     out: Path | None,
@@ -94,7 +100,7 @@ def scaling_command(
     into: Path | None,
 ) -> None:
     """Time the elastic gas from 1,000 to 100,000 bodies: nanoseconds per body per step."""
-    asked = _sizes(sizes) if sizes else bench_scaling.SIZES
+    asked = tuple(sorted(sizes)) if sizes else bench_scaling.SIZES
     output = Output.checked("carom bench scaling", as_json, as_markdown, into, out)
     with Bar(Console(stderr=True)) as bar:
         result = bench_scaling.scaling((*asked, *[bench_scaling.LARGEST] * million), repeats, bar)
@@ -103,24 +109,19 @@ def scaling_command(
 
 
 @bench_command.command("startup", short_help="The time to the first step of a new process.")
-@click.option("--scenes", "names", default="asteroids", metavar="NAME,NAME", help="Scenes of the library.")
+@click.option(
+    "--scenes", "names", default="asteroids", metavar="NAME,NAME", help="Scenes of the library.",
+    callback=listed("--scenes", "names", str),
+)  # fmt: skip
 @repeats_option(3, RUNS)
 @shown_options
-def startup_command(names: str, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+def startup_command(names: tuple[str, ...], repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time new processes up to their first step: nothing compiled, kernels kept on disk, and kernels shipped."""
     output = Output.checked("carom bench startup", as_json, as_markdown, into, None)
-    wanted = [load(name.strip()).name for name in names.split(",")]
+    wanted = [load(name).name for name in names]
     with Bar(Console(stderr=True)) as bar:
         result = bench_startup.startup(wanted, repeats, bar)
     output.show(result, [bench_startup.table(result)], [])
-
-
-def _sizes(text: str) -> tuple[int, ...]:
-    """"1000,10000" as numbers."""
-    parts = [part.strip() for part in text.split(",")]
-    if not all(part.isdecimal() and int(part) > 0 for part in parts):
-        raise Problem(f"--sizes takes whole numbers from 1 with commas between them, not {text!r}")
-    return tuple(sorted({int(part) for part in parts}))
 
 
 def _peer_there() -> bool:

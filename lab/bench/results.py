@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.metadata
 import platform
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from ..measure.timing import CLOCK, Spread
+from ..plain import Plain
 
 PACKAGES = ("carom", "numba", "numpy", "esper", "pymunk")
 
 
 @dataclass
-class Row:
+class Row(Plain):
     """One window of one scene at one size, or one kind of query.
 
     ``unit``: what the milliseconds are per; medians of the steps of a repeat, and ``fast``: a tenth of them took
@@ -52,33 +52,15 @@ class Row:
         """Scene, bodies, and the variant that distinguishes the row."""
         return " ".join(filter(None, (self.scene, f"{self.bodies:,}", self.variant, self.window)))
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        spreads = {
-            key: None if plain[key] is None else Spread.from_dict(plain[key])
-            for key in ("carom_ms", "carom_fast_ms", "peer_ms", "peer_fast_ms", "ratio")
-        }
-        return cls(**{**plain, **spreads})
-
 
 @dataclass
-class Result:
+class Result(Plain):
     """A whole benchmark: machine, settings and rows."""
 
     machine: dict[str, str]
     settings: dict[str, dict[str, Any]]
     repeats: int
     rows: list[Row]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "rows": [Row.from_dict(row) for row in plain["rows"]]})
 
 
 def machine() -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,10 @@ GEOMETRIES = ("precise", "bounds")
 WORDS = "carom.words"  # key for the words of a command line: see KeepsWords
 
 Option = Callable[[Any], Any]
+
+
+class NameProblem(Problem):
+    """An unknown name in a list."""
 
 
 def together(*options: Option) -> Option:
@@ -49,6 +53,45 @@ def seed_number(text: str) -> int:
     if not text.strip().isdecimal():
         raise Problem(f"--seed takes a whole number of at least 0, not {text!r}")
     return int(text)
+
+
+def listed(option: str, what: str, read: Callable[[str], Any]) -> Callable[[Any, Any, str | None], Any]:
+    """A callback for click that reads "a,b" as a tuple, each value once; Problem for a word that ``read`` refuses by a
+    ValueError or a Problem. what: the values, for the message."""
+
+    def values(context: click.Context, parameter: click.Parameter, text: str | None) -> tuple[Any, ...] | None:
+        if text is None:
+            return None
+        try:
+            found = tuple(dict.fromkeys(read(word) for part in text.split(",") if (word := part.strip())))
+        except NameProblem:
+            raise
+        except (ValueError, Problem):
+            found = ()
+        if not found:
+            raise Problem(f"{option} takes {what} with commas between them, not {text!r}")
+        return found
+
+    return values
+
+
+def whole_number(text: str) -> int:
+    """From 1; ValueError for others."""
+    if not text.isdecimal() or int(text) < 1:
+        raise ValueError
+    return int(text)
+
+
+def one_of(option: str, known: Iterable[str]) -> Callable[[str], str]:
+    """A reader of names; a usage error with suggestions for a name that is not among the known ones."""
+    names = tuple(known)
+
+    def read(word: str) -> str:
+        if word not in names:
+            raise NameProblem(f"{option}: no {word!r}{did_you_mean(word, names)}")
+        return word
+
+    return read
 
 
 # -- worlds -----------------------------------------------------------------------------------------------------
@@ -121,18 +164,12 @@ def _seconds(value: float) -> float:
     return value
 
 
-def _steps(text: str) -> tuple[float, ...]:
-    """"1/60,1/120" as seconds, each once."""
-    steps: dict[float, None] = {}
-    for part in text.split(","):
-        try:
-            step = float(parse_assignments([f"dt={part}"])["dt"])
-        except Problem:
-            step = math.nan
-        if not (math.isfinite(step) and step > 0):
-            raise Problem(f"--dt takes steps above 0 s with commas between them, as in 1/60,1/120, not {text!r}")
-        steps[step] = None
-    return tuple(steps)
+def _step(text: str) -> float:
+    """"1/60" as seconds."""
+    step = float(parse_assignments([f"dt={text}"])["dt"])
+    if not (math.isfinite(step) and step > 0):
+        raise ValueError
+    return step
 
 
 def _build_options(assignments: tuple[str, ...]) -> dict[str, Any]:
@@ -171,7 +208,8 @@ case_options = together(
         "--repeats", type=click.IntRange(min=1), metavar="N", help="Runs of each setting: start phases or seeds."
     ),
     click.option(
-        "--dt", "steps", metavar="S,S", default=None, callback=_read(_steps),
+        "--dt", "steps", metavar="S,S", default=None,
+        callback=listed("--dt", "steps above 0 s, as in 1/60,1/120,", _step),
         help="The steps, as in 1/60,1/120 (default: what suits the scene).",
     ),
     click.option(
@@ -182,40 +220,23 @@ case_options = together(
 )  # fmt: skip
 
 
-def _listed(option: str, known: tuple[str, ...] = ()) -> Callable[[str], tuple[str, ...]]:
-    """Parse "a,b" into words; Problem for a word not in ``known``, if that is not empty."""
-
-    def read(text: str) -> tuple[str, ...]:
-        words = tuple(dict.fromkeys(filter(None, (word.strip() for word in text.split(",")))))
-        if not words:
-            raise Problem(f"{option} takes names with commas between them, not {text!r}")
-        for word in words:
-            if known and word not in known:
-                raise Problem(f"{option}: no {word!r}{did_you_mean(word, known)}")
-        return words
-
-    return read
-
-
-def _substeps(text: str) -> tuple[int, ...]:
-    parts = [part.strip() for part in text.split(",")]
-    if not all(part.isdecimal() and int(part) > 0 for part in parts):
-        raise Problem(f"--substeps takes whole numbers from 1 with commas between them, not {text!r}")
-    return tuple(dict.fromkeys(int(part) for part in parts))
-
-
 only_options = together(
     click.option(
-        "--integrators", metavar="NAME,NAME", callback=_read(_listed("--integrators")),
+        "--integrators", metavar="NAME,NAME", callback=listed("--integrators", "names", str),
         help="Only these (default: all that differ in the scene; so for the next three).",
     ),
     click.option(
-        "--collisions", metavar="NAME,NAME", callback=_read(_listed("--collisions", COLLISIONS)),
+        "--collisions", metavar="NAME,NAME",
+        callback=listed("--collisions", "names", one_of("--collisions", COLLISIONS)),
         help=f"Only these of {', '.join(COLLISIONS)}.",
     ),
-    click.option("--substeps", metavar="N,N", callback=_read(_substeps), help="Only these of the solver."),
     click.option(
-        "--geometry", "geometries", metavar="NAME,NAME", callback=_read(_listed("--geometry", GEOMETRIES)),
+        "--substeps", metavar="N,N", callback=listed("--substeps", "whole numbers from 1", whole_number),
+        help="Only these of the solver.",
+    ),
+    click.option(
+        "--geometry", "geometries", metavar="NAME,NAME",
+        callback=listed("--geometry", "names", one_of("--geometry", GEOMETRIES)),
         help=f"Only these of {', '.join(GEOMETRIES)}.",
     ),
 )  # fmt: skip
@@ -224,5 +245,8 @@ only_options = together(
 
 runs_options = together(
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
-    click.option("--resume", is_flag=True, help="Go on with the finished runs that the folder holds."),
+    click.option(
+        "--runs", "kept", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+        default=Path("out/runs.sqlite"), show_default=True, help="Finished runs are kept here, and used again.",
+    ),
 )

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from ..measure.run import Run, run
 from ..plugins_check.installed import plugin_named
-from ..reporting.progress import StepProgress
+from ..reporting.progress import Bar
 from ..reporting.run_report import print_report
 from .choices import parse_assignments, parse_view, preset
 from .loading import Loaded, load, stdout_kept_clean
@@ -126,5 +126,7 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
 def _run_with_progress(
     loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool
 ) -> Run:
-    with StepProgress(screen, loaded.name, steps) as progress, loaded.attribute_errors(), stdout_kept_clean():
-        return run(world, steps, scene=loaded.name, seed=seed, after_step=progress.done, profile=profile)
+    with Bar(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
+        bar.begin(steps)
+        bar.say(loaded.name)
+        return run(world, steps, scene=loaded.name, seed=seed, after_step=lambda _: bar.advance(1), profile=profile)

@@ -20,7 +20,7 @@ from ...framework import Settings, World
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
-from ..reporting.progress import CompileStatus
+from ..reporting.progress import Bar
 from .loading import Loaded, load, stdout_kept_clean
 from .portable import compile_portable, copy_used
 from .usage_errors import Problem
@@ -79,7 +79,7 @@ def warm_up_command(
         return
     wanted = {int(dimensions)} if dimensions else {2, 3}
     before = cache_contents()
-    with CompileStatus(Console(stderr=True)) as status:
+    with Bar(Console(stderr=True)) as status:
         rows = warm_up(_work(targets, everything, wanted), status.say)
     copy_used()
     after = cache_contents()

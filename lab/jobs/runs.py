@@ -13,7 +13,7 @@ from ..commands.usage_errors import Problem
 from ..engines.cost import work_of
 from ..measure.norms import NORMS, OF_KIND, conserves, errors_of
 from ..measure.observation import Seen
-from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CHAOTIC, STOPPED, Cell, ErrorBar, Outcome, Point, Reference
 from .result_store import Store
 from .tasks import Task, mean_of, perform
@@ -33,14 +33,12 @@ class Runs:
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
         self.workers, self.progress = workers, progress
-        self._store = store
-        self._kept: dict[str, dict[str, Any]] = {}
+        self._store = Store() if store is None else store
         self.performed = 0
 
     def get(self, task: Task) -> dict[str, Any] | None:
         """The record of a task already performed, or None."""
-        known = self._kept.get(task.key)
-        return known if known is not None or self._store is None else self._store.get(task.key)
+        return self._store.get(task.key)
 
     def all(self, tasks: Iterable[Task], what: str) -> list[dict[str, Any]]:
         """The records of all tasks, in order."""
@@ -55,14 +53,11 @@ class Runs:
             for task, record in results:
                 self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
                 self.progress.advance(task.cost)
-        return [self._kept.get(task.key) or self.get(task) or {} for task in tasks]
+        return [self.get(task) or {} for task in tasks]
 
     def _keep(self, task: Task, record: dict[str, Any]) -> None:
         self.performed += 1
-        if self._store is None:
-            self._kept[task.key] = record
-        else:
-            self._store.add(task.key, record)
+        self._store.add(task.key, record)
 
 
 def _lost(task: Task, lost: Lost) -> dict[str, Any]:

@@ -1,40 +1,26 @@
-"""Tasks performed in parallel processes, so that a process that dies affects only its own task.
-
-Each worker has its own pipe and at most one task. When a pipe ends, it is certain which task was lost and that it gave
-no result: an incomplete answer of a killed worker cannot be read as another task's.
-"""
+"""Tasks on an executor: processes of this machine by default, and a process that dies affects only its own task."""
 
 from __future__ import annotations
 
 import logging
 import multiprocessing
-import multiprocessing.connection
 import os
 import pickle
 import signal
 import sys
 import threading
-import traceback
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from types import ModuleType
 from typing import Any, TypeVar
-
-from ...framework.compilation import log
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 TRIES = 2  # attempts at a task whose worker dies
-STARTS = 10  # workers in a row that end before they are ready, before giving up
-
-PATIENCE = 5.0  # s, to wait for a process to end after its pipe ended
-
-READY, COMPILES, DONE, RAISED, UNKNOWN = "ready", "compiles", "done", "raised", "unknown"  # messages of a worker
-DIED = "died"  # in place of a message
 
 logger = logging.getLogger("carom")
 
@@ -47,6 +33,13 @@ class Lost:
     reason: str
 
 
+@dataclass(frozen=True)
+class Unknown:
+    """The answer of a worker that cannot load a task."""
+
+    reason: str
+
+
 def available_cores() -> int:
     """How many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -54,109 +47,101 @@ def available_cores() -> int:
     return os.cpu_count() or 1
 
 
+def process_pool(workers: int) -> Executor:
+    """Processes that import what they need, say nothing on stdout and end with this one."""
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin)
+
+
 def in_parallel(
-    function: Callable[[Task], Result], tasks: Iterable[Task], workers: int | None = None
+    function: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    workers: int | None = None,
+    executor: Callable[[int], Executor] = process_pool,
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
     """``(task, function(task))`` for each task, as they finish, from ``workers`` processes (None: all cores).
 
-    A worker gets one task at a time. If it dies during the task (killed, out of memory, a crash), the task is tried
-    once more in another worker; if that dies too, :class:`Lost` is its result. No other task is affected, and none is
-    finished twice.
+    If a worker dies (killed, out of memory, a crash), the tasks that were running are tried once more, one at a time;
+    one that ends its worker again has :class:`Lost` as its result. No task is finished twice.
 
     The tasks run in this process instead, one after the other and in order, with ``workers=1``, inside a worker, and if
-    ``function`` cannot be pickled (a lambda, a function inside another). A task that a worker cannot load also runs
-    here, while the workers continue with the others: functions and classes of the script that was started
-    (``__main__``) are unknown to workers, which never run that script. An INFO line of the logger ``carom`` gives the
-    reason.
+    ``function`` cannot be pickled (a lambda, a function inside another). So does a task that a worker cannot load:
+    workers never run the script that was started, and its own functions and classes are unknown to them.
 
-    An exception of ``function`` stops everything and is raised here, with the worker's traceback as a note. Closing the
-    generator and Ctrl-C end the workers at once and silently; so does the death of this process. Prints of workers go
-    to stderr, and the kernels they compile are reported to the listeners of this process.
+    An exception of ``function`` stops everything and is raised here. Closing the generator and Ctrl-C end the workers
+    at once and silently; so does the death of this process. executor: makes one for that number of workers.
 
-    ValueError for fewer than one worker; ChildProcessError if processes cannot be started.
+    ValueError for fewer than one worker.
     """
     tasks = list(tasks)
     if workers is None:
         workers = available_cores()
     if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:
         raise ValueError(f"workers must be a whole number of at least 1, not {workers!r}")
-    pickled = None
-    if workers > 1 and not multiprocessing.current_process().daemon:  # a worker cannot have workers
-        pickled = _pickled(function)
-    if pickled is None or not tasks:
+    alone = workers == 1 or multiprocessing.parent_process() is not None
+    if alone or not tasks or _pickled(function) is None:
         return ((task, function(task)) for task in tasks)
-    return _shared_out(function, pickled, tasks, min(workers, len(tasks)))
+    return _shared_out(function, tasks, min(workers, len(tasks)), executor)
 
 
 def _shared_out(
-    function: Callable[[Task], Result], pickled: bytes, tasks: Sequence[Task], most: int
+    function: Callable[[Task], Result], tasks: Sequence[Task], most: int, executor: Callable[[int], Executor]
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
-    waiting = deque(range(len(tasks)))
+    waiting, suspects = deque(range(len(tasks))), deque[int]()  # suspects were running when a worker died
     tries = [0] * len(tasks)
-    here: deque[int] = deque()  # tasks that only this process can load
-    workers: list[_Worker] = []  # all of them busy or starting
-    failed_starts = 0
-
-    def go_on(worker: _Worker) -> None:
-        """Give it the next task that can be sent; end the worker if there is none."""
-        while waiting:
-            worker.task = waiting.popleft()
-            message = _pickled(tasks[worker.task])
-            if message is not None:
-                tries[worker.task] += 1
-                worker.send(message)
-                return
-            here.append(worker.task)
-        workers.remove(worker)
-        worker.end()
-
+    running: dict[Future[Any], int] = {}
+    others = set(multiprocessing.active_children())
+    pool = executor(most)
     try:
-        while waiting or here or any(worker.task is not None for worker in workers):
-            busy = sum(worker.task is not None for worker in workers)
-            while len(workers) < min(most, busy + len(waiting)):
-                workers.append(_Worker(pickled))
-            has_time = not here
-            if here:
-                index = here.popleft()
-                yield tasks[index], function(tasks[index])
-            for worker in _heard(workers, wait=has_time):
-                said, content = worker.answer()
-                if said == COMPILES:
-                    for listener in log.listeners:
-                        listener(content)
+        while waiting or suspects or running:
+            on_trial = any(tries[index] for index in running.values())
+            room = 0 if on_trial else most - len(running)
+            if suspects:
+                room = 0 if running else 1
+            while room > 0 and (suspects or waiting):
+                index = (suspects or waiting).popleft()
+                message = _pickled((function, tasks[index]))
+                if message is None:
+                    yield tasks[index], function(tasks[index])
                     continue
-                index = worker.task
-                if said == DIED:
-                    workers.remove(worker)
-                    if index is None:
-                        failed_starts += 1
-                        if failed_starts == STARTS:
-                            raise ChildProcessError(f"worker processes end before they begin: {content}")
-                    elif tries[index] < TRIES:
-                        waiting.append(index)  # at the end: the cause may be lack of memory
+                with _interrupts_held_back(), _main_hidden():
+                    running[pool.submit(_perform, message)] = index
+                room -= 1
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            broken = False
+            for future in done:
+                index = running.pop(future)
+                try:
+                    result = future.result()
+                except BrokenExecutor:
+                    broken = True
+                    tries[index] += 1
+                    if tries[index] < TRIES:
+                        suspects.append(index)
                     else:
-                        yield tasks[index], Lost(tasks[index], f"its process ended {TRIES} times: {content}")
+                        yield tasks[index], Lost(tasks[index], f"its process ended {TRIES} times")
                     continue
-                if said == RAISED:
-                    raise content
-                failed_starts = 0
-                go_on(worker)  # first, because the caller may take time over the result
-                if said == DONE:
-                    assert index is not None
-                    yield tasks[index], content
-                elif said == UNKNOWN:
-                    assert index is not None
-                    logger.info("no worker can load task %d, it runs here: %s", index, content)
-                    here.append(index)
+                if isinstance(result, Unknown):
+                    logger.info("no worker can load task %d, it runs here: %s", index, result.reason)
+                    result = function(tasks[index])
+                yield tasks[index], result
+            if broken:
+                for index in running.values():
+                    tries[index] += 1
+                    suspects.append(index)
+                running.clear()
+                _end(pool, others)
+                pool = executor(most)
     finally:
-        for worker in workers:
-            worker.end()
+        _end(pool, others)
 
 
-def _heard(workers: Sequence[_Worker], wait: bool) -> list[_Worker]:
-    """The workers that have sent a message or died; waits for one if ``wait``."""
-    by_pipe: dict[Any, _Worker] = {worker.pipe: worker for worker in workers}
-    return [by_pipe[pipe] for pipe in multiprocessing.connection.wait(list(by_pipe), None if wait else 0)]
+def _end(pool: Executor, others: set[Any]) -> None:
+    """Kill the pool's processes at once."""
+    pool.shutdown(wait=False, cancel_futures=True)
+    for child in set(multiprocessing.active_children()) - others:
+        child.kill()
+        child.join()
 
 
 def _pickled(thing: Any) -> bytes | None:
@@ -168,44 +153,29 @@ def _pickled(thing: Any) -> bytes | None:
         return None
 
 
-class _Worker:
-    """A worker process, seen from its parent.
+def _perform(message: bytes) -> Any:
+    """In a worker: one task."""
+    try:
+        function, task = pickle.loads(message)
+    except (Exception, SystemExit) as error:  # imports user modules, which may raise anything
+        return Unknown(f"{type(error).__name__}: {error}")
+    return function(task)
 
-    task
-        the index of the current task; None before the first
-    """
 
-    def __init__(self, pickled: bytes) -> None:
-        self.task: int | None = None
-        self.pipe, theirs = multiprocessing.Pipe()
-        self._process = multiprocessing.get_context("spawn").Process(
-            target=_serve, args=(theirs, pickled, bool(log.listeners)), daemon=True
-        )
-        with theirs, _interrupts_held_back(), _main_hidden():
-            self._process.start()  # then close our copy of the child's end, so that the pipe ends with the process
+def _begin() -> None:
+    """In a worker, before its first task."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
 
-    def send(self, message: bytes) -> None:
-        with suppress(OSError):  # it has just died: the end of its pipe is handled later
-            self.pipe.send_bytes(message)
 
-    def answer(self) -> tuple[str, Any]:
-        """The message that has begun to arrive; (DIED, how) if the process ended instead."""
-        try:
-            message = self.pipe.recv_bytes()
-        except (EOFError, OSError):
-            self._process.join(PATIENCE)
-            self.end()
-            code = self._process.exitcode
-            if code is not None and code < 0:
-                return DIED, f"signal {-code} ({signal.strsignal(-code)})"
-            return DIED, f"exit code {code}"
-        return pickle.loads(message)
-
-    def end(self) -> None:
-        """Kill the process at once."""
-        self.pipe.close()
-        self._process.kill()
-        self._process.join()
+def _end_with_parent() -> None:
+    """End this process with its parent: a killed parent does not end its workers."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 @contextmanager
@@ -244,55 +214,3 @@ def _main_hidden() -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"] = main
-
-
-def _serve(pipe: Connection, pickled: bytes, listened: bool) -> None:
-    """The main loop of a worker: perform tasks until the pipe ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    os.dup2(2, 1)
-    sys.stdout = sys.stderr
-    if listened:
-        log.listeners.append(lambda kernel: _say(pipe, COMPILES, kernel))
-    function: Any = None
-    with suppress(EOFError, OSError):
-        _say(pipe, READY)
-        while True:
-            message = pipe.recv_bytes()
-            try:
-                if function is None:
-                    function = pickle.loads(pickled)
-                task = pickle.loads(message)
-            except (Exception, SystemExit) as error:  # imports user modules, which may raise anything
-                _say(pipe, UNKNOWN, f"{type(error).__name__}: {error}")
-                continue
-            pipe.send_bytes(_outcome(function, task))
-
-
-def _say(pipe: Connection, what: str, content: Any = None) -> None:
-    pipe.send_bytes(pickle.dumps((what, content)))
-
-
-def _outcome(function: Callable[[Any], Any], task: Any) -> bytes:
-    """The message after a task."""
-    try:
-        return pickle.dumps((DONE, function(task)))
-    except (Exception, SystemExit) as error:  # passed on to the caller
-        trace = "".join(traceback.format_exception(error)).rstrip()
-        error.add_note(trace)
-        try:
-            message = pickle.dumps((RAISED, error))
-            pickle.loads(message)  # can fail where dumps does not: if __init__ has required arguments
-        except Exception:  # the error has contents that cannot be pickled
-            stand_in = RuntimeError(f"{type(error).__name__}: {error}")
-            stand_in.add_note(trace)
-            message = pickle.dumps((RAISED, stand_in))
-        return message
-
-
-def _end_with_parent() -> None:
-    """End this process with its parent: a killed parent does not end its workers."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)

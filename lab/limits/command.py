@@ -16,7 +16,7 @@ from ..commands.loading import Loaded, load, stdout_kept_clean
 from ..commands.options import plugin_option, seed_number, seed_option, set_option, settings_option
 from ..commands.usage_errors import Problem
 from ..plugins_check.installed import plugin_named
-from ..reporting.progress_bar import Bar, Progress
+from ..reporting.progress import Bar, Progress
 from .step_length import StepLimits, step_limits
 
 LOOKS = 20  # times that a running scene is examined

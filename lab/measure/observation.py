@@ -9,11 +9,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from ..engines.adapters import Engine
+from ..plain import Plain
 from ..trading.records import ESCAPED, NOT_FINITE
 from .body_shapes import Floats
 
@@ -24,7 +25,7 @@ SAMPLES = 400  # of the overlaps, which cost more than a step
 
 
 @dataclass
-class Seen:
+class Seen(Plain):
     """What one run showed. Lengths in the scene's units, energies in J, times in s.
 
     position (n, d)
@@ -78,11 +79,6 @@ class Seen:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {**dataclasses.asdict(self), "position": self.position.tolist()}
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`."""
-        return cls(**{**plain, "position": np.array(plain["position"], float)})
 
 
 def observe(

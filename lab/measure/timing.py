@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...framework.compilation import log
+from ..plain import Plain
 
 FINE = 1e-6  # s: a coarser clock cannot time a block of steps
 
@@ -47,7 +48,7 @@ def timed(work: Callable[[], Any]) -> tuple[float, bool, Any]:
 
 
 @dataclass(frozen=True)
-class Spread:
+class Spread(Plain):
     """Repeated measurements: the median, the least and the largest, and all values."""
 
     median: float
@@ -59,8 +60,3 @@ class Spread:
     def of(cls, values: Sequence[float]) -> Spread:
         """From at least one value."""
         return cls(statistics.median(values), min(values), max(values), tuple(values))
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Spread:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "values": tuple(plain["values"])})

@@ -11,7 +11,7 @@ from ...framework import Plugin
 from ...framework.plugins.discovery import offers
 from ..commands.group import Commands
 from ..commands.loading import stdout_kept_clean
-from ..reporting.progress import CompileStatus
+from ..reporting.progress import Bar
 from .check import check_plugin
 from .findings import Report, Subject
 from .installed import needed_by, plugins_of
@@ -57,7 +57,7 @@ def check_command(target: str, traceback: bool) -> int:
     del traceback  # seen by Commands.main
     found = plugins_of(target)
     console, findings = Console(), 0
-    with CompileStatus(Console(stderr=True)) as status:
+    with Bar(Console(stderr=True)) as status:
         for plugin in found:
             with stdout_kept_clean():
                 report = check_plugin(plugin, needed_by(plugin), lambda what, p=plugin: status.say(f"{p.name}: {what}"))

@@ -1,4 +1,4 @@
-"""Progress of a command: what compiles, the number of steps done, their rate, and the time left."""
+"""Progress of a command: what it does, what compiles, and the time left; a bar on a terminal, else lines."""
 
 from __future__ import annotations
 
@@ -6,65 +6,63 @@ import time
 from types import TracebackType
 from typing import Self
 
+import rich.progress
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 
 from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_folder
 
-REFRESH = 0.1  # s between two updates of the numbers
+REFRESH = 0.1  # s between two drawings of the bar
+LINES = 5.0  # s between two lines where there is no terminal
 
 
-class Compiling:
-    """The text shown when a compilation begins: the kernel, the number so far, and once the cache folder."""
+class Progress:
+    """Counts, but shows nothing."""
 
     def __init__(self) -> None:
-        self._before = (len(log.compiled), log.seconds)
-        self._shown = False
+        self.done = 0.0
 
-    def words(self, kernel: str) -> str:
-        """The text for ``kernel``, named as in the log."""
-        count, seconds = len(log.compiled) - self._before[0], log.seconds - self._before[1]
-        so_far = f"{count} so far, {seconds:.1f} s" if count else ""
-        left = f"{log.left} left" if log.left else ""
-        numbers = ", ".join(filter(None, (left, so_far)))
-        return f"compiling {kernel.rpartition('.')[2]}{f' ({numbers})' if numbers else ''} ..."
+    def begin(self, total: float, done: float = 0.0) -> None:
+        """Set the total amount of work, in any unit, and the part done by an earlier process."""
+        self.done = done
 
-    def show_cache_folder(self, console: Console) -> None:
-        """Print where the kernels are kept; at the first call only."""
-        if self._shown:
-            return
-        self._shown = True
-        folder = cache_folder()
-        text = f"kept in {folder} for next time"
-        if folder is None:
-            text = f"not kept: there is no folder that can be written ({CACHE_FOLDER_VARIABLE} names one)"
-        console.print(f"first use: kernels are compiled, and {text}", style="dim", highlight=False, soft_wrap=True)
+    def say(self, what: str) -> None:
+        """Show the current activity."""
+
+    def advance(self, amount: float) -> None:
+        """Add to the work done."""
+        self.done += amount
 
 
-class StepProgress:
-    """A context manager around a run: call :meth:`done` after each step.
+NO_PROGRESS = Progress()
 
-    The rate is measured since the last compilation, so that the time left does not jump after the first
-    step.
+
+class Bar(Progress):
+    """A context manager that shows progress on ``console``, and the names of kernels while they compile.
+
+    It has no thread, which would take time from the measurement.
     """
 
-    def __init__(self, console: Console, name: str, steps: int) -> None:
-        self._console, self._name, self._steps = console, name, steps
-        self._bar = Progress(
-            SpinnerColumn(),
-            TextColumn("[bold]{task.description}"),
-            BarColumn(bar_width=None),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
+    def __init__(self, console: Console) -> None:
+        super().__init__()
+        self._console = console
+        self._bar = rich.progress.Progress(
+            rich.progress.TextColumn("[bold]{task.description}"),
+            rich.progress.BarColumn(bar_width=None),
+            rich.progress.TaskProgressColumn(),
+            rich.progress.TimeRemainingColumn(),
+            rich.progress.TextColumn("left"),
             console=console,
             expand=True,
+            auto_refresh=False,
+            speed_estimate_period=120,
+            disable=not console.is_terminal,
         )
-        self._task = self._bar.add_task(f"{name}: starting", total=steps, rate="")
-        self._since = (time.perf_counter(), 0)  # start of the measurement, and the steps done then
-        self._shown = 0.0
-        self._words = Compiling()
-        self._compiling = False
+        self._task = self._bar.add_task("starting", total=None)
+        self._total: float | None = None
+        self._what = ""
+        self._shown = time.monotonic()
+        self._told_of_cache = False
 
     def __enter__(self) -> Self:
         log.listeners.append(self._compiles)
@@ -77,65 +75,58 @@ class StepProgress:
         log.listeners.remove(self._compiles)
         self._bar.stop()
 
-    def done(self, steps: int) -> None:
-        """Report that ``steps`` steps have been taken so far."""
-        now = time.perf_counter()
-        if self._compiling:
-            self._compiling = False
-            self._since = (now, steps)
-            self._shown = 0.0
-        if now - self._shown < REFRESH and steps < self._steps:
-            return
-        self._shown = now
-        seconds, counted = now - self._since[0], steps - self._since[1]
-        rate = ""
-        if counted and seconds > 0:
-            per_second = counted / seconds
-            left = (self._steps - steps) / per_second
-            rate = f"{per_second:,.0f} steps/s" + (f", {_clock(left)} left" if steps < self._steps else "")
-        self._bar.update(self._task, completed=steps, description=f"{self._name}: stepping", rate=rate)
+    def begin(self, total: float, done: float = 0.0) -> None:
+        """Set the total amount of work, in any unit, and the part done by an earlier process.
 
-    def _compiles(self, kernel: str) -> None:
-        self._compiling = True
-        self._words.show_cache_folder(self._console)
-        self._bar.update(self._task, description=f"{self._name}: {self._words.words(kernel)}", rate="")
-        self._bar.refresh()
-
-
-class CompileStatus:
-    """A context manager that reports compilations on ``console``; for work without a progress bar."""
-
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._words = Compiling()
-        self._what = ""
-        self._status = console.status("starting")
-
-    def __enter__(self) -> Self:
-        log.listeners.append(self._compiles)
-        self._status.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        log.listeners.remove(self._compiles)
-        self._status.stop()
+        That part fills the bar and is not used for the time left.
+        """
+        super().begin(total, done)
+        self._total = total
+        self._bar.update(self._task, total=total, completed=done)
+        self._show(0.0)
 
     def say(self, what: str) -> None:
         """Show the current activity."""
         self._what = what
-        self._status.update(what)
+        self._bar.update(self._task, description=what)
+        self._show(0.0)
+
+    def advance(self, amount: float) -> None:
+        """Add to the work done."""
+        super().advance(amount)
+        self._bar.update(self._task, completed=self.done, description=self._what)
+        last = self._total is not None and self.done >= self._total
+        self._show(0.0 if last else REFRESH)
+
+    def _show(self, pause: float) -> None:
+        """Draw the bar if ``pause`` s have gone by since; a line, if LINES have."""
+        now = time.monotonic()
+        terminal = self._console.is_terminal
+        if now - self._shown < (pause if terminal else LINES):
+            return
+        self._shown = now
+        if terminal:
+            self._bar.refresh()
+        else:
+            share = f": {100 * min(self.done / self._total, 1):.0f} %" if self._total else ""
+            self._line(f"{self._what}{share}")
+
+    def _line(self, text: str) -> None:
+        self._console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
 
     def _compiles(self, kernel: str) -> None:
-        self._words.show_cache_folder(self._console)
-        self._status.update(f"{self._what}: {self._words.words(kernel)}")
-
-
-def _clock(seconds: float) -> str:
-    whole = round(seconds)
-    return (
-        f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
-        if whole >= 3600
-        else f"{whole // 60}:{whole % 60:02}"
-    )
+        if not self._told_of_cache:
+            self._told_of_cache = True
+            folder = cache_folder()
+            place = f"kept in {folder} for next time"
+            if folder is None:
+                place = f"not kept: there is no folder that can be written ({CACHE_FOLDER_VARIABLE} names one)"
+            self._line(f"first use: kernels are compiled, and {place}")
+        left = f" ({log.left} left)" if log.left else ""
+        text = f"{self._what}: compiling {kernel.rpartition('.')[2]}{left} ..."
+        self._bar.update(self._task, description=text)
+        if self._console.is_terminal:
+            self._bar.refresh()
+        elif time.monotonic() - self._shown >= LINES:
+            self._shown = time.monotonic()
+            self._line(text)

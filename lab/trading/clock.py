@@ -11,7 +11,7 @@ from ...framework.compilation import log
 from ..cases.case import Case
 from ..jobs.tasks import engine_of
 from ..measure.timing import Spread, no_garbage_collection
-from ..reporting.progress_bar import Progress
+from ..reporting.progress import Progress
 from .records import Point
 
 REPEATS = 5  # of a run, at most

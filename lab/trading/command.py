@@ -32,7 +32,7 @@ from ..commands.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.result_store import Store
 from ..reporting.output import Output
-from ..reporting.progress_bar import Bar
+from ..reporting.progress import Bar
 from ..reporting.text_tables import TextTable
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
@@ -41,7 +41,6 @@ from .summary import summaries
 from .trade import Only, trade
 
 MARK = "carom trade"
-RESULTS = "results.jsonl"
 
 
 @click.command("trade", cls=KeepsWords, short_help="What speed costs in accuracy, measured.")
@@ -75,7 +74,7 @@ def trade_command(
     no_timing: bool,
     quick: bool,
     workers: int | None,
-    resume: bool,
+    kept: Path,
     out: Path,
     as_json: bool,
     as_markdown: bool,
@@ -102,9 +101,7 @@ def trade_command(
         "against_pymunk": against == PYMUNK, "timing": not no_timing, "quick": quick, "options": options,
         "seed": seed_number(seed), "workers": workers, "command": _command_line(context),
     }  # fmt: skip
-    with Store.open(out / RESULTS, resume) as store:
-        if resume:
-            click.echo(f"carom: {_results(store)} in {store.path}: those that fit are taken over", err=True)
+    with Store(kept) as store:
         try:
             with Bar(Console(stderr=True)) as bar:
                 result = trade(*targets, **arguments, store=store, progress=bar)
@@ -113,7 +110,7 @@ def trade_command(
                     bar.say("charts")
                     files += [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
         except KeyboardInterrupt:
-            click.echo(f"carom: stopped; {_results(store)} kept in {store.path}, --resume goes on", err=True)
+            click.echo(f"carom: stopped; {_results(store)} kept in {store.path}, the same command goes on", err=True)
             raise click.exceptions.Exit(STOPPED) from None
     choices = [cheapest(case) for case in measured(result)]
     page = [*summaries(result), *choices]
@@ -152,7 +149,7 @@ def chart_module() -> Any:
 
 def _command_line(context: click.Context) -> str:
     """The command line that repeats the measurement from the start."""
-    return shlex.join([*MARK.split(), *(word for word in context.meta[WORDS] if word != "--resume")])
+    return shlex.join([*MARK.split(), *context.meta[WORDS]])
 
 
 def _results(store: Store) -> str:

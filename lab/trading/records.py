@@ -14,6 +14,7 @@ from typing import Any, Self
 
 from ...framework import Settings
 from ..measure.timing import Spread
+from ..plain import Plain
 
 CAROM, PYMUNK = "carom", "pymunk"
 SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  # kinds of scenes
@@ -59,7 +60,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Plain):
     """One run of one cell.
 
     repeat
@@ -81,11 +82,6 @@ class Outcome:
     counts: dict[str, float]
     seconds: float
     detail: str = ""
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "cell": Cell(**plain["cell"])})
 
 
 @dataclass(frozen=True)
@@ -111,7 +107,7 @@ class ErrorBar:
 
 
 @dataclass
-class Point:
+class Point(Plain):
     """One cell over all its repeats.
 
     errors
@@ -142,20 +138,9 @@ class Point:
         """True if no repeat failed and the worst of them meets the target."""
         return not self.failed and norm in self.errors and self.errors[norm].high <= target
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        spread = plain["milliseconds"]
-        return cls(**{
-            **plain,
-            "cell": Cell(**plain["cell"]),
-            "errors": {norm: ErrorBar(**bar) for norm, bar in plain["errors"].items()},
-            "milliseconds": None if spread is None else Spread.from_dict(spread),
-        })  # fmt: skip
-
 
 @dataclass
-class Curve:
+class Curve(Plain):
     """One method: its points from the largest step to the smallest.
 
     label
@@ -170,11 +155,6 @@ class Curve:
     points: list[Point]
     orders: dict[str, float | None] = field(default_factory=dict)
     theory: dict[str, float | None] = field(default_factory=dict)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "points": [Point.from_dict(point) for point in plain["points"]]})
 
 
 @dataclass
@@ -200,7 +180,7 @@ class Reference:
 
 
 @dataclass
-class CaseTrade:
+class CaseTrade(Plain):
     """One scene with all its curves.
 
     scene
@@ -235,15 +215,9 @@ class CaseTrade:
     def norm(self) -> str:
         return next(iter(self.norms))
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        curves = [Curve.from_dict(curve) for curve in plain["curves"]]
-        return cls(**{**plain, "reference": Reference(**plain["reference"]), "curves": curves})
-
 
 @dataclass
-class Trade:
+class Trade(Plain):
     """All cases of one call, on one machine; ``command`` reproduces it."""
 
     machine: dict[str, str]
@@ -259,13 +233,13 @@ class Trade:
         return plain
 
     @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
+    def from_dict(cls, plain: Mapping[str, Any]) -> Self:
         """The inverse of :meth:`as_dict`, also after JSON."""
-        cases = [CaseTrade.from_dict(case) for case in plain["cases"]]
-        for case in cases:
+        trade = super().from_dict(plain)
+        for case in trade.cases:
             for curve in case.curves:
                 curve.theory = {k: math.inf if v == "exact" else v for k, v in curve.theory.items()}
-        return cls(**{**plain, "cases": cases})
+        return trade
 
 
 def observed_order(steps: Sequence[float], errors: Sequence[float]) -> float | None:

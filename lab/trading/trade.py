@@ -16,7 +16,7 @@ from ..jobs.result_store import Store
 from ..jobs.runs import Runs, point_of, refined_reference, run_tasks
 from ..jobs.tasks import engine_of
 from ..measure.norms import NORMS
-from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..reporting.progress import NO_PROGRESS, Progress
 from .clock import time_points
 from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Outcome, Point, Reference, Trade, by_method, observed_order
 

@@ -13,7 +13,7 @@ from ..cases.case import Case, case_of
 from ..jobs.result_store import Store
 from ..jobs.runs import Runs, point_of, run_tasks
 from ..measure.norms import NORMS
-from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CAROM, Cell, Outcome, Point, Reference
 from .search import Tuning, enough_repeats, exact_enough
 

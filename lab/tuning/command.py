@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import shlex
 from pathlib import Path
@@ -19,25 +18,22 @@ from ..commands.options import (
     KeepsWords,
     case_options,
     only_options,
-    out_option,
     runs_options,
     seed_number,
     shown_options,
     together,
-    writable_folder,
 )
 from ..commands.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import Runs
 from ..reporting.output import Output
-from ..reporting.progress_bar import Bar
+from ..reporting.progress import Bar
 from ..trading.trade import Only
 from .check import Check, check, measured_with
 from .report import TuneResult, sentences, tables
 from .search import Tuning, search
 
 MARK = "carom tune"
-RESULTS = "tune.jsonl"
 NONE_MEETS = 1  # exit code
 
 
@@ -63,7 +59,6 @@ def _above_zero(context: click.Context, parameter: click.Parameter, value: float
     help="Also measure the choice on this scene, which it was not tuned on; repeatable.",
 )  # fmt: skip
 @runs_options
-@out_option("Keep finished runs here, for --resume (default: nothing is kept).")
 @shown_options
 @click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
 @click.pass_context
@@ -84,8 +79,7 @@ def tune_command(
     geometries: tuple[str, ...] | None,
     checked: tuple[str, ...],
     workers: int | None,
-    resume: bool,
-    out: Path | None,
+    kept: Path,
     as_json: bool,
     as_markdown: bool,
     into: Path | None,
@@ -100,9 +94,7 @@ def tune_command(
     del traceback  # seen by Commands.main
     if len(norms) > 1:
         raise Problem(f"--norm: settings are tuned for one error, not for {' and '.join(norms)}")
-    if resume and out is None:
-        raise Problem("--resume goes on with the runs that --out FOLDER holds: say which folder")
-    command = shlex.join([*MARK.split(), *(word for word in context.meta[WORDS] if word != "--resume")])
+    command = shlex.join([*MARK.split(), *context.meta[WORDS]])
     output = Output.checked(" ".join((MARK, target)), as_json, as_markdown, into, None)
     for other in checked:
         subject_of(other)
@@ -111,9 +103,7 @@ def tune_command(
         "only": Only(integrators or (), collisions or (), substeps or (), geometries or ()), "seed": seed_number(seed),
         "workers": workers,
     }  # fmt: skip
-    if out is not None:
-        writable_folder(out)
-    with _store(out, resume) as store, Bar(Console(stderr=True)) as bar:
+    with Store(kept) as store, Bar(Console(stderr=True)) as bar:
         try:
             tuning = search(target, max_error, norms[0] if norms else None, store=store, progress=bar, **arguments)
             balanced = measured_with(tuning.case, Settings.balanced(), Runs(workers, store, bar))
@@ -121,16 +111,11 @@ def tune_command(
             for other in checked if tuning.choice is not None else ():
                 found.append(_checked(tuning, other, absolute=absolute, workers=workers, store=store, progress=bar))
         except KeyboardInterrupt:
-            kept = f"; --resume goes on with what {store.path} holds" if store is not None else ""
-            click.echo(f"carom: stopped{kept}", err=True)
+            click.echo(f"carom: stopped; finished runs are kept in {store.path}, the same command goes on", err=True)
             raise click.exceptions.Exit(STOPPED) from None
     _show(TuneResult(command, tuning, balanced, found), output)
     if tuning.choice is None:
         raise click.exceptions.Exit(NONE_MEETS)
-
-
-def _store(out: Path | None, resume: bool) -> contextlib.AbstractContextManager[Store | None]:
-    return contextlib.nullcontext() if out is None else Store.open(out / RESULTS, resume)
 
 
 def _checked(tuning: Tuning, target: str, **options: Any) -> Check:

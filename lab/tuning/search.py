@@ -25,7 +25,7 @@ from ..jobs.result_store import Store
 from ..jobs.runs import Runs, point_of, refined_reference, run_tasks
 from ..jobs.tasks import Task
 from ..measure.norms import NORMS
-from ..reporting.progress_bar import NO_PROGRESS, Progress
+from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
 from ..trading.records import TRUSTED, Cell, Outcome, Point, Reference
 from ..trading.trade import Only

@@ -28,7 +28,7 @@ from ...measure.body_shapes import Floats
 from ...measure.escape import Enclosure
 from ...measure.run import plain_settings
 from ...measure.timing import Spread, no_garbage_collection, timed
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...reporting.progress import NO_PROGRESS, Progress
 from ..results import Result, Row, machine
 from ..suite import Subject, Window, sizes_of
 from .queries import Query, time_queries

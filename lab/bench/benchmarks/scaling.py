@@ -6,14 +6,13 @@ With perfect scaling the nanoseconds per body and step are constant; cache misse
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from dataclasses import dataclass
-from typing import Any, Self
 
 from ....scenes import gas
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, timed
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...plain import Plain
+from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
 from ..report import digits, span
 from ..results import machine
@@ -27,7 +26,7 @@ TARGET = (10_000, 100_000, 2.5)  # from, to, largest allowed growth of the time 
 
 
 @dataclass
-class Point:
+class Point(Plain):
     """One size: nanoseconds per body per step, and the ratio to the first size."""
 
     bodies: int
@@ -35,29 +34,15 @@ class Point:
     nanoseconds: Spread
     growth: float
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "nanoseconds": Spread.from_dict(plain["nanoseconds"])})
-
 
 @dataclass
-class Scaling:
+class Scaling(Plain):
     """The whole series."""
 
     scene: str
     machine: dict[str, str]
     repeats: int
     points: list[Point]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "points": [Point.from_dict(point) for point in plain["points"]]})
 
     def grown(self, first: int, last: int) -> float | None:
         """The time per body at ``last`` over that at ``first``; None if either was not measured."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import statistics
@@ -12,12 +11,12 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
 
 from ....framework.jit.cache import CACHE_FOLDER_VARIABLE
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...plain import Plain
+from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
 from ..report import digits, span
 from ..results import machine
@@ -61,21 +60,11 @@ class Start:
 
 
 @dataclass
-class Startup:
+class Startup(Plain):
     """All starts that were measured; medians of the repeats."""
 
     machine: dict[str, str]
     starts: list[Start]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        starts = [Start(**{**start, "seconds": Spread.from_dict(start["seconds"])}) for start in plain["starts"]]
-        return cls(**{**plain, "starts": starts})
 
 
 def startup(scenes: Sequence[str] = ("asteroids",), repeats: int = 3, progress: Progress = NO_PROGRESS) -> Startup:

@@ -8,14 +8,13 @@ steps runs inside a profile, which gives the fraction of the step spent in the i
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import statistics
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +27,8 @@ from ...commands.usage_errors import Problem
 from ...measure.body_shapes import shapes_of
 from ...measure.escape import Enclosure
 from ...measure.timing import Spread, no_garbage_collection, timed
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...plain import Plain
+from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
 
 STEPS = 60
@@ -194,7 +194,7 @@ class Found:
 
 
 @dataclass
-class ModeCost:
+class ModeCost(Plain):
     """One collision mode in one scene.
 
     ``milliseconds`` per step; ``ratio``: to discrete, within each repeat; ``impacts`` and ``rounds`` per step, means;
@@ -220,16 +220,9 @@ class ModeCost:
     escaped: int
     capped: int
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        names = ("milliseconds", "ratio", "step_us", "loop_us")
-        spreads = {name: None if plain[name] is None else Spread.from_dict(plain[name]) for name in names}
-        return cls(**{**plain, **spreads})
-
 
 @dataclass
-class Modes:
+class Modes(Plain):
     """All scenes with all their modes. ``steps``: the number requested."""
 
     steps: int
@@ -237,15 +230,6 @@ class Modes:
     machine: dict[str, str]
     compile_seconds: float
     costs: list[ModeCost]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "costs": [ModeCost.from_dict(cost) for cost in plain["costs"]]})
 
 
 def modes(

@@ -10,7 +10,7 @@ from rich.console import Console
 from ...bench.command import RUNS
 from ...commands.options import repeats_option, shown_options
 from ...reporting.output import Output
-from ...reporting.progress_bar import Bar
+from ...reporting.progress import Bar
 from . import collision_modes as bench_modes
 from . import feature_ladder as bench_ladder
 from . import plugin_pairs as bench_pairs

@@ -6,11 +6,10 @@ A scene pays only for the features it uses. ``world.plan()`` lists them; this be
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,8 @@ from ...bench.report import digits, span
 from ...bench.results import machine
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, timed
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...plain import Plain
+from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
 
 BODIES = 10_000
@@ -130,7 +130,7 @@ RUNGS: tuple[Rung, ...] = (
 
 
 @dataclass
-class Cost:
+class Cost(Plain):
     """One rung. nanoseconds: per body and step; extra: difference to the scene beside it, within each repeat.
 
     ``bytes``: of the columns, per body; ``kernels``: those called here but not by the scene beside it.
@@ -143,15 +143,9 @@ class Cost:
     bytes: int
     kernels: list[str]
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        extra = None if plain["extra"] is None else Spread.from_dict(plain["extra"])
-        return cls(**{**plain, "nanoseconds": Spread.from_dict(plain["nanoseconds"]), "extra": extra})
-
 
 @dataclass
-class Ladder:
+class Ladder(Plain):
     """All rungs."""
 
     bodies: int
@@ -159,15 +153,6 @@ class Ladder:
     repeats: int
     machine: dict[str, str]
     costs: list[Cost]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "costs": [Cost.from_dict(cost) for cost in plain["costs"]]})
 
 
 def ladder(bodies: int = BODIES, repeats: int = 5, progress: Progress = NO_PROGRESS, steps: int = STEPS) -> Ladder:

@@ -13,12 +13,11 @@ Each state has new random positions, because repeating one state would train the
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +36,8 @@ from ...bench.report import digits, span
 from ...bench.results import machine
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, now
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...plain import Plain
+from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
 
 BODIES = 4000
@@ -166,7 +166,7 @@ def narrow_kernel(evaluate: Callable[..., bool], dimensions: int) -> Callable[..
 
 
 @dataclass
-class PairCost:
+class PairCost(Plain):
     """One scene: nanoseconds per candidate of each kernel, and the registered pair's time over that of two others.
 
     built_in, to_built_in
@@ -183,29 +183,14 @@ class PairCost:
     to_built_in: Spread | None
     to_by_hand: Spread
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        spreads = {name: Spread.from_dict(value) for name, value in plain.items() if isinstance(value, dict)}
-        return cls(**{**plain, **spreads})
-
 
 @dataclass
-class PairCosts:
+class PairCosts(Plain):
     """All scenes."""
 
     machine: dict[str, str]
     repeats: int
     costs: list[PairCost]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "costs": [PairCost.from_dict(cost) for cost in plain["costs"]]})
 
 
 def pair_costs(repeats: int = 15, progress: Progress = NO_PROGRESS, bodies: int = BODIES) -> PairCosts:

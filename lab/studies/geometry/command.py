@@ -9,7 +9,7 @@ from rich.console import Console
 
 from ...commands.options import out_option, repeats_option, shown_options
 from ...reporting.output import Output
-from ...reporting.progress_bar import Bar
+from ...reporting.progress import Bar
 from . import report as geometry_report
 from .study import COUNT, REPEATS, geometry_study
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 from ...measure.timing import Spread
+from ...plain import Plain
 
 DERIVED = ("false_positives", "share", "first_share")  # written to JSON besides the fields they follow from
 
 
 @dataclass
-class GeometryCost:
+class GeometryCost(Plain):
     """One kind of object, upright or turned, with one option; counts over all worlds.
 
     touching
@@ -66,16 +67,9 @@ class GeometryCost:
         derived = {name: getattr(self, name) for name in DERIVED}
         return {**dataclasses.asdict(self), **derived}
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        given = {name: value for name, value in plain.items() if name not in DERIVED}
-        spreads = {name: Spread.from_dict(plain[name]) for name in ("nanoseconds", "finding")}
-        return cls(**{**given, **spreads})
-
 
 @dataclass
-class GeometryStudy:
+class GeometryStudy(Plain):
     """All records, measured on one machine."""
 
     machine: dict[str, str]
@@ -106,8 +100,3 @@ class GeometryStudy:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {**dataclasses.asdict(self), "costs": [cost.as_dict() for cost in self.costs]}
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(**{**plain, "costs": [GeometryCost.from_dict(cost) for cost in plain["costs"]]})

@@ -22,7 +22,7 @@ from ....plugins.convex_polygon import ConvexPolygonCollider
 from ...bench.results import machine
 from ...commands.usage_errors import Problem, did_you_mean
 from ...measure.timing import Spread, no_garbage_collection, now
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...reporting.progress import NO_PROGRESS, Progress
 from .objects import OBJECTS, Object
 from .records import GeometryCost, GeometryStudy
 from .reference import expected_area, touching

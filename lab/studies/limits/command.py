@@ -11,14 +11,16 @@ import click
 from rich.console import Console
 
 from ...commands.options import (
+    listed,
+    one_of,
     out_option,
     seed_number,
     seed_option,
     shown_options,
 )
-from ...commands.usage_errors import Problem, did_you_mean
+from ...commands.usage_errors import Problem
 from ...reporting.output import Output
-from ...reporting.progress_bar import Bar
+from ...reporting.progress import Bar
 from . import report as limits_report
 from .pairs import report as pairs_report
 from .pairs.axes import Draw
@@ -31,7 +33,10 @@ NAMES = tuple(axis.name for axis in AXES)
 
 
 @click.command("limits", short_help="Where carom fails.")
-@click.option("--axes", "axis_names", metavar="NAME,NAME", help=f"Only these of {', '.join(NAMES)}.")
+@click.option(
+    "--axes", "names", metavar="NAME,NAME", help=f"Only these of {', '.join(NAMES)}.",
+    callback=listed("--axes", "names", one_of("--axes", NAMES)),
+)  # fmt: skip
 @click.option("--quick", is_flag=True, help="Fewer values on each axis: about a minute; few scenes of --pairs.")
 @click.option("--long", "long_runs", is_flag=True, help="Runs of a million steps too: about ten minutes more.")
 @click.option("--pairs", is_flag=True, help=f"Cross the axes in pairs: {SCENES:,} short random scenes, some minutes.")
@@ -43,7 +48,7 @@ NAMES = tuple(axis.name for axis in AXES)
 @seed_option
 @click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
 def limits_command(
-    axis_names: str | None,
+    names: tuple[str, ...] | None,
     quick: bool,
     long_runs: bool,
     pairs: bool,
@@ -68,7 +73,7 @@ def limits_command(
         _refuse({"--scenes": scenes is not None, "--workers": workers is not None}, "needs --pairs")
     if crossing:
         of_others = {
-            "--axes": axis_names is not None, "--long": long_runs, "--out": out is not None,
+            "--axes": names is not None, "--long": long_runs, "--out": out is not None,
         }  # fmt: skip
         _refuse(of_others, "does not go with --pairs or --play")
         if play is not None:
@@ -82,18 +87,12 @@ def limits_command(
         _cross(wanted, seed_number(seed), workers, output)
         return
     _refuse({"--seed": seed != "0"}, "needs --pairs")
-    _sweep(axis_names, quick, long_runs, Output.checked(MARK, as_json, as_markdown, into, out))
+    _sweep(names, quick, long_runs, Output.checked(MARK, as_json, as_markdown, into, out))
 
 
-def _sweep(axis_names: str | None, quick: bool, long_runs: bool, output: Output) -> None:
+def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: Output) -> None:
     if quick and long_runs:
         raise Problem("--quick and --long exclude each other")
-    names = None if axis_names is None else [name for name in axis_names.replace(" ", "").split(",") if name]
-    for name in names or ():
-        if name not in NAMES:
-            raise Problem(f"--axes: no axis {name!r}{did_you_mean(name, NAMES)}")
-    if names is not None and not names:
-        raise Problem(f"--axes takes names with commas between them: {', '.join(NAMES)}")
     if output.charts is not None:
         output = dataclasses.replace(output, charts=importlib.import_module(".chart", __package__))
     with Bar(Console(stderr=True)) as bar:

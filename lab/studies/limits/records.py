@@ -5,13 +5,13 @@ The results are plain data that converts to JSON and back.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any
 
 from ....framework import Settings
+from ...plain import Plain
 
 LEVELS = {"1 %": 0.01, "10 %": 0.1}
 BREAKS = "breaks"
@@ -121,7 +121,7 @@ class Edge:
 
 
 @dataclass
-class Line:
+class Line(Plain):
     """One method on one axis; samples ascending."""
 
     method: str
@@ -135,15 +135,9 @@ class Line:
                 return edge
         raise KeyError(f"{self.method}: no edge {level!r} on the way {way}")
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        samples = [Sample(**sample) for sample in plain["samples"]]
-        return cls(plain["method"], samples, [Edge(**edge) for edge in plain["edges"]])
-
 
 @dataclass
-class AxisLimits:
+class AxisLimits(Plain):
     """One axis with all its methods; see Axis."""
 
     name: str
@@ -159,14 +153,9 @@ class AxisLimits:
                 return line
         raise KeyError(f"axis {self.name}: no method {method!r}; it has {', '.join(x.method for x in self.lines)}")
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "lines": [Line.from_dict(line) for line in plain["lines"]]})
-
 
 @dataclass
-class Limits:
+class Limits(Plain):
     """A whole sweep, with the machine and versions it ran on."""
 
     machine: dict[str, str]
@@ -178,15 +167,6 @@ class Limits:
             if axis.name == name:
                 return axis
         raise KeyError(f"no axis {name!r} in this sweep; it has {', '.join(axis.name for axis in self.axes)}")
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(plain["machine"], [AxisLimits.from_dict(axis) for axis in plain["axes"]])
 
 
 def decades(first: int, last: int, per_decade: int = 1) -> tuple[float, ...]:

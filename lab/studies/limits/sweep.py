@@ -14,7 +14,7 @@ import numpy as np
 from ....framework import CaromError
 from ...bench.results import machine
 from ...commands.usage_errors import did_you_mean, one_line
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...reporting.progress import NO_PROGRESS, Progress
 from . import axes_contacts as limits_axes_contacts
 from . import axes_motion as limits_axes
 from .records import BREAKS, DOWN, LEVELS, MODES, UP, Axis, AxisLimits, BrokenError, Edge, Limits, Line, Method, Sample

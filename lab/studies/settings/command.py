@@ -10,7 +10,7 @@ from rich.console import Console
 from ...commands.options import repeats_option, shown_options
 from ...commands.usage_errors import Problem
 from ...reporting.output import Output
-from ...reporting.progress_bar import Bar
+from ...reporting.progress import Bar
 from .games import games_study, of_names
 from .records import GamesStudy, SettingsStudy
 from .report import game_remarks, game_tables, remarks, tables

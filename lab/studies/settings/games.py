@@ -28,7 +28,7 @@ from ...engines.cost import counts_of, work_of
 from ...jobs.runs import Runs, point_of, run_tasks
 from ...measure.escape import Enclosure
 from ...measure.timing import Spread
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...reporting.progress import NO_PROGRESS, Progress
 from ...trading.code_line import settings_line
 from ...trading.records import Cell, Outcome, Point
 from ...tuning.search import search

@@ -6,15 +6,16 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 from ...measure.timing import Spread
+from ...plain import Plain
 
 INFINITE = "infinite"  # represents infinity in JSON
 
 
 @dataclass
-class Sample:
+class Sample(Plain):
     """One value of a field in one scene.
 
     time
@@ -30,14 +31,9 @@ class Sample:
     work: float
     errors: dict[str, float]
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "time": Spread.from_dict(plain["time"])})
-
 
 @dataclass
-class Setting:
+class Setting(Plain):
     """One field varied in one scene; all other fields keep the scene's values.
 
     others
@@ -67,15 +63,9 @@ class Setting:
                 return sample
         raise KeyError(f"{self.field}={value!r} was not tried in {self.scene}")
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        samples = [Sample.from_dict(sample) for sample in plain["samples"]]
-        return cls(**{**plain, "milliseconds": Spread.from_dict(plain["milliseconds"]), "samples": samples})
-
 
 @dataclass
-class SettingsStudy:
+class SettingsStudy(Plain):
     """All fields, on one machine."""
 
     machine: dict[str, str]
@@ -98,15 +88,9 @@ class SettingsStudy:
         """For JSON."""
         return _without_infinities(dataclasses.asdict(self))
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        whole = _with_infinities(plain)
-        return cls(**{**whole, "settings": [Setting.from_dict(setting) for setting in whole["settings"]]})
-
 
 @dataclass
-class Choice:
+class Choice(Plain):
     """Settings tried in a game's scene.
 
     name
@@ -132,15 +116,9 @@ class Choice:
     failure: str = ""
     also: dict[str, float] = dataclasses.field(default_factory=dict)
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        spread = plain["milliseconds"]
-        return cls(**{**plain, "milliseconds": None if spread is None else Spread.from_dict(spread)})
-
 
 @dataclass
-class GameChoices:
+class GameChoices(Plain):
     """One kind of game.
 
     scene
@@ -174,14 +152,9 @@ class GameChoices:
                 return choice
         raise KeyError(f"no choice {name!r} for {self.game}")
 
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """From the output of ``dataclasses.asdict``, also after JSON."""
-        return cls(**{**plain, "choices": [Choice.from_dict(choice) for choice in plain["choices"]]})
-
 
 @dataclass
-class GamesStudy:
+class GamesStudy(Plain):
     """All kinds of games, on one machine."""
 
     machine: dict[str, str]
@@ -197,12 +170,6 @@ class GamesStudy:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return _without_infinities(dataclasses.asdict(self))
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        whole = _with_infinities(plain)
-        return cls(**{**whole, "games": [GameChoices.from_dict(game) for game in whole["games"]]})
 
 
 TUNED = "tuned"

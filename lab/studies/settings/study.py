@@ -16,7 +16,7 @@ from ....framework import Settings, World
 from ...bench.results import machine
 from ...commands.usage_errors import Problem, did_you_mean
 from ...measure.timing import Spread
-from ...reporting.progress_bar import NO_PROGRESS, Progress
+from ...reporting.progress import NO_PROGRESS, Progress
 from . import scenes as at
 from .clock import Cost, Play, costs, steps
 from .records import Sample, Setting, SettingsStudy

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, Self
 
 from ....bench.results import machine
 from ....jobs.workers import Lost, in_parallel
-from ....reporting.progress_bar import NO_PROGRESS, Progress
+from ....plain import Plain
+from ....reporting.progress import NO_PROGRESS, Progress
 from .axes import PAIRS, ROUND, Draw
 from .scenes import Outcome, played
 
@@ -27,7 +26,7 @@ class Batch:
 
 
 @dataclass
-class PairLimits:
+class PairLimits(Plain):
     """A whole sweep, with the machine and versions it ran on; outcomes in the order of their numbers."""
 
     machine: dict[str, str]
@@ -37,15 +36,6 @@ class PairLimits:
     def draws(self) -> list[Draw]:
         """The scenes, in the order of the outcomes."""
         return [Draw.of(self.seed, outcome.number) for outcome in self.outcomes]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
-    @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> Self:
-        """The inverse of :meth:`as_dict`, also after JSON."""
-        return cls(plain["machine"], plain["seed"], [Outcome(**outcome) for outcome in plain["outcomes"]])
 
 
 def pair_limits(
