@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import types
 import typing
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
+
+INFINITE = "inf"  # in the place of infinity, which JSON has no number for
 
 
 class Plain:
@@ -36,13 +39,16 @@ def _read(plain: Any, kind: Any) -> Any:
         return None
     origin, inner = typing.get_origin(kind), typing.get_args(kind)
     if dataclasses.is_dataclass(kind) and isinstance(plain, Mapping):
-        return kind(**{name: _read(value, _hints(kind)[name]) for name, value in plain.items()})  # type: ignore
+        names = [field.name for field in dataclasses.fields(kind) if field.name in plain]  # as_dict may give more
+        return kind(**{name: _read(plain[name], _hints(kind)[name]) for name in names})  # type: ignore
     if origin in (typing.Union, types.UnionType):
         (first, *_) = (one for one in inner if one is not type(None))
         return _read(plain, first)
     if origin is tuple and isinstance(plain, Sequence):
         kinds = [inner[0]] * len(plain) if inner[-1] is Ellipsis else inner
         return tuple(_read(value, one) for value, one in zip(plain, kinds, strict=True))
+    if kind is float and plain == INFINITE:
+        return math.inf
     if origin is np.ndarray:
         return np.array(plain, float)
     if origin is list:

@@ -316,7 +316,7 @@ def test_the_command_prints_json():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--axes", "sped"], "--axes: no axis 'sped'; did you mean 'speed'?"),
+        (["--axes", "sped"], "--axes: no 'sped'; did you mean 'speed'?"),
         (["--axes", ","], "--axes takes names"),
         (["--quick", "--long"], "--quick and --long exclude each other"),
         (["--json", "--markdown"], "--json and --markdown exclude each other"),

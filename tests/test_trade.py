@@ -15,8 +15,8 @@ from helpers_trade_scenes import BALL, BULLET, CROWD, REST, SPRING, scene_file
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import PhysicsWarning, World
 from carom.lab import Only, Trade, trade
+from carom.lab.cases import case as case_module
 from carom.lab.commands.usage_errors import Problem
-from carom.lab.jobs import runs
 from carom.lab.trading.records import (
     BLEW_UP,
     CHAOTIC,
@@ -225,7 +225,7 @@ def test_a_chaotic_file_is_recognised_and_its_places_are_not_measured(tmp_path):
 
 def test_a_chaotic_file_is_measured_by_statistics(tmp_path, monkeypatch):
     """Elastic discs without forces conserve their kinetic energy with any step. 16 runs make its reference, not 80."""
-    monkeypatch.setattr(runs, "ENSEMBLE", 8)
+    monkeypatch.setattr(case_module, "ENSEMBLE", 8)
     case = case_of(scene_file(tmp_path, CROWD), steps=(1 / 60,), repeats=5)
     assert (case.kind, case.repeated, case.norm) == (CHAOTIC, "seeds", "pressure")
     assert set(case.reference.spread) >= {"pressure", "rate"}

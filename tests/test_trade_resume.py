@@ -37,7 +37,7 @@ def measured(target, folder=None, workers=1, **options) -> Trade:
 def however_few():
     """Workers are used even for small amounts of work, and references are no better than they must be here."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trade_runs, "FEW_STEPS", 0)
+        patch.setattr(trade_runs, "FEW_SECONDS", 0)
         patch.setattr(cases, "FINER", 2)
         yield
 

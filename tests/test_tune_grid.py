@@ -17,11 +17,12 @@ import pytest
 
 from carom.components import AABBCollider, RigidBody, Transform
 from carom.framework import ForceSystem, Settings, World
+from carom.lab.cases.case import EFFORTS
 from carom.lab.engines.cost import WEIGHTS
 from carom.lab.jobs.result_store import Store
 from carom.lab.jobs.runs import Runs
 from carom.lab.trading.records import Cell, Point
-from carom.lab.trading.trade import Only, measure
+from carom.lab.trading.trade import Only, Study
 from carom.lab.tuning.check import check
 from carom.lab.tuning.search import Tuning, search
 from carom.plugins import Physics
@@ -211,7 +212,8 @@ def test_the_choice_meets_its_target_in_runs_of_the_test(laboratory, name):
 def measured(tuning: Tuning, store: Store, only: Only, steps: list[float], repeats: int) -> list[Point]:
     """The part of the grid with these methods and steps."""
     case = tuning.case.replace(steps=tuple(steps), repeats=repeats)
-    return [point for curve in measure(case, only, False, False, Runs(1, store)).curves for point in curve.points]
+    found = Study(case, only, False, False, Runs(1, store), None, 0.0).measured((EFFORTS - 1,))
+    return [point for curve in found.curves for point in curve.points]
 
 
 def alone(cell: Cell) -> Only:

@@ -26,7 +26,15 @@ OF_CONTACTS = ("impact_time", "count", "overlap", "overlap_mean", "pressure", "r
 FINER = 8  # own references use steps this many times smaller than the smallest measured step
 FEWEST_STEPS = 3  # per run
 MOST_REFINED = 2  # refinements of a reference at most
-QUICK_REPEATS = 8
+
+# Of the efforts before the last, which has everything: repeats; steps around the scene's own, down to own / a and up to
+# own * b; how many times smaller the steps of own references are; runs of each reference of a chaotic scene.
+EFFORTS = 3
+LESS_REPEATS = (1, 8)
+STEPS_AROUND = ((4, 2), (16, 4))
+LESS_FINE = (2, 4)
+FEWER_SEEDS = (2, 8)
+ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
 
 
 @dataclass(frozen=True)
@@ -79,6 +87,11 @@ class Case:
         of these fine runs: two methods, and unless the scene is chaotic the first one with twice its step
     orders
         as in ``Known``
+    refinements
+        of the reference at most; fineness: how many times smaller its steps are; ensemble: runs of each reference of a
+        chaotic scene
+    given
+        what the caller has chosen: "steps", "repeats"
     """
 
     subject: Subject
@@ -93,6 +106,10 @@ class Case:
     reference: Seen | None
     reference_cells: tuple[Cell, ...]
     orders: tuple[tuple[str, str, float], ...] = ()
+    refinements: int = MOST_REFINED
+    fineness: int = FINER
+    ensemble: int = ENSEMBLE
+    given: tuple[str, ...] = ()
 
     @property
     def repeated(self) -> str:
@@ -111,17 +128,36 @@ class Case:
         return grids.theory(cell, norm, self.survey)
 
     def phase(self, repeat: int) -> float:
-        """The length of the first step of that repeat, as a fraction of a step."""
-        return 1.0 if self.kind == CHAOTIC else 1.0 - repeat / self.repeats
+        """The length of the first step of that repeat, as a fraction of a step: spread evenly however many there are
+        (van der Corput's sequence)."""
+        if self.kind == CHAOTIC:
+            return 1.0
+        return 1.0 - sum((repeat >> k & 1) / 2 ** (k + 1) for k in range(repeat.bit_length()))
 
     def replace(self, **changes: Any) -> Case:
         return dataclasses.replace(self, **changes)
 
-    def quick(self, fewer_steps: bool = True, fewer_repeats: bool = True) -> Case:
-        """The case with every second step and few repeats, for a quick look."""
-        steps = self.steps[::2] if fewer_steps else self.steps
-        repeats = min(self.repeats, QUICK_REPEATS) if fewer_repeats else self.repeats
-        return self.replace(steps=steps, repeats=repeats)._with_reference_step(steps[-1] / FINER)
+    def at(self, effort: int) -> Case:
+        """The case as it is measured with that effort, from 0 to EFFORTS - 1."""
+        if effort >= EFFORTS - 1:
+            return self
+        own, (down, up) = self.survey.settings.dt, STEPS_AROUND[effort]
+        steps = self.steps
+        if "steps" not in self.given:
+            near = [dt for dt in steps if 0.99 * own / down < dt < 1.01 * own * up]
+            fits = own <= steps[0]
+            steps = tuple(sorted({*near, *[own] * fits}, reverse=True)) or steps[:2]
+        repeats = self.repeats if "repeats" in self.given else min(self.repeats, LESS_REPEATS[effort])
+        case = self.replace(
+            steps=steps, repeats=repeats, refinements=effort, fineness=min(self.fineness, LESS_FINE[effort]),
+            ensemble=min(self.ensemble, FEWER_SEEDS[effort]),
+        )  # fmt: skip
+        if self.reference_cells and self.kind == CHAOTIC:
+            fine = max(self.reference_cells[0].dt, own / (effort + 1))
+            return case.replace(reference_cells=tuple(
+                dataclasses.replace(cell, dt=fine) for cell in self.reference_cells
+            ))  # fmt: skip
+        return case._with_reference_step(steps[-1] / case.fineness)
 
     def _with_reference_step(self, dt: float) -> Case:
         """The case with other steps in its own references; those of chaotic scenes do not change."""
@@ -132,15 +168,17 @@ class Case:
 
     def coarse_reference(self) -> Case:
         """The case with the largest steps allowed in its own references, where smooth motion lets them converge."""
-        coarse = max(self.steps[0] / FINER**2, self.steps[-1] / FINER)
+        coarse = max(self.steps[0] / self.fineness**2, self.steps[-1] / self.fineness)
+        coarse = min(coarse, self.steps[-1])
         return self._with_reference_step(coarse) if self.kind == SMOOTH else self
 
     def finer_reference(self) -> Case | None:
-        """The case with smaller steps in its own references; None after MOST_REFINED refinements."""
+        """The case with smaller steps in its own references; None after the last refinement."""
         if self.kind == CHAOTIC or not self.reference_cells:
             return None
-        finer = self.reference_cells[0].dt / FINER
-        return self._with_reference_step(finer) if finer >= self.steps[-1] / FINER**MOST_REFINED else None
+        finer = self.reference_cells[0].dt / self.fineness
+        least = self.steps[-1] / self.fineness**self.refinements
+        return self._with_reference_step(finer) if finer >= least else None
 
 
 def case_of(
@@ -173,7 +211,8 @@ def case_of(
     found = Case(
         subject, facts, kind, facts.why, chosen, duration, times, ladder, form, reference,
         () if reference is not None else _own_references(facts, ladder),
-        known.orders if duration == known.seconds else (),
+        known.orders if duration == known.seconds else (), fineness=FINER, ensemble=ENSEMBLE,
+        given=tuple(name for name, value in (("steps", steps), ("repeats", repeats)) if value),
     )  # fmt: skip
     if kind == CHAOTIC and not facts.contacts:
         raise Problem(

@@ -243,7 +243,19 @@ only_options = together(
 
 # -- execution of runs ------------------------------------------------------------------------------------------
 
+def _budget(value: float) -> float:
+    if not (math.isfinite(value) and value > 0):
+        raise Problem(f"--budget takes seconds above 0, not {value:g}")
+    return value
+
+
+budget_option = click.option(
+    "--budget", type=float, metavar="S", default=60.0, show_default=True, callback=_read(_budget),
+    help="Seconds to spend; what is known by then is the answer.",
+)  # fmt: skip
 runs_options = together(
+    budget_option,
+    click.option("--thorough", is_flag=True, help="Everything, however long it takes."),
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
     click.option(
         "--runs", "kept", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -12,8 +13,9 @@ import numpy as np
 from ...framework import World
 from ..measure.body_shapes import Floats, sensor_entities, shapes_of
 from ..measure.escape import Enclosure
+from ..measure.timing import timed
 from ..trading.records import PYMUNK
-from .body_arrays import NotPlainError, moving_and_fixed
+from .body_arrays import moving_and_fixed
 from .cost import counts_of
 from .pymunk_space import PymunkSpace
 from .quality import overlaps
@@ -27,7 +29,8 @@ class Engine(ABC):
     """A running scene. Bodies are the dynamic ones, ascending by entity id.
 
     After a step: ``impulse`` N s on static bodies, ``times`` s of the impacts of the step, ``struck`` (n,) true for
-    bodies that have had an impact or a contact since the start.
+    bodies that have had an impact or a contact since the start. ``spent`` s on the clock of ``measure.timing`` for
+    ``timed_seconds`` simulated ones: steps that neither compiled nor loaded kernels.
     """
 
     def __init__(self, world: World) -> None:
@@ -39,6 +42,7 @@ class Engine(ABC):
         self.impulse = 0.0
         self.times: list[float] = []
         self.struck = np.zeros(len(self.ids), bool)
+        self.spent = self.timed_seconds = 0.0
 
     @property
     def time(self) -> float:
@@ -49,9 +53,11 @@ class Engine(ABC):
     def step(self, dt: float) -> None:
         """One step of ``dt`` seconds."""
 
-    @abstractmethod
-    def advance(self, count: int, dt: float) -> None:
-        """Take ``count`` steps without observation, as a game would."""
+    def _timed(self, step: Callable[[], Any], dt: float) -> None:
+        seconds, valid, _ = timed(step)
+        if valid:
+            self.spent += seconds
+            self.timed_seconds += dt
 
     @property
     def position(self) -> Floats:
@@ -70,32 +76,14 @@ class Engine(ABC):
         return np.array(self.world.bodies.dynamic.linear_velocity)[self._order]
 
     @property
-    def energy(self) -> float:
-        """Kinetic and potential energy, J; without force systems that do not report theirs."""
-        return self.world.kinetic_energy() + self.world.potential_energy()
+    def energies(self) -> tuple[float, float]:
+        """Kinetic energy, and with the potential energy, J; without force systems that do not report theirs."""
+        kinetic = self.world.kinetic_energy()
+        return kinetic, kinetic + self.world.potential_energy()
 
-    @property
-    def kinetic(self) -> float:
-        """Kinetic energy, J."""
-        return self.world.kinetic_energy()
-
+    @abstractmethod
     def overlaps(self) -> Floats:
         """(k,) depths of the overlapping pairs, in sizes of the smaller body."""
-        if self._plain is None:
-            return self._overlaps_of_contacts()
-        moving, fixed = self._plain
-        return overlaps(moving, self.position, fixed)
-
-    def _overlaps_of_contacts(self) -> Floats:
-        raise NotPlainError("bodies other than plain discs and boxes")
-
-    @cached_property
-    def _plain(self) -> Any:
-        try:
-            return moving_and_fixed(self.world)
-        except NotPlainError:
-            return None
-
     @cached_property
     def sizes(self) -> dict[int, float]:
         """The smallest extent of each entity that has a built-in shape."""
@@ -122,8 +110,6 @@ class CaromEngine(Engine):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._solver_loops = 0.0
-        self._resting = 0
         self._sensors = np.array(sorted(sensor_entities(world)), np.int64)
 
     def step(self, dt: float) -> None:
@@ -131,10 +117,7 @@ class CaromEngine(Engine):
         if world.settings.dt != dt:
             world.settings = world.settings.replace(dt=dt)
         before = world.time
-        world.step()
-        resting = world.stats().counters.get("resting_contacts", 0)
-        self._solver_loops += (resting - self._resting) * world.settings.substeps
-        self._resting = resting
+        self._timed(world.step, dt)
         contacts = world.contacts
         self.impulse, self.times = 0.0, []
         if len(contacts):
@@ -146,13 +129,6 @@ class CaromEngine(Engine):
         impacts = contacts.impacts
         if len(impacts):
             self.times = (before + np.sort(impacts.time_of_impact)).tolist()
-
-    def advance(self, count: int, dt: float) -> None:
-        world = self.world
-        if world.settings.dt != dt:
-            world.settings = world.settings.replace(dt=dt)
-        for _ in range(count):
-            world.step()
 
     def _rows(self, entities: Any) -> np.ndarray:
         """The rows of the entities in the body arrays; -1 for static bodies."""
@@ -167,17 +143,15 @@ class CaromEngine(Engine):
         contacts = self.world.contacts
         return ~(np.isin(contacts.entity_a, self._sensors) | np.isin(contacts.entity_b, self._sensors))
 
-    def _overlaps_of_contacts(self) -> Floats:
+    def overlaps(self) -> Floats:
         contacts, sizes = self.world.contacts, self.sizes
-        rows = zip(contacts.entity_a.tolist(), contacts.entity_b.tolist(), contacts.depth, self._solid(), strict=True)
-        return np.array([
-            depth / min(sizes.get(a, math.inf), sizes.get(b, math.inf))
-            for a, b, depth, solid in rows
-            if solid and depth > 0 and (a in sizes or b in sizes)
-        ])  # fmt: skip
+        deep = (contacts.depth > 0) & self._solid()
+        pairs = zip(contacts.entity_a[deep].tolist(), contacts.entity_b[deep].tolist(), strict=True)
+        smaller = [min(sizes.get(a, math.inf), sizes.get(b, math.inf)) for a, b in pairs]
+        return np.asarray(contacts.depth)[deep] / np.array(smaller, float)
 
     def counts(self) -> dict[str, float]:
-        return counts_of(self.world, self._solver_loops)
+        return counts_of(self.world)
 
 
 class PymunkEngine(Engine):
@@ -189,8 +163,7 @@ class PymunkEngine(Engine):
 
     def __init__(self, world: World, iterations: int) -> None:
         super().__init__(world)
-        if self._plain is None:
-            moving_and_fixed(world)  # raises, with the reason
+        self._plain = moving_and_fixed(world)
         self.space = PymunkSpace(world)
         self.space.space.iterations = iterations
         self._iterations = iterations
@@ -227,18 +200,14 @@ class PymunkEngine(Engine):
         if self.world.force_systems:
             self._push()
         self.space.dt = dt
-        self.space.step(1)
+        self._timed(lambda: self.space.step(1), dt)
         self._time += dt
         self._steps += 1
         self._mirror()
 
-    def advance(self, count: int, dt: float) -> None:
-        if self.world.force_systems:
-            for _ in range(count):
-                self.step(dt)
-            return
-        self.space.dt = dt
-        self.space.step(count)
+    def overlaps(self) -> Floats:
+        moving, fixed = self._plain
+        return overlaps(moving, self.position, fixed)
 
     def _push(self) -> None:
         """Apply the forces of the force systems at this state for one step; pymunk applies gravity itself."""

@@ -24,8 +24,8 @@ WEIGHTS: Mapping[str, float] = {
 }
 
 
-def counts_of(world: World, solver_loops: float) -> dict[str, float]:
-    """The counts of a world since its creation; solver_loops: contacts at rest times substeps.
+def counts_of(world: World) -> dict[str, float]:
+    """The counts of a world since its creation, with the same substeps throughout.
 
     steps, force_evaluations (sums over all bodies), body_steps, candidates of the broad phase, pairs tested, impacts,
     rounds: how often candidates were searched again within a step.
@@ -39,7 +39,7 @@ def counts_of(world: World, solver_loops: float) -> dict[str, float]:
         "pairs": float(counters.get("pairs", 0)),
         "impacts": float(counters.get("impacts", 0)),
         "rounds": float(counters.get("rounds", 0)),
-        "solver_loops": float(solver_loops),
+        "solver_loops": float(counters.get("resting_contacts", 0) * world.settings.substeps),
     }
 
 

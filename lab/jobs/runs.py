@@ -1,70 +1,110 @@
-"""Runs tasks on all cores and keeps their results, so that no run is repeated."""
+"""Runs tasks on all cores, within the time there is, and keeps their results, so that no run is repeated."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
 import math
-from collections.abc import Callable, Iterable
-from typing import Any
+import statistics
+import time
+from collections.abc import Callable, Iterable, Sequence
 
 from ..cases.case import Case
 from ..commands.usage_errors import Problem
 from ..engines.cost import work_of
 from ..measure.norms import NORMS, OF_KIND, conserves, errors_of
 from ..measure.observation import Seen
+from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..trading.records import CHAOTIC, STOPPED, Cell, ErrorBar, Outcome, Point, Reference
+from ..trading.records import CHAOTIC, CUT, Cell, ErrorBar, Outcome, Point, Reference
 from .result_store import Store
-from .tasks import Task, mean_of, perform
+from .tasks import Task, mean_of, outcome_of, perform, stopped
 from .workers import Lost, in_parallel
 
-FEW_STEPS = 20_000  # in total: fewer take less time than starting workers
+FEW_SECONDS = 4.0  # of work in all: less takes not much longer than starting workers
+PACE = 1e-4  # s per step, until runs have shown a better figure
 WORTH_IT = 4.0  # required improvement of the agreement with steps 8 times smaller; less is rounding or chance
-ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
+
+
+OUT_OF_TIME, STOPPED = "time is up", "stopped"
+
+
+class OutOfTimeError(Exception):
+    """The budget is spent, or the user has stopped the study; what is finished is kept."""
 
 
 class Runs:
-    """Performs tasks with ``workers`` processes; a store keeps the results if the command is interrupted."""
+    """Performs tasks with ``workers`` processes; finished runs are kept in the store.
+
+    until
+        on ``time.monotonic``: afterwards nothing runs, and :meth:`all` raises OutOfTimeError; so it does after Ctrl-C
+        if the study is ``stoppable``, and the reason is in ``stopped``
+    listener
+        called after each finished run
+    """
 
     def __init__(
-        self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS
-    ) -> None:
+        self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
+        until: float = math.inf, stoppable: bool = False,
+    ) -> None:  # fmt: skip
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
-        self.workers, self.progress = workers, progress
-        self._store = Store() if store is None else store
+        self.workers, self.progress, self.until, self.stoppable = workers, progress, until, stoppable
+        self.listener: Callable[[], None] | None = None
+        self.stopped = ""
         self.performed = 0
+        self._store = Store() if store is None else store
+        self._pace = PACE
 
-    def get(self, task: Task) -> dict[str, Any] | None:
-        """The record of a task already performed, or None."""
-        return self._store.get(task.key)
+    def get(self, task: Task) -> Seen | None:
+        """What a task showed that has been performed, or None."""
+        record = self._store.get(task.key)
+        return None if record is None else Seen.from_dict(record)
 
-    def all(self, tasks: Iterable[Task], what: str) -> list[dict[str, Any]]:
-        """The records of all tasks, in order."""
+    def all(self, tasks: Iterable[Task], what: str) -> list[Seen]:
+        """What all tasks showed, in order. OutOfTimeError if time is up before all are finished."""
         tasks = list(tasks)
-        missing = [task for task in tasks if self.get(task) is None]
+        missing = [dataclasses.replace(task, until=self.until) for task in tasks if task.key not in self._store]
         total = sum(task.cost for task in tasks)
-        self.progress.begin(total, total - sum(task.cost for task in missing))
+        left = sum(task.cost for task in missing)
+        self.progress.begin(total, total - left)
         self.progress.say(what)
-        missing.sort(key=lambda task: -task.cost)  # longest first, so that no core is idle at the end
-        few = sum(task.cost for task in missing) < FEW_STEPS
-        with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers)) as results:
-            for task, record in results:
-                self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
-                self.progress.advance(task.cost)
-        return [self.get(task) or {} for task in tasks]
+        if self.until == math.inf:
+            missing.sort(key=lambda task: -task.cost)  # longest first, so that no core is idle at the end
+        few = left * self._pace < FEW_SECONDS
+        if missing and (self.stopped or time.monotonic() > self.until):
+            self._stop("")
+        try:
+            with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers)) as results:
+                for task, record in results:
+                    self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
+        except KeyboardInterrupt:
+            if not self.stoppable:
+                raise
+            self._stop(STOPPED)
+        return [seen for task in tasks if (seen := self.get(task)) is not None]
 
-    def _keep(self, task: Task, record: dict[str, Any]) -> None:
+    def _stop(self, why: str) -> None:
+        self.stopped = self.stopped or why or OUT_OF_TIME
+        raise OutOfTimeError(self.stopped)
+
+    def _keep(self, task: Task, record: dict) -> None:
+        if record["failure"] == CUT:
+            self._stop("")
         self.performed += 1
         self._store.add(task.key, record)
+        self.progress.advance(task.cost)
+        if record["milliseconds"]:
+            self._pace = max(1e-3 * record["milliseconds"] * task.cell.dt + PACE, PACE)
+        if self.listener is not None:
+            self.listener()
 
 
-def _lost(task: Task, lost: Lost) -> dict[str, Any]:
+def _lost(task: Task, lost: Lost) -> dict:
     """The record of a run whose process died twice: a failed run. Problem if it is a reference."""
     if task.reference:
         raise Problem(f"{task.case.subject.name}: the reference run with {task.cell} was lost: {lost.reason}")
-    return dataclasses.asdict(Outcome(task.cell, task.repeat, {}, STOPPED, {}, task.case.seconds, lost.reason))
+    return stopped(task, lost.reason).as_dict()
 
 
 def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
@@ -72,15 +112,18 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
     if case.reference is not None:
         return case, Reference(f"closed form: {case.form}" if case.kind != "resting" else case.form)
     tasks = reference_tasks(case)
-    seens = [Seen.from_dict(record) for record in runs.all(tasks, f"{case.subject.name}: references")]
-    half = len(seens) // 2
-    for task, seen in zip(tasks, seens, strict=True):
-        if seen.failure:
-            raise Problem(
-                f"{case.subject.name} has no reference: the run with {task.cell} failed: {seen.failure}"
-            )
+    seens = runs.all(tasks, f"{case.subject.name}: references")
+    both = zip(tasks, seens, strict=True)
+    failed = [f"the run with {task.cell} {seen.failure}" for task, seen in both if seen.failure]
     if case.kind == CHAOTIC:
-        return _with_statistics(case, seens, half)
+        half = len(seens) // 2
+        one, other = ([seen for seen in some if not seen.failure] for some in (seens[:half], seens[half:]))
+        if not (one and other):
+            raise Problem(f"{case.subject.name} has no reference: {failed[0]}")
+        return _with_statistics(case, one, other)
+    seens = [seen for seen in seens if not seen.failure]
+    if len(seens) < 2:
+        raise Problem(f"{case.subject.name} has no reference: {failed[0]}")
     first, *others = seens
     case = _with_usable_norms(case, first)
     apart = [errors_of(other, first, NORMS) for other in others]
@@ -98,8 +141,8 @@ def refined_reference(
     """The case with its reference, refined with smaller steps until it is ``enough`` or no longer improves; and whether
     it is enough."""
     before, case = math.inf, case.coarse_reference()
+    with_own, reference = with_reference(case, runs)
     while True:
-        with_own, reference = with_reference(case, runs)
         if enough(with_own, reference):
             return with_own, reference, True
         agreement = reference.agreement.get(case.norms[0], 0.0)
@@ -107,17 +150,21 @@ def refined_reference(
         if finer is None:
             return with_own, reference, False
         before, case = agreement, finer
+        try:
+            with_own, reference = with_reference(case, runs)
+        except OutOfTimeError:
+            return with_own, reference, False
 
 
 def reference_tasks(case: Case) -> list[Task]:
     """The tasks of the first method, then as many of the second."""
-    repeats = ENSEMBLE if case.kind == CHAOTIC else 1
+    repeats = case.ensemble if case.kind == CHAOTIC else 1
     return [Task(case, cell, repeat, True) for cell in case.reference_cells for repeat in range(repeats)]
 
 
-def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Reference]:
+def _with_statistics(case: Case, one: list[Seen], other: list[Seen]) -> tuple[Case, Reference]:
     """The case with two ensembles as reference: if both are right, their means differ only by noise."""
-    means = mean_of(seens[:half]), mean_of(seens[half:])
+    seens, means = [*one, *other], (mean_of(one), mean_of(other))
     both = mean_of(seens)
     case = _with_usable_norms(case, both)
     agreement, spread = {}, {}
@@ -130,8 +177,8 @@ def _with_statistics(case: Case, seens: list[Seen], half: int) -> tuple[Case, Re
             spread[name] = bar.uncertainty * len(values) ** 0.5
     a, b = case.reference_cells
     text = (
-        f"statistics of {half} own runs with {_words(a)} and of {half} with {_words(b)}, other seeds, steps of "
-        f"{a.dt:.3g} s"
+        f"statistics of {len(one)} own runs with {_words(a)} and of {len(other)} with {_words(b)}, other seeds, steps "
+        f"of {a.dt:.3g} s"
     )
     return case.replace(reference=both), Reference(text, agreement, spread)
 
@@ -157,7 +204,26 @@ def run_tasks(case: Case, cells: Iterable[Cell]) -> list[Task]:
     return [Task(case, cell, repeat) for cell in cells for repeat in range(case.repeats)]
 
 
-def point_of(outcomes: list[Outcome]) -> Point:
+def known_points(case: Case, cells: Iterable[Cell], runs: Runs) -> list[Point]:
+    """The points of the cells of which there are finished runs, over those repeats."""
+    if case.reference is None:
+        return []
+    points = []
+    for cell in cells:
+        tasks = run_tasks(case, [cell])
+        seens = [(task, seen) for task in tasks if (seen := runs.get(task)) is not None]
+        if seens:
+            points.append(point_of([outcome_of(task, seen, case.reference) for task, seen in seens]))
+    return points
+
+
+def points_of(case: Case, cells: Sequence[Cell], runs: Runs, what: str) -> list[Point]:
+    """The points of all cells, over all repeats."""
+    runs.all(run_tasks(case, cells), what)
+    return known_points(case, cells, runs)
+
+
+def point_of(outcomes: Sequence[Outcome]) -> Point:
     """The point of one cell, from its repeats."""
     good = [outcome for outcome in outcomes if outcome.failure is None]
     failures: dict[str, int] = {}
@@ -173,5 +239,22 @@ def point_of(outcomes: list[Outcome]) -> Point:
         name: sum(outcome.counts.get(name, 0.0) / outcome.seconds for outcome in counted) / len(counted)
         for name in (counted[0].counts if counted else ())
     }
-    return Point(outcomes[0].cell, len(outcomes), errors, failures, counts, work_of(counts))
+    timed = [outcome.milliseconds for outcome in good if outcome.milliseconds is not None]
+    return Point(
+        outcomes[0].cell, len(outcomes), errors, failures, counts, work_of(counts), Spread.of(timed) if timed else None,
+        _worst_effects(good),
+    )  # fmt: skip
 
+
+def _worst_effects(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """Each effect at its worst; energies, which have a sign and no worst, as their mean."""
+    found: dict[str, float] = {}
+    for outcome in outcomes:
+        for name, value in outcome.effects.items():
+            if name != "body" and abs(value) >= abs(found.get(name, 0.0)):
+                found[name] = value
+                if name == "place" and "body" in outcome.effects:
+                    found["body"] = outcome.effects["body"]
+    if "energy" in found:
+        found["energy"] = statistics.fmean(outcome.effects.get("energy", 0.0) for outcome in outcomes)
+    return found

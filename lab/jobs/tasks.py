@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,34 +16,37 @@ from ..cases.case import Case
 from ..commands.usage_errors import Problem
 from ..engines.adapters import CaromEngine, Engine, engine_for
 from ..engines.body_arrays import NotPlainError
-from ..measure.norms import NORMS, errors_of, failure_of
+from ..measure.effects import effects_of
+from ..measure.norms import FAR, NORMS, errors_of, failure_of
 from ..measure.observation import Seen, observe
 from ..measure.survey import NUDGE, nudge
+from ..measure.timing import timed
 from ..measure.told_in_results import faults_in_results
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
 
+AWHILE, PASSES = 0.2, 3  # s; passes of a run that is timed
+BLOCK = 20  # steps
 FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds than the runs compared with them
 
 
 @dataclass(frozen=True)
 class Task:
-    """One run. reference: it is one of the case's own references, whose full observation is kept."""
+    """One run. reference: it is one of the case's own references; until: when it is cut off, on ``time.monotonic``."""
 
     case: Case
     cell: Cell
     repeat: int
     reference: bool = False
+    until: float = math.inf
 
     @property
     def key(self) -> str:
         """Identifies the run, in this process and later ones."""
         case = self.case
         facts = (
-            case.subject.mark, case.seconds, case.kind, repr(case.survey.settings), self.reference, self.cell.key,
-            self.repeat,
+            case.subject.mark, case.seconds, case.kind, repr(case.survey.settings), case.survey.walled, self.reference,
+            self.cell.key, self.repeat,
         )  # fmt: skip
-        if not self.reference:
-            facts = (*facts, case.repeats, case.form, tuple(cell.key for cell in case.reference_cells))
         return hashlib.sha256(repr(facts).encode()).hexdigest()[:24]
 
     @property
@@ -53,29 +58,71 @@ class Task:
 @faults_in_results()
 def perform(task: Task) -> dict[str, Any]:
     """Perform the run and return its observation as plain data. A run stopped by an error is a result too."""
-    case, cell = task.case, task.cell
     try:
-        seen = _run(task)
+        return _run(task).as_dict()
     except Problem as problem:
-        if task.reference or cell.engine == PYMUNK:
+        if task.reference or task.cell.engine == PYMUNK:
             raise
-        return dataclasses.asdict(Outcome(cell, task.repeat, {}, STOPPED, {}, case.seconds, problem.message))
-    if task.reference:
-        return seen.as_dict()
-    assert case.reference is not None
-    failure = failure_of(seen, None if case.kind == CHAOTIC else case.reference)
-    errors = {} if failure else errors_of(seen, case.reference, NORMS)
-    return dataclasses.asdict(Outcome(cell, task.repeat, errors, failure, seen.counts, seen.simulated))
+        return stopped(task, problem.message).as_dict()
+
+
+def stopped(task: Task, why: str) -> Seen:
+    """The observation of a run that an error ended."""
+    return Seen(np.zeros((0, 2)), failure=STOPPED, detail=why, seconds=task.case.seconds)
+
+
+def outcome_of(task: Task, seen: Seen, reference: Seen) -> Outcome:
+    """The errors and effects of a run, against the reference."""
+    kind = task.case.kind
+    failure = failure_of(seen, None if kind == CHAOTIC else reference)
+    errors = {} if failure else errors_of(seen, reference, NORMS)
+    effects = {} if failure else effects_of(seen, reference, kind)
+    simulated = seen.simulated or seen.seconds
+    return Outcome(
+        task.cell, task.repeat, errors, failure, seen.counts, simulated, seen.detail, effects, seen.milliseconds
+    )
 
 
 def _run(task: Task) -> Seen:
+    cost = None if task.repeat or task.reference or task.cell.engine == PYMUNK else bare_cost(task)
+    seen = _observed(task)
+    return seen if cost is None else dataclasses.replace(seen, milliseconds=cost)
+
+
+def bare_cost(task: Task) -> float | None:
+    """Milliseconds per simulated second without observation, which takes longer than a cheap step: the least of some
+    passes. None for a run that takes longer than AWHILE: there the observed run tells enough."""
+    passes: list[float] = []
+    whole = 0.0
+    while len(passes) < PASSES and whole < AWHILE:
+        with task.case.subject.attribute_errors(), contextlib.closing(world_of(task.case, task.cell, 0)) as world:
+            spent = simulated = 0.0
+            left = max(int(task.case.seconds / task.cell.dt), 1)
+            while left:
+                count = min(BLOCK, left)
+                left -= count
+                seconds, valid, _ = timed(lambda world=world, count=count: [world.step() for _ in range(count)])
+                whole += seconds
+                if valid:
+                    spent, simulated = spent + seconds, simulated + count * task.cell.dt
+                if whole > 2 * AWHILE:
+                    return min(passes, default=None)
+        if simulated:
+            passes.append(1e3 * spent / simulated)
+        else:
+            break  # each of its blocks waited for kernels
+    return min(passes, default=None)
+
+
+def _observed(task: Task) -> Seen:
     engine = engine_of(task.case, task.cell, task.repeat + FIRST_REFERENCE_SEED * task.reference)
     try:
         with task.case.subject.attribute_errors():
             case = task.case
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled
-            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled)
+            far = math.inf if case.kind == CHAOTIC else FAR * case.survey.trial.reach or math.inf
+            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, task.until)
     finally:
         engine.close()
 

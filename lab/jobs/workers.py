@@ -94,6 +94,7 @@ def _shared_out(
     pool = executor(most)
     try:
         while waiting or suspects or running:
+            broken = False
             on_trial = any(tries[index] for index in running.values())
             room = 0 if on_trial else most - len(running)
             if suspects:
@@ -104,11 +105,15 @@ def _shared_out(
                 if message is None:
                     yield tasks[index], function(tasks[index])
                     continue
-                with _interrupts_held_back(), _main_hidden():
-                    running[pool.submit(_perform, message)] = index
+                try:
+                    with _interrupts_held_back(), _main_hidden():
+                        running[pool.submit(_perform, message)] = index
+                except BrokenExecutor:  # a worker has died meanwhile: the tasks that were running will tell
+                    waiting.appendleft(index)
+                    broken = True
+                    break
                 room -= 1
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            broken = False
             for future in done:
                 index = running.pop(future)
                 try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from contextlib import closing
 from typing import Any
 
@@ -10,16 +11,19 @@ import click
 import numpy as np
 from rich.console import Console
 
-from ...framework import World
+from ...framework import Settings, World
 from ..commands.choices import parse_assignments, preset
 from ..commands.loading import Loaded, load, stdout_kept_clean
-from ..commands.options import plugin_option, seed_number, seed_option, set_option, settings_option
+from ..commands.options import budget_option, plugin_option, seed_number, seed_option, set_option, settings_option
 from ..commands.usage_errors import Problem
 from ..plugins_check.installed import plugin_named
 from ..reporting.progress import Bar, Progress
+from ..reporting.run_report import number
+from .outcome import StepOutcome, outcome_of_steps
 from .step_length import StepLimits, step_limits
 
 LOOKS = 20  # times that a running scene is examined
+IN_VIEW = 1.0  # s: limits far beyond the steps of a game are not told
 DEFAULT_SECONDS = 10.0  # for a file that does not define it
 
 
@@ -31,6 +35,7 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
 @set_option
 @seed_option
 @plugin_option
+@budget_option
 @click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
 def limits_command(
     target: str,
@@ -40,21 +45,34 @@ def limits_command(
     assignments: tuple[str, ...],
     seed: str,
     plugins: tuple[str, ...],
+    budget: float,
     traceback: bool,
 ) -> None:
-    """How long the step of a scene, or of a file that defines build(settings, seed=0), may be, and what limits it."""
+    """How long the step of a scene, or of a file that defines build(settings, seed=0), may be, and what limits it.
+
+    The scene runs with longer and shorter steps until a player would notice the difference, and its forces and speeds
+    are examined on the way.
+    """
     del traceback  # seen by Commands.main
     if seconds is not None and not 0 <= seconds < float("inf"):
         raise Problem(f"--seconds must be a number of at least 0, not {seconds!r}")
     settings = preset(preset_name) if preset_name is not None else None
-    changes, number = parse_assignments(assignments), seed_number(seed)
+    changes, variant = parse_assignments(assignments), seed_number(seed)
+    added = [plugin_named(name) for name in plugins]
     loaded = load(target)
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
-    with closing(loaded.build(settings, changes, number, [plugin_named(name) for name in plugins])) as world:
-        with Bar(Console(stderr=True)) as bar:
+
+    def build(chosen: Settings | None, seed: int = 0) -> World:
+        """The scene as the command line has it."""
+        return loaded.build(*((settings, changes) if chosen is None else (chosen, {})), seed, added)
+
+    with Bar(Console(stderr=True)) as bar:
+        with closing(build(None, variant)) as world:
             found = _watched(loaded, world, seconds, bar)
-        _show(loaded.name, found, as_json)
+        build.__name__ = loaded.name
+        outcome = outcome_of_steps(build, variant, seconds, budget, bar)
+    _show(loaded.name, found, outcome, as_json)
 
 
 def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -> list[tuple[float, StepLimits]]:
@@ -78,15 +96,30 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
     return found
 
 
-def _show(name: str, found: list[tuple[float, StepLimits]], as_json: bool) -> None:
+def _show(name: str, found: list[tuple[float, StepLimits]], outcome: StepOutcome, as_json: bool) -> None:
     time, tightest = min(found, key=lambda look: look[1].suggested)
     start = found[0][1]
+    dt = min(outcome.longest, tightest.suggested)
     if as_json:
         shortest: dict[str, Any] = {"time": time, **tightest.as_dict()}
-        click.echo(json.dumps({"scene": name, "start": start.as_dict(), "tightest": shortest}, indent=2))
+        plain = {
+            "scene": name, "suggested": dt if math.isfinite(dt) else None, "outcome": outcome.as_dict(),
+            "start": start.as_dict(), "tightest": shortest,
+        }  # fmt: skip
+        click.echo(json.dumps(plain, indent=2))
         return
-    if tightest.suggested == start.suggested:
-        watched = f" and for {found[-1][0]:.3g} s after it" if len(found) > 1 else ""
-        click.echo(f"{name}, at its start{watched}:\n{tightest}")
-        return
-    click.echo(f"{name}, at its start:\n{start}\n\nafter {time:.3g} s, when the step has to be shortest:\n{tightest}")
+    for line in [f"{name}: {_suggestion(dt, start.dt, tightest, outcome)}", *outcome.sentences()]:
+        click.echo(line)
+    for limit, line in zip((tightest.stability, tightest.tunnelling), tightest.sentences(), strict=False):
+        if limit < IN_VIEW:
+            click.echo(f"{line} (after {time:.3g} s)" if tightest.suggested != start.suggested else line)
+
+
+def _suggestion(dt: float, own: float, tightest: StepLimits, outcome: StepOutcome) -> str:
+    if dt == math.inf:
+        return "nothing that was looked at limits the step: choose it by the accuracy you need"
+    if dt == 0.0:
+        if tightest.suggested == 0.0:
+            return f"no step is stable: choose another integrator than {tightest.integrator}"
+        return f"no step that was tried keeps the outcome, not even {outcome.shortest:.4g} s: see carom trade"
+    return f"dt up to {number(dt)} s; its step of {number(own)} s {'fits' if own <= dt * 1.000001 else 'is too long'}"

@@ -57,7 +57,7 @@ def _position(seen: Seen, reference: Seen) -> float:
     return float(apart.max(initial=0.0)) / _reach(seen, reference)
 
 
-def _energy_scale(seen: Seen, reference: Seen) -> float:
+def energy_scale(seen: Seen, reference: Seen) -> float:
     """The largest kinetic energy, or the energy at the start if smaller, since the zero of the energy is arbitrary."""
     kinetic = reference.energy_scale or seen.energy_scale or 1.0
     total = abs(reference.energy_start)
@@ -71,8 +71,8 @@ def conserves(reference: Seen) -> bool:
 
 def _energy(seen: Seen, reference: Seen) -> float:
     if conserves(reference):
-        return seen.energy_worst / _energy_scale(seen, reference)
-    return abs(seen.energy - reference.energy) / _energy_scale(seen, reference)
+        return seen.energy_worst / energy_scale(seen, reference)
+    return abs(seen.energy - reference.energy) / energy_scale(seen, reference)
 
 
 def _impact_time(seen: Seen, reference: Seen) -> float:
@@ -115,7 +115,7 @@ NORMS: Mapping[str, Norm] = {
             "largest departure of the energy on the way (in the end, where it is not conserved); 1 is the energy at "
             "the start, or the largest kinetic energy if that is smaller",
             _energy,
-            _energy_scale,
+            energy_scale,
         ),
         _relative("apex", "height of the highest point reached, at steps; 1 is the right height"),
         Norm("impact_time", "largest error of an impact's time, a missing one being at the end; 1 is the whole run",

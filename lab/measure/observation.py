@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,13 +16,14 @@ import numpy as np
 
 from ..engines.adapters import Engine
 from ..plain import Plain
-from ..trading.records import ESCAPED, NOT_FINITE
+from ..trading.records import BLEW_UP, CUT, ESCAPED, NOT_FINITE
 from .body_shapes import Floats
 
 SETTLED = 0.5  # fraction of the run after which contacts at rest are measured
 EARLY = 0.2  # fraction of the run after which statistics begin
 MOST_TIMES = 200  # impacts whose times are kept
-SAMPLES = 400  # of the overlaps, which cost more than a step
+SAMPLES = 200  # of the overlaps
+LOOKS = 2000  # at the state of a run, at most: a look may cost more than a step
 
 
 @dataclass
@@ -51,6 +53,10 @@ class Seen(Plain):
         None, or why the run is unusable
     seconds
         planned duration; simulated: the actual one, which is less if the run failed
+    size
+        m, the smallest extent of the bodies
+    milliseconds
+        cost of a simulated second on this machine; None if it is not known
     """
 
     position: Floats
@@ -75,6 +81,10 @@ class Seen(Plain):
     counts: dict[str, float] = field(default_factory=dict)
     seconds: float = 0.0
     simulated: float = 0.0
+    size: float = 1.0
+    milliseconds: float | None = None
+    entities: list[int] = field(default_factory=list)
+    detail: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -82,18 +92,32 @@ class Seen(Plain):
 
 
 def observe(
-    engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True
+    engine: Engine,
+    seconds: float,
+    dt: float,
+    phase: float = 1.0,
+    whole_steps: bool = False,
+    walled: bool = True,
+    far: float = math.inf,
+    until: float = math.inf,
 ) -> Seen:
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
-    a body outside the walls around all bodies has escaped.
+    a body outside the walls around all bodies has escaped. far: m from its start, a body there has blown up. until: on
+    ``time.monotonic``, the moment at which the run is cut off.
     """
-    watch = _Watch(engine, seconds, walled)
+    watch = _Watch(engine, seconds, walled, far)
+    steps = _steps(seconds, dt, phase, whole_steps)
+    every = -(-len(steps) // LOOKS)
     with np.errstate(over="ignore", invalid="ignore"):
-        for step in _steps(seconds, dt, phase, whole_steps):
+        for done, step in enumerate(steps, 1):
             engine.step(step)
-            watch.look()
+            watch.count()
+            if done % every == 0 or done == len(steps):
+                watch.look()
+            if watch.failure is None and time.monotonic() > until:
+                watch.failure = CUT
             if watch.failure:
                 break
         return watch.seen()
@@ -111,14 +135,14 @@ def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[f
 class _Watch:
     """Observes the engine after each step."""
 
-    def __init__(self, engine: Engine, seconds: float, walled: bool) -> None:
-        self.engine, self.seconds, self.walled = engine, seconds, walled
+    def __init__(self, engine: Engine, seconds: float, walled: bool, far: float) -> None:
+        self.engine, self.seconds, self.walled, self.far = engine, seconds, walled, far
         self.failure: str | None = None
         self.start = engine.position
         self.settled = self.start
-        self.energy_start, self.scale = engine.energy, engine.kinetic
+        self.scale, self.energy_start = engine.energies
         self.reach = self.apex = self.worst = self.square = self.impulse = 0.0
-        self.steps = self.impacts = self.late_impacts = 0
+        self.looks = self.impacts = self.late_impacts = 0
         self.times: list[float] = []
         self.deepest, self.mean_overlaps = 0.0, [0.0]
         self.next_sample = SETTLED * seconds
@@ -126,11 +150,22 @@ class _Watch:
         size = float(np.linalg.norm(gravity))
         self.up = -gravity / size if size else None
 
+    def count(self) -> None:
+        """After each step: its impacts."""
+        engine = self.engine
+        self.impacts += len(engine.times)
+        if len(self.times) < MOST_TIMES:
+            self.times += engine.times
+        if engine.time > EARLY * self.seconds:
+            self.impulse += engine.impulse
+            self.late_impacts += len(engine.times)
+
     def look(self) -> None:
+        """Now and then: places and energy."""
         engine = self.engine
         position = engine.position
-        energy, kinetic = engine.energy, engine.kinetic
-        self.steps += 1
+        kinetic, energy = engine.energies
+        self.looks += 1
         if not (np.isfinite(position).all() and math.isfinite(kinetic)):
             self.failure = NOT_FINITE
             return
@@ -142,12 +177,6 @@ class _Watch:
         self.worst = max(self.worst, departure)
         self.square += departure * departure
         self.scale = max(self.scale, kinetic)
-        self.impacts += len(engine.times)
-        if len(self.times) < MOST_TIMES:
-            self.times += engine.times
-        if engine.time > EARLY * self.seconds:
-            self.impulse += engine.impulse
-            self.late_impacts += len(engine.times)
         if engine.time <= SETTLED * self.seconds:
             self.settled = position
         if engine.time >= self.next_sample:
@@ -157,23 +186,26 @@ class _Watch:
             self.mean_overlaps.append(float(depths.sum()) / max(len(position), 1))
         if self.walled and engine.enclosure.outside(position):
             self.failure = ESCAPED
+        elif self.reach > self.far:
+            self.failure = BLEW_UP
 
     def seen(self) -> Seen:
         engine = self.engine
         position, velocity = engine.position, engine.velocity
         late = (1 - EARLY) * self.seconds
+        kinetic, energy = engine.energies
         speeds = np.sqrt((velocity * velocity).sum(axis=1))
         way = np.sqrt(((position - self.settled) ** 2).sum(axis=1))
         return Seen(
             position=position,
             reach=self.reach,
             apex=self.apex,
-            energy=engine.energy,
+            energy=energy,
             energy_start=self.energy_start,
             energy_worst=self.worst,
-            energy_square=self.square / max(self.steps, 1),
+            energy_square=self.square / max(self.looks, 1),
             energy_scale=self.scale,
-            kinetic=engine.kinetic,
+            kinetic=kinetic,
             impacts=self.impacts,
             times=sorted(self.times)[:MOST_TIMES],
             pressure=self.impulse / late,
@@ -187,4 +219,7 @@ class _Watch:
             counts=engine.counts(),
             seconds=self.seconds,
             simulated=engine.time,
+            size=engine.size,
+            entities=engine.ids.tolist(),
+            milliseconds=1e3 * engine.spent / engine.timed_seconds if engine.timed_seconds else None,
         )

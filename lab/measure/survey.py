@@ -132,9 +132,15 @@ def _has_levels(world: World) -> bool:
 
 
 def nudge(world: World, size: float, seed: int = 0) -> None:
-    """Move every dynamic body by up to ``size`` along each axis, at random from ``seed``."""
-    position = world.bodies.dynamic.position
-    position += np.random.default_rng(seed).uniform(-size, size, position.shape)
+    """Move every dynamic body by up to ``size`` along each axis, at random from ``seed``.
+
+    Not along an axis on which all bodies are at one place and nothing moves or falls: bodies on a line stay on it.
+    """
+    dynamic = world.bodies.dynamic
+    position = dynamic.position
+    axes = np.ptp(position, axis=0) > 0 if len(position) > 1 else np.ones(position.shape[1], bool)
+    axes |= np.any(dynamic.linear_velocity, axis=0) | (np.asarray(world.gravity) != 0)
+    position += np.random.default_rng(seed).uniform(-size, size, position.shape) * axes
 
 
 def _nudge_of(subject: Subject, settings: Settings) -> float:

@@ -27,6 +27,11 @@ class Output:
     out: Path | None
     charts: Any
 
+    @property
+    def plain(self) -> bool:
+        """True if a person reads stdout."""
+        return not self.as_json and not self.as_markdown
+
     @classmethod
     def checked(
         cls,

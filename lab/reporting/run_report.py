@@ -87,11 +87,9 @@ def quality(report: RunReport) -> Table:
     )
     table.add_row("impacts", f"{contacts['impacts']:,}", "in all")
     if report.energy:
-        table.add_row(
-            "energy drift",
-            _percent(report.energy),
-            _energy_remark(report),
-        )
+        kept = not report.energy_changes and math.isfinite(report.energy.relative)
+        name, value = ("energy drift", _percent(report.energy)) if kept else ("energy", _from_to(report.energy))
+        table.add_row(name, value, _energy_remark(report))
     if report.momentum:
         remark = _drift_remark(report.momentum, "all mass times speed")
         if not math.isfinite(report.momentum.relative):
@@ -126,8 +124,15 @@ def _energy_remark(report: RunReport) -> str:
     if report.energy is None or not math.isfinite(report.energy.relative):
         return "energy overflows"
     if report.energy_changes:
-        return f"not conserved here: {', '.join(report.energy_changes)}"
+        return f"changed by {', '.join(report.energy_changes)}"
     return _drift_remark(report.energy, "peak kinetic energy")
+
+
+def _from_to(drift: Drift) -> str:
+    """Of an energy that changes by intent."""
+    if not math.isfinite(drift.relative):
+        return "not representable"
+    return f"{drift.start:.3g} to {drift.end:.3g} J"
 
 
 def _percent(drift: Drift) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import shlex
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from rich.console import Console
 
 from ..cases.grid import ALL_METHODS
 from ..cases.subjects import Subject, subject_of
-from ..commands.group import STOPPED
+from ..commands.group import STOPPED as STOPPED_CODE
 from ..commands.options import (
     WORDS,
     KeepsWords,
@@ -31,11 +32,13 @@ from ..commands.options import (
 from ..commands.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.result_store import Store
+from ..jobs.runs import STOPPED
 from ..reporting.output import Output
 from ..reporting.progress import Bar
 from ..reporting.text_tables import TextTable
+from .answer import answer
 from .files import write_csv, write_json
-from .records import PYMUNK, Trade
+from .records import PYMUNK, CaseTrade, Trade
 from .report import COUNTS, cheapest, choice_lines, measured, remarks, tables
 from .summary import summaries
 from .trade import Only, trade
@@ -50,7 +53,6 @@ MARK = "carom trade"
 @together(
     click.option("--against", type=click.Choice([PYMUNK]), help="The same scenes in this engine, on the same axes."),
     click.option("--no-timing", is_flag=True, help="Counts only; nothing is timed."),
-    click.option("--quick", is_flag=True, help="Every second step, and 8 repeats at most."),
 )
 @runs_options
 @out_option("Where results, tables and charts go.", Path("out/trade"))
@@ -72,7 +74,8 @@ def trade_command(
     geometries: tuple[str, ...] | None,
     against: str | None,
     no_timing: bool,
-    quick: bool,
+    budget: float,
+    thorough: bool,
     workers: int | None,
     kept: Path,
     out: Path,
@@ -90,7 +93,7 @@ def trade_command(
     targets = tuple(dict.fromkeys(targets))
     subjects = [subject_of(target, options, seed_number(seed)) for target in targets]
     only = Only(integrators or (), collisions or (), substeps or (), geometries or ())
-    _check_integrators(subjects, only.integrators)
+    check_integrators(subjects, only.integrators)
     if against == PYMUNK:
         pymunk_module()
     output = Output.checked(" ".join((MARK, *targets)), as_json, as_markdown, into, None)
@@ -98,28 +101,51 @@ def trade_command(
     charts = _charts_there()
     arguments = {
         "norms": norms, "seconds": seconds, "repeats": repeats, "steps": steps or (), "only": only,
-        "against_pymunk": against == PYMUNK, "timing": not no_timing, "quick": quick, "options": options,
+        "against_pymunk": against == PYMUNK, "timing": not no_timing, "options": options,
         "seed": seed_number(seed), "workers": workers, "command": _command_line(context),
+        "budget": None if thorough else budget,
     }  # fmt: skip
     with Store(kept) as store:
         try:
             with Bar(Console(stderr=True)) as bar:
-                result = trade(*targets, **arguments, store=store, progress=bar)
+                show = _shown(bar) if output.plain else _nothing
+                result = trade(*targets, **arguments, store=store, progress=bar, show=show)
                 files = _write(result, out)
-                if charts:
+                if charts and result.stopped != STOPPED:
                     bar.say("charts")
                     files += [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
         except KeyboardInterrupt:
-            click.echo(f"carom: stopped; {_results(store)} kept in {store.path}, the same command goes on", err=True)
-            raise click.exceptions.Exit(STOPPED) from None
+            click.echo(f"carom: stopped before anything was known; {_results(store)} kept in {kept}", err=True)
+            raise click.exceptions.Exit(STOPPED_CODE) from None
+    if output.plain:
+        for case in result.cases:
+            click.echo("\n".join(answer(case)) + "\n")
     choices = [cheapest(case) for case in measured(result)]
     page = [*summaries(result), *choices]
     output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)], page)
     for path in files:
         click.echo(f"written: {path}", err=True)
+    if result.stopped == STOPPED:
+        click.echo(f"carom: stopped; finished runs are kept in {kept}, the same command goes on", err=True)
+        raise click.exceptions.Exit(STOPPED_CODE)
 
 
-def _check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> None:
+def _shown(bar: Bar) -> Callable[[CaseTrade], None]:
+    began = time.monotonic()
+
+    def show(case: CaseTrade) -> None:
+        """What is known so far, above the bar."""
+        lines = answer(case)
+        click.echo("\n".join([f"after {time.monotonic() - began:.0f} s: {lines[0]}", *lines[1:], ""]))
+
+    return show
+
+
+def _nothing(case: CaseTrade) -> None:
+    pass
+
+
+def check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> None:
     """Problem, with suggestions, for an integrator that a scene does not have; plugins can add integrators."""
     for subject in subjects:
         for name in names:

@@ -20,6 +20,7 @@ CAROM, PYMUNK = "carom", "pymunk"
 SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  # kinds of scenes
 
 NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
+CUT = "cut off"  # of runs that time ended: these are no results
 FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: ended by an error
 TRUSTED = 10.0  # an error counts as measured if the references agree better by this factor
 
@@ -73,6 +74,10 @@ class Outcome(Plain):
         of the whole run, the same on every machine: steps, force_evaluations, candidates, pairs, impacts, solver_loops
     seconds
         simulated
+    effects
+        what could be noticed, see :mod:`carom.lab.measure.effects`
+    milliseconds
+        cost of a simulated second on this machine
     """
 
     cell: Cell
@@ -82,6 +87,8 @@ class Outcome(Plain):
     counts: dict[str, float]
     seconds: float
     detail: str = ""
+    effects: dict[str, float] = field(default_factory=dict)
+    milliseconds: float | None = None
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,11 @@ class Point(Plain):
     work
         weighted sum of the counts, see :mod:`carom.lab.engines.cost`; per simulated second
     milliseconds
-        wall time per simulated second; None if it was not timed
+        time per simulated second on this machine; None if it was not timed
+    effects
+        what could be noticed, each at its worst of all repeats
+    line
+        the code that sets the settings
     """
 
     cell: Cell
@@ -129,6 +140,8 @@ class Point(Plain):
     counts: dict[str, float]
     work: float
     milliseconds: Spread | None = None
+    effects: dict[str, float] = field(default_factory=dict)
+    line: str = ""
 
     @property
     def failed(self) -> bool:
@@ -194,7 +207,11 @@ class CaseTrade(Plain):
     refused
         why nothing was measured, else ""
     whole
-        number of repeats needed to trust their worst; a quick look has fewer
+        number of repeats needed to trust their worst; a first effort has fewer
+    own
+        the settings that the scene has
+    missing
+        number of settings that there was no time for
     """
 
     scene: str
@@ -210,6 +227,8 @@ class CaseTrade(Plain):
     curves: list[Curve]
     refused: str = ""
     whole: int = 0
+    own: Cell | None = None
+    missing: int = 0
 
     @property
     def norm(self) -> str:
@@ -218,11 +237,12 @@ class CaseTrade(Plain):
 
 @dataclass
 class Trade(Plain):
-    """All cases of one call, on one machine; ``command`` reproduces it."""
+    """All cases of one call, on one machine; ``command`` reproduces it. stopped: why it ended early, else ""."""
 
     machine: dict[str, str]
     command: str
     cases: list[CaseTrade]
+    stopped: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which cannot represent infinity: an inf order of theory becomes the string "exact"."""

@@ -238,8 +238,8 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
     lines.append(f"{number(case.seconds)} s simulated{repeated}")
     if case.repeats < case.whole:
         lines.append(
-            f"a quick look at {case.repeats} of {case.whole} {case.repeated}: others may be worse, and what is exact "
-            "here may not be; leave out --quick to know"
+            f"a look at {case.repeats} of {case.whole} {case.repeated}: others may be worse, and what is exact here "
+            "may not be; --thorough knows"
         )
     lines.append(f"{norm}: {case.norms[norm]}")
     lines.append(f"reference: {reference_line(case, norm)}")

@@ -3,28 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..bench.results import machine
 from ..cases import grid as grids
-from ..cases.case import Case, case_of, check_arguments
+from ..cases.case import EFFORTS, Case, case_of, check_arguments
 from ..cases.subjects import subject_of
 from ..commands.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
-from ..jobs.runs import Runs, point_of, refined_reference, run_tasks
-from ..jobs.tasks import engine_of
+from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, refined_reference, run_tasks
+from ..jobs.tasks import Task, engine_of
 from ..measure.norms import NORMS
+from ..measure.timing import CLOCK
 from ..reporting.progress import NO_PROGRESS, Progress
-from .clock import time_points
-from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Outcome, Point, Reference, Trade, by_method, observed_order
+from .code_line import python_line
+from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
 ROUNDING = 1e-12  # smaller errors are rounding, which has no order
 SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
+RUNNING = 0.9  # of the budget; the rest is for tables and charts
+FIRST_LOOK = 8.0  # s: then what is known is shown, if something is
+
+Show = Callable[[CaseTrade], None]
 
 
 @dataclass(frozen=True)
@@ -76,64 +83,128 @@ def trade(
     timing: bool = True,
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
-    quick: bool = False,
+    budget: float | None = None,
     workers: int | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
     command: str = "",
+    show: Show | None = None,
 ) -> Trade:
     """Measure work and error of every setting that matters in each scene.
 
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
-    follow from the scene. quick: every second step and at most 8 repeats, unless given, for a first look. workers:
-    processes at most, None for all cores (small amounts of work use none); store: finished runs, to be continued. Of
-    several scenes, one that cannot be measured is in the result with the reason. ValueError or Problem for wrong
-    arguments, and for a single scene that cannot be measured.
+    follow from the scene. budget: s for all together, spent on more and more exact looks; None: as long as it takes.
+    workers: processes at most, None for all cores (small amounts of work use none); store: finished runs, to be
+    continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; with it Ctrl-C ends the
+    study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
+    ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
     for target in targets:
         subject_of(target)
-    runs = Runs(workers, store, progress)
-    cases = []
-    for target in targets:
+    began = time.monotonic()
+    runs = Runs(workers, store, progress, stoppable=show is not None)
+    result = Trade({**machine(), "clock": CLOCK}, command, [])
+    for number, target in enumerate(targets, 1):
         name = target if isinstance(target, str) else getattr(target, "__name__", "scene")
+        if budget is not None:
+            runs.until = began + RUNNING * budget * number / len(targets)
+        if runs.stopped not in ("", OUT_OF_TIME):
+            break
+        runs.stopped = ""
         progress.say(f"{name}: survey")
         try:
             case = case_of(
                 target, norms=norms, seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed
             )
+            study = Study(case, only or Only(), against_pymunk, timing, runs, show, began)
+            result.cases.append(study.measured(range(EFFORTS) if budget is not None else (EFFORTS - 1,)))
         except Problem as problem:
             if len(targets) == 1:
                 raise
-            cases.append(_refused(name, problem.message))
-            continue
-        looked = case.quick(not steps, repeats is None) if quick else case
-        measured = measure(looked, only or Only(), against_pymunk, timing, runs)
-        cases.append(dataclasses.replace(measured, whole=case.repeats))
-    return Trade({**machine(), "clock": "wall time"}, command, cases)
+            result.cases.append(_refused(name, problem.message))
+        result.stopped = runs.stopped
+    return result
 
 
-def measure(case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Runs) -> CaseTrade:
-    """One case: its references, its grid, then the clock, with no other work in parallel."""
-    name = case.subject.name
-    curves = only.of(case)
-    peers = grids.peer_methods() if against_pymunk else ()
-    if peers:
-        engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # raises, with the reason
-    case, reference, _ = refined_reference(
-        case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
-    )
-    cells = grids.grid((*curves, *peers), case.steps)
-    records = runs.all(run_tasks(case, cells), f"{name}: {len(cells)} settings, {case.repeats_text}")
-    outcomes: dict[Cell, list[Outcome]] = {}
-    for record in records:
-        outcome = Outcome.from_dict(record)
-        outcomes.setdefault(outcome.cell, []).append(outcome)
-    points = [point_of(found) for found in outcomes.values()]
-    if timing:
-        time_points(case, points, runs.progress)
-    return summed_up(case, reference, points)
+class Study:
+    """One scene: its references and its grid, measured with more and more effort."""
+
+    def __init__(
+        self, case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Runs, show: Show | None, began: float
+    ) -> None:
+        self.whole, self.timing, self.runs, self.show = case, timing, runs, show
+        self.curves = only.of(case)
+        peers = grids.peer_methods() if against_pymunk else ()
+        if peers:
+            engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # raises, with the reason
+        self.curves += peers
+        own = case.survey.settings
+        self.own = Cell(own.dt, own.integrator, own.collision, own.substeps, own.geometry)
+        self.began = began
+        self.cells = self._nearest()
+        self.case, self.reference = case, Reference(f"closed form: {case.form}")
+        if case.reference is None:  # until there is a better one
+            self.case = case.replace(reference=case.survey.trial)
+            self.reference = Reference("a first run with all impacts at their true times")
+
+    def measured(self, efforts: Sequence[int] = range(EFFORTS)) -> CaseTrade:
+        """What is known when time is up, or when all is done."""
+        for effort in efforts:
+            try:
+                self._measure(self.whole.at(effort))
+            except OutOfTimeError:
+                break
+            if self.show is not None and effort < efforts[-1]:
+                self.show(self._known())
+        return self._known()
+
+    def _measure(self, case: Case) -> None:
+        runs, name = self.runs, case.subject.name
+        if self.show is not None and runs.listener is None:
+            runs.listener = self._first_look
+            runs.all([Task(case, cell, 0) for cell in self.cells], f"{name}: as it is")
+        case, reference, _ = refined_reference(
+            case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
+        )
+        self.case, self.reference = case, reference
+        self.cells = grids.grid(self.curves, case.steps)
+        tasks = sorted(run_tasks(case, self.cells), key=lambda task: (task.repeat, self._distance(task.cell)))
+        runs.all(tasks, f"{name}: {len(self.cells)} settings, {case.repeats_text}")
+
+    def _nearest(self) -> tuple[Cell, ...]:
+        """The scene's own settings, and with twice and half the step: known before there is a reference."""
+        steps = [self.own.dt * factor for factor in (1, 2, 0.5)]
+        return tuple(dataclasses.replace(self.own, dt=dt) for dt in steps if dt <= self.whole.steps[0])
+
+    def _distance(self, cell: Cell) -> float:
+        """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
+        steps are farther, because they cost more."""
+        fields = ("integrator", "collision", "substeps", "geometry")
+        own = grids.with_own_flight(dataclasses.replace(self.own, collision=cell.collision))
+        differ = sum(getattr(cell, name) != getattr(own, name) for name in fields)
+        differ += cell.collision != self.own.collision
+        halvings = math.log2(self.own.dt / cell.dt)
+        return differ + (1.5 * halvings if halvings > 0 else -halvings)
+
+    def _first_look(self) -> None:
+        if self.show is not None and time.monotonic() > self.began + FIRST_LOOK:
+            self.runs.listener = _nothing
+            self.show(self._known())
+
+    def _known(self) -> CaseTrade:
+        points = known_points(self.case, self.cells, self.runs)
+        for point in points:
+            point.line = python_line(point.cell, self.case.survey.settings)
+            point.milliseconds = point.milliseconds if self.timing else None
+        found = summed_up(self.case, self.reference, points)
+        missing = len(self.cells) - len(points)
+        return dataclasses.replace(found, whole=self.whole.repeats, own=self.own, missing=missing)
+
+
+def _nothing() -> None:
+    pass
 
 
 def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> CaseTrade:

@@ -11,10 +11,10 @@ from typing import Any
 from ...framework import Settings
 from ..cases.case import Case, case_of
 from ..jobs.result_store import Store
-from ..jobs.runs import Runs, point_of, run_tasks
+from ..jobs.runs import Runs, points_of
 from ..measure.norms import NORMS
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..trading.records import CAROM, Cell, Outcome, Point, Reference
+from ..trading.records import CAROM, Cell, Point, Reference
 from .search import Tuning, enough_repeats, exact_enough
 
 TOLERATED = 2.0  # times the promised error: beyond it a warning is shown
@@ -100,8 +100,8 @@ def check(
 def measured_with(case: Case, settings: Settings, runs: Runs) -> Point:
     """The point of these settings over all repeats of a case; fields that no cell has keep the scene's values."""
     cell = cell_of(settings)
-    records = runs.all(run_tasks(case, [cell]), f"{case.subject.name}: {case.repeats_text}")
-    return point_of([Outcome.from_dict(record) for record in records])
+    (point,) = points_of(case, [cell], runs, f"{case.subject.name}: {case.repeats_text}")
+    return point
 
 
 def cell_of(settings: Settings) -> Cell:

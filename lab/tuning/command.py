@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import shlex
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from rich.console import Console
 
 from ...framework import Settings
 from ..cases.subjects import subject_of
-from ..commands.group import STOPPED
+from ..commands.group import STOPPED as STOPPED_CODE
 from ..commands.options import (
     WORDS,
     KeepsWords,
@@ -25,20 +27,27 @@ from ..commands.options import (
 )
 from ..commands.usage_errors import Problem
 from ..jobs.result_store import Store
-from ..jobs.runs import Runs
+from ..jobs.runs import STOPPED, Runs
 from ..reporting.output import Output
 from ..reporting.progress import Bar
+from ..trading.command import check_integrators
 from ..trading.trade import Only
 from .check import Check, check, measured_with
-from .report import TuneResult, sentences, tables
+from .report import TuneResult, answer, sentences, tables
 from .search import Tuning, search
 
 MARK = "carom tune"
 NONE_MEETS = 1  # exit code
 
 
-def _above_zero(context: click.Context, parameter: click.Parameter, value: float) -> float:
-    if not (math.isfinite(value) and value > 0):
+MISSING = (
+    "--max-error is missing: how large may the error be? --max-error 0.01 allows 1 % of what the norm is relative to "
+    "(carom trade shows it), --max-error 0.05 --absolute 5 cm"
+)
+
+
+def _above_zero(context: click.Context, parameter: click.Parameter, value: float | None) -> float | None:
+    if value is not None and not (math.isfinite(value) and value > 0):
         raise Problem(f"--max-error takes a number above 0, not {value:g}")
     return value
 
@@ -47,8 +56,8 @@ def _above_zero(context: click.Context, parameter: click.Parameter, value: float
 @click.argument("target", metavar="SCENE|FILE.py")
 @together(
     click.option(
-        "--max-error", type=float, metavar="E", default=1e-3, show_default=True, callback=_above_zero,
-        help="The largest error allowed, as a part of what the norm is relative to.",
+        "--max-error", type=float, metavar="E", callback=_above_zero,
+        help="The largest error allowed, as a part of what the norm is relative to; it must be given.",
     ),
     click.option("--absolute", is_flag=True, help="--max-error is in the scene's own units."),
 )  # fmt: skip
@@ -65,7 +74,7 @@ def _above_zero(context: click.Context, parameter: click.Parameter, value: float
 def tune_command(
     context: click.Context,
     target: str,
-    max_error: float,
+    max_error: float | None,
     absolute: bool,
     norms: tuple[str, ...],
     seconds: float | None,
@@ -78,6 +87,8 @@ def tune_command(
     substeps: tuple[int, ...] | None,
     geometries: tuple[str, ...] | None,
     checked: tuple[str, ...],
+    budget: float,
+    thorough: bool,
     workers: int | None,
     kept: Path,
     as_json: bool,
@@ -96,26 +107,53 @@ def tune_command(
         raise Problem(f"--norm: settings are tuned for one error, not for {' and '.join(norms)}")
     command = shlex.join([*MARK.split(), *context.meta[WORDS]])
     output = Output.checked(" ".join((MARK, target)), as_json, as_markdown, into, None)
-    for other in checked:
-        subject_of(other)
+    for one in (target, *checked):
+        subject_of(one)
+    only = Only(integrators or (), collisions or (), substeps or (), geometries or ())
+    check_integrators([subject_of(target, options, seed_number(seed))], only.integrators)
+    if max_error is None:
+        raise Problem(MISSING)
     arguments = {
         "absolute": absolute, "seconds": seconds, "repeats": repeats, "steps": steps or (), "options": options,
-        "only": Only(integrators or (), collisions or (), substeps or (), geometries or ()), "seed": seed_number(seed),
-        "workers": workers,
+        "only": only, "seed": seed_number(seed),
+        "workers": workers, "budget": None if thorough else budget,
     }  # fmt: skip
     with Store(kept) as store, Bar(Console(stderr=True)) as bar:
         try:
-            tuning = search(target, max_error, norms[0] if norms else None, store=store, progress=bar, **arguments)
-            balanced = measured_with(tuning.case, Settings.balanced(), Runs(workers, store, bar))
-            found = []
-            for other in checked if tuning.choice is not None else ():
+            show = _shown(bar) if output.plain else _nothing
+            norm = norms[0] if norms else None
+            tuning = search(target, max_error, norm, store=store, progress=bar, show=show, **arguments)
+            balanced, found = None, []
+            if not tuning.stopped:
+                balanced = measured_with(tuning.case, Settings.balanced(), Runs(workers, store, bar))
+            for other in checked if tuning.choice is not None and tuning.stopped != STOPPED else ():
                 found.append(_checked(tuning, other, absolute=absolute, workers=workers, store=store, progress=bar))
         except KeyboardInterrupt:
-            click.echo(f"carom: stopped; finished runs are kept in {store.path}, the same command goes on", err=True)
-            raise click.exceptions.Exit(STOPPED) from None
+            click.echo(f"carom: stopped; finished runs are kept in {kept}, the same command goes on", err=True)
+            raise click.exceptions.Exit(STOPPED_CODE) from None
+    if output.plain:
+        click.echo("\n".join(answer(tuning)) + "\n")
     _show(TuneResult(command, tuning, balanced, found), output)
+    if tuning.stopped == STOPPED:
+        click.echo(f"carom: stopped; finished runs are kept in {kept}, the same command goes on", err=True)
+        raise click.exceptions.Exit(STOPPED_CODE)
     if tuning.choice is None:
         raise click.exceptions.Exit(NONE_MEETS)
+
+
+def _shown(bar: Bar) -> Callable[[Tuning], None]:
+    began = time.monotonic()
+
+    def show(tuning: Tuning) -> None:
+        """What is known so far, above the bar."""
+        lines = answer(tuning)
+        click.echo("\n".join([f"after {time.monotonic() - began:.0f} s: {lines[0]}", *lines[1:], ""]))
+
+    return show
+
+
+def _nothing(tuning: Tuning) -> None:
+    pass
 
 
 def _checked(tuning: Tuning, target: str, **options: Any) -> Check:

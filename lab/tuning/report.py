@@ -7,8 +7,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..measure.effects import metres
 from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
+from ..trading.answer import cost_text, noticed_text
+from ..trading.code_line import settings_line
 from ..trading.records import Cell, ErrorBar, Point
 from ..trading.report import NOTHING, compact, target_text
 from ..trading.trade import label_of
@@ -26,7 +29,7 @@ class TuneResult:
 
     command: str
     tuning: Tuning
-    balanced: Point
+    balanced: Point | None
     checks: list[Check]
 
     def as_dict(self) -> dict[str, Any]:
@@ -71,6 +74,44 @@ def _finite(value: float) -> float | None:
 
 def _plain(point: Point | None) -> dict[str, Any] | None:
     return None if point is None else dataclasses.asdict(point)
+
+
+# -- the answer ---------------------------------------------------------------------------------------------------
+
+
+def answer(tuning: Tuning) -> list[str]:
+    """The settings to paste, what they cost, and what the next cheaper choice would change."""
+    choice = tuning.choice
+    if choice is None:
+        return [tuning.why_not]
+    allowed = f"of the {_in_unit(tuning, tuning.target)} allowed"
+    lines = [
+        f"{tuning.scene}: use {tuning.line}",
+        f"  cost     {cost_text(choice)}",
+        f"  error    {_in_unit(tuning, tuning.error)} {allowed}, in {tuning.norm}",
+        f"  noticed  {noticed_text(choice)}",
+    ]
+    missed = [trial for trial in tuning.trials if not trial.met and trial.work < choice.work and not trial.failure]
+    if missed:
+        next_one = max(missed, key=lambda trial: trial.work)
+        line = settings_line(next_one.cell, tuning.base)
+        ratio = compact(next_one.work / choice.work, 2)
+        lines.append(f"  cheaper  {line}: {ratio} times the work, error {_in_unit(tuning, next_one.error)}")
+    if tuning.runner_up is not None:
+        line = settings_line(tuning.runner_up.cell, tuning.base)
+        error = _in_unit(tuning, tuning.runner_up.errors[tuning.norm].high)
+        ratio = compact(tuning.runner_up.work / choice.work, 2)
+        lines.append(f"  else     {line}: {ratio} times the work, error {error}")
+    repeats = f"{choice.repeats} {tuning.repeated if choice.repeats > 1 else tuning.repeated[:-1]}"
+    more = f"; {tuning.stopped}, the same command goes on" if tuning.stopped else ""
+    return [*lines, f"  known    from {len(tuning.trials)} trials, {repeats} of {number(tuning.seconds)} s{more}"]
+
+
+def _in_unit(tuning: Tuning, error: float) -> str:
+    """An error in metres if the norm is one of place, else as a share."""
+    if tuning.norm in ("position", "apex"):
+        return metres(error * tuning.scale)
+    return f"{100 * error:.2g} %"
 
 
 # -- tables -----------------------------------------------------------------------------------------------------
@@ -183,7 +224,9 @@ def sentences(result: TuneResult) -> list[str]:
     lines = [result.command, *_about(tuning)]
     if tuning.choice is None:
         return [*lines, f"{tuning.why_not}."]
-    lines += [_chosen(tuning, tuning.choice), _second(tuning, tuning.choice), _against_balanced(result, tuning.choice)]
+    lines += [_chosen(tuning, tuning.choice), _second(tuning, tuning.choice)]
+    if result.balanced is not None:
+        lines.append(_against_balanced(result.balanced, tuning, tuning.choice))
     lines += [line for check in result.checks if (line := check_line(check))]
     return [*lines, _limits(tuning)]
 
@@ -224,8 +267,7 @@ def _second(tuning: Tuning, choice: Point) -> str:
     return f"runner-up: {_words(second.cell, tuning)}: {tuning.norm} {error} with {work} times the work"
 
 
-def _against_balanced(result: TuneResult, choice: Point) -> str:
-    point, tuning = result.balanced, result.tuning
+def _against_balanced(point: Point, tuning: Tuning, choice: Point) -> str:
     ratio = point.work / choice.work
     work = (
         f"{compact(ratio)} times the work of the choice" if ratio >= 1

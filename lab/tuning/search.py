@@ -12,23 +12,23 @@ from __future__ import annotations
 import dataclasses
 import heapq
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from ...framework import CaromError, Settings
 from ..cases import grid as grids
-from ..cases.case import Case, case_of
+from ..cases.case import EFFORTS, Case, case_of
 from ..commands.usage_errors import Problem
 from ..engines.cost import WEIGHTS
 from ..jobs.result_store import Store
-from ..jobs.runs import Runs, point_of, refined_reference, run_tasks
-from ..jobs.tasks import Task
+from ..jobs.runs import OutOfTimeError, Runs, known_points, points_of, refined_reference
 from ..measure.norms import NORMS
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
-from ..trading.records import TRUSTED, Cell, Outcome, Point, Reference
-from ..trading.trade import Only
+from ..trading.records import TRUSTED, Cell, Point, Reference
+from ..trading.trade import RUNNING, Only
 
 BELOW = 16  # a method's step is at least the smallest step of the case over this
 MOST_REPEATS = 400  # of a noisy statistic
@@ -39,6 +39,10 @@ ROUNDING = 1e-9  # of a step
 SMALLEST = 1e-13  # of the scale: accuracy limit of own runs, ten times the rounding of some hundred steps
 FAR_DEARER = 4.0  # times the choice's work: limit of the search for a runner-up
 STUCK = 3  # smaller steps in a row without improvement: the error does not depend on the step
+
+
+class NotExactError(Problem):
+    """The references are not exact enough, or the statistics too noisy, for the error asked for."""
 
 
 class NothingMeetsError(CaromError, ValueError):
@@ -69,6 +73,8 @@ class Tuning:
         the scene's own settings, whose other fields are kept
     case
         as searched: with its reference and repeats
+    stopped
+        why the search ended early, else ""
     """
 
     scene: str
@@ -86,6 +92,7 @@ class Tuning:
     choice: Point | None = None
     runner_up: Point | None = None
     trials: list[Trial] = field(default_factory=list)
+    stopped: str = ""
 
     @property
     def settings(self) -> Settings:
@@ -145,9 +152,11 @@ def search(
     only: Only | None = None,
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
+    budget: float | None = None,
     workers: int | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
+    show: Callable[[Tuning], None] | None = None,
 ) -> Tuning:
     """The result of :func:`tune` with all its trials.
 
@@ -158,12 +167,34 @@ def search(
     number = isinstance(max_error, (int, float)) and not isinstance(max_error, bool)
     if not (number and math.isfinite(max_error) and max_error > 0):
         raise ValueError(f"max_error must be a number above 0, got {max_error!r}")
+    until = math.inf if budget is None else time.monotonic() + RUNNING * budget
     progress.say("survey")
     case = case_of(
         target, norms=(norm,) if norm else (), seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed
     )
-    runs = Runs(workers, store, progress)
-    return _Search(case, float(max_error), absolute, only or Only(), runs).result()
+    runs = Runs(workers, store, progress, until, stoppable=show is not None)
+    found: Tuning | None = None
+    for effort in range(EFFORTS - 1 if budget is None else 0, EFFORTS):
+        try:
+            searching = _Search(case.at(effort), float(max_error), absolute, only or Only(), runs)
+        except OutOfTimeError:
+            break
+        except NotExactError:
+            if effort < EFFORTS - 1:
+                continue
+            raise
+        tuning = searching.result()
+        if not tuning.stopped or found is None or tuning.choice is not None:
+            found = tuning
+        if tuning.stopped:
+            found.stopped = tuning.stopped
+            break
+        if show is not None and effort < EFFORTS - 1:
+            show(found)
+    if found is None:
+        why = runs.stopped or "time is up"
+        raise Problem(f"{case.subject.name}: {why} before anything was known: take a larger budget")
+    return found
 
 
 class _Search:
@@ -184,23 +215,32 @@ class _Search:
         self.whole: dict[Cell, Point] = {}
 
     def result(self) -> Tuning:
-        held = self._cheapest_two()
-        held = [self._refined(held[0]), *held[1:]] if held else []
+        held: list[Point] = []
+        try:
+            self._cheapest_two(held)
+            if held:
+                held[0] = self._refined(held[0])
+        except OutOfTimeError:
+            held = held or self._held_once()
         held.sort(key=lambda point: point.work)
         case = self.case
         return Tuning(
             case.subject.name, self.norm.name, self.norm.text, self.target, self.scale, case.seconds, case.repeats,
             case.repeated, self.reference, case.survey.settings, len(self.methods), case, held[0] if held else None,
-            held[1] if len(held) > 1 else None, self.trials,
+            held[1] if len(held) > 1 else None, self.trials, self.runs.stopped,
         )  # fmt: skip
 
-    def _cheapest_two(self) -> list[Point]:
-        """The first two methods that hold, the cheapest first."""
+    def _held_once(self) -> list[Point]:
+        """What has met the target in the runs there are."""
+        known = known_points(self.case, self.looks, self.runs)
+        return [point for point in known if point.meets(self.norm.name, self.target)]
+
+    def _cheapest_two(self, held: list[Point]) -> None:
+        """Fill in the first two methods that hold, the cheapest first."""
         queue: list[tuple[float, int, Cell]] = []
         for number, method in enumerate(self.methods):
             cell = dataclasses.replace(method, dt=self.case.steps[0])
             heapq.heappush(queue, (_expected(cell), number, cell))
-        held: list[Point] = []
         while queue and len(held) < 2:
             expected, number, cell = heapq.heappop(queue)
             if held and expected > FAR_DEARER * held[0].work:
@@ -218,7 +258,6 @@ class _Search:
             smaller = self._next(cell, error)
             if smaller is not None:
                 heapq.heappush(queue, (work * cell.dt / smaller.dt, number, smaller))
-        return held
 
     def _walked_back(self, point: Point) -> Point:
         """The largest step of the grid from which on all smaller ones hold: a jump may have been too long."""
@@ -235,18 +274,16 @@ class _Search:
     def _look(self, cell: Cell) -> tuple[float, float]:
         """Error and work of a single run, at the first start phase or seed."""
         if cell not in self.looks:
-            outcome = Outcome.from_dict(self.runs.all([Task(self.case, cell, 0)], _words(self.case, cell))[0])
-            point = point_of([outcome])
-            error = abs(outcome.errors[self.norm.name]) if outcome.failure is None else math.inf
+            (point,) = points_of(self.case.replace(repeats=1), [cell], self.runs, _words(self.case, cell))
+            error = math.inf if point.failed else point.errors[self.norm.name].mean
             self.looks[cell] = error, point.work or _expected(cell)
             met = error <= self.target
-            self.trials.append(Trial(cell, error, point.work, 1, met, outcome.failure or ""))
+            self.trials.append(Trial(cell, error, point.work, 1, met, ", ".join(point.failures)))
         return self.looks[cell]
 
     def _hold(self, cell: Cell) -> Point | None:
         """The point over all repeats if it meets the target, including the reference's own error."""
-        records = self.runs.all(run_tasks(self.case, [cell]), f"{_words(self.case, cell)}, all repeats")
-        point = point_of([Outcome.from_dict(record) for record in records])
+        (point,) = points_of(self.case, [cell], self.runs, f"{_words(self.case, cell)}, all repeats")
         self.whole[cell] = point
         error = self._worst(cell)
         met = error <= self.target
@@ -295,7 +332,7 @@ def enough_repeats(case: Case, norm: str, noise: float, target: float) -> Case:
     """
     wanted = max(case.repeats, math.ceil((NOISE * noise / target) ** 2))
     if wanted > MOST_REPEATS:
-        raise Problem(
+        raise NotExactError(
             f"{case.subject.name}: the {norm} of one run of {case.seconds:g} s scatters by {noise:.2g}, {target:.2g} "
             f"cannot be told from chance by {MOST_REPEATS} runs: take a larger error or longer runs (--seconds)"
         )
@@ -327,7 +364,7 @@ def exact_enough(
         return known, reference
     agreement = reference.agreement[norm]
     target = margin_of(known, reference) * agreement
-    raise Problem(
+    raise NotExactError(
         f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
         f"{reference.text} agree to {agreement:.2g} only. Take a larger error"
         + (" or longer runs" if NORMS[norm].signed else " or a shorter time")

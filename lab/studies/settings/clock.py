@@ -92,5 +92,4 @@ def _span(
 
 
 def _counts(world: World) -> Mapping[str, float]:
-    resting = world.stats().counters.get("resting_contacts", 0)
-    return counts_of(world, resting * world.settings.substeps)
+    return counts_of(world)

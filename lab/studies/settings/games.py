@@ -25,12 +25,12 @@ from ...cases.case import Case
 from ...commands.choices import PRESETS, preset
 from ...commands.usage_errors import Problem, did_you_mean
 from ...engines.cost import counts_of, work_of
-from ...jobs.runs import Runs, point_of, run_tasks
+from ...jobs.runs import Runs, points_of
 from ...measure.escape import Enclosure
 from ...measure.timing import Spread
 from ...reporting.progress import NO_PROGRESS, Progress
 from ...trading.code_line import settings_line
-from ...trading.records import Cell, Outcome, Point
+from ...trading.records import Cell, Point
 from ...tuning.search import search
 from . import scenes as settings_scenes
 from .clock import costs
@@ -137,8 +137,7 @@ def _tuned(game: Game, repeats: int, progress: Progress) -> GameChoices:
     runs, case = Runs(1, progress=progress), found.case
     points = {} if found.choice is None else {TUNED: found.choice}
     for name in PRESETS:
-        records = runs.all(run_tasks(case, [cell_of(preset(name))]), f"{game.label}: {name}")
-        points[name] = point_of([Outcome.from_dict(record) for record in records])
+        (points[name],) = points_of(case, [cell_of(preset(name))], runs, f"{game.label}: {name}")
     scale = game.per_unit * (found.scale if game.absolute else 1.0)
     choices = [_choice(game, name, point, found.base, scale, found.target) for name, point in points.items()]
     _time(choices, [partial(_world, case, point.cell) for point in points.values()], game.timed, repeats, progress)
@@ -252,7 +251,7 @@ def _shot(name: str, settings: Settings, ccd: bool) -> Choice:
             world.step()
         out = walls.outside(np.array(world.bodies.dynamic.position))
         counters = world.stats().counters
-        work = work_of(counts_of(world, counters.get("resting_contacts", 0) * settings.substeps)) / FLIGHT
+        work = work_of(counts_of(world)) / FLIGHT
     figures = {"of 8 wrong": wrong, f"of {BULLETS} out": out, "impacts capped": counters.get("capped_impacts", 0)}
     error = float(sum(figures.values()))
     line = settings_line(cell_of(settings), settings)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...measure.timing import Spread
-from ...plain import Plain
-
-INFINITE = "infinite"  # represents infinity in JSON
+from ...plain import INFINITE, Plain
 
 
 @dataclass
@@ -181,11 +178,3 @@ def _without_infinities(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_without_infinities(one) for one in value]
     return INFINITE if isinstance(value, float) and value == math.inf else value
-
-
-def _with_infinities(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _with_infinities(one) for key, one in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_with_infinities(one) for one in value]
-    return math.inf if value == INFINITE else value

@@ -1,0 +1,101 @@
+"""The longest step at which nothing would be noticed in the outcome of a scene, and what gives way beyond it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ...framework import World
+from ..cases.case import case_of
+from ..commands.usage_errors import Problem
+from ..jobs.runs import Runs
+from ..measure.effects import SHARE, in_words, metres, noticed
+from ..plain import Plain
+from ..reporting.progress import Progress
+from ..reporting.run_report import number
+from ..trading.records import CaseTrade, Point
+from ..trading.report import failures
+from ..trading.trade import RUNNING, Only, Study
+
+STEPS = (8, 4, 2, 1, 1 / 2, 1 / 4, 1 / 8)  # of the scene's own, as long as they are steps of a game
+LONGEST = 1 / 10  # s
+EFFORTS = (0, 1)
+
+
+@dataclass
+class StepOutcome(Plain):
+    """What runs with several steps have shown.
+
+    longest
+        s, of those steps from which on all shorter ones change nothing that would be noticed; 0 if there is none, inf
+        if nothing was measured
+    shortest
+        s, of those tried; size: of a body, m
+    link
+        what gives way at the next longer step, ``beyond`` s; "" if none was tried
+    refused
+        why nothing was measured, else ""
+    """
+
+    longest: float = math.inf
+    shortest: float = math.inf
+    size: float = 1.0
+    link: str = ""
+    beyond: float = math.inf
+    refused: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON, which has no infinity."""
+        return {name: None if value == math.inf else value for name, value in super().as_dict().items()}
+
+    def sentences(self) -> list[str]:
+        """For a person."""
+        if self.refused:
+            return [f"Outcome: not measured: {self.refused}"]
+        lines = []
+        if self.longest:
+            share = f"moves no body by more than {metres(SHARE * self.size)}, 1 % of the smallest one's size"
+            lines.append(f"Outcome: up to {number(self.longest)} s the step {share}, and nothing else is noticed.")
+        if self.link:
+            lines.append(f"Weakest link: at {number(self.beyond)} s {self.link}.")
+        return lines
+
+
+def outcome_of_steps(
+    build: Callable[..., World], seed: int, seconds: float, budget: float, progress: Progress
+) -> StepOutcome:
+    """Run the scene with its own settings and several steps, for at most ``budget`` s."""
+    if not seconds:
+        return StepOutcome(refused="it was not run")
+    try:
+        case = case_of(build, seconds=seconds, seed=seed)
+        own = case.survey.settings
+        longest = min(LONGEST, seconds / 3)
+        steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)
+        case = case.replace(steps=steps, given=("steps",))
+        only = Only((own.integrator,), (own.collision,), (own.substeps,), (own.geometry,))
+        runs = Runs(None, None, progress, time.monotonic() + RUNNING * budget, stoppable=True)
+        return _outcome(Study(case, only, False, False, runs, None, time.monotonic()).measured(EFFORTS))
+    except Problem as problem:
+        return StepOutcome(refused=problem.message)
+
+
+def _outcome(case: CaseTrade) -> StepOutcome:
+    points = sorted((point for curve in case.curves for point in curve.points), key=lambda point: point.cell.dt)
+    if not points:
+        return StepOutcome(refused="there was no time: take a larger --budget")
+    size = next((point.effects["size"] for point in points if point.effects), 1.0)
+    found = StepOutcome(0.0, points[0].cell.dt, size)
+    for point in points:
+        if point.failed or noticed(point.effects):
+            found.link, found.beyond = _link(point), point.cell.dt
+            break
+        found.longest = point.cell.dt
+    return found
+
+
+def _link(point: Point) -> str:
+    """What would be noticed, the bodies and their places first."""
+    return "; ".join([failures(point)] * point.failed + in_words(point.effects))

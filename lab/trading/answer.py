@@ -1,0 +1,119 @@
+"""The answer of a trade in words: the settings to paste, their cost and error, and what would be noticed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..measure.effects import in_words, metres, noticed
+from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Point
+from .report import failures
+
+FRAME = 1 / 60  # s: the frame of a game whose cost is told
+FACTOR = 2.0  # a better choice is better by this
+HARDLY = 1.25  # times the cost: no reason to change settings
+
+
+def answer(case: CaseTrade) -> list[str]:
+    """Lines for one scene: the settings to paste, and what the next cheaper and the next better choice would change."""
+    if case.refused:
+        return [f"{case.scene}: not measured: {case.refused}"]
+    points = _points(case)
+    usable = [point for point in points if not point.failed and case.norm in point.errors]
+    if not usable:
+        failed = "; ".join(dict.fromkeys(failures(point) for point in points if point.failed))
+        return [f"{case.scene}: nothing that was tried can be used{f': {failed}' if failed else ' yet'}"]
+    chosen = recommended(case, usable)
+    now = next((point for point in points if point.cell == case.own), None)
+    name = " (as it has now)" if chosen is now else ""
+    lines = [f"{case.scene}: use {chosen.line}{name}"]
+    lines.append(f"  cost     {cost_text(chosen)}")
+    lines.append(f"  error    {_error(case, chosen)}")
+    lines.append(f"  noticed  {noticed_text(chosen)}")
+    front = _front(case, usable)
+    error = _size(case, chosen)
+    cheaper = [point for point in front if _price(point) < 0.9 * _price(chosen)]
+    better = [point for point in front if _size(case, point) * FACTOR <= error and _price(point) > _price(chosen)]
+    if now is not None and now is not chosen:
+        lines.append(f"  now      {_compared(case, now, chosen)}")
+    if cheaper:
+        lines.append(f"  cheaper  {_compared(case, cheaper[-1], chosen)}")
+    if better:
+        lines.append(f"  better   {_compared(case, better[0], chosen)}")
+    lines.append(f"  known    {_known(case, points)}")
+    return lines
+
+
+def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
+    """The cheapest of which nothing would be noticed, or the scene's own settings if they cost hardly more; if there is
+    none, the one with the smallest error."""
+    quiet = [point for point in usable if not noticed(point.effects)]
+    if quiet:
+        cheapest = min(quiet, key=_price)
+        own = [point for point in quiet if point.cell == case.own and _price(point) < HARDLY * _price(cheapest)]
+        return own[0] if own else cheapest
+    return min(usable, key=lambda point: (_size(case, point), _price(point)))
+
+
+def _points(case: CaseTrade) -> list[Point]:
+    return [point for curve in case.curves for point in curve.points if point.cell.engine == CAROM]
+
+
+def _price(point: Point) -> float:
+    """Milliseconds per simulated second; work where nothing is timed."""
+    return point.milliseconds.median if point.milliseconds else point.work
+
+
+def _size(case: CaseTrade, point: Point) -> float:
+    """The error by which choices are compared; what cannot be told from the reference's own error counts as that."""
+    return max(point.errors[case.norm].high, case.reference.agreement.get(case.norm, 0.0))
+
+
+def _front(case: CaseTrade, usable: Sequence[Point]) -> list[Point]:
+    """The points of which none is cheaper and better at once, the cheapest first."""
+    front: list[Point] = []
+    for point in sorted(usable, key=lambda point: (_price(point), _size(case, point))):
+        if not front or _size(case, point) < _size(case, front[-1]):
+            front.append(point)
+    return front
+
+
+def cost_text(point: Point) -> str:
+    if point.milliseconds is None:
+        return f"work {point.work:.3g} per simulated second (not timed)"
+    frame = point.milliseconds.median * FRAME
+    text = f"{1e3 * frame:.3g} us" if frame < 1 else f"{frame:.3g} ms"
+    return f"{text} per frame of 1/60 s on this machine, {100 * frame / (1e3 * FRAME):.2g} % of it"
+
+
+def _error(case: CaseTrade, point: Point) -> str:
+    effects = point.effects
+    if case.kind == RESTING and "sink" in effects:
+        return f"{metres(effects['sink'])}: how deep what rests sinks into what it rests on"
+    if case.kind not in (CHAOTIC, RESTING) and "place" in effects:
+        return f"{metres(effects['place'])}: how far a body ends from where it should after {case.seconds:g} s"
+    bar = point.errors[case.norm]
+    return f"{100 * bar.high:.2g} % in {case.norm} ({case.norms[case.norm].partition(';')[0]})"
+
+
+def noticed_text(point: Point) -> str:
+    words = [failures(point)] * point.failed + in_words(point.effects)
+    return "; ".join(words) or "nothing"
+
+
+def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
+    ratio = _price(point) / _price(chosen)
+    words = noticed_text(point)
+    if words == "nothing" and case.norm in point.errors and not point.failed:
+        words = f"nothing; error {_error(case, point).partition(':')[0]}"
+    return f"{point.line}: {ratio:.2g} times the cost; noticed: {words}"
+
+
+def _known(case: CaseTrade, points: Sequence[Point]) -> str:
+    runs = sum(point.repeats for point in points)
+    text = f"from {runs:,} run{'s' * (runs != 1)} of {case.seconds:g} s with {len(points)} settings"
+    if case.repeats < case.whole:
+        text += f", {case.repeats} of {case.whole} {case.repeated}"
+    if case.missing:
+        text += f"; {case.missing} settings not tried yet"
+    short = case.repeats < case.whole or case.missing
+    return text + ("; the same command goes on, --thorough does it all" if short else "")
