@@ -71,9 +71,9 @@ ACCURACY := spring orbit jump bouncing stack thermal_gas
 
 figures: $(BENCH)
 	for scene in $(ACCURACY); do \
-	  $(BIN)/carom trade $$scene --against pymunk --out out/$$scene --into docs/accuracy.md || exit 1; \
+	  $(BIN)/carom trade $$scene --thorough --against pymunk --out out/$$scene --into docs/accuracy.md || exit 1; \
 	done
-	$(BIN)/carom trade billiards --out out/billiards --into docs/accuracy.md
+	$(BIN)/carom trade billiards --thorough --out out/billiards --into docs/accuracy.md
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
 	$(STUDIES) limits --long --into docs/limits.md --out docs/pictures

@@ -165,6 +165,9 @@ class Study:
         if self.show is not None and runs.listener is None:
             runs.listener = self._first_look
             runs.all([Task(case, cell, 0) for cell in self.cells], f"{name}: as it is")
+            if runs.listener is not _nothing and runs.until < math.inf:
+                runs.listener = _nothing
+                self.show(self._known())
         case, reference, _ = refined_reference(
             case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
         )
