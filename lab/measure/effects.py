@@ -47,12 +47,21 @@ def effects_of(seen: Seen, reference: Seen, kind: str) -> dict[str, float]:
 
 def noticed(effects: Mapping[str, float]) -> dict[str, float]:
     """Those that would be noticed."""
+    return {name: effects[name] for name, times in _times_the_limit(effects).items() if times > 1}
+
+
+def severity(effects: Mapping[str, float]) -> float:
+    """The worst effect over its limit: nothing is noticed up to 1."""
+    return max(_times_the_limit(effects).values(), default=0.0)
+
+
+def _times_the_limit(effects: Mapping[str, float]) -> dict[str, float]:
     size = effects.get("size", 1.0)
     limits = {
         "place": SHARE * size, "apex": SHARE * size, "contact": LATE, "impacts": 0.5, "sink": SHARE * size,
         "jitter": SPEED * size, "energy": SHARE,
     }  # fmt: skip
-    return {name: effects[name] for name, limit in limits.items() if abs(effects.get(name, 0.0)) > limit}
+    return {name: abs(effects[name]) / limit for name, limit in limits.items() if name in effects}
 
 
 def in_words(effects: Mapping[str, float], names: Any = None) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..measure.effects import in_words, metres, noticed
+from ..measure.effects import in_words, metres, severity
 from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Point
 from .report import failures
 
@@ -29,10 +29,12 @@ def answer(case: CaseTrade) -> list[str]:
     lines.append(f"  cost     {cost_text(chosen)}")
     lines.append(f"  error    {_error(case, chosen)}")
     lines.append(f"  noticed  {noticed_text(chosen)}")
-    front = _front(case, usable)
-    error = _size(case, chosen)
+    front = _front(usable)
     cheaper = [point for point in front if _price(point) < 0.9 * _price(chosen)]
-    better = [point for point in front if _size(case, point) * FACTOR <= error and _price(point) > _price(chosen)]
+    better = [
+        point for point in front
+        if severity(point.effects) * FACTOR <= severity(chosen.effects) and _price(point) > _price(chosen)
+    ] if case.reference.trusts(case.norm, chosen.errors[case.norm].mean) else []  # fmt: skip
     if now is not None and now is not chosen:
         lines.append(f"  now      {_compared(case, now, chosen)}")
     if cheaper:
@@ -44,14 +46,13 @@ def answer(case: CaseTrade) -> list[str]:
 
 
 def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
-    """The cheapest of which nothing would be noticed, or the scene's own settings if they cost hardly more; if there is
-    none, the one with the smallest error."""
-    quiet = [point for point in usable if not noticed(point.effects)]
-    if quiet:
-        cheapest = min(quiet, key=_price)
-        own = [point for point in quiet if point.cell == case.own and _price(point) < HARDLY * _price(cheapest)]
-        return own[0] if own else cheapest
-    return min(usable, key=lambda point: (_size(case, point), _price(point)))
+    """The cheapest of which nothing would be noticed, or hardly more than with the best of all; the scene's own
+    settings if they cost hardly more."""
+    least = max(min(severity(point.effects) for point in usable), 1.0)
+    good = [point for point in usable if severity(point.effects) <= (HARDLY * least if least > 1.0 else 1.0)]
+    cheapest = min(good, key=_price)
+    own = [point for point in good if point.cell == case.own and _price(point) < HARDLY * _price(cheapest)]
+    return own[0] if own else cheapest
 
 
 def _points(case: CaseTrade) -> list[Point]:
@@ -63,16 +64,11 @@ def _price(point: Point) -> float:
     return point.milliseconds.median if point.milliseconds else point.work
 
 
-def _size(case: CaseTrade, point: Point) -> float:
-    """The error by which choices are compared; what cannot be told from the reference's own error counts as that."""
-    return max(point.errors[case.norm].high, case.reference.agreement.get(case.norm, 0.0))
-
-
-def _front(case: CaseTrade, usable: Sequence[Point]) -> list[Point]:
+def _front(usable: Sequence[Point]) -> list[Point]:
     """The points of which none is cheaper and better at once, the cheapest first."""
     front: list[Point] = []
-    for point in sorted(usable, key=lambda point: (_price(point), _size(case, point))):
-        if not front or _size(case, point) < _size(case, front[-1]):
+    for point in sorted(usable, key=lambda point: (_price(point), severity(point.effects))):
+        if not front or severity(point.effects) < severity(front[-1].effects):
             front.append(point)
     return front
 

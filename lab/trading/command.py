@@ -120,6 +120,8 @@ def trade_command(
     if output.plain:
         for case in result.cases:
             click.echo("\n".join(answer(case)) + "\n")
+    if result.stopped == STOPPED and not any(case.curves for case in result.cases):
+        raise click.exceptions.Exit(STOPPED_CODE)
     choices = [cheapest(case) for case in measured(result)]
     page = [*summaries(result), *choices]
     output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)], page)

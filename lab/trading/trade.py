@@ -29,7 +29,7 @@ SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
 RUNNING = 0.9  # of the budget; the rest is for tables and charts
-FIRST_LOOK = 8.0  # s: then what is known is shown, if something is
+FIRST_LOOK = 4.0  # s: then what is known is shown, if something is
 
 Show = Callable[[CaseTrade], None]
 
@@ -144,9 +144,9 @@ class Study:
         self.own = Cell(own.dt, own.integrator, own.collision, own.substeps, own.geometry)
         self.began = began
         self.cells = self._nearest()
-        self.case, self.reference = case, Reference(f"closed form: {case.form}")
+        self.case, self.reference = case.at(0), Reference(f"closed form: {case.form}")
         if case.reference is None:  # until there is a better one
-            self.case = case.replace(reference=case.survey.trial)
+            self.case = self.case.replace(reference=case.survey.trial)
             self.reference = Reference("a first run with all impacts at their true times")
 
     def measured(self, efforts: Sequence[int] = range(EFFORTS)) -> CaseTrade:

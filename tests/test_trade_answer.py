@@ -1,0 +1,94 @@
+"""The answer of `carom trade` in words: what to paste, what it costs, what would be noticed."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import helpers_trade as made
+import pytest
+
+from carom.lab.measure.effects import in_words, metres, noticed, severity
+from carom.lab.measure.timing import Spread
+from carom.lab.trading.answer import answer, recommended
+from carom.lab.trading.records import Cell, ErrorBar, Point
+
+OWN = Cell(1 / 60)
+
+
+def point(dt: float, microseconds: float, **effects: float) -> Point:
+    """One setting with the cost of a frame and its effects; bodies are 1 m."""
+    error = ErrorBar.of([effects.get("place", 0.0)])
+    return Point(
+        Cell(dt), 1, {"position": error, "energy": error}, {}, {}, 1e6 / dt, Spread.of([0.06 * microseconds]),
+        {"size": 1.0, **effects}, f"Settings(dt={dt:.4g})",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def case():
+    found = made.smooth(against=False)
+    curve = found.curves[0]
+    curve.points = [
+        point(1 / 15, 10.0, place=0.3, body=7.0), point(1 / 30, 20.0, place=0.009), point(1 / 60, 40.0, place=0.008),
+        point(1 / 120, 80.0, place=0.001),
+    ]  # fmt: skip
+    return dataclasses.replace(found, curves=[curve], own=OWN, repeats=1, whole=4, missing=3)
+
+
+def test_the_cheapest_of_which_nothing_is_noticed_and_its_neighbours(case):
+    assert answer(case) == [
+        "orbit: use Settings(dt=0.03333)",
+        "  cost     20 us per frame of 1/60 s on this machine, 0.12 % of it",
+        "  error    9 mm: how far a body ends from where it should after 10 s",
+        "  noticed  nothing",
+        "  now      Settings(dt=0.01667): 2 times the cost; noticed: nothing; error 8 mm",
+        "  cheaper  Settings(dt=0.06667): 0.5 times the cost; noticed: entity 7 ends 30 cm from where it should",
+        "  better   Settings(dt=0.008333): 4 times the cost; noticed: nothing; error 1 mm",
+        "  known    from 4 runs of 10 s with 4 settings, 1 of 4 start phases; 3 settings not tried yet; the same "
+        "command goes on, --thorough does it all",
+    ]
+
+
+def test_the_scenes_own_settings_stay_if_others_save_little(case):
+    points = case.curves[0].points
+    points[2].milliseconds = Spread.of([0.06 * 22.0])
+    assert recommended(case, points) is points[2]
+    assert answer(case)[0] == "orbit: use Settings(dt=0.01667) (as it has now)"
+
+
+def test_where_something_is_noticed_with_all_the_least_is_best(case):
+    points = [point(1 / 30, 1.0, place=9.0), point(1 / 60, 2.0, place=2.2), point(1 / 120, 9.0, place=2.0)]
+    case.curves[0].points = points
+    assert recommended(case, case.curves[0].points).cell.dt == 1 / 60
+
+
+def test_scenes_of_which_nothing_is_known(case):
+    assert answer(made.refused()) == [
+        "my_scene.py: not measured: there is no wall whose pressure could be measured"
+    ]
+    case.curves[0].points = [dataclasses.replace(point(1 / 60, 1.0), failures={"tunnelled": 1})]
+    assert answer(case) == ["orbit: nothing that was tried can be used: tunnelled"]
+    case.curves = []
+    assert answer(case) == ["orbit: nothing that was tried can be used yet"]
+
+
+@pytest.mark.parametrize(("effects", "words"), [
+    ({"place": 0.2, "body": 3.0}, ["entity 3 ends 20 cm from where it should"]),
+    ({"apex": -0.02}, ["the highest point is 2 cm lower"]),
+    ({"contact": 0.0123}, ["the first contact is 12.3 ms late"]),
+    ({"impacts": -2.0}, ["2 impacts fewer"]),
+    ({"sink": 0.5}, ["bodies sink 50 cm into each other"]),
+    ({"jitter": 0.05}, ["what rests still moves at 5 cm per second"]),
+    ({"energy": -0.03}, ["the energy falls by 3 % a minute"]),
+    ({"place": 0.01, "apex": 0.01, "contact": 0.01, "sink": 0.01, "energy": 0.01}, []),
+    ({"place": 0.1, "size": 20.0}, []),
+])  # fmt: skip
+def test_what_is_noticed_is_told(effects, words):
+    assert in_words(effects) == words
+    assert bool(noticed(effects)) == (severity(effects) > 1) == bool(words)
+
+
+def test_lengths():
+    assert [metres(size) for size in (1e-9, 0.00042, 0.0123, 0.5, 12.345)] == [
+        "less than 0.001 mm", "0.42 mm", "1.2 cm", "50 cm", "12.3 m",
+    ]  # fmt: skip
