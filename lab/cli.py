@@ -17,7 +17,7 @@ COMMANDS = {
     "bench": LateCommand("bench.command:bench_command", "Time carom on this machine."),
     "limits": LateCommand("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
     "plan": LateCommand("commands.plan:plan_command", "Show what a step of a scene runs, and why."),
-    "plugins": LateCommand("plugins_check.command:plugins_command", "List plugins, or check one."),
+    "plugins": LateCommand("plugins.command:plugins_command", "List plugins, or check one."),
     "run": LateCommand("commands.run:run_command", "Run a scene or a file and show what happened."),
     "scenes": LateCommand("commands.scenes:scenes_command", "List the scenes of the library."),
     "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, measured."),

@@ -11,7 +11,7 @@ import pytest
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
-from carom.lab.bench.benchmarks.against_pymunk import CaromWorld
+from carom.lab.bench.against_pymunk import CaromWorld
 from carom.lab.bench.suite import SUITE
 from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.engines.body_arrays import BodyArrays, NotPlainError, moving_and_fixed

@@ -15,8 +15,8 @@ import pytest
 
 from carom.components import AABBCollider, SphereCollider
 from carom.framework.plugins.registry import Registry
-from carom.lab.plugins_check.kernels import PairCode
-from carom.lab.plugins_check.samples import Poses, Rows, poses
+from carom.lab.plugins.kernels import PairCode
+from carom.lab.plugins.samples import Poses, Rows, poses
 from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider

@@ -18,8 +18,8 @@ from worlds import both_dimensions, box, make_world
 from carom.components import AABBCollider, SphereCollider, Transform
 from carom.framework import World
 from carom.framework.plugins.registry import Registry
-from carom.lab.plugins_check.kernels import PairCode
-from carom.lab.plugins_check.samples import Rows, poses
+from carom.lab.plugins.kernels import PairCode
+from carom.lab.plugins.samples import Rows, poses
 from carom.plugins import Physics, capsule, half_space
 from carom.plugins.capsule import CapsuleCollider, capsule_sphere_sweep
 from carom.plugins.half_space import HalfSpaceCollider

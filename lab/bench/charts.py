@@ -1,4 +1,4 @@
-"""The charts of the benchmarks: ratios against pymunk, and the time per body against the number of bodies."""
+"""The chart of ``carom bench``: ratios against pymunk."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..pictures import canvas
-from .benchmarks.scaling import Scaling
 from .results import Result
 
 BAR = "#4dabf7"
@@ -23,7 +22,7 @@ def draw_ratios(result: Result, folder: Path) -> Path | None:
     rows = [row for row in reversed(result.rows) if row.ratio is not None]
     if not rows:
         return None
-    axes = _axes(f"carom against pymunk {result.machine['pymunk']}", 1.8 + ROW_HEIGHT * len(rows))
+    axes = new_axes(f"carom against pymunk {result.machine['pymunk']}", 1.8 + ROW_HEIGHT * len(rows))
     places = range(len(rows))
     ratios = [row.ratio for row in rows if row.ratio is not None]
     colours = [BAR if ratio.median >= 1 else SLOWER for ratio in ratios]
@@ -42,27 +41,10 @@ def draw_ratios(result: Result, folder: Path) -> Path | None:
     _plain_numbers(axes)
     if targets:
         axes.legend(facecolor=canvas.PANEL, edgecolor=canvas.FRAME, labelcolor=canvas.TEXT, loc="best")
-    return _save(axes, folder / "bench.png")
+    return saved(axes, folder / "bench.png")
 
 
-def draw_scaling(result: Scaling, folder: Path) -> Path:
-    """Nanoseconds per body per step against the number of bodies, the spread as a band."""
-    axes = _axes("how the time per body grows (gas2d)", 4.5)
-    bodies = [point.bodies for point in result.points]
-    spreads = [point.nanoseconds for point in result.points]
-    axes.fill_between(bodies, [s.low for s in spreads], [s.high for s in spreads], color=BAR, alpha=0.25, lw=0)
-    axes.plot(bodies, [s.median for s in spreads], "o-", color=BAR)
-    for n, spread in zip(bodies, spreads, strict=True):
-        above: dict[str, Any] = {"xytext": (0, 8), "textcoords": "offset points", "ha": "center"}
-        axes.annotate(f"{spread.median:.0f}", (n, spread.median), color=canvas.TEXT, **above)
-    axes.set_xscale("log")
-    axes.set_ylim(0, 1.2 * max(s.high for s in spreads))
-    axes.set_xlabel("bodies", color=canvas.MUTED)
-    axes.set_ylabel("ns per body per step", color=canvas.MUTED)
-    return _save(axes, folder / "scaling.png")
-
-
-def _axes(title: str, height: float) -> Any:
+def new_axes(title: str, height: float) -> Any:
     size = (canvas.LONG_SIDE, height)
     figure = Figure(figsize=size, dpi=canvas.DPI, facecolor=canvas.BACKGROUND, layout="constrained")
     FigureCanvasAgg(figure)
@@ -85,6 +67,6 @@ def _plain_numbers(axes: Any) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _save(axes: Any, path: Path) -> Path:
+def saved(axes: Any, path: Path) -> Path:
     axes.figure.savefig(path, facecolor=canvas.BACKGROUND)
     return path

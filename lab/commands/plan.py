@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..plugins_check.installed import plugin_named
+from ..plugins.installed import plugin_named
 from .choices import parse_assignments, preset
 from .loading import load, stdout_kept_clean
 from .options import plugin_option, seed_number, seed_option, set_option, settings_option

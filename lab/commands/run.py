@@ -12,7 +12,7 @@ import click
 from rich.console import Console
 
 from ..measure.run import Run, run
-from ..plugins_check.installed import plugin_named
+from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar
 from ..reporting.run_report import print_report
 from .choices import parse_assignments, parse_view, preset

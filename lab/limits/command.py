@@ -16,7 +16,7 @@ from ..commands.choices import parse_assignments, preset
 from ..commands.loading import Loaded, load, stdout_kept_clean
 from ..commands.options import budget_option, plugin_option, seed_number, seed_option, set_option, settings_option
 from ..commands.usage_errors import Problem
-from ..plugins_check.installed import plugin_named
+from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
 from ..reporting.run_report import number
 from .outcome import StepOutcome, outcome_of_steps

@@ -17,10 +17,12 @@ COMMANDS = {
     "plugin-pairs": LateCommand(
         "studies.bench.command:pairs_command", "What a pair of a plugin costs, next to a built-in one and by hand."
     ),
+    "scaling": LateCommand("studies.bench.command:scaling_command", "How the time per body grows with their number."),
     "settings": LateCommand(
         "studies.settings.command:settings_command",
         "What each field of Settings costs and buys; settings for kinds of games.",
     ),
+    "startup": LateCommand("studies.bench.command:startup_command", "The time to the first step of a new process."),
     "stages": LateCommand(
         "studies.stages:stages_command", "List the stages of a step: what each reads and writes, where its code is."
     ),

@@ -7,13 +7,17 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...bench.command import RUNS
-from ...commands.options import repeats_option, shown_options
+from ...commands.loading import load
+from ...commands.options import listed, out_option, repeats_option, shown_options, whole_number
 from ...reporting.output import Output
 from ...reporting.progress import Bar
 from . import collision_modes as bench_modes
 from . import feature_ladder as bench_ladder
 from . import plugin_pairs as bench_pairs
+from . import scaling as bench_scaling
+from . import startup as bench_startup
+
+RUNS = "Runs; the median counts."
 
 
 @click.command("plugin-pairs", short_help="What a pair of a plugin costs, next to a built-in one and by hand.")
@@ -52,3 +56,46 @@ def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, in
     with Bar(Console(stderr=True)) as bar:
         result = bench_modes.modes(steps, repeats, bar)
     output.show(result, bench_modes.tables(result), bench_modes.remarks(result))
+
+
+@click.command("scaling", short_help="How the time per body grows with their number.")
+@click.option(
+    "--sizes", metavar="N,N", help="Numbers of bodies (default: 1,000 to 100,000).",
+    callback=listed("--sizes", "whole numbers from 1", whole_number),
+)  # fmt: skip
+@click.option("--million", is_flag=True, help=f"{bench_scaling.LARGEST:,} bodies too: needs some gigabytes.")
+@repeats_option(3, RUNS)
+@out_option("Draw a chart into this folder.")
+@shown_options
+def scaling_command(
+    sizes: tuple[int, ...] | None,
+    million: bool,
+    repeats: int,
+    out: Path | None,
+    as_json: bool,
+    as_markdown: bool,
+    into: Path | None,
+) -> None:
+    """Time the elastic gas from 1,000 to 100,000 bodies: nanoseconds per body per step."""
+    asked = tuple(sorted(sizes)) if sizes else bench_scaling.SIZES
+    output = Output.checked("studies scaling", as_json, as_markdown, into, out, "studies.bench.charts")
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_scaling.scaling((*asked, *[bench_scaling.LARGEST] * million), repeats, bar)
+    output.show(result, [bench_scaling.table(result)], [])
+    output.draw("draw_scaling", result)
+
+
+@click.command("startup", short_help="The time to the first step of a new process.")
+@click.option(
+    "--scenes", "names", default="asteroids", metavar="NAME,NAME", help="Scenes of the library.",
+    callback=listed("--scenes", "names", str),
+)  # fmt: skip
+@repeats_option(3, RUNS)
+@shown_options
+def startup_command(names: tuple[str, ...], repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
+    """Time new processes up to their first step: nothing compiled, kernels kept on disk, and kernels shipped."""
+    output = Output.checked("studies startup", as_json, as_markdown, into, None)
+    wanted = [load(name).name for name in names]
+    with Bar(Console(stderr=True)) as bar:
+        result = bench_startup.startup(wanted, repeats, bar)
+    output.show(result, [bench_startup.table(result)], [])

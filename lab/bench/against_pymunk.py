@@ -17,21 +17,21 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .... import scenes
-from ....framework import Settings, World
-from ....framework.compilation import log
-from ...commands.usage_errors import Problem
-from ...engines.body_arrays import moving_and_fixed
-from ...engines.pymunk_space import INDEXES, PymunkSpace
-from ...engines.quality import Quality
-from ...measure.body_shapes import Floats
-from ...measure.escape import Enclosure
-from ...measure.run import plain_settings
-from ...measure.timing import Spread, no_garbage_collection, timed
-from ...reporting.progress import NO_PROGRESS, Progress
-from ..results import Result, Row, machine
-from ..suite import Subject, Window, sizes_of
+from ... import scenes
+from ...framework import Settings, World
+from ...framework.compilation import log
+from ..commands.usage_errors import Problem
+from ..engines.body_arrays import moving_and_fixed
+from ..engines.pymunk_space import INDEXES, PymunkSpace
+from ..engines.quality import Quality
+from ..measure.body_shapes import Floats
+from ..measure.escape import Enclosure
+from ..measure.run import plain_settings
+from ..measure.timing import Spread, no_garbage_collection, timed
+from ..reporting.progress import NO_PROGRESS, Progress
 from .queries import Query, time_queries
+from .results import Result, Row, machine
+from .suite import Subject, Window, sizes_of
 
 CAROM = "carom"
 LOOKS = 10  # at the quality of the states, per window

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ....framework import World
-from ....scenes import gas, player_query
-from ...engines.pymunk_space import PymunkSpace
-from ...measure.body_shapes import Floats
-from ...measure.timing import no_garbage_collection, timed
+from ...framework import World
+from ...scenes import gas, player_query
+from ..engines.pymunk_space import PymunkSpace
+from ..measure.body_shapes import Floats
+from ..measure.timing import no_garbage_collection, timed
 
 ROUNDS = 5  # of 1,000 queries each, at different places; the engines alternate
 BOX_SIDE, REACH = 4.0, 2.0  # m

@@ -9,13 +9,13 @@ import contextlib
 from dataclasses import dataclass
 
 from ....scenes import gas
+from ...bench.report import digits, span
+from ...bench.results import machine
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, timed
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
-from ..report import digits, span
-from ..results import machine
 
 SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 LARGEST = 1_000_000

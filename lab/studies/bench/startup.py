@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ....framework.jit.cache import CACHE_FOLDER_VARIABLE
+from ...bench.report import digits, span
+from ...bench.results import machine
 from ...commands.usage_errors import Problem
 from ...measure.timing import Spread
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
-from ..report import digits, span
-from ..results import machine
 
 STEPS = 600  # after the first
 EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
