@@ -7,6 +7,7 @@ import dataclasses
 import math
 import statistics
 import time
+import weakref
 from collections.abc import Callable, Iterable, Sequence
 
 from ..cases.case import Case
@@ -19,7 +20,7 @@ from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CHAOTIC, CUT, Cell, ErrorBar, Outcome, Point, Reference
 from .result_store import Store
 from .tasks import Task, mean_of, outcome_of, perform, stopped
-from .workers import Lost, in_parallel
+from .workers import Lost, Pool, in_parallel
 
 FEW_SECONDS = 4.0  # of work in all: less takes not much longer than starting workers
 PACE = 1e-4  # s per step, until runs have shown a better figure
@@ -55,6 +56,8 @@ class Runs:
         self.performed = 0
         self._store = Store() if store is None else store
         self._pace = PACE
+        self._pool = Pool()
+        weakref.finalize(self, self._pool.end)
 
     def get(self, task: Task) -> Seen | None:
         """What a task showed that has been performed, or None."""
@@ -75,7 +78,7 @@ class Runs:
         if missing and (self.stopped or time.monotonic() > self.until):
             self._stop("")
         try:
-            with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers)) as results:
+            with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers, self._pool)) as results:
                 for task, record in results:
                     self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
         except KeyboardInterrupt:

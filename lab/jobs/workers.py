@@ -53,11 +53,39 @@ def process_pool(workers: int) -> Executor:
     return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin)
 
 
+class Pool:
+    """An executor that is made when it is needed, and kept until it is ended.
+
+    executor
+        makes one for a number of workers
+    """
+
+    def __init__(self, executor: Callable[[int], Executor] = process_pool) -> None:
+        self._make = executor
+        self._executor: Executor | None = None
+        self._others: set[Any] = set()
+
+    def submit(self, workers: int, message: bytes) -> Future[Any]:
+        """Hand a task to a worker."""
+        if self._executor is None:
+            self._others = set(multiprocessing.active_children())
+            self._executor = self._make(workers)
+        with _interrupts_held_back(), _main_hidden():
+            return self._executor.submit(_perform, message)
+
+    def end(self) -> None:
+        """Kill the processes at once."""
+        if self._executor is None:
+            return
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor = None
+        for child in set(multiprocessing.active_children()) - self._others:
+            child.kill()
+            child.join()
+
+
 def in_parallel(
-    function: Callable[[Task], Result],
-    tasks: Iterable[Task],
-    workers: int | None = None,
-    executor: Callable[[int], Executor] = process_pool,
+    function: Callable[[Task], Result], tasks: Iterable[Task], workers: int | None = None, pool: Pool | None = None
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
     """``(task, function(task))`` for each task, as they finish, from ``workers`` processes (None: all cores).
 
@@ -69,7 +97,8 @@ def in_parallel(
     workers never run the script that was started, and its own functions and classes are unknown to them.
 
     An exception of ``function`` stops everything and is raised here. Closing the generator and Ctrl-C end the workers
-    at once and silently; so does the death of this process. executor: makes one for that number of workers.
+    at once and silently; so does the death of this process. pool: kept for later calls if all went well; None: one for
+    this call.
 
     ValueError for fewer than one worker.
     """
@@ -81,17 +110,16 @@ def in_parallel(
     alone = workers == 1 or multiprocessing.parent_process() is not None
     if alone or not tasks or _pickled(function) is None:
         return ((task, function(task)) for task in tasks)
-    return _shared_out(function, tasks, min(workers, len(tasks)), executor)
+    return _shared_out(function, tasks, workers, Pool() if pool is None else pool, pool is not None)
 
 
 def _shared_out(
-    function: Callable[[Task], Result], tasks: Sequence[Task], most: int, executor: Callable[[int], Executor]
+    function: Callable[[Task], Result], tasks: Sequence[Task], most: int, pool: Pool, kept: bool
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
     waiting, suspects = deque(range(len(tasks))), deque[int]()  # suspects were running when a worker died
     tries = [0] * len(tasks)
     running: dict[Future[Any], int] = {}
-    others = set(multiprocessing.active_children())
-    pool = executor(most)
+    finished = False
     try:
         while waiting or suspects or running:
             broken = False
@@ -106,8 +134,7 @@ def _shared_out(
                     yield tasks[index], function(tasks[index])
                     continue
                 try:
-                    with _interrupts_held_back(), _main_hidden():
-                        running[pool.submit(_perform, message)] = index
+                    running[pool.submit(most, message)] = index
                 except BrokenExecutor:  # a worker has died meanwhile: the tasks that were running will tell
                     waiting.appendleft(index)
                     broken = True
@@ -135,18 +162,11 @@ def _shared_out(
                     tries[index] += 1
                     suspects.append(index)
                 running.clear()
-                _end(pool, others)
-                pool = executor(most)
+                pool.end()
+        finished = True
     finally:
-        _end(pool, others)
-
-
-def _end(pool: Executor, others: set[Any]) -> None:
-    """Kill the pool's processes at once."""
-    pool.shutdown(wait=False, cancel_futures=True)
-    for child in set(multiprocessing.active_children()) - others:
-        child.kill()
-        child.join()
+        if not (finished and kept):
+            pool.end()
 
 
 def _pickled(thing: Any) -> bytes | None:
