@@ -35,7 +35,7 @@ def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):
         "billiards",
         "16 dynamic",
         "contacts",
-        "energy drift",
+        "energy",
         "momentum drift",
         "deepest overlap",
         "escaped",

@@ -24,7 +24,7 @@ from ..measure.timing import timed
 from ..measure.told_in_results import faults_in_results
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
 
-AWHILE, PASSES = 0.2, 3  # s; passes of a run that is timed
+BRIEF, AWHILE, PASSES = 0.1, 0.2, (2, 12)  # s; passes of a run that is timed, at least and at most
 BLOCK = 20  # steps
 FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds than the runs compared with them
 
@@ -94,7 +94,7 @@ def bare_cost(task: Task) -> float | None:
     passes. None for a run that takes longer than AWHILE: there the observed run tells enough."""
     passes: list[float] = []
     whole = 0.0
-    while len(passes) < PASSES and whole < AWHILE:
+    while len(passes) < PASSES[0] or (whole < BRIEF and len(passes) < PASSES[1]):
         with task.case.subject.attribute_errors(), contextlib.closing(world_of(task.case, task.cell, 0)) as world:
             spent = simulated = 0.0
             left = max(int(task.case.seconds / task.cell.dt), 1)
@@ -105,7 +105,7 @@ def bare_cost(task: Task) -> float | None:
                 whole += seconds
                 if valid:
                     spent, simulated = spent + seconds, simulated + count * task.cell.dt
-                if whole > 2 * AWHILE:
+                if whole > AWHILE:
                     return min(passes, default=None)
         if simulated:
             passes.append(1e3 * spent / simulated)
