@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from oracles.whole_step import Oracle, assert_agrees
 from worlds import both_dimensions
 
 from carom.lab import testing as kit
@@ -212,11 +213,11 @@ def test_the_oracle_agrees(mode, d):
             way /= np.linalg.norm(way)
             kit.ball(world, way * 1.0625, -way * 8.0, radius=0.5, mass=float(rng.uniform(0.5, 2)), friction=0.4,
                      restitution=float(rng.choice([0.5, 1.0])))  # fmt: skip
-        oracle = kit.Oracle(world)
+        oracle = Oracle(world)
         for _ in range(3):
             world.step()
             oracle.step()
-            kit.assert_agrees(world, oracle)
+            assert_agrees(world, oracle)
             together += len(world.contacts.impacts) > 2
         world.close()
     assert together > 4

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracles.whole_step import Oracle, assert_agrees
 from worlds import make_world
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.lab import testing as kit
 
 PASSES = 4 + 3 * 2 + 4  # over all contacts of a calm world: one that pushes in each substep, and those that relax
 
@@ -80,7 +80,7 @@ def test_a_blow_through_a_heap_agrees_with_the_oracle(friction):
         Transform((1.4, 4.2)), RigidBody(linear_velocity=(1.0, -8.0)), SphereCollider(0.5, friction=friction)
     )
     for _ in range(12):
-        oracle = kit.Oracle(world)
+        oracle = Oracle(world)
         world.step()
         oracle.step()
-        kit.assert_agrees(world, oracle)
+        assert_agrees(world, oracle)
