@@ -48,6 +48,7 @@ def go_on(world):
     return json.dumps([hashes, log, springs, world.step_count, world.alpha, world.stats().counters])
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("d", [2, 3])
 def test_loaded_worlds_go_on_with_the_same_bits_in_another_process(d, tmp_path):
     futures = []
@@ -244,6 +245,7 @@ def test_components_are_pickled_with_their_values():
 # -- worlds that are dropped -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 def test_a_world_that_is_dropped_is_collected_with_its_context():
     world = make(2, "discrete")
     fill(world)

@@ -26,7 +26,7 @@ needs_signals = pytest.mark.skipif(os.name == "nt", reason="there are no signals
 @pytest.fixture(autouse=True)
 def no_worker_is_left():
     yield
-    assert not multiprocessing.active_children()
+    until(lambda: not multiprocessing.active_children())
 
 
 def tasks_of(folder: Path, *what: str) -> list[Task]:
@@ -116,7 +116,7 @@ def test_closing_early_ends_the_workers(tmp_path):
         assert next(results) == (tasks[0], 0)
         until(lambda: "1" in marks(tmp_path))
         assert multiprocessing.active_children()
-    assert not multiprocessing.active_children()
+    until(lambda: not multiprocessing.active_children())
     assert "3" not in marks(tmp_path)
 
 

@@ -23,11 +23,13 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import absolute, add, add_scaled, dot, item, length, scale, sub
 from ..integration.trajectory import ROUNDING, along, bend_of, first_root, rate_along
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, sweep
+from ..shapes.tolerances import smaller_extent
 
 MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
 GENEROUS, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
 CLEAR = 64.0 * ROUNDING  # of the distances in a path: farther off a touch rounding does not turn its normal round
+DEPTH = 0.25  # of the extent: what is deeper in is there, however coarse the numbers are
 APART, TOUCHES, AT_CORNER = range(3)
 
 
@@ -100,10 +102,12 @@ def march(state, a, b, path, since, until, limits):
 
 @inlined
 def clear_of_rounding(state, a, b, path, t):
-    """A distance of the two at time t, m, beyond what rounding makes of it."""
+    """A distance of the two at time t, m, beyond what rounding makes of it; of what has an extent a part of that."""
     origin, speed = state.bodies.origin, state.bodies.path_velocity
     places = length(origin[a]) + length(origin[b]) + length(path[0])
-    return CLEAR * (places + (length(speed[a]) + length(speed[b])) * t)
+    rounding = CLEAR * (places + (length(speed[a]) + length(speed[b])) * t)
+    extent = smaller_extent(state.bodies, a, b)
+    return min(rounding, DEPTH * extent) if extent > 0.0 else rounding
 
 
 @part
