@@ -127,11 +127,12 @@ SHAPES = Schema(
     bounds=ints(),
     rotated=ints(),  # 0 for shapes that rotation does not change
     concave=flags(),
+    sharp=flags(),  # of faces that meet in corners
     flipped=flags(),  # pairs that are registered as (second, first); the functions below take them so
     evaluate=ints(),
     batch=ints(),
     sweep=ints(),  # 0: no closed form
-    corner=ints(),  # 0: touches of corners are contacts
+    corner=ints(),  # 0: none of the pair's own
     mixing=ints(),  # rules of plugins
 )
 

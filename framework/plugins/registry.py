@@ -52,6 +52,12 @@ class Shape:
         return bool(getattr(self.component, "convex", True))
 
     @property
+    def sharp(self) -> bool:
+        """Whether its faces may meet in corners: nothing says that it is rounded."""
+        rounding = getattr(self.component, "rounding", None)
+        return rounding is None or not rounding(self.component.sample()) > 0.0
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """Names of the columns the pair functions see: the shape's own, without those every collider has."""
         shared = getattr(self.component, "stacked_columns", ())

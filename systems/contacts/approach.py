@@ -6,10 +6,11 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, sub
 from ..integration.trajectory import ROUNDING, along, relative_path
-from ..shapes.dispatch import both_convex, evaluate, is_corner_touch
+from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
 from ..shapes.tolerances import slop_of
 
 LOOKS = 24
+STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a step stay where they are
 
 
 @inlined
@@ -35,8 +36,13 @@ def meet(state, a, b, d):
 
 @part
 def meets_at_corner(state, a, b, d, slop):
-    """Whether the two touch at a corner only."""
-    shape = state.bodies.shape
+    """Whether the two touch at a corner only. Shapes without a rule of their own are looked at if they move past each
+    other: what stays where it is does not catch."""
+    bodies, shape = state.bodies, state.bodies.shape
+    if not has_corner_rule(state, shape[a], shape[b]):
+        travel = sub(between(bodies, a, b), between_at_start(bodies, a, b))
+        if length(travel) < STAYS_SLOPS * slop:
+            return False
     return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
 
 

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import inlined
-from ...framework.vectors import negative
+from ...framework.compilation import inlined, part
+from ...framework.vectors import add_scaled, negative
 from .linking.batches import SOUND, repeat_batch, turned_back
 from .linking.mixing import mix as mix
 from .linking.mixing import mix_friction as mix_friction
 from .linking.signatures import call_batch, call_bounds, call_corner, call_evaluate, call_rotated, call_sweep
+
+DEEPER = 2.0  # slops: how deep two shapes are looked at that may touch at a corner
+OTHER_FACE = 0.9  # of that: a way out that is shorter is not that of the face that they touch with
 
 
 @inlined
@@ -52,13 +55,30 @@ def evaluate_batch(state, kind, start, stop):
             pairs.hit[bucket[k]], pairs.depth[bucket[k]] = False, -math.inf
 
 
+@part
+def gives_way(state, shape_a, a, shape_b, b, d, slop):
+    """Whether two shapes that touch by less than the slop would, a little deeper, have a shorter way out along another
+    normal: they touch where faces meet."""
+    _, depth, n, _ = evaluate(state, shape_a, a, shape_b, b, d)
+    if not -slop <= depth <= slop:
+        return False
+    _, deeper, _, _ = evaluate(state, shape_a, a, shape_b, b, add_scaled(d, n, depth - DEEPER * slop))
+    return deeper < OTHER_FACE * DEEPER * slop
+
+
+@inlined
+def has_corner_rule(state, shape_a, shape_b):
+    """Whether the pair says itself when it touches at a corner."""
+    return state.shapes.corner[kind_of(state, shape_a, shape_b)] != 0
+
+
 @inlined
 def is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
     """Whether the two touch by less than the slop and at a corner or an edge only, which is no contact."""
     shapes, kind = state.shapes, kind_of(state, shape_a, shape_b)
     address = shapes.corner[kind]
     if address == 0:
-        return False
+        return shapes.sharp[shape_a] and shapes.sharp[shape_b] and gives_way(state, shape_a, a, shape_b, b, d, slop)
     pa, pb = shapes.parameters[shape_a], shapes.parameters[shape_b]
     if (shape_a > shape_b) != shapes.flipped[kind]:
         return call_corner(address, state, pb, b, pa, a, negative(d), slop)

@@ -94,6 +94,7 @@ class LinkedShapes:
         """
         shapes.count = len(self.shapes)
         shapes.concave = np.array([not shape.convex for shape in self.shapes], bool)
+        shapes.sharp = np.array([shape.sharp for shape in self.shapes], bool)
         shapes.bounds, shapes.rotated, shapes.mixing = self._bounds, self._rotated, self._mixing
         shapes.evaluate, shapes.batch, shapes.corner = self._evaluate, self._batch, self._corner
         shapes.flipped = self._flipped
