@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, length, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_caught
@@ -16,6 +16,8 @@ from .solving.softness import SAG
 ENTRY_ITERATIONS = 24
 OWN_SAG = 0.0003  # of the extent: a contact that would sag more under one body alone is rigid;
 CONCAVE_SAG = 0.001  # one of concave shapes, which stands for all sides where they touch, by turns
+APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
+BESIDE, EVEN = 1e-6, 1e-9  # of the extent: so near the normal is another one, by this much of its cosine
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
 SAME_PLACE = 1e-9  # of the extent: a gap of rounding errors is none
 
@@ -193,6 +195,17 @@ def entry(state, a, b, d, travel, at_end, slop):
     return -depth - chosen * dot(travel, normal), normal, point
 
 
+@part
+def normal_varies(state, a, b, d):
+    """Whether the normal is another one a little beside, so that it stands for several faces of a concave shape."""
+    _, _, normal, _ = meet(state, a, b, d)
+    near, varies = BESIDE * smaller_extent(state.bodies, a, b), False
+    for k in range(len(d)):
+        _, _, beside, _ = meet(state, a, b, replace(d, k, item(d, k) + near))
+        varies |= dot(beside, normal) < 1.0 - EVEN
+    return varies
+
+
 def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
     pairs, bodies, solver, inverse_mass = state.pairs, state.bodies, state.solver, state.bodies.inverse_mass
@@ -202,8 +215,8 @@ def linearise(state, dt):
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         slop, d = slop_of(state, a, b), between_at_start(bodies, a, b)
         _, depth, normal, point = meet(state, a, b, d)
-        gap = -depth
-        if depth < 0.0 or parting != STAYS or meets_at_corner(state, a, b, d, slop):
+        gap, apart = -depth, depth < -APART * smaller_extent(bodies, a, b)
+        if apart or parting != STAYS or meets_at_corner(state, a, b, d, slop):
             far, gap, normal, point = far_touch(state, dt, a, b, between(bodies, a, b))
             if not far or parting != STAYS:
                 travel = sub(between(bodies, a, b), d)
@@ -212,13 +225,15 @@ def linearise(state, dt):
             normal = pairs.normal[c]  # coincident centres have parted: not back again
         solver.normal[k], pairs.normal[c] = normal, normal
         pairs.point[c] = add(point, add(bodies.previous_position[a], bodies.offset[a]))
-        solver.gap[k] = gap
+        solver.gap[k], solver.apart[k] = gap, apart
         solver.mass[k] = 1.0 / (inverse_mass[a] + inverse_mass[b])
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = smaller_extent(bodies, a, b)
         weight = SAG * max(bodies.force_speed_change[a], bodies.force_speed_change[b]) * dt
-        most = OWN_SAG if both_convex(state, bodies.shape[a], bodies.shape[b]) else CONCAVE_SAG
+        most, solver.varies[k] = OWN_SAG, False
+        if not both_convex(state, bodies.shape[a], bodies.shape[b]):
+            most, solver.varies[k] = CONCAVE_SAG, normal_varies(state, a, b, d)
         solver.rigid[k] = weight > most * state.substeps * state.substeps * solver.extent[k]
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu

@@ -1,1 +1,1 @@
-"""The solver for contacts at rest: soft and rigid ones, light bodies between heavy ones, and what it starts with."""
+"""The solver for contacts at rest: soft, firm and rigid ones, light bodies between heavy ones, and their warm start."""

@@ -16,6 +16,7 @@ import math
 from ....framework.compilation import part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...codes import OK
+from .firm import leave_open
 from .heavy_light_blocks import hold_light, solve_blocks
 from .passes import solve_friction, solve_normals
 from .rigid import choose_rigid, converge, leave_out_rigid
@@ -49,13 +50,14 @@ def measure(solver, h, bias_rate):
             any_deep |= deep[k]
             if solver.rigid[k] or not deep[k]:
                 pushing[k] = bias_rate * max(room, -DEEP * solver.extent[k])
-                soft[k] = not (solver.rigid[k] or solver.in_block[k])
+                soft[k] = not (solver.rigid[k] or solver.in_block[k] or solver.firm[k])
     return any_deep
 
 
 @part
-def propagate(solver):
-    """The contacts of unsettled bodies are active, and unsettle the bodies on their other sides."""
+def propagate(solver, begins):
+    """The contacts of unsettled bodies are active, and unsettle the bodies on their other sides; in the pass that
+    begins only those that do not wait, so that these bear the load."""
     unsettled, inverse_mass, active = solver.unsettled, solver.inverse_mass, solver.active
     for k in range(solver.contacts):
         a, b = solver.first[k], solver.second[k]
@@ -63,6 +65,7 @@ def propagate(solver):
     for k in range(solver.contacts):
         if active[k]:
             unsettled[solver.first[k]] = unsettled[solver.second[k]] = True
+            active[k] = not (begins and solver.waits[k])
 
 
 @part
@@ -98,8 +101,8 @@ def apply_warm_start(solver, h):
 
 
 @part
-def solve_substep(solver, h, substeps, passes, plastic):
-    """One substep; passes: (how many before the one that pushes, how many after it)."""
+def solve_substep(solver, h, substeps, passes, plastic, ends):
+    """One substep; passes: (how many before the one that pushes, how many after it); ends: it is the last one."""
     omega = 2.0 * math.pi * FREQUENCY / h
     damping = 2.0 * DAMPING_RATIO + h * omega
     stiffness = h * omega * damping
@@ -110,7 +113,7 @@ def solve_substep(solver, h, substeps, passes, plastic):
     turn, last = -passes[0], passes[1]
     while turn <= last:
         if turn < 0:
-            propagate(solver)
+            propagate(solver, turn == -passes[0])
         elif any_rigid:
             leave_out_rigid(solver)
         chosen = turn < 0 or any_rigid
@@ -132,6 +135,8 @@ def solve_substep(solver, h, substeps, passes, plastic):
             if measure(solver, h, bias_rate):
                 push_deep(solver, substeps)
                 measure(solver, h, bias_rate)
+            if ends:
+                leave_open(solver, h)
             if plastic:
                 solve_shocks(solver, h * substeps)
         turn += 1
@@ -161,7 +166,8 @@ def solve_contacts(state, dt):
         solve_shocks(solver, dt)
     for step in range(substeps):
         before = LET_GO_PASSES if solver.any_unsettled and step == 0 else 0
-        after = LAST_RELAX_PASSES if step == substeps - 1 else RELAX_PASSES
-        solve_substep(solver, h, substeps, (before, after), plastic)
+        ends = step == substeps - 1
+        after = LAST_RELAX_PASSES if ends else RELAX_PASSES
+        solve_substep(solver, h, substeps, (before, after), plastic, ends)
     hold_light(state, dt)
     return OK

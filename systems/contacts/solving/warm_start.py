@@ -11,6 +11,7 @@ from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, scale
 from ...codes import NEED_WARM_START, OK
+from .firm import choose_firm, let_go
 
 TURNED = 0.5  # cosine between last step's normal and this one's, below which the impulses say nothing
 
@@ -95,6 +96,8 @@ def match_warm_start(state, dt):
             if i >= 0 and bodies.place[i] >= 0:
                 solver.unsettled[bodies.place[i]] = True
                 solver.any_unsettled = True
+    choose_firm(state, dt / state.substeps, zero)
+    let_go(solver, zero)
     return OK
 
 

@@ -17,6 +17,7 @@ from .sweeps import enters, is_swept, last_leg, may_be_swept, sweep, way_of
 SEARCHES = 24  # iterations of the search for the first overlap
 ROUNDING = 1e-12  # relative to the operands: smaller differences may be rounding
 SAME_PLACE = 1e-9  # of the size: smaller overlaps count as none
+APART = 1e-11  # of the size: a smaller gap at the start of the step is none
 RATIO, OPPOSED = 10.0, -0.5  # of masses: light and heavy; cosine: from opposite sides
 SAG = (2.0 / math.pi) ** 2  # of a soft contact under a load: times substep^2 load / mass
 OWN_SAG = 0.0003  # of the size: a contact that would sag more under one of its bodies is rigid
@@ -47,6 +48,9 @@ class Resting:
     shock: float = 0.0  # N s, of all shocks in the step: not remembered
     pushed: bool = False
     in_block: bool = False
+    apart: bool = False  # where the step starts
+    waits: bool = False  # a firm one that is open where the step starts
+    firm: bool = False  # of a body that touches only what cannot be moved, and not against the others of its contacts
     rigid: bool = False  # does not sag under its load
     deep: bool = False  # overlaps by more than what is corrected through velocities
     soft: bool = False  # its overlap is corrected softly
@@ -121,6 +125,7 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     if is_corner_touch(a, b, apart, slop):
         return None
     pair.doubtful |= not (pair.surely_near or motions_come_near(a, b))  # a swept world does not look that far
+    is_apart = touch(a, b, pair.between(a.start, b.start)).depth < -APART * pair.size
     gap, normal = first_overlap(pair, at_end, slop, far)
     if bounced and pair.normal is not None and float(normal @ pair.normal) <= 0.0:
         normal = pair.normal  # coincident centres have separated: keep the direction
@@ -129,7 +134,8 @@ def _rests(pair: Pair, travels: float, settings: Settings) -> Resting | None:
     weight = SAG * (dt / settings.substeps) ** 2 * pair.gained / dt
     rigid = weight > OWN_SAG * pair.size
     pair.doubtful = pair.doubtful or abs(weight - OWN_SAG * pair.size) <= ROUNDING * weight
-    return Resting(pair, normal, gap, parting, pair.friction(settings), np.zeros_like(normal), rigid=rigid)
+    tangent = np.zeros_like(normal)
+    return Resting(pair, normal, gap, parting, pair.friction(settings), tangent, apart=is_apart, rigid=rigid)
 
 
 def _deepest(pair: Pair, end: Floats, settings: Settings) -> Touch:
@@ -183,7 +189,7 @@ def first_overlap(
         return -depth - t * float(travel @ normal), normal
 
     depth, normal = look(1.0 if at_end else 0.0)
-    if at_end or depth >= 0.0:
+    if at_end or depth >= -APART * pair.size:
         return at_start(1.0 if at_end else 0.0, depth, normal)
     if far is not None:
         return far

@@ -17,6 +17,9 @@ from .rest import OPPOSED, RATIO, ROUNDING, Kept, Moving, Resting
 from .shocks import stop_shocks
 
 SHOT = 4.0  # times the fastest closing speed: no light body between heavy ones leaves them faster
+LOAD = 1e-6  # of the impulse that forces give in a substep: less is none
+ALONG = 0.5  # of a firm contact's normal along the sum of the normals of its body
+OPEN, NEVER = 1e-9, 1e6  # of the size: what is less open touches; and may close by so much
 DEEP, PUSH, PUSH_LIMIT = 0.02, 0.2, 0.05  # of the size: overlap corrected in position, its fraction, limit per step
 
 
@@ -33,6 +36,8 @@ def solve(
     bodies = {body: Moving(body, dt, h) for contact in contacts for body in contact.pair.bodies}
     contacts = by_colour(contacts)
     any_unsettled = warm_start(contacts, bodies, memory)
+    choose_firm(contacts, bodies, h)
+    any_unsettled |= let_go(contacts, bodies)
     blocks = find_blocks(contacts)
     omega = 0.5 * math.pi / h  # a spring of a quarter of the substeps' rate, ten times overdamped
     damping = 20.0 + h * omega
@@ -49,8 +54,9 @@ def solve(
         for contact in contacts:
             if contact.impulse > 0.0:
                 sweep.push(contact, contact.tangent + contact.impulse * contact.normal)
-        for _ in range(4 if any_unsettled and substep == 0 else 0):
-            sweep.over(propagate(contacts, bodies), biased=False)
+        for turn in range(4 if any_unsettled and substep == 0 else 0):
+            active = propagate(contacts, bodies)
+            sweep.over([contact for contact in active if turn > 0 or not contact.waits], biased=False)
         sweep.all_over(biased=True)
         for contact in contacts:
             contact.pushed = contact.pushed or contact.impulse > 0.0
@@ -59,6 +65,8 @@ def solve(
         sweep.measure()
         push_out(contacts, bodies, substeps)
         sweep.measure()
+        if substep == substeps - 1:
+            sweep.leave_open()
         if plastic:
             stop_shocks(contacts, bodies, dt)
         for _ in range(4 if substep == substeps - 1 else 2):
@@ -107,6 +115,43 @@ def warm_start(contacts: Sequence[Resting], bodies: dict[Body, Moving], memory: 
             if entity in by_entity:
                 by_entity[entity].unsettled = True
     return any(moving.unsettled for moving in bodies.values())
+
+
+def choose_firm(contacts: Sequence[Resting], bodies: dict[Body, Moving], h: float) -> None:
+    """Contacts with what cannot be moved are firm if their body has rested until now, and carries nobody, but not those
+    that push against the sum of such normals of their body."""
+    shared: set[Body] = set()
+    way: dict[Body, Floats] = {}
+    for contact in contacts:
+        movable = [body for body in contact.pair.bodies if body.inverse_mass > 0.0]
+        if len(movable) == 1:
+            way[movable[0]] = way.get(movable[0], 0.0) - outwards(contact, movable[0])
+        elif contact.impulse > LOAD * contact.pair.mass * h * max(
+            float(np.linalg.norm(bodies[body].acceleration)) for body in movable
+        ):
+            shared.update(movable)
+    for contact in contacts:
+        movable = [body for body in contact.pair.bodies if body.inverse_mass > 0.0]
+        if len(movable) == 1 and movable[0].resting_prediction is not None and movable[0] not in shared:
+            contact.firm = -float(way[movable[0]] @ outwards(contact, movable[0])) > ALONG
+        if contact.firm and contact.apart:
+            contact.gap = max(0.0, contact.gap)
+
+
+def let_go(contacts: Sequence[Resting], bodies: dict[Body, Moving]) -> bool:
+    """Firm contacts that are open where the step starts wait until the others of their body bear its load; those that
+    open further have no impulse any more. Returns True if any wait."""
+    for contact in contacts:
+        contact.waits = contact.firm and contact.apart
+        if contact.waits:
+            a, b = (bodies[body] for body in contact.pair.bodies)
+            a.unsettled = b.unsettled = True
+            speed = float((b.velocity - a.velocity) @ contact.normal)
+            rounding = ROUNDING * float(np.linalg.norm(a.velocity) + np.linalg.norm(b.velocity))
+            contact.doubtful |= contact.impulse > 0.0 and 0.0 < abs(speed) <= rounding
+            if speed > 0.0:
+                contact.impulse, contact.tangent = 0.0, 0.0 * contact.tangent
+    return any(contact.waits for contact in contacts)
 
 
 def propagate(contacts: Sequence[Resting], bodies: dict[Body, Moving]) -> list[Resting]:
@@ -247,7 +292,18 @@ class Sweep:
             if room <= 0.0 and not contact.parting:
                 contact.deep = room < -DEEP * size
                 if contact.rigid or not contact.deep:
-                    contact.pushing, contact.soft = self.soft[0] * max(room, -DEEP * size), not contact.rigid
+                    contact.pushing = self.soft[0] * max(room, -DEEP * size)
+                    contact.soft = not (contact.rigid or contact.firm)
+
+    def leave_open(self) -> None:
+        """Firm contacts that are open, of bodies that others hold, are left to the next step."""
+        held = {body for c in self.contacts if c.impulse > 0.0 for body in c.pair.bodies if body.inverse_mass > 0.0}
+        for contact in self.contacts:
+            a, b = (self.bodies[body] for body in contact.pair.bodies)
+            room = contact.gap + float((b.shift - a.shift) @ contact.normal)
+            is_open = contact.impulse == 0.0 and room > OPEN * contact.pair.size
+            if is_open and contact.firm and held.intersection(contact.pair.bodies):
+                contact.opening = NEVER * contact.pair.size / self.h
 
     def push(self, contact: Resting, impulse: Floats) -> None:
         """Apply ``impulse`` to b and its opposite to a."""
