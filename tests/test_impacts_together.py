@@ -154,6 +154,20 @@ def test_light_and_heavy_keep_their_energy(mode, d):
         np.testing.assert_allclose(kinetic, (masses * np.array([v for _, v, _ in balls]) ** 2).sum(), rtol=2e-14)
 
 
+@pytest.mark.parametrize("restitution", [1.0, 0.3])
+def test_a_light_ball_is_not_shot_out_between_two_heavy_ones(restitution):
+    """They come on from sides that are 0.02 from opposite: all at once, it would leave at 100 or 65 times their speed.
+    One after the other, each of at most eight impacts gives it twice that."""
+    speed, across = 5.0, 0.03
+    with kit.make_world(2, collision="discrete") as world:
+        kit.ball(world, (0, 0), radius=0.5, mass=1e-3, restitution=restitution)
+        for x in (-1.0, 1.0):
+            kit.ball(world, (1.5 * x, across), (-speed * x, 0), radius=1.0, mass=1e3, restitution=restitution)
+        world.step()
+        fastest = np.linalg.norm(world.bodies.linear_velocity, axis=1).max()
+        assert speed < fastest < 16.0 * speed
+
+
 @each_collision
 def test_a_cradle_is_no_group(mode):
     """Balls in a row that touch are struck one after the other: as many leave as arrive."""

@@ -58,7 +58,7 @@ def test_a_shock_ends_when_what_fell_lies():
 
 def test_a_pile_at_rest_has_no_shocks():
     with scenes.pile2d.build(n=100) as world:
-        for _ in range(300):
+        for _ in range(500):
             world.step()
         pairs = world.physics.state.pairs
         assert pairs.looked < pairs.count - pairs.resting_count + 10  # those that rest need no second look

@@ -26,6 +26,7 @@ WORK = 1 << 18  # impacts in all passes: a heap of bodies that overlap is not wo
 AGREED = 8e-16  # of the largest speed
 SAME = 2e-15  # of a sum of energies
 ORTHOGONAL = 1e-12  # cosine of the angle between normals that have nothing to do with each other
+SHOT = 2.0  # times the fastest change of speed that its impacts ask for: a body that gains more is shot out
 
 
 @part
@@ -142,6 +143,29 @@ def keep_energy(state, count):
         for g in range(count):
             impacts.ahead[impacts.group[g]] *= wanted / given
         push_bodies(state, count, False)
+
+
+@part
+def is_shot(state, i):
+    """Whether the group gives body i far more speed than any of its impacts asks for: it is pinched between others at a
+    small angle, which in truth opens on the way."""
+    impacts, fastest, entry = state.impacts, 0.0, state.impacts.firsts[i]
+    while entry >= 0:
+        fastest = max(fastest, impacts.event_change[impacts.member[entry // 2]])
+        entry = impacts.next_member[entry]
+    return length(impacts.gained[i]) > SHOT * fastest
+
+
+@part
+def shoots(state, count):
+    """Whether a body of the group that has been solved is shot out."""
+    impacts, pairs, inverse_mass, any_shot = state.impacts, state.pairs, state.bodies.inverse_mass, False
+    for g in range(count):
+        c = impacts.event_pair[impacts.member[impacts.group[g]]]
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            any_shot |= inverse_mass[i] > 0.0 and is_shot(state, i)
+    return any_shot
 
 
 @part

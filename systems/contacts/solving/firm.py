@@ -1,4 +1,4 @@
-"""Firm contacts: those of a body that rests only on what cannot be moved, and carries nobody.
+"""Firm contacts: those of a body that rests only on what cannot be moved, and that nobody presses on.
 
 Soft contacts sag, by an amount that depends on how many there are. A body that slides over floors which lie flush would
 rise and sink at each seam, and meet the next floor's corner below its own underside. Firm contacts do not sag. A body
@@ -12,22 +12,24 @@ from ....framework.vectors import add, dot, length, sub
 
 LOAD = 1e-6  # of the impulse that forces give in a substep: less is none
 ALONG = 0.5  # of a firm contact's normal along the sum of the normals of all such contacts of its body
-OPEN = 1e-9  # of the extent: a contact that is open by more at the end of the step does not touch,
-NEVER = 1e6  # and may close by so many extents: the next step looks along its own normals
+OPEN = 1e-9  # of the extent: less is neither a gap nor an overlap; a contact that is open at the end of the step
+NEVER = 1e6  # may close by so many extents: the next step looks along its own normals
 
 
 @part
-def bears(solver, k, h):
-    """Whether contact k, of two bodies that can be moved, bears a load."""
+def presses(solver, k, h):
+    """Whether contact k, of two bodies that can be moved, bears a load, or will: they overlap."""
     a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
     if not (solver.inverse_mass[a] > 0.0 and solver.inverse_mass[b] > 0.0):
         return False
+    if solver.gap[k] < -OPEN * solver.extent[k]:
+        return True
     return solver.impulse[k] > LOAD * solver.mass[k] * h * max(length(acceleration[a]), length(acceleration[b]))
 
 
 @part
 def choose_firm(state, h, nothing):
-    """Contacts with what cannot be moved are firm if their body has rested until now, and carries nobody.
+    """Contacts with what cannot be moved are firm if their body has rested until now, and nobody presses on it.
 
     Not those that push against the sum of its normals: no impulse is high enough for what is squeezed. Nor one that
     stands for several faces: how much it overlaps each of them says which way it pushes.
@@ -40,7 +42,7 @@ def choose_firm(state, h, nothing):
         a, b, n = solver.first[k], solver.second[k], solver.normal[k]
         if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
             way[a], way[b] = sub(way[a], n), add(way[b], n)
-        elif bears(solver, k, h):
+        elif presses(solver, k, h):
             shared[a] = shared[b] = True
     for k in range(solver.contacts):
         a, b, n = solver.first[k], solver.second[k], solver.normal[k]

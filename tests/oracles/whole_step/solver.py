@@ -118,17 +118,17 @@ def warm_start(contacts: Sequence[Resting], bodies: dict[Body, Moving], memory: 
 
 
 def choose_firm(contacts: Sequence[Resting], bodies: dict[Body, Moving], h: float) -> None:
-    """Contacts with what cannot be moved are firm if their body has rested until now, and carries nobody, but not those
-    that push against the sum of such normals of their body."""
+    """Contacts with what cannot be moved are firm if their body has rested until now, and nobody presses on it, but not
+    those that push against the sum of such normals of their body."""
     shared: set[Body] = set()
     way: dict[Body, Floats] = {}
     for contact in contacts:
         movable = [body for body in contact.pair.bodies if body.inverse_mass > 0.0]
         if len(movable) == 1:
             way[movable[0]] = way.get(movable[0], 0.0) - outwards(contact, movable[0])
-        elif contact.impulse > LOAD * contact.pair.mass * h * max(
-            float(np.linalg.norm(bodies[body].acceleration)) for body in movable
-        ):
+            continue
+        forced = max((float(np.linalg.norm(bodies[body].acceleration)) for body in movable), default=0.0) * h
+        if contact.gap < -OPEN * contact.pair.size or contact.impulse > LOAD * contact.pair.mass * forced:
             shared.update(movable)
     for contact in contacts:
         movable = [body for body in contact.pair.bodies if body.inverse_mass > 0.0]
