@@ -111,6 +111,8 @@ def test_a_build_that_ignores_its_settings_is_refused(carom, tmp_path):
     assert carom(*arguments).exit_code == 0
     line = refusal(carom(*arguments, "--set", "dt=1/120"))
     assert "deaf.py: build ignores its settings, so --set dt=0.00833" in line
+    line = refusal(carom(*arguments, "--settings", "fast"))
+    assert "deaf.py: build ignores its settings, so --settings has no effect" in line
 
 
 def test_set_builds_once(carom, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import dataclasses
 import hashlib
 import importlib.machinery
 import importlib.util
@@ -49,6 +50,7 @@ class Loaded:
     ) -> World:
         """A world with ``settings`` (None: the scene's own; for a file the default ones) and with additional plugins;
         Problem if it fails."""
+        chosen = settings
         if settings is None:
             settings = self.settings
         brought = {name for plugin in plugins for name in _names_for_settings(plugin)}
@@ -57,13 +59,13 @@ class Loaded:
         if early:
             settings = apply(settings or Settings(), early)
         world = self._call(settings, seed)
-        for field, value in early.items():
-            if getattr(world.settings, field) != value:
-                world.close()
-                raise Problem(
-                    f"{self.name}: build ignores its settings, so --set {field}={value} has no effect: give them to "
-                    f"the world, World(..., settings=settings)"
-                )
+        ignored = _what_is_ignored(world.settings, chosen, early)
+        if ignored is not None:
+            world.close()
+            raise Problem(
+                f"{self.name}: build ignores its settings, so {ignored} has no effect: give them to the world, "
+                f"World(..., settings=settings)"
+            )
         for plugin in plugins:
             try:
                 with stdout_kept_clean():
@@ -97,6 +99,21 @@ class Loaded:
             if isinstance(error, Problem):
                 raise
             raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
+
+
+def _what_is_ignored(found: Settings, chosen: Settings | None, changes: dict[str, Any]) -> str | None:
+    """The option that a world's settings show nothing of; of a preset a build may change this and that, not all."""
+    for field, value in changes.items():
+        if getattr(found, field) != value:
+            return f"--set {field}={value}"
+    if chosen is None:
+        return None
+    default = Settings()
+    told = [field.name for field in dataclasses.fields(Settings)]
+    told = [name for name in told if name not in changes and getattr(chosen, name) != getattr(default, name)]
+    if told and all(getattr(found, name) != getattr(chosen, name) for name in told):
+        return "--settings"
+    return None
 
 
 def _names_for_settings(plugin: Plugin) -> list[str]:
