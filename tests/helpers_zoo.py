@@ -128,7 +128,8 @@ def levels(d: int, mode: str) -> World:
 
 
 def crowd(d: int, mode: str, sizes: float, moving: int = 200) -> World:
-    """Among 200 that do not move so many do that candidates come from grids; of very different sizes, from trees."""
+    """Among 200 that do not move so many do that candidates come from grids; of very different sizes, from trees, and
+    they only feel each other: hundreds that overlap would take Python minutes."""
     random = np.random.default_rng(5)
     world = World(Physics(d), settings=Settings(collision=mode))
     side = 40.0 if d == 2 else 16.0
@@ -138,7 +139,20 @@ def crowd(d: int, mode: str, sizes: float, moving: int = 200) -> World:
             world.create_entity(Transform(place), AABBCollider((radius,) * d))
         else:
             body = RigidBody(linear_velocity=tuple(random.uniform(-30.0, 30.0, d)))
-            world.create_entity(Transform(place), body, SphereCollider(radius, restitution=1.0))
+            look = {"sensor": True} if sizes > 4.0 else {"restitution": 1.0}
+            world.create_entity(Transform(place), body, SphereCollider(radius, **look))
+    return world
+
+
+def break_shot(d: int, mode: str) -> World:
+    """One ball strikes two at once, while a light one is pinched between two heavy ones."""
+    world = World(Physics(d), settings=Settings(collision=mode))
+    for x, y, speed in ((-2.0, 0.0, 30.0), (0.0, 0.51, 0.0), (0.0, -0.51, 0.0)):
+        body = RigidBody(linear_velocity=at(d, speed))
+        world.create_entity(Transform(at(d, x, y)), body, SphereCollider(0.5, restitution=1.0, friction=0.2))
+    for x, y, mass in ((-1.5, 9.03, 1e3), (0.0, 9.0, 1e-3), (1.5, 9.03, 1e3)):
+        body = RigidBody(mass=mass, linear_velocity=at(d, -5.0 * x))
+        world.create_entity(Transform(at(d, x, y)), body, SphereCollider(1.0 if x else 0.5, restitution=1.0))
     return world
 
 
@@ -240,9 +254,11 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
     for k, method in enumerate(METHODS):
         yield f"swinging {method}", lambda k=k, method=method: play(swinging(2 + k % 2, method))
         yield f"thrown {method}", lambda k=k, method=method: play(mixed(3 - k % 2, "discrete", 4, integrator=method), 5)
+    for d, mode in ((2, MODES[0]), (3, MODES[2])):
+        yield f"break shot {d}D {mode}", lambda d=d, mode=mode: play(break_shot(d, mode), 5)
     for d in (2, 3):
         yield f"buried {d}D", lambda d=d: play(buried(d), 5)
-        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 60 if d == 3 else 15)
+        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 15)
         yield f"asked {d}D", lambda d=d: asked(d)
 
 
