@@ -47,6 +47,7 @@ class Sleepers:
         self._lengths = 1.0, 1.0  # of the step and the substep that the impulses are of
         self.links = self.sizes = np.empty((0, 2), np.int64)
         self._followed: Any = None  # the structure that all this is of
+        self._seen = -1
         self.on = False  # the settings say so, or those that sleep have to wake because they do not any more
         self._all_wake = False
         self.kept: Any = None  # before this step
@@ -69,14 +70,17 @@ class Sleepers:
     def begin_step(self) -> None:
         """The scene is up to date: follow who has come or gone, and let fall asleep who is due."""
         words, table = self._words, self._table
-        self._scene.reserve(*SLEEPING)
-        self._watching.bind()
         if self._all_wake:
             self._wake_all()
             self._all_wake, self.on = False, self._state.sleeping
-        structure = self._structure()
-        if structure != self._followed:
-            self._follow(structure)
+        seen = table.version + table.members_version + table.static_version + table.columns_version  # these only grow
+        if seen != self._seen:
+            self._scene.reserve(*SLEEPING)
+            self._watching.bind()
+            structure = self._structure()
+            if structure != self._followed:
+                self._follow(structure)
+            self._seen = seen
         if words[self._due] or (words[self._asleep] and words[self._fresh]):
             self._fall_asleep(table.stops[1])
 
@@ -96,8 +100,9 @@ class Sleepers:
         before, self._followed = self._followed, structure
         if self._state.due:
             self._keep()
-            still = self._still()
-            still[still == FALLING] = AWAKE
+            falling = np.flatnonzero(self._still() == FALLING)
+            self._state.bodies.still[falling] = AWAKE
+            self._state.bodies.rest_steps[falling] = 0
             self._state.due = 0
         if not self._state.asleep:
             return
@@ -279,7 +284,7 @@ class Sleepers:
         """Back to the start of the step; the records show the contacts and impulses of that time."""
         if self.kept is None:
             return
-        (columns, parts, self._followed, impulses, contacts), self.kept = self.kept, None
+        (columns, parts, self._followed, impulses, contacts), self.kept, self._seen = self.kept, None, -1
         for name, column in columns.items():
             getattr(self._state.bodies, name)[: len(column)] = column
         self._take_parts(parts)
@@ -310,7 +315,7 @@ class Sleepers:
 
     def take_back(self, saved: Any) -> None:
         """The table is what it was then."""
-        self.kept = None
+        self.kept, self._seen = None, -1
         self._take_parts(saved)
         self._all_wake = saved["all_wake"]
         self._followed = self._structure() if saved["followed"] else None

@@ -20,9 +20,12 @@ AWAKE, STILL, FALLING, DISTURBED = 0, 1, 2, -1
 
 REST_TIME = 0.5  # s at rest before sleep,
 REST_STEPS = 8  # and at least so many steps
-REST_SHARE = 0.25  # of what forces change of the speed in a step: a body that they move is faster after one
-REST_SIZES = 0.002  # of the extent, per step: beyond it nothing is at rest, however strong the forces
-UNMOVED_SIZES = 1e-6  # of the extent, per step: below it everything is
+REST_SHARE = 0.25  # of what forces change of the speed in a step: what they move freely is faster after one
+RATTLE_SHARE = 0.9  # the same of what stays in its place: one disc of ten thousand rattles there for ever
+REST_ROOM = 0.01  # of the extent: its place
+REST_SIZES = 0.002  # of the extent, per step: what is faster is not at rest, however strong the forces
+UNMOVED_SIZES = 1e-6  # of the extent, per step: what is slower is, without forces and contacts
+FIRST_SHARE = 0.05  # of what forces change: they may differ by it when its velocity has become 0
 THROW = 3.0  # times the highest speed there is: what an impact may make of a body within the step
 
 _watched_at = record_at(WATCHED, 2)
@@ -71,18 +74,6 @@ def take_prints(state, dt):
     return OK
 
 
-@inlined
-def rest_speed(state, i, dt):
-    """The speed up to which a body is at rest.
-
-    What forces accelerate is faster after a step, unless contacts hold it. Without forces it has to stand as good as
-    still: what drifts in space is not at rest.
-    """
-    bodies = state.bodies
-    extent = bodies.min_extent[i] / dt
-    return max(UNMOVED_SIZES * extent, min(REST_SIZES * extent, REST_SHARE * bodies.force_speed_change[i]))
-
-
 # -- who sleeps on -----------------------------------------------------------------------------------------------------
 
 
@@ -100,7 +91,7 @@ def sleeps_on(state, i, dt):
         return False
     if bodies.still[i] == FALLING:
         push = length(sub(bodies.force[i], bodies.rest_force[i])) * bodies.inverse_mass[i] * dt
-        if not push <= (rest_speed(state, i, dt) if free else 0.0):
+        if not push <= (FIRST_SHARE * bodies.force_speed_change[i] if free else 0.0):
             return False
         bodies.flown_position[i], bodies.flown_velocity[i] = bodies.position[i], bodies.linear_velocity[i]
         return True
@@ -187,7 +178,7 @@ def leave_out_still(state, dt):
 def weigh_sleepers(state, dt):
     """What forces would change of the speed of sleepers, for the margins of their pairs."""
     bodies = state.bodies
-    for i in range(state.dynamic if state.asleep > 0 else 0):
+    for i in range(state.dynamic if state.asleep > 0 and state.pairs.count > 0 else 0):
         if bodies.still[i] == STILL:
             bodies.force_speed_change[i] = length(bodies.flown_velocity[i])
     return OK
@@ -227,16 +218,36 @@ def find_touched(state, dt):
 # -- who falls asleep --------------------------------------------------------------------------------------------------
 
 
+@inlined
+def is_unmoved(state, i, dt):
+    """Whether a body stands as good as still."""
+    v, least = state.bodies.linear_velocity[i], UNMOVED_SIZES * state.bodies.min_extent[i] / dt
+    return dot(v, v) <= least * least
+
+
 @part
 def is_at_rest(state, i, dt):
-    """Whether an awake body is slow, and nothing has struck it; one that cannot be moved, whether it stands still."""
+    """Whether an awake body is slow, or rattles about where its rest began, and nothing has struck it.
+
+    What forces accelerate is too fast after a step, unless contacts hold it. Without forces a body has to stand as good
+    as still: what drifts in space is not at rest.
+    """
     bodies = state.bodies
-    v = bodies.linear_velocity[i]
-    if i >= state.dynamic:
-        return is_zero(v) and same(bodies.position[i], bodies.previous_position[i])
-    struck = state.impacts.logged > 0 and bodies.impact_count[i] > 0
-    limit = rest_speed(state, i, dt)
-    return not struck and not bodies.quarantined[i] and bodies.shape[i] >= 0 and dot(v, v) <= limit * limit
+    if bodies.quarantined[i] or bodies.shape[i] < 0 or (state.impacts.logged > 0 and bodies.impact_count[i] > 0):
+        return False
+    v, extent, forced = bodies.linear_velocity[i], bodies.min_extent[i], bodies.force_speed_change[i]
+    away, room, limit = sub(bodies.position[i], bodies.rest_position[i]), REST_ROOM * extent, REST_SHARE * forced
+    if bodies.rest_steps[i] > 0 and dot(away, away) <= room * room:
+        limit = RATTLE_SHARE * forced
+    limit = min(REST_SIZES * extent / dt, limit)
+    return dot(v, v) <= limit * limit or is_unmoved(state, i, dt)
+
+
+@part
+def stands_still(state, i):
+    """Whether a body that moves by its own velocity alone has none."""
+    bodies = state.bodies
+    return is_zero(bodies.linear_velocity[i]) and same(bodies.position[i], bodies.previous_position[i])
 
 
 @part
@@ -246,7 +257,10 @@ def count_rest(state, dt, needed):
     bodies, ripe, last = state.bodies, False, state.moving if state.asleep > 0 else state.dynamic
     for i in range(state.moving):
         if bodies.still[i] == AWAKE:
-            bodies.rest_steps[i] = bodies.rest_steps[i] + 1 if is_at_rest(state, i, dt) else 0
+            rests = is_at_rest(state, i, dt) if i < state.dynamic else stands_still(state, i)
+            bodies.rest_steps[i] = bodies.rest_steps[i] + 1 if rests else 0
+            if bodies.rest_steps[i] <= 1:
+                bodies.rest_position[i] = bodies.position[i]
             ripe |= bodies.rest_steps[i] >= needed and i < last
     return ripe
 
@@ -261,12 +275,22 @@ def root_of(root, i):
 
 
 @part
-def join_islands(state, needed):
-    """Islands of dynamic bodies that are awake, each known by its first row; restless[row] tells which stay awake."""
+def join_islands(state, dt, needed):
+    """Islands of dynamic bodies that are awake, each known by its first row; restless[row] tells which stay awake.
+
+    Those do of which a body has not been at rest for long enough, or has nothing that holds it, or stands on something
+    that moves.
+    """
     bodies, pairs, root, restless = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.restless
     still = bodies.still
     for i in range(state.dynamic):
-        root[i], restless[i] = i, False
+        root[i], restless[i] = i, bodies.rest_steps[i] < needed or not is_unmoved(state, i, dt)
+    for c in range(pairs.count):
+        a, b = pairs.a[c], pairs.b[c]
+        if pairs.is_solid[c] and pairs.near_contact[c]:
+            for i in (a, b):
+                if i < state.dynamic and bodies.rest_steps[i] >= needed:
+                    restless[i] = False
     for c in range(pairs.count):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
@@ -274,7 +298,7 @@ def join_islands(state, needed):
             one, other = root_of(root, a), root_of(root, b)
             root[max(one, other)] = min(one, other)
     for i in range(state.dynamic):
-        if bodies.rest_steps[i] < needed:
+        if restless[i]:
             restless[root_of(root, i)] = True
     for c in range(pairs.count):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
@@ -299,7 +323,7 @@ def judge_rest(state, dt):
     needed = max(REST_STEPS, math.ceil(REST_TIME / dt))
     if not count_rest(state, dt, needed):
         return OK
-    join_islands(state, needed)
+    join_islands(state, dt, needed)
     print_rows(state, 0, state.moving)
     for i in range(state.dynamic):
         first = root_of(bodies.rest_root, i)
