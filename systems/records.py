@@ -386,6 +386,7 @@ STATE = Schema(
     asleep=integer(),  # bodies that sleep, or are about to
     due=integer(),  # bodies that do from the next step on
     disturbed=integer(),  # marked in ``still``
+    sleep_stages=integer(),  # those of sleeping that have run in this step, as bits
     fresh_statics=integer(),  # bodies that cannot move and are new, or have been changed
     quarantining=flag(),  # some body is, or was told of and may be sound again
     # the scene

@@ -131,8 +131,14 @@ class Simulation(PhysicsServices):
     # -- a step -----------------------------------------------------------------------------------
 
     def begin_step(self, others_write: bool) -> None:
-        table, scene, words = self.table, self.scene, self._words
         self.sleepers.kept = None
+        self._follow(others_write)
+        if self.sleepers.on:
+            self.sleepers.begin_step()
+
+    def _follow(self, others_write: bool) -> None:
+        """Everything that depends on which bodies and systems there are."""
+        table, scene, words = self.table, self.scene, self._words
         words[self._step_number] = self.table.clock.step_count
         self._contacts_before = self.contacts.columns_now() if words[self._found_current] else None
         if self._structure() != scene.structure or table.static_version != scene.static_version:
@@ -143,8 +149,6 @@ class Simulation(PhysicsServices):
             self._link()
         if others_write or words[self._others_write]:
             self._take_care(others_write)
-        if self.sleepers.on:
-            self.sleepers.begin_step()
 
     def _structure(self) -> int:
         """Another number whenever bodies, their components or plugins come or go."""
@@ -318,7 +322,7 @@ class Simulation(PhysicsServices):
         put_rows_back(state.warm_start, saved["warm_start"])
         put_rows_back(state.contacts, saved["contacts"])
         state.warm_start.rows_version[:] = -1
-        self.sleepers.take_back(saved["sleepers"])
+        self.sleepers.take_back(saved.get("sleepers"))
         self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]
         if self.quarantine.take_back(saved["quarantine"]) or moved or not saved["followed"]:
             self.scene.forget()
@@ -335,7 +339,7 @@ class Simulation(PhysicsServices):
         return SYSTEM_OF_STAGE[stage]
 
     def look_ahead(self, others_write: bool) -> None:
-        self.begin_step(others_write)
+        self._follow(others_write)
         self._copies.kept = False
         self.scene.refresh_rotation()
         state = self.state

@@ -13,6 +13,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, Settings, System, World
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
+from carom.systems import Integration
 from tests.helpers_pairwise import pairwise
 
 MODES = ("discrete", "continuous", "event_driven")
@@ -566,6 +567,21 @@ def test_snapshots_and_files_go_on_to_the_bit(when, tmp_path):
     assert go_on(loaded, boxes) == expected
 
 
+def test_a_world_that_does_not_sleep_goes_on_from_a_snapshot_of_one_that_does():
+    world, other = sleepy_world(), sleepy_world(sleeping=False)
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    other.restore(world.snapshot())
+    other.step()
+    assert not any(is_asleep(other, *boxes))
+    assert len(other.contacts) == 3
+    assert len(other.contacts.begin) == len(other.contacts.end) == 0
+    assert "_still" in other.physics.table.arrays
+    world.restore(other.snapshot())
+    assert not any(is_asleep(world, *boxes))
+    sleep(world, *boxes)
+
+
 def test_a_snapshot_from_before_wakes_what_sleeps():
     world = sleepy_world()
     boxes = tower(world, 0.0)
@@ -623,6 +639,60 @@ def test_rows_that_move_take_their_sleep_along():
     world.delete_entity(boxes[0])
     world.step()
     assert not any(is_asleep(world, *boxes[1:]))
+
+
+def test_a_plan_between_falling_asleep_and_the_next_step_changes_nothing():
+    world, other = sleepy_world(), sleepy_world()
+    seen = []
+    for each in (world, other):
+        boxes = tower(each, 0.0)
+        while not is_asleep(each, boxes[1])[0]:
+            each.step()
+        if each is world:
+            assert "rest_sleepers" in str(each.plan())
+        assert len(each.contacts.stay) == len(each.contacts) == 3
+        for _ in range(3):
+            each.step()
+            seen.append((each.state_hash(), len(each.contacts), len(each.contacts.stay)))
+    assert seen[:3] == seen[3:]
+
+
+def test_several_steps_in_one_call_show_the_contacts_that_stay():
+    class Look(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            stays.append(len(self.world.contacts.stay))
+
+    stays = []
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    world.add_system(Look())
+    for _ in range(12):
+        world.advance(5 / 60)
+    assert all(is_asleep(world, *boxes))
+    assert stays[10:].count(0) == len(stays[10::5])  # in the first step of a call nothing has stayed yet
+    assert set(stays[10:]) == {0, 3}
+
+
+def test_a_replaced_integration_lets_nothing_sleep():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    world.remove_system(world.get_processor(Integration))
+    world.step()
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+
+
+def test_without_its_collider_the_last_sleeper_falls():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    sleep(world, *boxes)
+    world.remove_component(boxes[0], AABBCollider)
+    for _ in range(30):
+        world.step()
+    assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
 
 
 def test_turned_off_all_wake():

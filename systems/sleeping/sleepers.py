@@ -87,7 +87,9 @@ class Sleepers:
     def end_step(self) -> None:
         """Note what those stand on who fall asleep; nothing may change until the next step."""
         self.kept = None
-        if self._words[self._due]:
+        if self._state.due < 0:
+            self._all_wake, self._state.due = True, 0
+        elif self._words[self._due]:
             self._followed = self._structure()
             self._note_links()
 
@@ -112,7 +114,7 @@ class Sleepers:
         ids, sizes = np.unique(self._islands(), return_counts=True)
         now = dict(zip(ids.tolist(), sizes.tolist(), strict=True))
         islands.append(np.array([i for i, size in self.sizes.tolist() if now.get(i) != size], np.int64))
-        if before is not None and before[3] != structure[3]:  # ids mean other entities
+        if not self._state.collides or (before is not None and before[3] != structure[3]):  # ids mean other entities
             islands.append(ids)
         self._wake(np.concatenate(islands))
 
@@ -308,14 +310,25 @@ class Sleepers:
         self._lengths = parts["lengths"][0], parts["lengths"][1]
         state.asleep, state.due, state.fresh_statics, state.contacts.stored = parts["numbers"]
 
-    def saved(self) -> dict[str, Any]:
+    def saved(self) -> dict[str, Any] | None:
         """For snapshots; also whether bodies have come or gone since the last step, and whether all wake."""
+        if not self.on:
+            return None
         followed = self._structure() == self._followed
         return {**self._saved_parts(), "followed": followed, "all_wake": self._all_wake}
 
     def take_back(self, saved: Any) -> None:
-        """The table is what it was then."""
-        self.kept, self._seen = None, -1
+        """The table is what it was then; if this world does not sleep, all of them wake."""
+        state = self._state
+        self.kept, self._followed, self._seen = None, None, -1
+        if saved is None:
+            self.contacts.clear()
+            self.impulses.clear()
+            self.links = self.sizes = np.empty((0, 2), np.int64)
+            state.asleep = state.due = state.fresh_statics = state.contacts.stored = 0
+            return
         self._take_parts(saved)
-        self._all_wake = saved["all_wake"]
-        self._followed = self._structure() if saved["followed"] else None
+        self._all_wake = saved["all_wake"] or not state.sleeping
+        self.on = state.sleeping or self._all_wake
+        if saved["followed"]:
+            self._followed = self._structure()

@@ -18,6 +18,10 @@ from ..shapes.tolerances import contact_margin
 # Values of ``bodies.still``. FALLING: its first step asleep is the next one. What cannot be moved is still, too.
 AWAKE, STILL, FALLING, DISTURBED = 0, 1, 2, -1
 
+# Stages without which nothing can sleep, as bits of ``state.sleep_stages``: a game may have replaced their systems.
+RESTED, LEFT_OUT, TOUCHED = 1, 2, 4
+EVERYBODY = -1  # in place of the number of those that fall asleep: all wake
+
 REST_TIME = 0.5  # s at rest before sleep,
 REST_STEPS = 8  # and at least so many steps
 REST_SHARE = 0.25  # of what forces change of the speed in a step: what they move freely is faster after one
@@ -25,6 +29,7 @@ RATTLE_SHARE = 0.9  # the same of what stays in its place: one disc of ten thous
 REST_ROOM = 0.01  # of the extent: its place
 REST_SIZES = 0.002  # of the extent, per step: what is faster is not at rest, however strong the forces
 UNMOVED_SIZES = 1e-6  # of the extent, per step: what is slower is, without forces and contacts
+LOOK_EVERY = 4  # steps; islands need not be joined in each
 FIRST_SHARE = 0.05  # of what forces change: they may differ by it when its velocity has become 0
 THROW = 3.0  # times the highest speed there is: what an impact may make of a body within the step
 
@@ -149,6 +154,7 @@ def put_to_rest(state):
 
 def rest_sleepers(state, dt):
     """Compare what is still with what it was, and put sleepers back to where they rest."""
+    state.sleep_stages |= RESTED
     if state.asleep == 0:
         return OK
     state.disturbed = find_disturbed(state, dt)
@@ -164,6 +170,7 @@ def rest_sleepers(state, dt):
 def leave_out_still(state, dt):
     """Pairs of two bodies that are still are no candidates."""
     candidates, still, kept = state.candidates, state.bodies.still, 0
+    state.sleep_stages |= LEFT_OUT
     if state.asleep == 0:
         return OK
     first, second = candidates.first, candidates.second
@@ -199,6 +206,7 @@ def highest_speed(state):
 def find_touched(state, dt):
     """Wake what an awake body touches, or may touch after impacts in this step."""
     pairs, still, disturbed = state.pairs, state.bodies.still, 0
+    state.sleep_stages |= TOUCHED
     if state.asleep == 0 or pairs.count == 0:
         return OK
     reach = THROW * highest_speed(state) * dt
@@ -318,10 +326,13 @@ def lay_down(state, i):
 def judge_rest(state, dt):
     """Count the steps that bodies have been at rest; islands that have been for long enough fall asleep."""
     bodies, due = state.bodies, 0
-    if not (state.moved and state.contacts_ready) or state.unsound != 0:
+    if state.unsound != 0:
+        return OK
+    if not state.moved or state.sleep_stages != RESTED | LEFT_OUT | TOUCHED:
+        state.due = EVERYBODY if state.asleep > 0 else 0
         return OK
     needed = max(REST_STEPS, math.ceil(REST_TIME / dt))
-    if not count_rest(state, dt, needed):
+    if not count_rest(state, dt, needed) or state.step_number % LOOK_EVERY != 0:
         return OK
     join_islands(state, dt, needed)
     print_rows(state, 0, state.moving)

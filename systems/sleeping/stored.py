@@ -36,7 +36,13 @@ class Stored:
 
     def __init__(self, record: Record, names: tuple[str, ...], reserve: Callable[[int], None]) -> None:
         self._record, self._names, self._reserve = record, names, reserve
-        self.columns: Columns = {name: column[:0] for name, column in self._live().items()}
+        self._lists_stays = "stayed" in record.schema.fields  # the rows that were there in the step before, too
+        self.columns: Columns = {}
+        self.clear()
+
+    def clear(self) -> None:
+        """Keep none."""
+        self.columns = {name: column[:0] for name, column in self._live().items()}
 
     def __len__(self) -> int:
         return len(self.columns["entity_a"])
@@ -55,8 +61,20 @@ class Stored:
         still = both_still(joined["entity_a"], joined["entity_b"])
         if np.array_equal(still, ~was_live):
             return
+        stays = self._stays(was_live)[~still]
         self.columns = {name: column[still] for name, column in joined.items()}
         self._write({name: column[~still] for name, column in joined.items()})
+        if self._lists_stays:
+            record, rows = self._record, np.flatnonzero(stays)
+            record.stayed[record.now, : len(rows)], record.stays[record.now] = rows, len(rows)
+
+    def _stays(self, was_live: np.ndarray) -> np.ndarray:
+        """Mask of what was there in the step before, too: all that sleeps, and what the record says."""
+        stays = ~was_live
+        if self._lists_stays:
+            record, now = self._record, self._record.now
+            stays[np.flatnonzero(was_live)[record.stayed[now, : record.stays[now]]]] = True
+        return stays
 
     def _write(self, columns: Columns) -> None:
         record, count = self._record, len(columns["entity_a"])
