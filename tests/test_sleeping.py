@@ -117,6 +117,14 @@ def test_what_drifts_flies_or_is_carried_does_not_sleep():
     assert is_asleep(lift, carried) == [False]
 
 
+def test_what_slides_slowly_does_not_stop():
+    world = sleepy_world()
+    slow = box(world, (0.0, 0.05), (0.02, 0.0), half=0.05, friction=0.0)
+    for _ in range(120):
+        world.step()
+    assert world.component_for_entity(slow, RigidBody).linear_velocity[0] == pytest.approx(0.02)
+
+
 def test_sleeps_on_a_kinematic_body_that_stands_until_it_moves():
     world = sleepy_world()
     lift = box(world, (0.0, 5.0), half=(2.0, 0.5), kind="kinematic")
@@ -520,9 +528,47 @@ def test_disabling_the_contact_of_sleepers_wakes_them():
     world.add_system(trapdoor)
     sleep(world, *boxes)
     trapdoor.open = True
+    world.step()
+    assert is_asleep(world, *boxes) == [False]
     for _ in range(30):
         world.step()
     assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
+    assert is_asleep(world, *boxes) == [False]
+
+
+def test_one_way_platforms_that_look_at_velocities_hold_sleepers():
+    class OneWay(System):
+        phase = Phase.NARROW
+
+        def process(self, dt):
+            contacts, bodies = self.world.contacts, self.world.bodies
+            rows = [bodies.row_of(entity) for entity in contacts.entity_b.tolist()]
+            contacts.enabled[:] = bodies.linear_velocity[rows, 1] < 0.0
+
+    world = sleepy_world()
+    tower(world, 0.0, 1)
+    world.add_system(OneWay())
+    heights = [world.step() or world.bodies.dynamic.position[0, 1] for _ in range(100)]
+    assert min(heights) > 0.49
+
+
+def test_what_is_held_apart_by_disabled_contacts_does_not_sleep():
+    class Off(System):
+        phase = Phase.NARROW
+
+        def process(self, dt):
+            self.world.contacts.enabled[:] = False
+
+    world = make_world(2, 0.0, sleeping=True)
+    pair = ball(world, 0.0), ball(world, 0.9)
+    off = Off()
+    world.add_system(off)
+    for _ in range(60):
+        world.step()
+    assert not any(is_asleep(world, *pair))
+    world.remove_system(off)
+    world.step()
+    assert len(world.contacts.begin) == 1
 
 
 # -- snapshots, files, failures ----------------------------------------------------------------------------------------

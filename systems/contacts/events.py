@@ -53,7 +53,8 @@ class RecordedContacts(ContactSource):
         return columns
 
     def lively(self, enabled: np.ndarray) -> np.ndarray:
-        """Of what sleeps a contact that has been disabled wakes the two; the records hold the others."""
+        """Of what sleeps a contact that has been disabled wakes the two, and holds for one more step: a system that
+        looks at velocities sees none of sleepers. The records hold the others."""
         if self._lively is None:
             return enabled
         columns = self.stored.columns

@@ -25,8 +25,9 @@ EVERYBODY = -1  # in place of the number of those that fall asleep: all wake
 REST_TIME = 0.5  # s at rest before sleep,
 REST_STEPS = 8  # and at least so many steps
 REST_SHARE = 0.25  # of what forces change of the speed in a step: what they move freely is faster after one
-RATTLE_SHARE = 0.9  # the same of what stays in its place: one disc of ten thousand rattles there for ever
-REST_ROOM = 0.01  # of the extent: its place
+REST_ROOM = 0.02  # of the extent: how far it may go in that time
+RATTLE_SHARE = 0.9  # the same of what rattles in its place, as one disc of ten thousand does for ever
+RATTLE_ROOM = 0.01
 REST_SIZES = 0.002  # of the extent, per step: what is faster is not at rest, however strong the forces
 UNMOVED_SIZES = 1e-6  # of the extent, per step: what is slower is, without forces and contacts
 LOOK_EVERY = 4  # steps; islands need not be joined in each
@@ -244,11 +245,10 @@ def is_at_rest(state, i, dt):
     if bodies.quarantined[i] or bodies.shape[i] < 0 or (state.impacts.logged > 0 and bodies.impact_count[i] > 0):
         return False
     v, extent, forced = bodies.linear_velocity[i], bodies.min_extent[i], bodies.force_speed_change[i]
-    away, room, limit = sub(bodies.position[i], bodies.rest_position[i]), REST_ROOM * extent, REST_SHARE * forced
-    if bodies.rest_steps[i] > 0 and dot(away, away) <= room * room:
-        limit = RATTLE_SHARE * forced
-    limit = min(REST_SIZES * extent / dt, limit)
-    return dot(v, v) <= limit * limit or is_unmoved(state, i, dt)
+    away = length(sub(bodies.position[i], bodies.rest_position[i])) if bodies.rest_steps[i] > 0 else math.inf
+    limit = min(REST_SIZES * extent / dt, (RATTLE_SHARE if away <= RATTLE_ROOM * extent else REST_SHARE) * forced)
+    slow = dot(v, v) <= limit * limit and (bodies.rest_steps[i] == 0 or away <= REST_ROOM * extent)
+    return slow or is_unmoved(state, i, dt)
 
 
 @part
@@ -287,7 +287,7 @@ def join_islands(state, dt, needed):
     """Islands of dynamic bodies that are awake, each known by its first row; restless[row] tells which stay awake.
 
     Those do of which a body has not been at rest for long enough, or has nothing that holds it, or stands on something
-    that moves.
+    that moves, or that a system disables the contact with.
     """
     bodies, pairs, root, restless = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.restless
     still = bodies.still
@@ -305,6 +305,10 @@ def join_islands(state, dt, needed):
         if awake and pairs.is_solid[c] and pairs.near_contact[c]:
             one, other = root_of(root, a), root_of(root, b)
             root[max(one, other)] = min(one, other)
+    for k in range(pairs.disabled_count):
+        for i in (pairs.a[pairs.disabled[k]], pairs.b[pairs.disabled[k]]):
+            if i < state.dynamic:
+                restless[i] = True
     for i in range(state.dynamic):
         if restless[i]:
             restless[root_of(root, i)] = True
