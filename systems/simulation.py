@@ -131,10 +131,12 @@ class Simulation(PhysicsServices):
     # -- a step -----------------------------------------------------------------------------------
 
     def begin_step(self, others_write: bool) -> None:
-        self.sleepers.kept = None
+        sleepers = self.sleepers
+        if sleepers.on:
+            sleepers.kept = None
         self._follow(others_write)
-        if self.sleepers.on:
-            self.sleepers.begin_step()
+        if sleepers.on:
+            sleepers.begin_step()
 
     def _follow(self, others_write: bool) -> None:
         """Everything that depends on which bodies and systems there are."""
