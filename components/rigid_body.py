@@ -77,6 +77,15 @@ class RigidBody(Component, flat=True):
     applied_frame: int = special_column(default=-1, dtype=int, on_demand=True, init=False, on_write=_force_applied)
     step_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
 
+    @property
+    def asleep(self) -> bool:
+        """Whether the body sleeps: see ``Settings.sleeping``."""
+        store: Any = self._store
+        if not hasattr(store, "asleep") or self._entity is None:
+            return False
+        row = store.find(self._entity)
+        return bool(store.asleep(slice(row, row + 1))[0])
+
     def apply_impulse(self, impulse: Vector | float) -> None:
         """Change the velocity at once by impulse / mass; (d,) N s. Kinematic and static bodies do not react."""
         if self.kind == "dynamic":

@@ -57,6 +57,9 @@ class Settings:
     on_fault
         warn: PhysicsWarning and a line of the logger ``carom``, once for each kind of fault and body; raise: FaultError
         at the end of the step that found it, which is complete; ignore: nothing. All are in ``world.faults``
+    sleeping
+        islands of bodies that have been at rest for half a second take no part in steps until something touches one of
+        them or changes it
     """
 
     dt: float = 1 / 60
@@ -73,6 +76,7 @@ class Settings:
     broad_phase: str = "automatic"
     debug: bool = False
     on_fault: str = "warn"
+    sleeping: bool = False
 
     def __post_init__(self) -> None:
         self._number("dt", above=0.0)
@@ -88,8 +92,9 @@ class Settings:
         for name in ("integrator", "restitution_mixing", "friction_mixing", "broad_phase"):  # a plugin may bring it
             if not isinstance(getattr(self, name), str) or not getattr(self, name):
                 raise ValueError(f"Settings.{name} must be a name, got {getattr(self, name)!r}")
-        if not isinstance(self.debug, bool):
-            raise ValueError(f"Settings.debug must be True or False, got {self.debug!r}")
+        for name in ("debug", "sleeping"):
+            if not isinstance(getattr(self, name), bool):
+                raise ValueError(f"Settings.{name} must be True or False, got {getattr(self, name)!r}")
         for name, known in (
             ("collision", COLLISION_MODES),
             ("geometry", GEOMETRY_MODES),

@@ -49,6 +49,7 @@ def keep_state(state, dt):
     impacts.logged = impacts.capped = 0
     state.candidates.count = 0
     state.row_a, state.unsound = NOTHING_TESTED, 0
+    state.all_still, state.sleep_stages = False, 0
     state.kept_rows = state.moving if state.collides and not state.statics_stale else state.count
     state.velocity_kept = not state.others_write and (state.collides or len(bodies.max_linear_speed) > 0)
     for i in range(state.moving if state.velocity_kept else 0):

@@ -86,6 +86,18 @@ BODIES = Schema(
     support_change=vectors(),
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
+    # sleeping; the first ones are columns of the table, and move with its rows
+    still=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
+    rest_steps=ints("int32"),  # for how many steps it has been at rest
+    island=ints(),  # entity id of the first body of those that sleep together; 0: none
+    watched=ints(),  # ``prints`` as they were when it came to rest
+    rest_position=vectors(),
+    rest_force=vectors(),
+    flown_position=vectors(),  # where free flight leads it from there
+    flown_velocity=vectors(),
+    prints=ints(),  # of what code of the game may change unseen
+    rest_root=ints("int32"),
+    restless=flags(),
 )
 
 DYNAMIC_ROWS, STATIC_ROWS, ALL_ROWS = range(3)
@@ -103,6 +115,16 @@ CHECKED = Schema(
     turns=flag(),  # quaternions
     some=flag(),  # not all of these bodies have the component,
     owned=flags(),  # but these
+)
+
+# A column whose changes wake bodies; one of the two arrays has rows.
+WATCHED = Schema(
+    "Watched",
+    words=ints(),  # bits of 8 bytes
+    small=ints("int8"),
+    width=integer(),  # numbers per body
+    turn=integer(),  # by which their bits are rotated, so that columns do not cancel each other
+    defaults=ints(),  # the bits of the default, as what has none of its own holds them
 )
 
 # Fields that every collider has, by the slot of its type and the row.
@@ -352,6 +374,7 @@ CONTACTS = Schema(
     stays=ints(),  # one for each of the two
     ended=ints("int32"),
     began=ints("int32"),
+    stored=integer(),  # those among what sleeps, which are kept elsewhere
     stayed=ints("int32", stacked=True),
     steps=ints(),  # numbers of the steps that the contacts are of
 )
@@ -362,6 +385,14 @@ STATE = Schema(
     links=ints(),  # addresses of parts of stages, see linking.parts
     needed=integer(),  # rows that a stage asks for
     checked=ints(),  # addresses of records of CHECKED
+    watching=ints(),  # and of WATCHED
+    sleeping=flag(),  # the settings say so
+    all_still=flag(),  # in this step nothing moves that could meet another
+    asleep=integer(),  # bodies that sleep, or are about to
+    due=integer(),  # bodies that do from the next step on
+    disturbed=integer(),  # marked in ``still``
+    sleep_stages=integer(),  # those of sleeping that have run in this step, as bits
+    fresh_statics=integer(),  # bodies that cannot move and are new, or have been changed
     quarantining=flag(),  # some body is, or was told of and may be sound again
     # the scene
     count=integer(),

@@ -186,6 +186,8 @@ class Room:
         program.run_one("box_rest_of_step", dt)
         found = simulation.broad_phase.segment("choose_search")
         found(dt)
+        while simulation.sleepers.wake_candidates(dt):
+            found(dt)
         program.run_one("order_candidates", dt)
         simulation.narrow_phase.filter_candidates()
         program.run_one("merge_pairs", dt)

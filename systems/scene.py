@@ -22,6 +22,13 @@ TABLE_COLUMNS = (
     "entity", "position", "previous_position", "linear_velocity", "force", "mass", "inverse_mass", "gravity_scale",
     "linear_damping", "max_linear_speed", "constant_force", "applied_force", "step_force", "ccd",
 )  # fmt: skip
+# Those of bodies that sleep; the table has them under names that are not shown.
+SLEEP_COLUMNS = {
+    name: f"_{name}"
+    for name in (
+        "still", "rest_steps", "island", "watched", "rest_position", "rest_force", "flown_position", "flown_velocity",
+    )
+}  # fmt: skip
 STACKED_COLUMNS = ("offset", "restitution", "friction", "sensor", "layer", "mask")
 
 # Columns that are made within a step or when rows have moved, by what needs them.
@@ -37,6 +44,7 @@ SWEEPS = (
 )  # fmt: skip
 HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
+SLEEPING = ("prints", "rest_root", "restless")
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
 ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "held", "place")
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
@@ -194,6 +202,9 @@ class Scene:
         for name in TABLE_COLUMNS:
             if name in table.arrays:
                 setattr(bodies, name, table.arrays[name])
+        for name, key in SLEEP_COLUMNS.items():
+            if key in table.arrays:
+                setattr(bodies, name, table.arrays[key])
         if "rotation" in table.arrays:
             bodies.rotation = table.arrays["rotation"].reshape(-1)
         for name in STACKED_COLUMNS:

@@ -21,7 +21,7 @@ from ..framework.world.contacts import Contacts, EntityLookup
 from ..framework.world.services import PhysicsServices
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT
+from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, WAKE, WAKE_TOUCHED
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
@@ -43,6 +43,7 @@ from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
+from .sleeping.sleepers import Sleepers, add_columns
 from .stage_list import CLOSING, OPENING, STAGES, SYSTEM_OF_STAGE
 from .tracking import CONTACTS, WARM_START, put_rows_back, saved_rows
 
@@ -72,8 +73,12 @@ class Simulation(PhysicsServices):
         handlers = {
             **self._room.handlers(self),
             CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
+            WAKE: lambda dt: self.sleepers.wake_disturbed(dt),
+            WAKE_TOUCHED: lambda dt: self.sleepers.wake_touched(self, dt),
         }  # fmt: skip
         self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
+        self.sleepers = Sleepers(self.state, self.table, self.scene, self.program, self._room)
+        source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
         self._attribution = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
         )
@@ -114,6 +119,7 @@ class Simulation(PhysicsServices):
 
     def take_settings(self, settings: Any) -> None:
         write_settings(self.state, settings, self._world.registry)
+        self.sleepers.take_settings(settings.sleeping)
         self.search.read_settings()
         self.scene.forget()
         self.links.forget()
@@ -125,6 +131,15 @@ class Simulation(PhysicsServices):
     # -- a step -----------------------------------------------------------------------------------
 
     def begin_step(self, others_write: bool) -> None:
+        sleepers = self.sleepers
+        if sleepers.on:
+            sleepers.kept = None
+        self._follow(others_write)
+        if sleepers.on:
+            sleepers.begin_step()
+
+    def _follow(self, others_write: bool) -> None:
+        """Everything that depends on which bodies and systems there are."""
         table, scene, words = self.table, self.scene, self._words
         words[self._step_number] = self.table.clock.step_count
         self._contacts_before = self.contacts.columns_now() if words[self._found_current] else None
@@ -201,7 +216,7 @@ class Simulation(PhysicsServices):
         state = self.state
         before = state.moved, state.candidates_ready
         self.links.link_boxes()
-        state.moved = False
+        state.moved = state.all_still = False
         self.program.run_one("box_statics", 0.0)
         self.program.run_one("box_motions", 0.0)
         state.moved, state.candidates_ready = before
@@ -228,6 +243,7 @@ class Simulation(PhysicsServices):
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
         self.contacts.forget_step(state.step_number)
+        self.sleepers.abandon_step()
         state.moved = state.forces_summed = state.found_current = state.kept = state.started = False
         state.impacts.logged = 0
         state.contacts_version += 1
@@ -253,6 +269,8 @@ class Simulation(PhysicsServices):
 
     def end_step(self) -> None:
         self._copies.kept = False
+        if self.sleepers.on:
+            self.sleepers.end_step()
         if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
             self.contacts.columns_now()
         if not self._words[self._finite]:
@@ -278,6 +296,9 @@ class Simulation(PhysicsServices):
                 table.arrays["applied_frame"][: table.stops[0]] = -1  # else state_hash would tell frame rates apart
             table.frames_applied = False
 
+    def wake(self, entity: int) -> None:
+        self.sleepers.wake(entity)
+
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any]:
@@ -291,6 +312,7 @@ class Simulation(PhysicsServices):
             "followed": self._structure() == self.scene.structure,
             "ids_changed": state.ids_changed or self.table.generation != self._generation,
             "quarantine": self.quarantine.saved(),
+            "sleepers": self.sleepers.saved(),
             "counters": counters_of(state),
         }
 
@@ -302,6 +324,7 @@ class Simulation(PhysicsServices):
         put_rows_back(state.warm_start, saved["warm_start"])
         put_rows_back(state.contacts, saved["contacts"])
         state.warm_start.rows_version[:] = -1
+        self.sleepers.take_back(saved.get("sleepers"))
         self._generation, state.ids_changed = self.table.generation, saved["ids_changed"]
         if self.quarantine.take_back(saved["quarantine"]) or moved or not saved["followed"]:
             self.scene.forget()
@@ -318,7 +341,7 @@ class Simulation(PhysicsServices):
         return SYSTEM_OF_STAGE[stage]
 
     def look_ahead(self, others_write: bool) -> None:
-        self.begin_step(others_write)
+        self._follow(others_write)
         self._copies.kept = False
         self.scene.refresh_rotation()
         state = self.state
@@ -370,4 +393,5 @@ def _make_table(dimensions: int) -> Table:
     table.add_array("previous_position", "vector")
     table.add_array("force", "vector", on_demand=True)
     table.add_array("inverse_mass")
+    add_columns(table)
     return table

@@ -31,6 +31,7 @@ from .opening import check_finite, keep_state, read_bodies
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE
 from .scene import TABLE_COLUMNS
+from .sleeping.stages import judge_rest, take_prints
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
@@ -43,7 +44,13 @@ OPENING = (
         ("mass", "rotation", "ccd", "max_linear_speed"), ("inverse_mass",),
     ),
 )  # fmt: skip
-CLOSING = (Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),)
+CLOSING = (
+    Stage(
+        judge_rest, "how long bodies have been at rest; islands fall asleep", ("pairs", "position", "linear_velocity"),
+        ("still", "rest_steps", "linear_velocity"), "sleeping",
+    ),
+    Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),
+)  # fmt: skip
 ON_DEMAND = (
     Stage(
         box_rest_of_step,
@@ -59,11 +66,12 @@ ON_DEMAND = (
         ("merged", "impacts"),
         "swept bodies",
     ),
+    Stage(take_prints, "what bodies are like, to tell when they change", ("watching",), ("prints",), "sleeping"),
     *Integration.ON_DEMAND,
 )
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
 WITH_COLLIDERS = frozenset(("colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies"))
-CONDITIONS = ("", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "on demand")
+CONDITIONS = ("", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "sleeping", "on demand")
 # Columns of the table that a failed step puts back, and those that every step makes again.
 PUT_BACK = ("position", "linear_velocity", "previous_position", "step_force", "force", "inverse_mass")
 
@@ -103,6 +111,6 @@ SYSTEM_OF_STAGE = (
     *("" for _ in OPENING),
     *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
     *("" for _ in CLOSING),
-    *(BroadPhase.__name__, NarrowPhase.__name__),
+    *(BroadPhase.__name__, NarrowPhase.__name__, ""),
     *(Integration.__name__ for _ in Integration.ON_DEMAND),
 )

@@ -238,6 +238,26 @@ def asked(d: int) -> list[str]:
     return [hashlib.sha256(text.encode()).hexdigest()[:16] for text in found]
 
 
+def sleepers(d: int, mode: str) -> list[str]:
+    """A tower that sleeps on a kinematic floor, beside a zone; a ball comes by, and wakes it."""
+    world = World(Physics(d, gravity=at(d, 0.0, -9.81)), settings=Settings(collision=mode, dt=1 / 30, sleeping=True))
+    floor = AABBCollider((20.0, 0.5, 20.0)[:d], friction=0.5)
+    world.create_entity(Transform(at(d, 0.0, -0.5)), RigidBody(kind="kinematic"), floor)
+    for k in range(2):
+        box = AABBCollider((0.5, 0.5, 0.5)[:d], friction=0.5)
+        world.create_entity(Transform(at(d, 0.0, 0.5 + k), 0.0), RigidBody(), box)
+    world.create_entity(Transform(at(d, 0.0, 1.0)), AABBCollider((0.2, 0.2, 0.2)[:d], sensor=True))
+    ball = RigidBody(0.5, at(d, 6.0), gravity_scale=0.0)
+    world.create_entity(Transform(at(d, -5.2, 1.3)), ball, SphereCollider(0.3))
+    found = []
+    for _ in range(28):
+        world.step()
+        found.append(f"{seen(world)}/{np.count_nonzero(world.bodies.asleep)}/{len(world.contacts.stay)}")
+    assert found[17].split("/")[1] == "2"
+    assert found[27].split("/")[1] == "0"
+    return found
+
+
 def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
     """By name; calling one plays it."""
     for d, mode in itertools.product((2, 3), MODES):
@@ -260,6 +280,8 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"buried {d}D", lambda d=d: play(buried(d), 5)
         yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 15)
         yield f"asked {d}D", lambda d=d: asked(d)
+    for d, mode in zip((2, 3, 2), MODES, strict=True):
+        yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)
 
 
 if __name__ == "__main__":

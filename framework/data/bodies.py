@@ -68,6 +68,11 @@ class Bodies:
             return np.zeros(len(self), bool)
         return self._table.has_mask(component)[self.rows]
 
+    @property
+    def asleep(self) -> np.ndarray:
+        """Mask (n,) of the bodies that sleep, a copy: see ``Settings.sleeping``."""
+        return self._table.asleep(self.rows)
+
     def row_of(self, entity: int) -> int:
         """The row of that entity among all bodies; KeyError if it is no body."""
         return self._table.find(entity)

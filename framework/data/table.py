@@ -19,7 +19,7 @@ from .row_moves import MovedColumns, RowPlan
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
-RESERVED = ("column_names", "dynamic", "has", "kinematic", "row_of", "rows", "static")  # attributes of Bodies
+RESERVED = ("asleep", "column_names", "dynamic", "has", "kinematic", "row_of", "rows", "static")  # attributes of Bodies
 
 
 class Table:
@@ -248,6 +248,13 @@ class Table:
         for key in keys:
             if key in self.arrays:
                 self.arrays[key][...] = self._fills[key]
+
+    def asleep(self, rows: slice) -> np.ndarray:
+        """Mask of the dynamic bodies among these rows that sleep, a copy."""
+        still = self.arrays.get("_still")
+        if still is None:
+            return np.zeros(rows.stop - rows.start, bool)
+        return (still[rows] > 0) & (np.arange(rows.start, rows.stop) < self.stops[0])
 
     # -- rows -------------------------------------------------------------------------------------
 

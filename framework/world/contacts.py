@@ -245,6 +245,10 @@ class ContactSource:
         """Those that touched in the step before, too."""
         raise NotImplementedError
 
+    def lively(self, enabled: np.ndarray) -> np.ndarray:
+        """``enabled`` of the rows of :meth:`columns` that take part in the step, of all of them."""
+        return enabled
+
     def record_impacts(self) -> None:
         """Add the impacts of the step that is running to the history, unless they are in it already."""
 
@@ -321,8 +325,11 @@ class Contacts(ContactRows):
                 chunks.clear()
 
     def enabled_now(self) -> np.ndarray | None:
-        """``enabled`` of the contacts as they are; None if nothing has read their columns, so that all are."""
-        return self._own_columns["enabled"] if self._columns_of == self._source.version else None
+        """``enabled`` of the contacts as they are, but for those of what sleeps; None if nothing has read their
+        columns, so that all are."""
+        if self._columns_of != self._source.version:
+            return None
+        return self._source.lively(self._own_columns["enabled"])
 
     def defer(self, record: Callable[[], None]) -> None:
         """Let ``record`` be called when somebody reads the events, or before they are lost; most are never read."""

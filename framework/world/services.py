@@ -129,6 +129,10 @@ class PhysicsServices(ABC):
     def taken_out(self) -> np.ndarray:
         """(n,) mask of the bodies that took no part in the last step, because some value of them cannot be."""
 
+    @abstractmethod
+    def wake(self, entity: int) -> None:
+        """The bodies that sleep with this one are awake from the next step on; KeyError if it is no body."""
+
     # -- looking inside ---------------------------------------------------------------------------
 
     @abstractmethod

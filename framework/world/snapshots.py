@@ -145,4 +145,7 @@ def state_hash(physics: PhysicsServices) -> str:
         for key, values in {mask: table.column(mask), **columns}.items():
             digest.update(key.encode())
             digest.update(np.ascontiguousarray(values[order] + 0).tobytes())
+    asleep = table.asleep(slice(0, table.count))
+    if asleep.any():
+        digest.update(asleep[order].tobytes())
     return digest.hexdigest()

@@ -244,6 +244,10 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self._synchronized()
         return self._services.momentum()
 
+    def wake(self, entity: int) -> None:
+        """Wake the body and what sleeps with it, see ``Settings.sleeping``; KeyError if it is no body."""
+        self._synchronized().wake(entity)
+
     def _synchronized(self) -> PhysicsServices:
         services = self._services
         self._pipeline.synchronize()

@@ -164,6 +164,8 @@ def box_motions(state, dt):
     """Boxes around the motion of what moves; where bodies are swept, with room for what impacts make of it."""
     bodies = state.bodies
     state.neighbours_known_until, state.candidates_ready = math.inf, True
+    if state.all_still:
+        return OK
     call_box_rows(state.links[BOX_ROWS], state, 0, state.moving, MOVING)
     if state.sweeping and state.moved:
         for i in range(state.moving):

@@ -44,7 +44,7 @@ def choose_search(state, dt):
     """No candidates yet; and how they are to be found."""
     state.candidates.count = 0
     state.pair_search = NO_SEARCH
-    if not state.collides:
+    if not state.collides or state.all_still:
         return OK
     if state.uses_plugin_broad_phase:
         state.pair_search = PLUGIN

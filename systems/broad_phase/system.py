@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, Stage
+from ..sleeping.stages import leave_out_still
 from ..staged import StagedSystem
 from .boxes import box_motions, box_statics
 from .brute_force import BRUTE_FORCE_MAX
@@ -60,6 +61,10 @@ class BroadPhase(StagedSystem):
         Stage(
             search_static_grid, "what moves looks into the grid of what does not", (*BOXES, "static_grid"),
             ("candidates",), MANY, "more bodies are static than move",
+        ),
+        Stage(
+            leave_out_still, "pairs of two bodies that are still", ("candidates", "still"), ("candidates",), "sleeping",
+            "bodies sleep",
         ),
     )  # fmt: skip
 

@@ -88,5 +88,5 @@ def compare_contacts(state, dt):
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
     faults = state.impacts.capped + state.solver.squeezed + state.hasty
-    state.news = ends + begins + state.impacts.logged + faults + (stays if state.stay_wanted else 0)
+    state.news = ends + begins + state.impacts.logged + faults + (stays + contacts.stored if state.stay_wanted else 0)
     return OK

@@ -13,6 +13,7 @@ from ...framework.schedule.stages import Check, Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ...framework.world.contacts import ContactRows, Contacts, ContactSource, EntityLookup
 from ...framework.world.events import CONTACT_EVENTS
+from ..sleeping.stored import merged
 from ..staged import StagedSystem
 from .event_stages import compare_contacts
 
@@ -25,6 +26,9 @@ class RecordedContacts(ContactSource):
     def __init__(self, state: Record) -> None:
         self._state, self._touching, self._impacts = state, state.contacts, state.impacts
         self.record: Callable[[str, Columns], None] = lambda history, columns: None
+        self.stored: Any = ()  # those of what sleeps, which the records do not hold
+        self.disturb: Callable[[np.ndarray], None] = lambda entities: None  # wakes these
+        self._lively: Any = None  # mask of the rows of the columns that the records hold; None: all
 
     @property
     def version(self) -> int:
@@ -38,14 +42,41 @@ class RecordedContacts(ContactSource):
         """After NARROW what overlaps where free flight leads, or is near; after RESPONSE what touches."""
         state = self._state
         if state.found_current:
-            return self._found()
-        contacts, now = self._touching, self._touching.now
-        count = int(contacts.counts[now])
-        return {**self._rows(now, slice(count)), "enabled": contacts.enabled[now, :count].copy()}
+            columns = self._found()
+        else:
+            contacts, now = self._touching, self._touching.now
+            count = int(contacts.counts[now])
+            columns = {**self._rows(now, slice(count)), "enabled": contacts.enabled[now, :count].copy()}
+        self._lively = None
+        if len(self.stored):
+            columns, self._lively = merged(columns, self._stored_rows())
+        return columns
+
+    def lively(self, enabled: np.ndarray) -> np.ndarray:
+        """Of what sleeps a contact that has been disabled wakes the two, and holds for one more step: a system that
+        looks at velocities sees none of sleepers. The records hold the others."""
+        if self._lively is None:
+            return enabled
+        columns = self.stored.columns
+        changed = enabled[~self._lively] != columns["enabled"]
+        if changed.any():
+            self.disturb(np.concatenate((columns["entity_a"][changed], columns["entity_b"][changed])))
+        return enabled[self._lively]
 
     def stay_columns(self) -> Columns:
         now = self._touching.now
-        return self._rows(now, self._touching.stayed[now, : self._touching.stays[now]])
+        columns = self._rows(now, self._touching.stayed[now, : self._touching.stays[now]])
+        if len(self.stored):
+            stored = self._stored_rows()
+            enabled = stored.pop("enabled")
+            columns, _ = merged(columns, {name: column[enabled] for name, column in stored.items()})
+        return columns
+
+    def _stored_rows(self) -> Columns:
+        """The contacts of what sleeps; they last."""
+        columns = dict(self.stored.columns)
+        columns["normal_impulse"] = columns.pop("impulse")
+        return {**columns, "step": _repeated(self._state.step_number, len(self.stored))}
 
     def began(self) -> Columns:
         """The contacts that are new in this step."""

@@ -12,7 +12,7 @@ from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.plan import PlannedColumn
 from ..room import SOLVER_BODIES
-from ..scene import COLLISIONS, CURVES, HALF_KICKS, SEVERAL_EVALUATIONS, SWEEPS, Scene
+from ..scene import COLLISIONS, CURVES, HALF_KICKS, SEVERAL_EVALUATIONS, SLEEP_COLUMNS, SLEEPING, SWEEPS, Scene
 
 FIELDS = "what the game has set"
 DEFAULTS = "at their defaults, there because handles and world.bodies write in place"
@@ -21,6 +21,7 @@ TABLE = {
     "previous_position": "the start of the step: for drawing between steps, and for going back",
     "force": "the sum of forces",
     "inverse_mass": "0 for what cannot be moved",
+    **dict.fromkeys(SLEEP_COLUMNS.values(), "bodies may sleep: who does, since when, and what they were like then"),
 }
 STANDING = "where it stood when its box was made"
 MASKS = "which components it has"
@@ -36,6 +37,7 @@ GROUPS = (
         "the integrator evaluates forces more than once, or flies exactly",
     ),
     ("going back", ("kept_previous", "kept_velocity", "kept_step_force"), "the start of the step, for one that fails"),
+    ("sleeping", SLEEPING, "bodies may sleep: islands, and whether anything has changed them"),
     ("rotation", ("axes",), "some body is rotated, or a shape reads its axes"),
     ("shapes", ("levels", "level_offsets"), "which shapes a body has, and where they are"),
 )  # fmt: skip

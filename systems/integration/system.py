@@ -17,6 +17,7 @@ from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ..forces.accumulation import ForceAccumulation
 from ..scene import Scene
+from ..sleeping.stages import rest_sleepers
 from ..staged import StagedSystem
 from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
 from .motion import Motion
@@ -75,6 +76,10 @@ class Integration(StagedSystem):
         ),
         Stage(
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",
+        ),
+        Stage(
+            rest_sleepers, "puts sleepers back, unless something has changed them or their flight", MOTION,
+            (*MOTION, "path_velocity", "still"), "sleeping", "bodies sleep",
         ),
     )  # fmt: skip
     ON_DEMAND = (
@@ -154,7 +159,7 @@ class Integration(StagedSystem):
         return [
             self.segment("keep_start", "drift"),
             PythonPart(self.name, self._advance),
-            self.segment("end_flight", "note_path"),
+            self.segment("end_flight", "rest_sleepers"),
         ]
 
     def _advance(self, dt: float) -> None:
@@ -212,7 +217,7 @@ class Integration(StagedSystem):
         if self.world.force_systems and self.integrator.evaluations > 1:
             for kernel in self._forces.kernels_of_systems():
                 yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")
-        for name in ("end_flight", "check_flight", "note_path"):
+        for name in ("end_flight", "check_flight", "note_path", "rest_sleepers"):
             if name in linked:
                 yield linked[name]
 

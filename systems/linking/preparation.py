@@ -54,7 +54,8 @@ def kind_of(scene: Scene, integration: Integration) -> Kind:
         return dimensions, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
     queries = tuple(linked_query(registry, linked, component) for component in asking if component in registry.shapes)
-    return dimensions, conditions | WITH_COLLIDERS, linked, queries
+    sleeping = frozenset(("sleeping",)) if scene.state.sleeping else frozenset()
+    return dimensions, conditions | WITH_COLLIDERS | sleeping, linked, queries
 
 
 def needed_functions(

@@ -59,7 +59,7 @@ class StepLinks:
         state.sweeps_ready = self.needs_sweeps()
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, state.sweeps_ready,
-            state.collides, state.several_levels, state.dynamic > 0, self._search.needs_grids(),
+            state.collides, state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
         )  # fmt: skip
         if self._key is not None and usual == self._usual and usual[5]:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
@@ -107,6 +107,7 @@ class StepLinks:
             "several levels": collides and state.several_levels,
             "many bodies": collides and self._search.needs_grids(),
             "swept bodies": state.sweeps_ready,
+            "sleeping": collides and state.sleeping,
             **dict.fromkeys(self._integration.stages_needed, moves),
         }
 

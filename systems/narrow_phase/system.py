@@ -10,6 +10,7 @@ from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ..ccd.search_bounds import sweep_pairs
 from ..scene import Scene
+from ..sleeping.stages import find_touched, weigh_sleepers
 from ..staged import StagedSystem
 from .filters import filtered
 from .level_stages import evaluate_levels
@@ -30,6 +31,10 @@ class NarrowPhase(StagedSystem):
             "colliders",
         ),
         Stage(select_pairs, "layers and masks", ("candidates", "layer", "mask"), ("pairs",), "colliders"),
+        Stage(
+            weigh_sleepers, "what forces would do to sleepers", ("still", "flown_velocity"), ("force_speed_change",),
+            "sleeping", "bodies sleep",
+        ),
         Stage(evaluate_pairs, "the shapes' functions", ("pairs", "position"), ("pairs",), "one level"),
         Stage(
             evaluate_levels, "the shapes' functions, level by level", ("pairs", "position"), ("pairs",),
@@ -39,6 +44,10 @@ class NarrowPhase(StagedSystem):
         Stage(
             sweep_pairs, "which pairs touch on their paths only", ("pairs", "path_velocity"), ("pairs",),
             "swept bodies", "pairs are near each other",
+        ),
+        Stage(
+            find_touched, "wakes what an awake body touches", ("pairs", "still"), ("still",), "sleeping",
+            "bodies sleep",
         ),
     )  # fmt: skip
 

@@ -1,0 +1,334 @@
+"""The Python side of sleeping: who falls asleep and who wakes, in the few steps in which that changes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...framework.data.table import Table
+from ...framework.jit.records.record import Record
+from ...framework.schedule.stages import Program
+from ..room import Room
+from ..scene import SLEEP_COLUMNS, SLEEPING, Scene
+from ..tracking import CONTACTS as CONTACT_NUMBERS
+from ..tracking import WARM_START, put_rows_back, saved_rows
+from .stages import AWAKE, DISTURBED, FALLING, STILL
+from .stored import CONTACTS, IMPULSES, Stored
+from .watching import Watching
+
+PATH = ("origin", "path_velocity", "path_second", "path_third")
+
+
+def add_columns(table: Table) -> None:
+    """The columns that move with the rows; none of them has an array before something sleeps."""
+    for name, dtype in (("still", np.int8), ("rest_steps", np.int32), ("island", np.int64), ("watched", np.int64)):
+        table.add_array(SLEEP_COLUMNS[name], dtype=dtype, on_demand=True)
+    for name in ("rest_position", "rest_force", "flown_position", "flown_velocity"):
+        table.add_array(SLEEP_COLUMNS[name], "vector", on_demand=True)
+
+
+class Sleepers:
+    """Who sleeps in one world.
+
+    contacts, impulses
+        of pairs of which both bodies are still
+    links
+        (k, 2) what cannot be moved, by entity id, and the island that rests on it
+    sizes
+        (k, 2) islands and how many bodies they have
+    """
+
+    def __init__(self, state: Record, table: Table, scene: Scene, program: Program, room: Room) -> None:
+        self._state, self._table, self._scene, self._program = state, table, scene, program
+        self._watching = Watching(state, table, scene)
+        self.contacts = Stored(state.contacts, CONTACTS, room.reserve_contacts)
+        self.impulses = Stored(state.warm_start, IMPULSES, room.reserve_warm_start)
+        self._lengths = 1.0, 1.0  # of the step and the substep that the impulses are of
+        self.links = self.sizes = np.empty((0, 2), np.int64)
+        self._followed: Any = None  # the structure that all this is of
+        self._seen = -1
+        self.on = False  # the settings say so, or those that sleep have to wake because they do not any more
+        self._all_wake = False
+        self.kept: Any = None  # before this step
+        self._words = state.words
+        self._due, self._asleep, self._fresh = (state.word_of(n) for n in ("due", "asleep", "fresh_statics"))
+
+    # -- settings ---------------------------------------------------------------------------------
+
+    def take_settings(self, sleeping: bool) -> None:
+        """Other settings change how bodies fly and rest."""
+        if sleeping or self._state.asleep or self._state.due:
+            self._all_wake = True
+        self._state.sleeping, self.on = sleeping, sleeping or self._all_wake
+        if sleeping:
+            for key in SLEEP_COLUMNS.values():
+                self._table.make(key)
+
+    # -- a step -----------------------------------------------------------------------------------
+
+    def begin_step(self) -> None:
+        """The scene is up to date: follow who has come or gone, and let fall asleep who is due."""
+        words, table = self._words, self._table
+        if self._all_wake:
+            self._wake_all()
+            self._all_wake, self.on = False, self._state.sleeping
+        seen = table.version + table.members_version + table.static_version + table.columns_version  # these only grow
+        if seen != self._seen:
+            self._scene.reserve(*SLEEPING)
+            self._watching.bind()
+            structure = self._structure()
+            if structure != self._followed:
+                self._follow(structure)
+            self._seen = seen
+        if words[self._due] or (words[self._asleep] and words[self._fresh]):
+            self._fall_asleep(table.stops[1])
+
+    def end_step(self) -> None:
+        """Note what those stand on who fall asleep; nothing may change until the next step."""
+        self.kept = None
+        if self._state.due < 0:
+            self._all_wake, self._state.due = True, 0
+        elif self._words[self._due]:
+            self._followed = self._structure()
+            self._note_links()
+
+    def _structure(self) -> tuple[int, ...]:
+        table = self._table
+        return table.version, table.members_version, table.static_version, table.generation
+
+    def _follow(self, structure: tuple[int, ...]) -> None:
+        """Bodies have come, gone or changed: who was about to sleep does not; islands that miss something wake."""
+        before, self._followed = self._followed, structure
+        if self._state.due:
+            self._keep()
+            falling = np.flatnonzero(self._still() == FALLING)
+            self._state.bodies.still[falling] = AWAKE
+            self._state.bodies.rest_steps[falling] = 0
+            self._state.due = 0
+        if not self._state.asleep:
+            return
+        self._keep()
+        table, links = self._table, self.links
+        islands = [links[table.rows_of(links[:, 0]) < 0, 1]] if len(links) else []
+        ids, sizes = np.unique(self._islands(), return_counts=True)
+        now = dict(zip(ids.tolist(), sizes.tolist(), strict=True))
+        islands.append(np.array([i for i, size in self.sizes.tolist() if now.get(i) != size], np.int64))
+        if not self._state.collides or (before is not None and before[3] != structure[3]):  # ids mean other entities
+            islands.append(ids)
+        self._wake(np.concatenate(islands))
+
+    def _fall_asleep(self, moving: int) -> None:
+        """Who is due is still from now on; so is all that cannot move."""
+        self._keep()
+        state, table, bodies = self._state, self._table, self._state.bodies
+        self._program.run_one("take_prints", 0.0)
+        fixed = slice(moving, table.count)
+        bodies.still[fixed] = STILL
+        bodies.watched[fixed], bodies.rest_position[fixed] = bodies.prints[fixed], bodies.position[fixed]
+        state.due = state.fresh_statics = 0
+        self._exchange()
+
+    def _note_links(self) -> None:
+        state, bodies = self._state, self._state.bodies
+        pairs, dynamic = state.pairs, state.dynamic
+        near = pairs.near_contact[: pairs.count] & pairs.is_solid[: pairs.count]
+        a, b = pairs.a[: pairs.count][near], pairs.b[: pairs.count][near]
+        fixed, body = np.maximum(a, b), np.minimum(a, b)
+        some = (fixed >= dynamic) & (body < dynamic)
+        fixed, body = fixed[some], body[some]
+        due = bodies.still[body] == FALLING
+        found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)
+        self.links = np.unique(np.concatenate((self.links, found)), axis=0)
+
+    # -- waking -----------------------------------------------------------------------------------
+
+    def wake(self, entity: int) -> None:
+        """Its island is awake from the next step on; KeyError if it is no body."""
+        self._table.find(entity)
+        self.disturb(np.array([entity], np.int64))
+
+    def disturb(self, entities: np.ndarray) -> None:
+        """The islands of those that sleep are awake from the next step on."""
+        still, rows = self._table.arrays.get(SLEEP_COLUMNS["still"]), self._table.rows_of(entities)
+        if still is not None:
+            rows = rows[(rows >= 0) & (rows < self._table.stops[0])]
+            still[rows[still[rows] > AWAKE]] = DISTURBED
+
+    def wake_disturbed(self, dt: float) -> np.ndarray:
+        """Those that are marked, and their islands; returns the rows of the dynamic ones."""
+        self._keep()
+        state, bodies = self._state, self._state.bodies
+        rows = np.flatnonzero(self._still() == DISTURBED)
+        state.disturbed = 0
+        standing = self.links[np.isin(self.links[:, 0], bodies.entity[rows]), 1]
+        bodies.still[rows], bodies.rest_steps[rows] = AWAKE, 0
+        return self._wake(np.concatenate((bodies.island[rows], standing)), rows)
+
+    def wake_touched(self, simulation: Any, dt: float) -> None:
+        """An awake body has come near: the islands have the flight that they were spared, and their pairs."""
+        rows = self.wake_disturbed(dt)
+        if self._state.moved:
+            self._fly(rows, dt)
+        simulation.broad_phase.process(dt)
+        simulation.narrow_phase.process(dt)
+
+    def wake_candidates(self, dt: float) -> bool:
+        """In the middle of a step candidates are others: wake what meets the box of an awake body. Whether any does."""
+        state, still = self._state, self._state.bodies.still
+        if not state.sleeping or not state.asleep:
+            return False
+        candidates = state.candidates
+        rows = np.concatenate((candidates.first[: candidates.count], candidates.second[: candidates.count]))
+        rows = rows[(rows < state.dynamic) & (still[rows] > AWAKE)]
+        if not len(rows):
+            return False
+        still[rows] = DISTURBED
+        self._fly(self.wake_disturbed(dt), dt)
+        return True
+
+    def _fly(self, rows: np.ndarray, dt: float) -> None:
+        """The free flight of this step, which is that of all steps, and its path; the paths of others stay."""
+        bodies, moving = self._state.bodies, self._state.moving
+        kept = {name: column[:moving].copy() for name in PATH if len(column := getattr(bodies, name))}
+        bodies.position[rows], bodies.linear_velocity[rows] = bodies.flown_position[rows], bodies.flown_velocity[rows]
+        self._program.run_one("note_path", dt)
+        others = np.ones(moving, bool)
+        others[rows] = False
+        for name, column in kept.items():
+            getattr(bodies, name)[:moving][others] = column[others]
+
+    def _wake_all(self) -> None:
+        """All of them, without their flight."""
+        self._keep()
+        bodies = self._state.bodies
+        if len(bodies.still):
+            self._still()[:] = AWAKE
+            bodies.rest_steps[: self._table.count] = 0
+        self._state.due = self._state.fresh_statics = 0
+        self.links = self.links[:0]
+        self._exchange()
+
+    def _wake(self, islands: np.ndarray, disturbed: Any = ()) -> np.ndarray:
+        """These islands are awake; returns the rows of their bodies, and of dynamic ones that are ``disturbed``."""
+        bodies, dynamic = self._state.bodies, self._table.stops[0]
+        islands = np.unique(islands[islands != 0])
+        asleep = bodies.still[:dynamic] > AWAKE
+        rows = np.flatnonzero(asleep & np.isin(bodies.island[:dynamic], islands))
+        bodies.still[rows], bodies.rest_steps[rows] = AWAKE, 0
+        self.links = self.links[~np.isin(self.links[:, 1], islands)]
+        self._exchange()
+        alone = np.asarray(disturbed, np.int64)
+        return np.union1d(rows, alone[alone < dynamic])
+
+    # -- contacts and impulses --------------------------------------------------------------------
+
+    def _exchange(self) -> None:
+        """The pairs of which both are still are kept here, the others in the records; if nothing sleeps, nothing is."""
+        state, memory, still = self._state, self._state.warm_start, self._still()
+        state.asleep = int(np.count_nonzero(still[: self._table.stops[0]] > AWAKE))
+        if not state.asleep:
+            still[still > AWAKE] = AWAKE
+            state.fresh_statics = 0
+        now = memory.now
+        lengths = float(memory.step[now]), float(memory.substep[now])
+        if not len(self.impulses):
+            self._lengths = lengths
+        elif not memory.counts[now]:
+            memory.step[now], memory.substep[now] = self._lengths
+        elif lengths != self._lengths:
+            self._scale(lengths)
+        self.impulses.exchange(self._both_still)
+        memory.rows_version[now] = -1
+        self.contacts.exchange(self._both_still)
+        state.contacts.stored = int(np.count_nonzero(self.contacts.columns["enabled"]))
+        ids, sizes = np.unique(self._islands(), return_counts=True)
+        self.sizes = np.stack((ids, sizes), axis=1)
+
+    def _scale(self, lengths: tuple[float, float]) -> None:
+        """The impulses that belong to steps and substeps of that length."""
+        by_step, by_substep = (new / old for new, old in zip(lengths, self._lengths, strict=True))
+        columns, self._lengths = self.impulses.columns, lengths
+        self.impulses.columns = {
+            **columns, "total": columns["total"] * by_step, "impulse": columns["impulse"] * by_substep,
+            "tangent": columns["tangent"] * by_substep,
+        }  # fmt: skip
+
+    def _both_still(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        still, table = self._still(), self._table
+        if not len(still):
+            return np.zeros(len(a), bool)
+        one, other = table.rows_of(a), table.rows_of(b)
+        return (one >= 0) & (other >= 0) & (still[one] > AWAKE) & (still[other] > AWAKE)
+
+    def _still(self) -> np.ndarray:
+        return self._state.bodies.still[: self._table.count]
+
+    def _islands(self) -> np.ndarray:
+        """The island of each sleeper."""
+        bodies, dynamic = self._state.bodies, self._table.stops[0]
+        return bodies.island[:dynamic][bodies.still[:dynamic] > AWAKE]
+
+    # -- a step that fails, snapshots -------------------------------------------------------------
+
+    def _keep(self) -> None:
+        """What a failed step puts back, before the first change in it."""
+        if self.kept is None:
+            state, bodies, count = self._state, self._state.bodies, self._table.count
+            names = [name for name in ("still", "rest_steps", "island") if len(getattr(bodies, name))]
+            self.kept = (
+                {name: getattr(bodies, name)[:count].copy() for name in names},
+                self._saved_parts(), self._followed,
+                saved_rows(state.warm_start, WARM_START), saved_rows(state.contacts, CONTACT_NUMBERS),
+            )  # fmt: skip
+
+    def abandon_step(self) -> None:
+        """Back to the start of the step; the records show the contacts and impulses of that time."""
+        if self.kept is None:
+            return
+        (columns, parts, self._followed, impulses, contacts), self.kept, self._seen = self.kept, None, -1
+        for name, column in columns.items():
+            getattr(self._state.bodies, name)[: len(column)] = column
+        self._take_parts(parts)
+        put_rows_back(self._state.warm_start, impulses)
+        put_rows_back(self._state.contacts, contacts)
+        self._state.warm_start.rows_version[:] = -1
+
+    def _saved_parts(self) -> dict[str, Any]:
+        state = self._state
+        return {
+            "contacts": self.contacts.saved(), "impulses": self.impulses.saved(), "links": self.links,
+            "sizes": self.sizes, "lengths": list(self._lengths),
+            "numbers": [state.asleep, state.due, state.fresh_statics, state.contacts.stored],
+        }  # fmt: skip
+
+    def _take_parts(self, parts: Any) -> None:
+        state = self._state
+        self.contacts.take_back(parts["contacts"])
+        self.impulses.take_back(parts["impulses"])
+        self.links, self.sizes = (np.array(parts[name], np.int64).reshape(-1, 2) for name in ("links", "sizes"))
+        self._lengths = parts["lengths"][0], parts["lengths"][1]
+        state.asleep, state.due, state.fresh_statics, state.contacts.stored = parts["numbers"]
+
+    def saved(self) -> dict[str, Any] | None:
+        """For snapshots; also whether bodies have come or gone since the last step, and whether all wake."""
+        if not self.on:
+            return None
+        followed = self._structure() == self._followed
+        return {**self._saved_parts(), "followed": followed, "all_wake": self._all_wake}
+
+    def take_back(self, saved: Any) -> None:
+        """The table is what it was then; if this world does not sleep, all of them wake."""
+        state = self._state
+        self.kept, self._followed, self._seen = None, None, -1
+        if saved is None:
+            self.contacts.clear()
+            self.impulses.clear()
+            self.links = self.sizes = np.empty((0, 2), np.int64)
+            state.asleep = state.due = state.fresh_statics = state.contacts.stored = 0
+            return
+        self._take_parts(saved)
+        self._all_wake = saved["all_wake"] or not state.sleeping
+        self.on = state.sleeping or self._all_wake
+        if saved["followed"]:
+            self._followed = self._structure()

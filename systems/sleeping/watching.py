@@ -1,0 +1,64 @@
+"""Which columns are watched: what code of the game may write in place, and that changes how a body rests."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...components import RigidBody, Transform
+from ...framework.data.arrays.column import ArrayColumn
+from ...framework.data.columns import Column
+from ...framework.data.table import Table
+from ...framework.jit.records.record import Record, make_record
+from ..records import WATCHED
+from ..scene import Scene
+
+# All else that acts on them shows in their flight: and these too, but for the step in which they fall asleep.
+OF_BODIES = ("mass", "kind", "gravity_scale", "constant_force", "applied_force")
+
+
+class Watching:
+    """Binds the records of the columns for the stages; again when columns are other arrays."""
+
+    def __init__(self, state: Record, table: Table, scene: Scene) -> None:
+        self._state, self._table, self._scene = state, table, scene
+        self._bound: object = None
+        self._records: list[Record] = []
+
+    def bind(self) -> None:
+        """Call it before a step."""
+        table = self._table
+        bound = table.columns_version, self._scene.linked, table.version, table.members_version
+        if bound == self._bound:
+            return
+        self._records = list(self._find())
+        self._state.watching = np.array([record.address for record in self._records], np.int64)
+        self._bound = bound
+
+    def _find(self) -> Iterator[Record]:
+        table, linked = self._table, self._scene.linked
+        columns: list[Column] = [RigidBody.columns[name] for name in OF_BODIES]
+        columns.append(Transform.columns["rotation"])
+        for shape in linked.shapes if linked is not None else ():
+            columns += shape.component.columns.values()
+            yield self._record(table.mask_name(shape.component), table.has_mask(shape.component), False)
+        for column in columns:
+            array, default = table.arrays.get(column.key), table.default_of(column.key)
+            if array is not None:
+                if isinstance(column, ArrayColumn):  # what the arrays hold; their numbers mean nothing elsewhere
+                    array = column.hashable(array[: table.count])
+                yield self._record(column.key, array, default)
+
+    def _record(self, key: str, array: np.ndarray, default: object) -> Record:
+        record, flat = make_record(WATCHED, 2), array.reshape(-1)
+        record.width, record.turn = array[:1].size, zlib.crc32(key.encode()) % 62
+        fill = np.empty(array.shape[1:], array.dtype)
+        fill[...] = default
+        if array.itemsize == 8:
+            record.words, bits = flat.view(np.int64), fill.reshape(-1).view(np.int64)
+        else:
+            record.small, bits = flat.view(np.int8), fill.reshape(-1).view(np.int8)
+        record.defaults = bits.astype(np.int64)
+        return record
