@@ -196,6 +196,19 @@ def test_contacts_of_sleepers_are_listed_in_order_and_make_no_events():
     assert told == [("contact_end", late[1], late[2])]
 
 
+def test_what_a_game_writes_into_the_contacts_of_sleepers_changes_nothing_but_what_it_reads():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    normals = world.contacts.normal.copy()
+    world.contacts.normal[:] = 7.0
+    world.contacts.enabled[:] = False
+    world.step()
+    assert (world.contacts.normal == normals).all()
+    assert world.contacts.enabled.all()
+    assert all(is_asleep(world, *boxes))
+
+
 def test_contact_stay_is_told_of_sleepers():
     world = sleepy_world()
     boxes = tower(world, 0.0, 2)

@@ -114,9 +114,9 @@ def _work(targets: tuple[str, ...], everything: bool, dimensions: set[int]) -> I
 
 
 def prepare_built_in(dimensions: int) -> None:
-    """What worlds of spheres and boxes need, with every standard integrator and in every mode of collision."""
+    """What worlds of spheres and boxes need, with every standard integrator, in every mode of collision, asleep too."""
     integrators = [Settings(integrator=name) for name in sorted(Physics(dimensions=dimensions).integrators)]
-    for settings in (*integrators, Settings(collision="event_driven")):
+    for settings in (*integrators, Settings(collision="event_driven"), Settings(sleeping=True)):
         with closing(World(Physics(dimensions=dimensions), settings=settings)) as world:
             world.prepare(SphereCollider, AABBCollider)
 

@@ -73,8 +73,8 @@ class RecordedContacts(ContactSource):
         return columns
 
     def _stored_rows(self) -> Columns:
-        """The contacts of what sleeps; they last."""
-        columns = dict(self.stored.columns)
+        """Copies of the contacts of what sleeps; they last."""
+        columns = {name: column.copy() for name, column in self.stored.columns.items()}
         columns["normal_impulse"] = columns.pop("impulse")
         return {**columns, "step": _repeated(self._state.step_number, len(self.stored))}
 

@@ -138,8 +138,9 @@ class Sleepers:
         some = (fixed >= dynamic) & (body < dynamic)
         fixed, body = fixed[some], body[some]
         due = bodies.still[body] == FALLING
-        found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)
-        self.links = np.unique(np.concatenate((self.links, found)), axis=0)
+        found = set(zip(bodies.entity[fixed[due]].tolist(), bodies.island[body[due]].tolist(), strict=True))
+        found |= set(map(tuple, self.links.tolist()))
+        self.links = np.array(sorted(found), np.int64).reshape(-1, 2)
 
     # -- waking -----------------------------------------------------------------------------------
 

@@ -21,7 +21,9 @@ IMPULSES = ("entity_a", "entity_b", "normal", "impulse", "total", "tangent")
 
 def merged(one: Columns, other: Columns) -> tuple[Columns, np.ndarray]:
     """Two lists of pairs as one in canonical order; mask of the rows that are of the first."""
-    count = len(one["entity_a"])
+    count, more = len(one["entity_a"]), len(other["entity_a"])
+    if not count or not more:  # usual, for whole piles
+        return dict(one if count else other), np.full(max(count, more), count > 0)
     joined = {name: np.concatenate((column, other[name])) for name, column in one.items()}
     order = np.lexsort((joined["entity_b"], joined["entity_a"]))
     return {name: column[order] for name, column in joined.items()}, order < count

@@ -200,7 +200,9 @@ VARIED: tuple[Varied, ...] = (
         "on_fault", "jump", at.scene_of("jump"), ("warn", "raise", "ignore"), at.same_as(on_fault="warn"), SAME,
         "bodies that end elsewhere than with the default, in a world without faults", 1.0, 1.0,
     ),
-    Varied("sleeping", "pyramid of 210", at.scene_of("pyramid", rows=20), (False, True), at.rest, OVERLAP, RESTS, 5.0, 5.0),
+    Varied(
+        "sleeping", "pyramid of 210", at.scene_of("pyramid", rows=20), (False, True), at.rest, OVERLAP, RESTS, 5.0, 5.0
+    ),
     Varied(
         "sleeping", "slow gas", at.scene_of("gas2d"), (False, True), at.same_as(sleeping=False), SAME,
         "bodies that end elsewhere than without, of 1,000, in a world in which nothing comes to rest", 0.5, 0.5,
