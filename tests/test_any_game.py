@@ -103,14 +103,16 @@ class Game(RuleBasedStateMachine):
     steps = 0  # of all games
     world: World
 
-    @initialize(d=st.sampled_from((2, 3)), mode=mode, gravity=st.sampled_from((0.0, GRAVITY)))
-    def begin(self, d, mode, gravity):
+    @initialize(
+        d=st.sampled_from((2, 3)), mode=mode, gravity=st.sampled_from((0.0, GRAVITY, GRAVITY)), sleeping=st.booleans()
+    )
+    def begin(self, d, mode, gravity, sleeping):
         self.d, self.touching, self.kept, self.spoiled, self.raises = d, set(), [], {}, False
         self.folder = tempfile.TemporaryDirectory()
         self.gravity = tuple(-gravity * (k == 1) for k in range(d))
-        self.enter(World(Physics(d, self.gravity), settings=Settings(collision=mode, on_fault="ignore")))
+        self.enter(World(Physics(d, self.gravity), settings=Settings(collision=mode, sleeping=sleeping, on_fault="ignore")))
         half = np.where(np.arange(d) == 1, 0.5, 6.0)
-        self.world.create_entity(Transform(-4.0 * (np.arange(d) == 1)), AABBCollider(half))
+        self.world.create_entity(Transform(-4.0 * (np.arange(d) == 1)), AABBCollider(half, friction=0.5))
 
     def enter(self, world):
         self.world = world
@@ -151,7 +153,7 @@ class Game(RuleBasedStateMachine):
     def spawn(self, data, ball, size, kind, sensor, restitution, layer):
         place, speed = data.draw(vector(self.d)), 2.0 * data.draw(vector(self.d))
         body = RigidBody(kind=kind, linear_velocity=speed * (kind != "static"))
-        collider = self.shape(ball, size, sensor=sensor, restitution=restitution, layer=layer)
+        collider = self.shape(ball, size, sensor=sensor, restitution=restitution, layer=layer, friction=0.5)
         self.world.create_entity(Transform(place), body, collider, Health())
 
     @precondition(lambda self: len(self.world.bodies) < MOST)
@@ -159,7 +161,7 @@ class Game(RuleBasedStateMachine):
     def spawn_many(self, data, count):
         places = np.array([data.draw(vector(self.d)) for _ in range(count)])
         self.world.create_entities(
-            count, Transform.many(places), RigidBody.many(mass=2.0), SphereCollider.many(radius=0.3)
+            count, Transform.many(places), RigidBody.many(mass=2.0), SphereCollider.many(radius=0.3, friction=0.5)
         )
 
     @rule(number=number, immediate=st.booleans())
@@ -233,15 +235,17 @@ class Game(RuleBasedStateMachine):
 
     @rule(
         mode=mode, dt=st.sampled_from((1 / 120, 1 / 60, 1 / 30)), substeps=st.sampled_from((1, 4)),
-        gravity=st.sampled_from((0.0, GRAVITY)),
+        gravity=st.sampled_from((0.0, GRAVITY)), sleeping=st.booleans(),
     )  # fmt: skip
-    def change_settings(self, mode, dt, substeps, gravity):
-        self.world.settings = self.world.settings.replace(collision=mode, dt=dt, substeps=substeps)
+    def change_settings(self, mode, dt, substeps, gravity, sleeping):
+        self.world.settings = self.world.settings.replace(
+            collision=mode, dt=dt, substeps=substeps, sleeping=sleeping
+        )
         self.world.gravity = tuple(-gravity * (k == 1) for k in range(self.d))
 
     # -- steps --------------------------------------------------------------------------------------
 
-    @rule(count=st.integers(1, 60))
+    @rule(count=st.sampled_from((1, 2, 5, 20, 60, 300)))
     def step(self, count):
         for _ in range(count):
             self.world.step()
