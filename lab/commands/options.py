@@ -11,7 +11,6 @@ from typing import Any
 import click
 
 from ..cases.grid import COLLISIONS
-from ..measure.norms import norm_named
 from .choices import parse_assignments
 from .usage_errors import Problem, did_you_mean
 
@@ -154,10 +153,6 @@ def writable_folder(folder: Path, option: Path | None = None) -> None:
 # -- what is measured -------------------------------------------------------------------------------------------
 
 
-def _norm(name: str) -> str:
-    return norm_named(name).name
-
-
 def _seconds(value: float) -> float:
     if not (math.isfinite(value) and value > 0):
         raise Problem(f"--seconds takes a number above 0, not {value:g}")
@@ -198,7 +193,7 @@ def _number_or_word(text: str) -> int | float | str:
 
 case_options = together(
     click.option(
-        "--norm", "norms", multiple=True, metavar="NAME", callback=lambda c, p, names: tuple(map(_norm, names)),
+        "--norm", "norms", multiple=True, metavar="NAME",
         help="What the error is the error of; repeatable, the first counts (default: what suits the scene).",
     ),
     click.option(

@@ -19,7 +19,7 @@ from ..engines.body_arrays import NotPlainError
 from ..measure.effects import effects_of
 from ..measure.norms import FAR, NORMS, errors_of, failure_of
 from ..measure.observation import Seen, observe
-from ..measure.survey import NUDGE, nudge
+from ..measure.survey import nudge
 from ..measure.timing import timed
 from ..measure.told_in_results import faults_in_results
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
@@ -75,7 +75,7 @@ def outcome_of(task: Task, seen: Seen, reference: Seen) -> Outcome:
     """The errors and effects of a run, against the reference."""
     kind = task.case.kind
     failure = failure_of(seen, None if kind == CHAOTIC else reference)
-    errors = {} if failure else errors_of(seen, reference, NORMS)
+    errors = {} if failure else errors_of(seen, reference, {**NORMS, **dict.fromkeys(task.case.norms)})
     effects = {} if failure else effects_of(seen, reference, kind)
     simulated = seen.simulated or seen.seconds
     return Outcome(
@@ -122,7 +122,8 @@ def _observed(task: Task) -> Seen:
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled
             far = math.inf if case.kind == CHAOTIC else FAR * case.survey.trial.reach or math.inf
-            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, task.until)
+            values = case.subject.values_of
+            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, task.until, values)
     finally:
         engine.close()
 
@@ -132,13 +133,15 @@ def world_of(case: Case, cell: Cell, repeat: int) -> World:
     seed = case.subject.seed + (repeat if case.kind == CHAOTIC else 0)
     world = case.subject.world(cell.settings(case.survey.settings), seed)
     if case.kind == CHAOTIC and not case.survey.seeded:
-        nudge(world, 1e3 * NUDGE * CaromEngine(world).size, repeat)
+        nudge(world, case.survey.nudge * CaromEngine(world).size, repeat)
     return world
 
 
 def engine_of(case: Case, cell: Cell, repeat: int) -> Engine:
     """An engine at the start of that repeat; Problem if pymunk cannot represent the scene."""
     if cell.engine == PYMUNK:
+        if case.subject.names or "order" in case.norms:
+            raise Problem(f"{case.subject.name} cannot be given to pymunk, which runs no systems and tells no order")
         cell_of_carom = dataclasses.replace(cell, integrator=case.survey.settings.integrator)
         world = world_of(case, cell_of_carom, repeat)
     else:
@@ -148,10 +151,3 @@ def engine_of(case: Case, cell: Cell, repeat: int) -> Engine:
     except NotPlainError as error:
         world.close()
         raise Problem(f"{case.subject.name} cannot be given to pymunk: {error}") from error
-
-
-def mean_of(seens: list[Seen]) -> Seen:
-    """The averaged statistics of several runs; all other fields are those of the first."""
-    signed = [name for name, norm in NORMS.items() if norm.signed]
-    means = {name: float(np.mean([getattr(seen, name) for seen in seens])) for name in signed}
-    return dataclasses.replace(seens[0], **means)

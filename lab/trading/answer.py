@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..measure.effects import in_words, metres, severity
+from ..measure.effects import in_words, metres, severity, told
 from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Point
 from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
+MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
 
 
@@ -83,6 +84,9 @@ def cost_text(point: Point) -> str:
 
 def _error(case: CaseTrade, point: Point) -> str:
     effects = point.effects
+    of_game = told(effects)
+    if of_game:
+        return "; ".join(of_game[:MOST_TOLD])
     if case.kind == RESTING and "sink" in effects:
         return f"{metres(effects['sink'])}: how deep what rests sinks into what it rests on"
     if case.kind not in (CHAOTIC, RESTING) and "place" in effects:
@@ -99,7 +103,7 @@ def noticed_text(point: Point) -> str:
 def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
     ratio = _price(point) / _price(chosen)
     words = noticed_text(point)
-    if words == "nothing" and case.norm in point.errors and not point.failed:
+    if words == "nothing" and case.norm in point.errors and not point.failed and not told(point.effects):
         words = f"nothing; error {_error(case, point).partition(':')[0]}"
     return f"{point.line}: {ratio:.2g} times the cost; noticed: {words}"
 

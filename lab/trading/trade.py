@@ -17,11 +17,11 @@ from ..commands.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
 from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, refined_reference, run_tasks
 from ..jobs.tasks import Task, engine_of
-from ..measure.norms import NORMS
+from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK
 from ..reporting.progress import NO_PROGRESS, Progress
 from .code_line import python_line
-from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
+from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
 ROUNDING = 1e-12  # smaller errors are rounding, which has no order
 SURE = 1e-10  # a reference with a better agreement needs no refinement
@@ -101,8 +101,9 @@ def trade(
     ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
-    for target in targets:
-        subject_of(target)
+    subjects = [subject_of(target, options, seed) for target in targets]
+    for name in norms:
+        check_norm(name, () if name in NORMS else [own for subject in subjects for own in subject.names])
     began = time.monotonic()
     runs = Runs(workers, store, progress, stoppable=show is not None)
     result = Trade({**machine(), "clock": CLOCK}, command, [])
@@ -173,13 +174,19 @@ class Study:
         )
         self.case, self.reference = case, reference
         self.cells = grids.grid(self.curves, case.steps)
-        tasks = sorted(run_tasks(case, self.cells), key=lambda task: (task.repeat, self._distance(task.cell)))
+        tasks = sorted(run_tasks(case, self.cells), key=self._later)
         runs.all(tasks, f"{name}: {len(self.cells)} settings, {case.repeats_text}")
 
     def _nearest(self) -> tuple[Cell, ...]:
         """The scene's own settings, and with twice and half the step: known before there is a reference."""
         steps = [self.own.dt * factor for factor in (1, 2, 0.5)]
         return tuple(dataclasses.replace(self.own, dt=dt) for dt in steps if dt <= self.whole.steps[0])
+
+    def _later(self, task: Task) -> tuple[float, float]:
+        """Tasks run in this order: all settings once, the nearest first; of a chaotic scene, of which one run tells
+        little, the nearest are repeated before the farthest are tried."""
+        distance = self._distance(task.cell)
+        return (task.repeat + distance, distance) if task.case.kind == CHAOTIC else (task.repeat, distance)
 
     def _distance(self, cell: Cell) -> float:
         """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
@@ -226,7 +233,7 @@ def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> Case
         case.subject.description,
         case.kind,
         case.why,
-        {norm: NORMS[norm].text for norm in case.norms},
+        {norm: norm_of(norm).text for norm in case.norms},
         case.seconds,
         case.repeats,
         case.repeated,
@@ -247,8 +254,8 @@ def _tells(point: Point, norm: str, reference: Reference) -> bool:
     if point.failed or norm not in point.errors:
         return False
     error = point.errors[norm]
-    small = NORMS[norm].absolute or error.mean < SMALL
-    noise = CLEAR * error.uncertainty if NORMS[norm].signed else 0.0
+    small = norm_of(norm).absolute or error.mean < SMALL
+    noise = CLEAR * error.uncertainty if norm_of(norm).signed else 0.0
     return small and error.mean > max(ROUNDING, noise) and reference.trusts(norm, error.mean)
 
 

@@ -28,6 +28,7 @@ from ..commands.options import (
 from ..commands.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import STOPPED, Runs
+from ..measure.norms import NORMS, check_norm
 from ..reporting.output import Output
 from ..reporting.progress import Bar
 from ..trading.command import check_integrators
@@ -110,7 +111,10 @@ def tune_command(
     for one in (target, *checked):
         subject_of(one)
     only = Only(integrators or (), collisions or (), substeps or (), geometries or ())
-    check_integrators([subject_of(target, options, seed_number(seed))], only.integrators)
+    subject = subject_of(target, options, seed_number(seed))
+    for name in norms:
+        check_norm(name, () if name in NORMS else subject.names)
+    check_integrators([subject], only.integrators)
     if max_error is None:
         raise Problem(MISSING)
     arguments = {

@@ -24,7 +24,7 @@ from ..commands.usage_errors import Problem
 from ..engines.cost import WEIGHTS
 from ..jobs.result_store import Store
 from ..jobs.runs import OutOfTimeError, Runs, known_points, points_of, refined_reference
-from ..measure.norms import NORMS
+from ..measure.norms import norm_of
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
 from ..trading.records import TRUSTED, Cell, Point, Reference
@@ -200,7 +200,7 @@ def search(
 class _Search:
     def __init__(self, case: Case, max_error: float, absolute: bool, only: Only, runs: Runs) -> None:
         self.runs = runs
-        self.norm = NORMS[case.norms[0]]
+        self.norm = norm_of(case.norms[0])
         self.methods = only.of(case)
         self.case, self.reference = exact_enough(case, self.norm.name, max_error, absolute, runs)
         seen = self.case.reference
@@ -347,7 +347,7 @@ def exact_enough(
         """The target over the accuracy of the reference."""
         seen = known.reference
         assert seen is not None
-        target = max_error / NORMS[norm].scale(seen, seen) if absolute else max_error
+        target = max_error / norm_of(norm).scale(seen, seen) if absolute else max_error
         if case.reference is None and target < SMALLEST:
             raise Problem(
                 f"{case.subject.name}: a {norm} error of {target:.3g} is below rounding, no own runs can tell it: take "
@@ -355,7 +355,7 @@ def exact_enough(
             )
         return target / max(reference.agreement.get(norm, 0.0), 1e-300)
 
-    wanted = NOISE if NORMS[norm].signed else TRUSTED
+    wanted = NOISE if norm_of(norm).signed else TRUSTED
     known, reference, enough = refined_reference(case, runs, lambda case, found: margin_of(case, found) >= wanted)
     if norm not in known.norms:
         others = " or ".join(f"--norm {name}" for name in known.norms)
@@ -367,7 +367,7 @@ def exact_enough(
     raise NotExactError(
         f"{case.subject.name}: no reference is exact enough for a {norm} error of {target:.3g}: "
         f"{reference.text} agree to {agreement:.2g} only. Take a larger error"
-        + (" or longer runs" if NORMS[norm].signed else " or a shorter time")
+        + (" or longer runs" if norm_of(norm).signed else " or a shorter time")
     )
 
 
