@@ -9,7 +9,7 @@ import pytest
 
 from carom.lab.measure.effects import in_words, metres, noticed, severity
 from carom.lab.measure.timing import Spread
-from carom.lab.trading.answer import answer, recommended
+from carom.lab.trading.answer import answer, clearly_worse, recommended
 from carom.lab.trading.records import Cell, ErrorBar, Point
 
 OWN = Cell(1 / 60)
@@ -92,3 +92,12 @@ def test_lengths():
     assert [metres(size) for size in (1e-9, 0.00042, 0.0123, 0.5, 12.345)] == [
         "less than 0.001 mm", "0.42 mm", "1.2 cm", "50 cm", "12.3 m",
     ]  # fmt: skip
+
+
+def test_what_is_clearly_worse_at_no_less_cost_is_not_run_again():
+    points = [
+        point(1 / 30, 10.0, place=0.005), point(1 / 60, 20.0, place=0.04), point(1 / 90, 20.0, place=0.06),
+        point(1 / 20, 5.0, place=5.0), dataclasses.replace(point(1 / 120, 30.0), failures={"tunnelled": 1}),
+        dataclasses.replace(point(1 / 15, 4.0), failures={"tunnelled": 1}),
+    ]  # fmt: skip
+    assert {round(1 / cell.dt) for cell in clearly_worse(points)} == {90, 120}

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..measure.effects import in_words, metres, severity, told
-from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Point
+from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Cell, Point
 from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
+CLEARLY = 10.0  # times
 MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
 
@@ -31,10 +33,10 @@ def answer(case: CaseTrade) -> list[str]:
     lines.append(f"  error    {_error(case, chosen)}")
     lines.append(f"  noticed  {noticed_text(chosen)}")
     front = _front(usable)
-    cheaper = [point for point in front if _price(point) < 0.9 * _price(chosen)]
+    cheaper = [point for point in front if price(point) < 0.9 * price(chosen)]
     better = [
         point for point in front
-        if severity(point.effects) * FACTOR <= severity(chosen.effects) and _price(point) > _price(chosen)
+        if severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
     ] if case.reference.trusts(case.norm, chosen.errors[case.norm].mean) else []  # fmt: skip
     if now is not None and now is not chosen:
         lines.append(f"  now      {_compared(case, now, chosen)}")
@@ -51,8 +53,8 @@ def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
     settings if they cost hardly more."""
     least = max(min(severity(point.effects) for point in usable), 1.0)
     good = [point for point in usable if severity(point.effects) <= (HARDLY * least if least > 1.0 else 1.0)]
-    cheapest = min(good, key=_price)
-    own = [point for point in good if point.cell == case.own and _price(point) < HARDLY * _price(cheapest)]
+    cheapest = min(good, key=price)
+    own = [point for point in good if point.cell == case.own and price(point) < HARDLY * price(cheapest)]
     return own[0] if own else cheapest
 
 
@@ -60,15 +62,30 @@ def _points(case: CaseTrade) -> list[Point]:
     return [point for curve in case.curves for point in curve.points if point.cell.engine == CAROM]
 
 
-def _price(point: Point) -> float:
+def price(point: Point) -> float:
     """Milliseconds per simulated second; work where nothing is timed."""
     return point.milliseconds.median if point.milliseconds else point.work
+
+
+def clearly_worse(points: Sequence[Point]) -> set[Cell]:
+    """The settings of which something is noticed CLEARLY more than of others that cost no more: more runs of them would
+    change no answer."""
+
+    def harm(point: Point) -> float:
+        return math.inf if point.failed else severity(point.effects)
+
+    return {
+        point.cell for point in points if harm(point) > 1.0 and any(
+            price(other) <= price(point) and CLEARLY * harm(other) <= harm(point)
+            for other in points if not other.failed
+        )
+    }  # fmt: skip
 
 
 def _front(usable: Sequence[Point]) -> list[Point]:
     """The points of which none is cheaper and better at once, the cheapest first."""
     front: list[Point] = []
-    for point in sorted(usable, key=lambda point: (_price(point), severity(point.effects))):
+    for point in sorted(usable, key=lambda point: (price(point), severity(point.effects))):
         if not front or severity(point.effects) < severity(front[-1].effects):
             front.append(point)
     return front
@@ -101,7 +118,7 @@ def noticed_text(point: Point) -> str:
 
 
 def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
-    ratio = _price(point) / _price(chosen)
+    ratio = price(point) / price(chosen)
     words = noticed_text(point)
     if words == "nothing" and case.norm in point.errors and not point.failed and not told(point.effects):
         words = f"nothing; error {_error(case, point).partition(':')[0]}"

@@ -20,6 +20,7 @@ from ..jobs.tasks import Task, engine_of
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK
 from ..reporting.progress import NO_PROGRESS, Progress
+from .answer import clearly_worse
 from .code_line import python_line
 from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
@@ -175,7 +176,12 @@ class Study:
         self.case, self.reference = case, reference
         self.cells = grids.grid(self.curves, case.steps)
         tasks = sorted(run_tasks(case, self.cells), key=self._later)
-        runs.all(tasks, f"{name}: {len(self.cells)} settings, {case.repeats_text}")
+        what = f"{name}: {len(self.cells)} settings, {case.repeats_text}"
+        if runs.until < math.inf and case.repeats > 1:
+            runs.all([task for task in tasks if task.repeat == 0], what)
+            worse = clearly_worse(known_points(case.replace(repeats=1), self.cells, runs)) - {self.own}
+            tasks = [task for task in tasks if task.cell not in worse]
+        runs.all(tasks, what)
 
     def _nearest(self) -> tuple[Cell, ...]:
         """The scene's own settings, and with twice and half the step: known before there is a reference."""
