@@ -77,7 +77,7 @@ def _of_game(seen: Seen, reference: Seen, kind: str) -> dict[str, float]:
         least = 0.5 if len(right) == 1 and right[0] % 1 == 0 else 0.0
         limit = SHARE * (seen.size if len(right) > 1 else abs(right[0]))
         found[f"limit {name}"] = NEVER / 2 if math.isnan(limit) else max(limit, least)
-        found[f"right {name}"] = right[0] if len(right) == 1 else 0.0
+        found[f"right {name}"] = right[0] if len(right) == 1 and not math.isnan(right[0]) else 0.0
         if kind == CHAOTIC:
             found |= {f"mean {name}": apart, f"spread {name}": reference.spread.get(name, 0.0)}
             found["known"] = float(reference.runs)
@@ -180,6 +180,8 @@ def _phrase(name: str, value: float, effects: Mapping[str, float]) -> str:
 
 def _of_game_in_words(what: str, name: str, value: float, effects: Mapping[str, float]) -> str:
     if name.startswith("at ") and f"right {name}" not in effects:
+        if abs(value) == NEVER:
+            return f"{name.removeprefix('at ')}: none, and there should be one"
         return f"{name.removeprefix('at ')} ends {metres(value)} from where it should"
     right = effects[f"right {name}"]
     if abs(value) == NEVER:
