@@ -44,8 +44,8 @@ def test_the_cheapest_of_which_nothing_is_noticed_and_its_neighbours(case):
         "  now      Settings(dt=0.01667): 2 times the cost; noticed: nothing; error 8 mm",
         "  cheaper  Settings(dt=0.06667): 0.5 times the cost; noticed: entity 7 ends 30 cm from where it should",
         "  better   Settings(dt=0.008333): 4 times the cost; noticed: nothing; error 1 mm",
-        "  known    from 4 runs of 10 s with 4 settings, 1 of 4 start phases; 3 settings not tried yet; the same "
-        "command goes on, --thorough does it all",
+        "  known    from 4 runs of 10 s with 4 settings, 1 of 4 start phases with these; 3 settings not tried "
+        "yet; the same command goes on, --thorough does it all",
     ]
 
 

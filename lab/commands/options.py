@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections.abc import Callable, Iterable
@@ -244,6 +245,17 @@ def _budget(value: float) -> float:
     return value
 
 
+def workers_of(workers: int | None, cluster: str | None) -> contextlib.AbstractContextManager[Any]:
+    """What performs the runs, for the time of a command: a number of processes, or a cluster."""
+    if cluster is None:
+        return contextlib.nullcontext(workers)
+    if workers is not None:
+        raise Problem("--workers and --cluster exclude each other")
+    from ..jobs.cluster import Cluster
+
+    return Cluster(cluster)
+
+
 budget_option = click.option(
     "--budget", type=float, metavar="S", default=60.0, show_default=True, callback=_read(_budget),
     help="Seconds to spend; what is known by then is the answer.",
@@ -252,6 +264,7 @@ runs_options = together(
     budget_option,
     click.option("--thorough", is_flag=True, help="Everything, however long it takes."),
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
+    click.option("--cluster", metavar="ADDRESS", help="Run on the workers of this dask.distributed scheduler."),
     click.option(
         "--runs", "kept", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
         default=Path("out/runs.sqlite"), show_default=True, help="Finished runs are kept here, and used again.",

@@ -35,7 +35,7 @@ class OutOfTimeError(Exception):
 
 
 class Runs:
-    """Performs tasks with ``workers`` processes; finished runs are kept in the store.
+    """Performs tasks with ``workers`` processes, or those of a Pool; finished runs are kept in the store.
 
     until
         on ``time.monotonic``: afterwards nothing runs, and :meth:`all` raises OutOfTimeError; so it does after Ctrl-C
@@ -45,9 +45,12 @@ class Runs:
     """
 
     def __init__(
-        self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
+        self, workers: int | Pool | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
         until: float = math.inf, stoppable: bool = False,
     ) -> None:  # fmt: skip
+        self._pool = workers if isinstance(workers, Pool) else Pool()
+        if isinstance(workers, Pool):
+            workers = max(getattr(workers, "size", 0), 2)
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
         self.workers, self.progress, self.until, self.stoppable = workers, progress, until, stoppable
@@ -56,7 +59,6 @@ class Runs:
         self.performed = 0
         self._store = Store() if store is None else store
         self._pace = PACE
-        self._pool = Pool()
         weakref.finalize(self, self._pool.end)
 
     def get(self, task: Task) -> Seen | None:
@@ -67,7 +69,8 @@ class Runs:
     def all(self, tasks: Iterable[Task], what: str) -> list[Seen]:
         """What all tasks showed, in order. OutOfTimeError if time is up before all are finished."""
         tasks = list(tasks)
-        missing = [dataclasses.replace(task, until=self.until) for task in tasks if task.key not in self._store]
+        until = self.until - time.monotonic() + time.time()
+        missing = [dataclasses.replace(task, until=until) for task in tasks if task.key not in self._store]
         total = sum(task.cost for task in tasks)
         left = sum(task.cost for task in missing)
         self.progress.begin(total, total - left)

@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import math
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +32,7 @@ FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds 
 
 @dataclass(frozen=True)
 class Task:
-    """One run. reference: it is one of the case's own references; until: when it is cut off, on ``time.monotonic``."""
+    """One run. reference: it is one of the case's own references; until: when it is cut off, on ``time.time``."""
 
     case: Case
     cell: Cell
@@ -97,7 +98,8 @@ def bare_cost(task: Task) -> float | None:
     while len(passes) < PASSES[0] or (whole < BRIEF and len(passes) < PASSES[1]):
         with task.case.subject.attribute_errors(), contextlib.closing(world_of(task.case, task.cell, 0)) as world:
             spent = simulated = 0.0
-            left = max(int(task.case.seconds / task.cell.dt), 1)
+            world.step()  # the first one prepares what all others use
+            left = max(int(task.case.seconds / task.cell.dt) - 1, 1)
             while left:
                 count = min(BLOCK, left)
                 left -= count
@@ -122,8 +124,8 @@ def _observed(task: Task) -> Seen:
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled
             far = math.inf if case.kind == CHAOTIC else FAR * case.survey.trial.reach or math.inf
-            values = case.subject.values_of
-            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, task.until, values)
+            until, values = task.until - time.time() + time.monotonic(), case.subject.values_of
+            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, until, values)
     finally:
         engine.close()
 

@@ -77,7 +77,7 @@ def _of_game(seen: Seen, reference: Seen, kind: str) -> dict[str, float]:
         least = 0.5 if len(right) == 1 and right[0] % 1 == 0 else 0.0
         limit = SHARE * (seen.size if len(right) > 1 else abs(right[0]))
         found[f"limit {name}"] = NEVER / 2 if math.isnan(limit) else max(limit, least)
-        found[f"right {name}"] = right[0] if len(right) == 1 and not math.isnan(right[0]) else 0.0
+        found[f"right {name}"] = right[0] if len(right) == 1 and not math.isnan(right[0]) else NEVER
         if kind == CHAOTIC:
             found |= {f"mean {name}": apart, f"spread {name}": reference.spread.get(name, 0.0)}
             found["known"] = float(reference.runs)
@@ -190,6 +190,8 @@ def _of_game_in_words(what: str, name: str, value: float, effects: Mapping[str, 
         spread = effects.get(f"spread {name}", 0.0)
         mean = f"{name}: {right + value:.4g} on average instead of {right:.4g}"
         return f"{mean}; one game differs from the next by {spread:.2g}"
+    if right == NEVER:
+        return f"{name}: none, as it should be"
     return f"{name}: {right + value:.4g} instead of {right:.4g}" if value else f"{name}: {right:.4g}, as it should be"
 
 

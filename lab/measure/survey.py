@@ -70,7 +70,7 @@ class Survey:
         """SMOOTH, IMPACTS, RESTING or CHAOTIC."""
         if not self.contacts:
             return CHAOTIC if self.growth > CHAOS else SMOOTH
-        if self.resting and self.speed <= STILL:
+        if self.resting and self.speed <= STILL and not self.trial.values:  # a game tells itself what matters
             return RESTING
         return CHAOTIC if self.growth > CHAOS else IMPACTS
 

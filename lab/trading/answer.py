@@ -32,10 +32,10 @@ def answer(case: CaseTrade) -> list[str]:
     lines.append(f"  cost     {cost_text(chosen)}")
     lines.append(f"  error    {_error(case, chosen)}")
     lines.append(f"  noticed  {noticed_text(chosen)}")
-    front = _front(usable)
-    cheaper = [point for point in front if price(point) < 0.9 * price(chosen)]
+    best = front(usable)
+    cheaper = [point for point in best if price(point) < 0.9 * price(chosen)]
     better = [
-        point for point in front
+        point for point in best
         if severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
     ] if case.reference.trusts(case.norm, chosen.errors[case.norm].mean) else []  # fmt: skip
     if now is not None and now is not chosen:
@@ -44,7 +44,7 @@ def answer(case: CaseTrade) -> list[str]:
         lines.append(f"  cheaper  {_compared(case, cheaper[-1], chosen)}")
     if better:
         lines.append(f"  better   {_compared(case, better[0], chosen)}")
-    lines.append(f"  known    {_known(case, points)}")
+    lines.append(f"  known    {_known(case, points, chosen.repeats)}")
     return lines
 
 
@@ -82,13 +82,13 @@ def clearly_worse(points: Sequence[Point]) -> set[Cell]:
     }  # fmt: skip
 
 
-def _front(usable: Sequence[Point]) -> list[Point]:
+def front(usable: Sequence[Point]) -> list[Point]:
     """The points of which none is cheaper and better at once, the cheapest first."""
-    front: list[Point] = []
+    found: list[Point] = []
     for point in sorted(usable, key=lambda point: (price(point), severity(point.effects))):
-        if not front or severity(point.effects) < severity(front[-1].effects):
-            front.append(point)
-    return front
+        if not found or severity(point.effects) < severity(found[-1].effects):
+            found.append(point)
+    return found
 
 
 def cost_text(point: Point) -> str:
@@ -125,12 +125,12 @@ def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
     return f"{point.line}: {ratio:.2g} times the cost; noticed: {words}"
 
 
-def _known(case: CaseTrade, points: Sequence[Point]) -> str:
+def _known(case: CaseTrade, points: Sequence[Point], repeats: int) -> str:
     runs = sum(point.repeats for point in points)
     text = f"from {runs:,} run{'s' * (runs != 1)} of {case.seconds:g} s with {len(points)} settings"
-    if case.repeats < case.whole:
-        text += f", {case.repeats} of {case.whole} {case.repeated}"
+    if repeats < case.whole:
+        text += f", {repeats} of {case.whole} {case.repeated} with these"
     if case.missing:
         text += f"; {case.missing} settings not tried yet"
-    short = case.repeats < case.whole or case.missing
+    short = repeats < case.whole or case.missing
     return text + ("; the same command goes on, --thorough does it all" if short else "")

@@ -17,10 +17,11 @@ from ..commands.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
 from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, refined_reference, run_tasks
 from ..jobs.tasks import Task, engine_of
+from ..jobs.workers import Pool
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK
 from ..reporting.progress import NO_PROGRESS, Progress
-from .answer import clearly_worse
+from .answer import clearly_worse, front
 from .code_line import python_line
 from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
@@ -85,7 +86,7 @@ def trade(
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
     budget: float | None = None,
-    workers: int | None = None,
+    workers: int | Pool | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
     command: str = "",
@@ -96,8 +97,8 @@ def trade(
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
     follow from the scene. budget: s for all together, spent on more and more exact looks; None: as long as it takes.
-    workers: processes at most, None for all cores (small amounts of work use none); store: finished runs, to be
-    continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; with it Ctrl-C ends the
+    workers: processes at most, None for all cores (small amounts of work use none), or a Cluster; store: finished runs,
+    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; with it Ctrl-C ends the
     study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
     ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
@@ -179,8 +180,13 @@ class Study:
         what = f"{name}: {len(self.cells)} settings, {case.repeats_text}"
         if runs.until < math.inf and case.repeats > 1:
             runs.all([task for task in tasks if task.repeat == 0], what)
-            worse = clearly_worse(known_points(case.replace(repeats=1), self.cells, runs)) - {self.own}
-            tasks = [task for task in tasks if task.cell not in worse]
+            points = known_points(case.replace(repeats=1), self.cells, runs)
+            worse = clearly_worse(points) - {self.own}
+            told = {self.own, *(point.cell for point in front([point for point in points if not point.failed]))}
+            tasks = sorted(
+                (task for task in tasks if task.cell not in worse),
+                key=lambda task: (task.cell not in told, *self._later(task)),
+            )
         runs.all(tasks, what)
 
     def _nearest(self) -> tuple[Cell, ...]:

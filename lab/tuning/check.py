@@ -12,6 +12,7 @@ from ...framework import Settings
 from ..cases.case import Case, case_of
 from ..jobs.result_store import Store
 from ..jobs.runs import Runs, points_of
+from ..jobs.workers import Pool
 from ..measure.norms import norm_of
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CAROM, Cell, Point, Reference
@@ -66,7 +67,7 @@ def check(
     repeats: int | None = None,
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
-    workers: int | None = None,
+    workers: int | Pool | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> Check:

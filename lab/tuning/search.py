@@ -24,6 +24,7 @@ from ..commands.usage_errors import Problem
 from ..engines.cost import WEIGHTS
 from ..jobs.result_store import Store
 from ..jobs.runs import OutOfTimeError, Runs, known_points, points_of, refined_reference
+from ..jobs.workers import Pool
 from ..measure.norms import norm_of
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
@@ -153,7 +154,7 @@ def search(
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
     budget: float | None = None,
-    workers: int | None = None,
+    workers: int | Pool | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
     show: Callable[[Tuning], None] | None = None,
