@@ -98,7 +98,7 @@ def trade(
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
     follow from the scene. budget: s for all together, spent on more and more exact looks; None: as long as it takes.
     workers: processes at most, None for all cores (small amounts of work use none), or a Cluster; store: finished runs,
-    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; with it Ctrl-C ends the
+    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; then Ctrl-C ends the
     study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
     ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
@@ -179,15 +179,19 @@ class Study:
         tasks = sorted(run_tasks(case, self.cells), key=self._later)
         what = f"{name}: {len(self.cells)} settings, {case.repeats_text}"
         if runs.until < math.inf and case.repeats > 1:
+            told, _ = self._told_and_worse()
+            runs.all([task for task in tasks if task.cell in told], what)
             runs.all([task for task in tasks if task.repeat == 0], what)
-            points = known_points(case.replace(repeats=1), self.cells, runs)
-            worse = clearly_worse(points) - {self.own}
-            told = {self.own, *(point.cell for point in front([point for point in points if not point.failed]))}
-            tasks = sorted(
-                (task for task in tasks if task.cell not in worse),
-                key=lambda task: (task.cell not in told, *self._later(task)),
-            )
+            told, worse = self._told_and_worse()
+            runs.all([task for task in tasks if task.cell in told], what)
+            tasks = [task for task in tasks if task.cell not in worse]
         runs.all(tasks, what)
+
+    def _told_and_worse(self) -> tuple[set[Cell], set[Cell]]:
+        """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""
+        points = known_points(self.case.replace(repeats=1), self.cells, self.runs)
+        best = front([point for point in points if not point.failed])
+        return {self.own, *(point.cell for point in best)}, clearly_worse(points) - {self.own}
 
     def _nearest(self) -> tuple[Cell, ...]:
         """The scene's own settings, and with twice and half the step: known before there is a reference."""
