@@ -15,8 +15,10 @@ from carom.lab.cli import cli
 from carom.lab.commands.usage_errors import Problem
 from carom.lab.jobs.result_store import Store
 
-SHORT = ("--seconds", "0.5", "--dt", "1/60,1/120", "--repeats", "2", "--no-timing", "--thorough", "--collisions", "discrete",
-         "--integrators", "velocity_verlet")  # fmt: skip
+SHORT = (
+    "--seconds", "0.5", "--dt", "1/60,1/120", "--repeats", "2", "--no-timing", "--thorough", "--collisions", "discrete",
+    "--integrators", "velocity_verlet",
+)  # fmt: skip
 
 
 def carom_command(*arguments):

@@ -98,8 +98,8 @@ def trade(
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
     follow from the scene. budget: s for all together, spent on more and more exact looks; None: as long as it takes.
     workers: processes at most, None for all cores (small amounts of work use none), or a Cluster; store: finished runs,
-    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; then Ctrl-C ends the
-    study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
+    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; then Ctrl-C ends
+    the study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
     ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
