@@ -80,6 +80,7 @@ figures: $(BENCH)
 	$(STUDIES) limits --pairs --into docs/tables/limits.md
 	$(STUDIES) settings --into docs/tables/settings.md
 	$(STUDIES) settings --games --into docs/tables/settings.md
+	$(STUDIES) promises $(foreach game,pool platformer crates survivors,examples/games/$(game).py) --into docs/tables/trade.md
 	$(STUDIES) geometry --into docs/tables/levels.md --out docs/pictures
 
 # Checkers and editors do not follow the import hooks of an editable install; they follow links.

@@ -27,7 +27,7 @@ from ..reporting.output import Output
 from ..reporting.text_tables import TextTable
 
 MARK = "studies promises"
-FINE = {"dt": 1 / 1920, "integrator": "velocity_verlet", "collision": "continuous", "substeps": 32}
+FINE = {"dt": 1 / 1920, "integrator": "velocity_verlet", "collision": "event_driven", "substeps": 32}
 FINE_OF_SEEDS = {"dt": 1 / 240, "collision": "continuous"}  # many runs of a costly game
 PASSES = 5
 PHASES = [1 - (k + 0.5) / 8 for k in range(8)]

@@ -11,6 +11,7 @@ from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
+ENOUGH = 2  # settings with this many times fewer runs than others are not told of
 CLEARLY = 10.0  # times
 MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
@@ -25,6 +26,8 @@ def answer(case: CaseTrade) -> list[str]:
     if not usable:
         failed = "; ".join(dict.fromkeys(failures(point) for point in points if point.failed))
         return [f"{case.scene}: nothing that was tried can be used{f': {failed}' if failed else ' yet'}"]
+    most = max(point.repeats for point in usable)
+    usable = [point for point in usable if ENOUGH * point.repeats >= most]  # less is known of the others
     chosen = recommended(case, usable)
     now = next((point for point in points if point.cell == case.own), None)
     name = " (as it has now)" if chosen is now else ""

@@ -16,10 +16,10 @@ from ..cases.subjects import subject_of
 from ..commands.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
 from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, refined_reference, run_tasks
-from ..jobs.tasks import Task, engine_of
+from ..jobs.tasks import Task, bare_cost, engine_of
 from ..jobs.workers import Pool
 from ..measure.norms import NORMS, check_norm, norm_of
-from ..measure.timing import CLOCK
+from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from .answer import clearly_worse, front
 from .code_line import python_line
@@ -30,7 +30,8 @@ SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
-RUNNING = 0.9  # of the budget; the rest is for tables and charts
+RUNNING = 0.86  # of the budget; the rest is for timing what is told of again, tables and charts
+TURNS, MOST_TIMED = 3, 6  # of the settings timed again
 FIRST_LOOK = 4.0  # s: then what is known is shown, if something is
 
 Show = Callable[[CaseTrade], None]
@@ -146,6 +147,7 @@ class Study:
         own = case.survey.settings
         self.own = Cell(own.dt, own.integrator, own.collision, own.substeps, own.geometry)
         self.began = began
+        self.costs: dict[Cell, float] = {}  # ms per simulated second, timed again
         self.cells = self._nearest()
         self.case, self.reference = case.at(0), Reference(f"closed form: {case.form}")
         if case.reference is None:  # until there is a better one
@@ -161,7 +163,20 @@ class Study:
                 break
             if self.show is not None and effort < efforts[-1]:
                 self.show(self._known())
+        if self.timing and self.runs.until < math.inf and self.runs.stopped in ("", OUT_OF_TIME):
+            self._time_again()
         return self._known()
+
+    def _time_again(self) -> None:
+        """Time what the answer may tell of, in turns and with nothing else running: the first times were taken beside
+        other runs."""
+        told, _ = self._told_and_worse()
+        tasks = [Task(self.case, cell, 0) for cell in sorted(told, key=self._distance)[:MOST_TIMED]]
+        for _ in range(TURNS):
+            for task in tasks:
+                cost = bare_cost(task)
+                if cost is not None:
+                    self.costs[task.cell] = min(cost, self.costs.get(task.cell, math.inf))
 
     def _measure(self, case: Case) -> None:
         runs, name = self.runs, case.subject.name
@@ -223,6 +238,8 @@ class Study:
         points = known_points(self.case, self.cells, self.runs)
         for point in points:
             point.line = python_line(point.cell, self.case.survey.settings)
+            if point.cell in self.costs:
+                point.milliseconds = Spread.of([self.costs[point.cell]])
             point.milliseconds = point.milliseconds if self.timing else None
         found = summed_up(self.case, self.reference, points)
         missing = len(self.cells) - len(points)
