@@ -141,6 +141,12 @@ def in_words(effects: Mapping[str, float], names: Any = None) -> list[str]:
     return _phrases(shown, effects)
 
 
+def names_told(effects: Mapping[str, float]) -> tuple[str, ...]:
+    """The names of what the game compares."""
+    found = (word.partition(" ")[2] for word in effects if word.partition(" ")[0] in OF_GAME)
+    return tuple(name.removeprefix("at ") for name in found)
+
+
 def told(effects: Mapping[str, float]) -> list[str]:
     """A phrase for each value that the game compares, noticed or not."""
     return _phrases({word: effects[word] for word in effects if word.partition(" ")[0] in OF_GAME}, effects)
