@@ -32,7 +32,7 @@ MOST_REFINED = 2  # refinements of a reference at most
 EFFORTS = 3
 LESS_REPEATS = (1, 8)
 STEPS_AROUND = ((4, 2), (16, 4))
-FEWEST_SEEDS = 3  # of a game
+FEWEST = 3  # repeats of a game: keys that were recorded in steps fit the first start phase too well
 LESS_FINE = (2, 4)
 FEWER_SEEDS = (2, 8)
 ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
@@ -151,7 +151,7 @@ class Case:
             near = [dt for dt in steps if 0.99 * own / down < dt < 1.01 * own * up]
             fits = own <= steps[0]
             steps = tuple(sorted({*near, *[own] * fits}, reverse=True)) or steps[:2]
-        least = FEWEST_SEEDS if self.kind == CHAOTIC and self.subject.names else 1
+        least = FEWEST if self.subject.names else 1
         repeats = self.repeats if "repeats" in self.given else min(self.repeats, max(least, LESS_REPEATS[effort]))
         case = self.replace(
             steps=steps, repeats=repeats, refinements=effort, fineness=min(self.fineness, LESS_FINE[effort]),

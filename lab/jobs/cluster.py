@@ -60,9 +60,8 @@ class Cluster(Pool):
     def submit(self, workers: int, message: bytes) -> Future[Any]:
         """Hand a task to a worker."""
         del workers
-        if self._executor is None:
-            self._executor = self._client.get_executor(pure=False)
-        return self._executor.submit(run_message, message, self.folder)
+        executor = self._executor = self._executor or self._client.get_executor(pure=False)
+        return executor.submit(run_message, message, self.folder)
 
     def end(self) -> None:
         """Cancel what is waiting; the workers stay."""

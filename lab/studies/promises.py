@@ -1,4 +1,4 @@
-"""Promises kept? What `carom trade` prints of a file is measured again with nothing but a world and a clock.
+"""Promises kept? What `carom trade` and `tune` print of a file is measured again with nothing but a world and a clock.
 
 No code of the laboratory that measures is used. Other start phases, other seeds, another reference: one method with
 steps far below those that were tried.
@@ -34,6 +34,11 @@ PHASES = [1 - (k + 0.5) / 8 for k in range(8)]
 SEEDS = range(700, 706)
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "us": 1e-6, "ms": 1e-3, "s": 1.0}
 FACTOR = 2.0
+TUNED = {  # what tune is asked for
+    "survivors": ("--norm", "kills", "--max-error", "0.05"),
+    "platformer": ("--norm", "hero", "--max-error", "0.01"),
+    "pool": ("--norm", "ball 0", "--max-error", "0.01"),
+}
 LENGTH = r"(less than )?([\d.e+-]+) (mm|cm|m)"
 
 
@@ -62,10 +67,12 @@ class Kept:
 
 @dataclass(frozen=True)
 class Played:
-    """A run: what the game compares at its end, and the deepest overlap of boxes in its second half."""
+    """A run: what the game compares at its end, the deepest overlap of boxes in its second half, and how far a body
+    gets from where it was seen first."""
 
     values: dict[str, Any]
     sunk: float
+    reach: float
 
 
 class Game:
@@ -105,19 +112,26 @@ class Game:
 
 
 def _played(world: World, dt: float, seconds: float, compared: Callable[[World], dict[str, Any]]) -> Played:
+    start = dict(_places(world))
     world.step()
     world.settings = world.settings.replace(dt=dt)
-    sunk, every = 0.0, max(int(seconds / dt / 400), 1)
+    sunk, reach, every = 0.0, 0.0, max(int(seconds / dt / 400), 1)
     while seconds - world.time > 1.000001 * dt:
         world.step()
-        if world.time > seconds / 2 and world.step_count % every == 0:
-            sunk = max(sunk, deepest(world))
+        if world.step_count % every == 0:
+            reach = max(float(np.linalg.norm(place - start.setdefault(e, place))) for e, place in _places(world))
+            sunk = max(sunk, deepest(world)) if world.time > seconds / 2 else 0.0
     rest = seconds - world.time
     if rest > 1e-9:
         world.settings = world.settings.replace(dt=min(rest, dt))
         world.step()
     values = {name: None if value is None else np.array(value, float) for name, value in compared(world).items()}
-    return Played(values, sunk)
+    return Played(values, sunk, reach)
+
+
+def _places(world: World) -> list[tuple[int, Any]]:
+    dynamic = world.bodies.dynamic
+    return list(zip(dynamic.entity.tolist(), np.array(dynamic.position), strict=True))
 
 
 def deepest(world: World) -> float:
@@ -139,9 +153,15 @@ def promises(text: str) -> Iterator[tuple[str, str, str]]:
     """(settings, "cost" or "cost of" another, words) and (settings, "error", words) of the last answer in the text."""
     answer = text[text.rindex(": use Settings") :].partition("\n\n")[0].splitlines()
     use = answer[0].split("use ", 1)[1].removesuffix(" (as it has now)")
+    norm = ""
     for line in answer[1:]:
         name, _, words = line.strip().partition(" ")
         words = words.strip()
+        norm = words.partition(" allowed, in ")[2] or norm
+        if name in ("cheaper", "else") and "times the work, error " in words:
+            other, _, words = words.partition("): ")
+            yield f"{other})", "error", f"{words.partition('error ')[2]} of the 0 allowed, in {norm}"
+            continue
         if name in ("cost", "error"):
             yield use, name, words
         elif name in ("now", "cheaper", "better"):
@@ -161,6 +181,10 @@ def kept(name: str, game: Game, settings: str, what: str, words: str) -> Iterato
     if what.startswith("cost of "):
         other = eval(what.removeprefix("cost of "), {"Settings": Settings})
         yield Kept(name, settings, "times the cost", float(words), game.cost(chosen) / game.cost(other))
+        return
+    if found := re.fullmatch(r"([\d.e+-]+) % of the .+ allowed, in (.+)", words):
+        number, norm = found.groups()
+        yield Kept(name, settings, f"{norm}: error", float(number) / 100, _error(game, chosen, norm))
         return
     for phrase in re.split(r"; (?!one game)", words):
         if found := re.match(r"(.+): ([\d.e+-]+) on average instead of ([\d.e+-]+)", phrase):
@@ -190,6 +214,25 @@ def _apart(game: Game, chosen: Settings, phase: float, own: str) -> float:
     return math.inf if right is None or mine is None else float(np.linalg.norm(mine - right))
 
 
+def _error(game: Game, chosen: Settings, norm: str) -> float:
+    """Relative to what the norm is relative to, in the worst phase; of a mean, with two standard errors of 3 seeds."""
+    if norm == "overlap":  # the boxes of these games are 1 m
+        return game.play(chosen).sunk
+    if norm.startswith("mean "):
+        own = norm.removeprefix("mean ")
+        mine, right = (
+            [float(game.play(settings, seed=seed).values[own]) for seed in SEEDS]
+            for settings in (chosen, Settings(**FINE_OF_SEEDS))
+        )
+        wrong = abs(np.mean(mine) - np.mean(right)) + 2 * np.std(mine, ddof=1) / math.sqrt(3)
+        return float(wrong / np.mean(right))
+    reference = game.play(Settings(**FINE))
+    if np.size(reference.values[norm]) > 1:
+        return max(_apart(game, chosen, phase, norm) for phase in PHASES) / reference.reach
+    right = float(reference.values[norm])
+    return max(abs(float(game.play(chosen, phase).values[norm]) - right) for phase in PHASES) / abs(right)
+
+
 def _means(
     name: str, game: Game, settings: str, chosen: Settings, own: str, mean: str, right: str
 ) -> Iterator[Kept]:
@@ -216,7 +259,7 @@ class Promises:
             for one in self.found
         ]
         headings = ("game", "settings", "promise", "printed", "again", "factor")
-        return TextTable("What carom trade prints, and the same measured again", headings, rows, words=3)
+        return TextTable("What carom trade and tune print, and the same measured again", headings, rows, words=3)
 
     def remarks(self) -> list[str]:
         """How many hold."""
@@ -230,27 +273,32 @@ class Promises:
         ]
 
 
+def _printed(command: str, path: Path, budget: float, printed: Path | None) -> str:
+    """What the command says of that file: now, or before."""
+    if printed is not None:
+        return (printed / f"{path.stem}-{command}.txt").read_text(encoding="utf-8")
+    asked = TUNED.get(path.stem, ("--max-error", "0.01")) if command == "tune" else ()
+    line = [sys.executable, "-m", "carom", command, str(path), "--budget", str(budget), *asked]
+    return subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
 @click.command("promises", short_help="What `carom trade` promises of files, measured again by other means.")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True))
 @budget_option
-@click.option("--printed", type=click.Path(path_type=Path), help="A folder of FILE.txt, printed before.")
+@click.option("--printed", type=click.Path(path_type=Path), help="A folder of FILE-trade.txt, FILE-tune.txt.")
 @shown_options
 def promises_command(
     files: tuple[Path, ...], budget: float, printed: Path | None, as_json: bool, as_markdown: bool, into: Path | None
 ) -> None:
-    """Run `carom trade` on each file, then recompute what its answer promises."""
+    """Run `carom trade` and `tune` on each file, then recompute what their answers promise."""
     output = Output.checked(MARK, as_json, as_markdown, into, None)
     found: list[Kept] = []
     for path in files:
-        if printed is None:
-            command = [sys.executable, "-m", "carom", "trade", str(path), "--budget", str(budget)]
-            text = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
-        else:
-            text = (printed / f"{path.stem}.txt").read_text(encoding="utf-8")
         game = Game(path)
-        for settings, what, words in promises(text):
-            for one in kept(path.stem, game, settings, what, words):
-                found.append(one)
-                click.echo(f"{one.file}, {one.settings}: {one.promise} {one.printed:.3g}, {one.again:.3g}", err=True)
+        for command in ("trade", "tune"):
+            for settings, what, words in promises(_printed(command, path, budget, printed)):
+                for one in kept(path.stem, game, settings, what, words):
+                    found.append(one)
+                    click.echo(f"{path.stem}: {one.promise} {one.printed:.3g}, {one.again:.3g}", err=True)
     result = Promises(list(dict.fromkeys(found)))
     output.show(result, [result.table()], result.remarks())

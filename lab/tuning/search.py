@@ -23,13 +23,15 @@ from ..cases.case import EFFORTS, Case, case_of
 from ..commands.usage_errors import Problem
 from ..engines.cost import WEIGHTS
 from ..jobs.result_store import Store
-from ..jobs.runs import OutOfTimeError, Runs, known_points, points_of, refined_reference
+from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, points_of, refined_reference
+from ..jobs.tasks import Task, bare_cost
 from ..jobs.workers import Pool
 from ..measure.norms import norm_of
+from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
 from ..trading.records import TRUSTED, Cell, Point, Reference
-from ..trading.trade import RUNNING, Only
+from ..trading.trade import RUNNING, TURNS, Only
 
 BELOW = 16  # a method's step is at least the smallest step of the case over this
 MOST_REPEATS = 400  # of a noisy statistic
@@ -225,6 +227,10 @@ class _Search:
             held = held or self._held_once()
         held.sort(key=lambda point: point.work)
         case = self.case
+        if held and self.runs.until < math.inf and self.runs.stopped in ("", OUT_OF_TIME):
+            costs = [bare_cost(Task(case, held[0].cell, 0)) for _ in range(TURNS)]  # the first was beside other runs
+            if any(costs):
+                held[0].milliseconds = Spread.of([min(filter(None, costs))])
         return Tuning(
             case.subject.name, self.norm.name, self.norm.text, self.target, self.scale, case.seconds, case.repeats,
             case.repeated, self.reference, case.survey.settings, len(self.methods), case, held[0] if held else None,
