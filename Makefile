@@ -5,7 +5,7 @@
 #   make coverage: which lines they run
 #   make wheel   a wheel that carries compiled kernels, into dist/
 #   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
-#   make figures measure again what the tables and charts of docs/accuracy.md, limits.md, settings.md and levels.md show
+#   make figures measure again what the tables and charts of docs/tables show
 
 PYTHON ?= python3
 SCENE ?= asteroids
@@ -72,16 +72,17 @@ ACCURACY := spring orbit jump bouncing stack thermal_gas
 
 figures: $(BENCH)
 	for scene in $(ACCURACY); do \
-	  $(BIN)/carom trade $$scene --thorough --against pymunk --out out/$$scene --into docs/accuracy.md || exit 1; \
+	  $(BIN)/carom trade $$scene --thorough --against pymunk --out out/$$scene --into docs/tables/accuracy.md || exit 1; \
 	done
-	$(BIN)/carom trade billiards --thorough --out out/billiards --into docs/accuracy.md
+	$(BIN)/carom trade billiards --thorough --out out/billiards --into docs/tables/accuracy.md
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
-	$(STUDIES) limits --long --into docs/limits.md --out docs/pictures
-	$(STUDIES) limits --pairs --into docs/limits.md
-	$(STUDIES) settings --into docs/settings.md
-	$(STUDIES) settings --games --into docs/settings.md
-	$(STUDIES) geometry --into docs/levels.md --out docs/pictures
+	$(STUDIES) limits --long --into docs/tables/limits.md --out docs/pictures
+	$(STUDIES) limits --pairs --into docs/tables/limits.md
+	$(STUDIES) settings --into docs/tables/settings.md
+	$(STUDIES) settings --games --into docs/tables/settings.md
+	$(STUDIES) promises $(foreach game,pool platformer crates survivors,examples/games/$(game).py) --into docs/tables/trade.md
+	$(STUDIES) geometry --into docs/tables/levels.md --out docs/pictures
 
 # Checkers and editors do not follow the import hooks of an editable install; they follow links.
 ide:

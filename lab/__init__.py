@@ -9,6 +9,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .inputs import Inputs
     from .limits.step_length import step_limits, suggest_dt
     from .trading.records import Trade
     from .trading.trade import Only, trade
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "NothingMeetsError": "tuning.search",
+    "Inputs": "inputs",
     "Only": "trading.trade",
     "Trade": "trading.records",
     "Tuning": "tuning.search",
@@ -29,6 +31,7 @@ _MODULES = {
 }
 
 __all__ = [
+    "Inputs",
     "NothingMeetsError",
     "Only",
     "Trade",

@@ -110,7 +110,8 @@ class Game(RuleBasedStateMachine):
         self.d, self.touching, self.kept, self.spoiled, self.raises = d, set(), [], {}, False
         self.folder = tempfile.TemporaryDirectory()
         self.gravity = tuple(-gravity * (k == 1) for k in range(d))
-        self.enter(World(Physics(d, self.gravity), settings=Settings(collision=mode, sleeping=sleeping, on_fault="ignore")))
+        chosen = Settings(collision=mode, sleeping=sleeping, on_fault="ignore")
+        self.enter(World(Physics(d, self.gravity), settings=chosen))
         half = np.where(np.arange(d) == 1, 0.5, 6.0)
         self.world.create_entity(Transform(-4.0 * (np.arange(d) == 1)), AABBCollider(half, friction=0.5))
 

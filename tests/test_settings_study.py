@@ -41,7 +41,7 @@ from carom.systems.contacts.resting import OWN_SAG
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
-PAGE = Path(__file__).parent.parent / "docs" / "settings.md"
+PAGE = Path(__file__).parent.parent / "docs" / "tables" / "settings.md"
 EVERY = {(varied.field, varied.scene): varied for varied in VARIED}
 
 

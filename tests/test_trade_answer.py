@@ -9,7 +9,7 @@ import pytest
 
 from carom.lab.measure.effects import in_words, metres, noticed, severity
 from carom.lab.measure.timing import Spread
-from carom.lab.trading.answer import answer, recommended
+from carom.lab.trading.answer import answer, clearly_worse, recommended
 from carom.lab.trading.records import Cell, ErrorBar, Point
 
 OWN = Cell(1 / 60)
@@ -44,8 +44,8 @@ def test_the_cheapest_of_which_nothing_is_noticed_and_its_neighbours(case):
         "  now      Settings(dt=0.01667): 2 times the cost; noticed: nothing; error 8 mm",
         "  cheaper  Settings(dt=0.06667): 0.5 times the cost; noticed: entity 7 ends 30 cm from where it should",
         "  better   Settings(dt=0.008333): 4 times the cost; noticed: nothing; error 1 mm",
-        "  known    from 4 runs of 10 s with 4 settings, 1 of 4 start phases; 3 settings not tried yet; the same "
-        "command goes on, --thorough does it all",
+        "  known    from 4 runs of 10 s with 4 settings, 1 of 4 start phases with these; 3 settings not tried "
+        "yet; the same command goes on, --thorough does it all",
     ]
 
 
@@ -92,3 +92,12 @@ def test_lengths():
     assert [metres(size) for size in (1e-9, 0.00042, 0.0123, 0.5, 12.345)] == [
         "less than 0.001 mm", "0.42 mm", "1.2 cm", "50 cm", "12.3 m",
     ]  # fmt: skip
+
+
+def test_what_is_clearly_worse_at_no_less_cost_is_not_run_again():
+    points = [
+        point(1 / 30, 10.0, place=0.005), point(1 / 60, 20.0, place=0.04), point(1 / 90, 20.0, place=0.06),
+        point(1 / 20, 5.0, place=5.0), dataclasses.replace(point(1 / 120, 30.0), failures={"tunnelled": 1}),
+        dataclasses.replace(point(1 / 15, 4.0), failures={"tunnelled": 1}),
+    ]  # fmt: skip
+    assert {round(1 / cell.dt) for cell in clearly_worse(points)} == {90, 120}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..commands.usage_errors import Problem
-from ..measure.norms import NORMS, OF_KIND, norm_named
+from ..measure.norms import MEAN, NORMS, OF_KIND, check_norm, norm_of
 from ..measure.observation import Seen
 from ..measure.survey import Survey, survey
 from ..trading.records import CAROM, CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
@@ -32,6 +32,7 @@ MOST_REFINED = 2  # refinements of a reference at most
 EFFORTS = 3
 LESS_REPEATS = (1, 8)
 STEPS_AROUND = ((4, 2), (16, 4))
+FEWEST = 3  # repeats of a game: keys that were recorded in steps fit the first start phase too well
 LESS_FINE = (2, 4)
 FEWER_SEEDS = (2, 8)
 ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
@@ -63,13 +64,14 @@ KNOWN: Mapping[str, Known] = {
     # Semi-implicit Euler is velocity Verlet shifted by half a step (Hairer, Lubich, Wanner: Geometric Numerical
     # Integration, VI.3). At the perihelion, the start, that shift changes no energy, and after whole orbits no length.
     "orbit": Known(
-        20 * math.pi, ("position", "energy"), 1, _halved(2 * math.pi / 100, 8),
+        20 * math.pi,
+        ("position", "energy"),
+        1,
+        _halved(2 * math.pi / 100, 8),
         orders=(("semi_implicit_euler", "position", 2.0),),
     ),
     # As published: 49 balls, 20 s, these steps.
-    "bouncing": Known(
-        20.0, ("energy_square", "position", "energy"), 4, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)
-    ),
+    "bouncing": Known(20.0, ("energy_square", "position", "energy"), 4, (0.1, 0.04, 0.01, 0.004, 0.001), (("n", 49),)),
     "oblique": Known(3.0, ("position", "energy", "impact_time"), steps=_halved(0.8, 6)),
     "stack": Known(5.0, ("overlap", "overlap_mean", "speed", "drift"), 1, _halved(1 / 30, 6)),
     "billiards": Known(1.0, steps=_halved(1 / 30, 6)),
@@ -125,6 +127,8 @@ class Case:
         for integrator, name, order in self.orders:
             if (cell.engine, cell.integrator, name) == (CAROM, integrator, norm):
                 return order
+        if self.subject.names:  # its systems act in each step
+            return None
         return grids.theory(cell, norm, self.survey)
 
     def phase(self, repeat: int) -> float:
@@ -147,13 +151,14 @@ class Case:
             near = [dt for dt in steps if 0.99 * own / down < dt < 1.01 * own * up]
             fits = own <= steps[0]
             steps = tuple(sorted({*near, *[own] * fits}, reverse=True)) or steps[:2]
-        repeats = self.repeats if "repeats" in self.given else min(self.repeats, LESS_REPEATS[effort])
+        least = FEWEST if self.subject.names else 1
+        repeats = self.repeats if "repeats" in self.given else min(self.repeats, max(least, LESS_REPEATS[effort]))
         case = self.replace(
             steps=steps, repeats=repeats, refinements=effort, fineness=min(self.fineness, LESS_FINE[effort]),
             ensemble=min(self.ensemble, FEWER_SEEDS[effort]),
         )  # fmt: skip
         if self.reference_cells and self.kind == CHAOTIC:
-            fine = max(self.reference_cells[0].dt, own / (effort + 1))
+            fine = max(self.reference_cells[0].dt, own / (effort + 1 + bool(self.subject.names)))
             return case.replace(reference_cells=tuple(
                 dataclasses.replace(cell, dt=fine) for cell in self.reference_cells
             ))  # fmt: skip
@@ -199,10 +204,14 @@ def case_of(
     check_arguments(norms, seconds, repeats, steps)
     known = KNOWN.get(target, Known()) if isinstance(target, str) else Known()
     subject = subject_of(target, {**dict(known.options), **(options or {})}, seed)
+    for name in norms:
+        check_norm(name, subject.names)
     duration = seconds or known.seconds or subject.recommended[0]
     facts = survey(subject, duration)
     kind = facts.kind
-    chosen = tuple(norms) or known.norms or OF_KIND[kind]
+    chosen = tuple(norms) or known.norms or subject.names or OF_KIND[kind]
+    if kind == CHAOTIC:
+        chosen = _statistics(subject, chosen, facts)
     ladder = _fitting(steps or known.steps or grids.steps_for(facts), duration)
     form, reference = _closed_form(subject, duration, kind, chosen)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
@@ -210,11 +219,11 @@ def case_of(
     times = repeats or known.repeats or _repeats(kind, chosen)
     found = Case(
         subject, facts, kind, facts.why, chosen, duration, times, ladder, form, reference,
-        () if reference is not None else _own_references(facts, ladder),
+        () if reference is not None else _own_references(facts, ladder, bool(subject.names)),
         known.orders if duration == known.seconds else (), fineness=FINER, ensemble=ENSEMBLE,
         given=tuple(name for name, value in (("steps", steps), ("repeats", repeats)) if value),
     )  # fmt: skip
-    if kind == CHAOTIC and not facts.contacts:
+    if kind == CHAOTIC and not facts.contacts and not subject.names:
         raise Problem(
             f"{subject.name} is chaotic: {facts.why}. No body can be compared with itself after {duration:g} s, and "
             f"without contacts there is no pressure or rate to measure instead: take a shorter time"
@@ -231,14 +240,24 @@ def case_of(
     return found
 
 
+def _statistics(subject: Subject, norms: Sequence[str], facts: Survey) -> tuple[str, ...]:
+    """The norms, with means over the seeds of what a game compares; Problem if it compares places only."""
+    places = [name for name in subject.names if len(facts.trial.values.get(name, ())) > 1]
+    found = tuple(name if name in NORMS else MEAN + name for name in norms if name not in places)
+    if not found:
+        raise Problem(
+            f"{subject.name} is chaotic: {facts.why}, so {', '.join(places)} would measure chance: let compared give "
+            "numbers too, such as counts, times or scores"
+        )
+    return found
+
+
 def check_arguments(
     norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None, steps: Sequence[float] = ()
 ) -> None:
     """Raise ValueError, TypeError or Problem for arguments that no case can have."""
     if isinstance(norms, str):
         raise TypeError(f"norms must be a sequence of names, got {norms!r}")
-    for name in norms:
-        norm_named(name)
     for name, numbers in (("seconds", () if seconds is None else (seconds,)), ("steps", steps)):
         for number in numbers:
             good = isinstance(number, (int, float)) and not isinstance(number, bool)
@@ -273,16 +292,18 @@ def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[st
     world = subject.world(None)
     seen = form.function(world, seconds)
     world.close()
-    return (form.text, seen) if all(NORMS[name].is_usable_with(seen) for name in norms) else ("", None)
+    return (form.text, seen) if all(norm_of(name).is_usable_with(seen) for name in norms) else ("", None)
 
 
-def _own_references(facts: Survey, ladder: Sequence[float]) -> tuple[Cell, ...]:
+def _own_references(facts: Survey, ladder: Sequence[float], steered: bool) -> tuple[Cell, ...]:
     """Two methods that share as little as possible, with steps far below the smallest one measured. Unless the scene is
-    chaotic, also the first method with twice that step, to detect errors that both methods share."""
+    chaotic, also the first method with twice that step, to detect errors that both methods share. steered: the systems
+    of a game act in each step."""
     own = facts.settings
     fine = ladder[-1] / FINER
     if facts.kind == CHAOTIC:  # long runs; without forces the step does not affect the paths
-        fine = ladder[0] / 2 if not facts.forces and not facts.damping else ladder[-1]
+        free = not (facts.forces or facts.damping or steered)
+        fine = ladder[0] / 2 if free else ladder[-1]
         pairs = (("velocity_verlet", "event_driven"), ("velocity_verlet", "continuous"))
     elif facts.force_systems and not facts.contacts:
         pairs = (("yoshida4", own.collision), ("rk4", own.collision))

@@ -20,6 +20,7 @@ from typing import Any
 from ... import scenes
 from ...framework import Settings, World
 from ..commands.loading import Loaded, load
+from ..inputs import texts_read
 
 DEFAULT_SECONDS = 5.0  # if the subject does not define it
 
@@ -49,11 +50,24 @@ class Subject:
     @property
     def _loaded(self) -> Loaded:
         if self.build is not None:
-            return Loaded(self.name, functools.partial(self.build, **dict(self.options)))
+            build = functools.partial(self.build, **dict(self.options))
+            return Loaded(self.name, build, compared=getattr(self.build, "compared", None))
         loaded = _load_once(self.target)
         if not self.options:
             return loaded
         return dataclasses.replace(loaded, function=functools.partial(loaded.function, **dict(self.options)))
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of what the game says is compared; none for a scene."""
+        if self._loaded.compared is None:
+            return ()
+        with contextlib.closing(self.world(None)) as world:
+            return tuple(self.values_of(world))
+
+    def values_of(self, world: World) -> dict[str, list[float]]:
+        """What the game compares, now; see ``Loaded.values_of``."""
+        return self._loaded.values_of(world)
 
     @property
     def recommended(self) -> tuple[float, Any]:
@@ -104,7 +118,7 @@ def _text_around(loaded: Loaded) -> str:
     places = {Path(found) for module in modules if (found := getattr(module, "__file__", None))} | loaded.siblings.files
     near = {place for place in places if place.is_relative_to(file.parent) and "site-packages" not in place.parts}
     sources = [place for place in sorted({file, *near}) if place.suffix == ".py" and place.is_file()]
-    return "".join(place.read_text(encoding="utf-8", errors="replace") for place in sources)
+    return "".join(place.read_text(encoding="utf-8", errors="replace") for place in sources) + texts_read()
 
 
 def _source_of(function: Any) -> str:

@@ -11,7 +11,7 @@ import importlib.util
 import inspect
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,10 +31,12 @@ Bounds = tuple[tuple[float, ...], tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Loaded:
-    """Something that builds worlds; ``seconds`` and ``view`` are None if not defined.
+    """Something that builds worlds; ``seconds``, ``view`` and ``compared`` are None if not defined.
 
     settings
         those that it recommends; None: not known before a world is built
+    compared
+        compared(world) -> dict: what a game is judged by
     """
 
     name: str
@@ -44,6 +46,7 @@ class Loaded:
     view: Bounds | None = None
     settings: Settings | None = None
     siblings: Siblings | None = None
+    compared: Any = None
 
     def build(
         self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
@@ -85,6 +88,28 @@ class Loaded:
         if world.dimensions is None:
             raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
         return world
+
+    def values_of(self, world: World) -> dict[str, list[float]]:
+        """What the game compares, now: numbers as lists of one (NaN for None), places as lists of coordinates."""
+        if self.compared is None:
+            return {}
+        with self.attribute_errors():
+            found = self.compared(world)
+        if not isinstance(found, Mapping):
+            raise Problem(f"{self.name}: compared must return a dict of names and values, not {found!r}")
+        values = {}
+        for name, value in found.items():
+            try:
+                numbers = np.atleast_1d(np.array(np.nan if value is None else value, float))
+            except (TypeError, ValueError):
+                numbers = np.zeros(0)
+            if numbers.shape not in ((1,), (world.dimensions,)):
+                raise Problem(
+                    f"{self.name}: compared must give a number, None or a place for each name, not {value!r} for "
+                    f"{name!r}"
+                )
+            values[str(name)] = numbers.tolist()
+        return values
 
     @contextmanager
     def attribute_errors(self) -> Iterator[None]:
@@ -170,7 +195,10 @@ def _load_file(path: Path) -> Loaded:
         raise Problem(f"{path.name} defines no build(settings, seed=0)")
     _check_signature(path, function)
     seconds, view = _seconds_of(path, module), _view_of(path, module)
-    return Loaded(path.name, function, path.resolve(), seconds, view, Settings(), siblings)
+    compared = getattr(module, "compared", None)
+    if compared is not None and not callable(compared):
+        raise Problem(f"{path.name}: compared must be a function, compared(world) -> dict, not {compared!r}")
+    return Loaded(path.name, function, path.resolve(), seconds, view, Settings(), siblings, compared)
 
 
 def _check_source(path: Path) -> None:

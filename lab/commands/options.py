@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections.abc import Callable, Iterable
@@ -11,7 +12,6 @@ from typing import Any
 import click
 
 from ..cases.grid import COLLISIONS
-from ..measure.norms import norm_named
 from .choices import parse_assignments
 from .usage_errors import Problem, did_you_mean
 
@@ -154,10 +154,6 @@ def writable_folder(folder: Path, option: Path | None = None) -> None:
 # -- what is measured -------------------------------------------------------------------------------------------
 
 
-def _norm(name: str) -> str:
-    return norm_named(name).name
-
-
 def _seconds(value: float) -> float:
     if not (math.isfinite(value) and value > 0):
         raise Problem(f"--seconds takes a number above 0, not {value:g}")
@@ -198,7 +194,7 @@ def _number_or_word(text: str) -> int | float | str:
 
 case_options = together(
     click.option(
-        "--norm", "norms", multiple=True, metavar="NAME", callback=lambda c, p, names: tuple(map(_norm, names)),
+        "--norm", "norms", multiple=True, metavar="NAME",
         help="What the error is the error of; repeatable, the first counts (default: what suits the scene).",
     ),
     click.option(
@@ -249,6 +245,17 @@ def _budget(value: float) -> float:
     return value
 
 
+def workers_of(workers: int | None, cluster: str | None) -> contextlib.AbstractContextManager[Any]:
+    """What performs the runs, for the time of a command: a number of processes, or a cluster."""
+    if cluster is None:
+        return contextlib.nullcontext(workers)
+    if workers is not None:
+        raise Problem("--workers and --cluster exclude each other")
+    from ..jobs.cluster import Cluster
+
+    return Cluster(cluster)
+
+
 budget_option = click.option(
     "--budget", type=float, metavar="S", default=60.0, show_default=True, callback=_read(_budget),
     help="Seconds to spend; what is known by then is the answer.",
@@ -257,6 +264,7 @@ runs_options = together(
     budget_option,
     click.option("--thorough", is_flag=True, help="Everything, however long it takes."),
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
+    click.option("--cluster", metavar="ADDRESS", help="Run on the workers of this dask.distributed scheduler."),
     click.option(
         "--runs", "kept", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
         default=Path("out/runs.sqlite"), show_default=True, help="Finished runs are kept here, and used again.",

@@ -82,6 +82,7 @@ def run_command(
     if steps is None:
         steps = _steps_for(loaded, seconds, world.settings.dt)
     finished = _run_with_progress(loaded, world, steps, number, screen, profile)
+    finished.report.compared = loaded.values_of(finished.world)
     if draw is not None:
         with screen.status("drawing ..."):
             finished.report.pictures = _pictures(draw, finished, out, loaded)

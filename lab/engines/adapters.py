@@ -20,24 +20,26 @@ from .cost import counts_of
 from .pymunk_space import PymunkSpace
 from .quality import overlaps
 
-
-class ComesAndGoesError(ValueError):
-    """Bodies were created or deleted during the run."""
+MOST_TOUCHES = 400  # pairs whose first contact is kept
 
 
 class Engine(ABC):
-    """A running scene. Bodies are the dynamic ones, ascending by entity id.
+    """A running scene. Bodies are the dynamic ones there are, ascending by entity id, which is the order of creation.
 
     After a step: ``impulse`` N s on static bodies, ``times`` s of the impacts of the step, ``struck`` (n,) true for
     bodies that have had an impact or a contact since the start. ``spent`` s on the clock of ``measure.timing`` for
-    ``timed_seconds`` simulated ones: steps that neither compiled nor loaded kernels.
+    ``timed_seconds`` simulated ones: steps that neither compiled nor loaded kernels. ``created``: bodies that came
+    since the start; ``fixed``: none came or went. ``touches``: pairs of entities and the time of their first contact,
+    in this order; ``met``: one was of solid bodies.
     """
 
     def __init__(self, world: World) -> None:
         self.world = world
-        dynamic = world.bodies.dynamic
-        self._order = np.argsort(dynamic.entity, kind="stable")
-        self.ids = np.array(dynamic.entity)[self._order]
+        self._rows_then = np.array(world.bodies.dynamic.entity)
+        self._order = np.argsort(self._rows_then, kind="stable")
+        self.ids = self._rows_then[self._order]
+        self.created, self.fixed, self.met = 0, True, False
+        self.touches: dict[tuple[int, int], float] = {}
         self.enclosure = Enclosure.around(world)
         self.impulse = 0.0
         self.times: list[float] = []
@@ -59,16 +61,25 @@ class Engine(ABC):
             self.spent += seconds
             self.timed_seconds += dt
 
+    def follow(self) -> None:
+        """Take up which bodies there are now."""
+        rows = np.asarray(self.world.bodies.dynamic.entity)
+        if len(rows) == len(self._rows_then) and (rows == self._rows_then).all():
+            return
+        self._rows_then = rows.copy()
+        self._order = np.argsort(rows, kind="stable")
+        ids = rows[self._order]
+        if len(ids) != len(self.ids) or (ids != self.ids).any():
+            self.fixed = False
+            self.created += len(np.setdiff1d(ids, self.ids, assume_unique=True))
+            self.struck = carried(self.struck, self.ids, ids, np.zeros(len(ids), bool))
+            self.ids = ids
+
     @property
     def position(self) -> Floats:
-        """A copy, (n, d); ComesAndGoesError if the bodies are not those of the start."""
-        dynamic = self.world.bodies.dynamic
-        order = self._order
-        if len(dynamic) != len(order) or (np.asarray(dynamic.entity)[order] != self.ids).any():
-            order = self._order = np.argsort(dynamic.entity, kind="stable")
-            if len(order) != len(self.ids) or (np.asarray(dynamic.entity)[order] != self.ids).any():
-                raise ComesAndGoesError("bodies come and go in this scene, so there is no body to compare with itself")
-        return np.array(dynamic.position)[order]
+        """A copy, (n, d)."""
+        self.follow()
+        return np.array(self.world.bodies.dynamic.position)[self._order]
 
     @property
     def velocity(self) -> Floats:
@@ -84,6 +95,7 @@ class Engine(ABC):
     @abstractmethod
     def overlaps(self) -> Floats:
         """(k,) depths of the overlapping pairs, in sizes of the smaller body."""
+
     @cached_property
     def sizes(self) -> dict[int, float]:
         """The smallest extent of each entity that has a built-in shape."""
@@ -118,17 +130,34 @@ class CaromEngine(Engine):
             world.settings = world.settings.replace(dt=dt)
         before = world.time
         self._timed(world.step, dt)
+        self.follow()
         contacts = world.contacts
+        self._note_touches(before)
         self.impulse, self.times = 0.0, []
         if len(contacts):
             a, b = self._rows(contacts.entity_a), self._rows(contacts.entity_b)
             solid = self._solid()
+            self.met |= bool(solid.any())
             self.struck[a[(a >= 0) & solid]] = True
             self.struck[b[(b >= 0) & solid]] = True
             self.impulse = float(contacts.normal_impulse[(a < 0) | (b < 0)].sum())
         impacts = contacts.impacts
         if len(impacts):
             self.times = (before + np.sort(impacts.time_of_impact)).tolist()
+
+    def _note_touches(self, before: float) -> None:
+        """Keep which pairs have touched for the first time, and when."""
+        contacts = self.world.contacts
+        if not len(contacts.begin) and not len(contacts.impacts):
+            return
+        if len(self.touches) >= MOST_TOUCHES:
+            return
+        impacts, begin = contacts.impacts, contacts.begin
+        times = (before + np.asarray(impacts.time_of_impact)).tolist()
+        found = list(zip(times, impacts.entity_a.tolist(), impacts.entity_b.tolist(), strict=True))
+        found += [(self.time, a, b) for a, b in zip(begin.entity_a.tolist(), begin.entity_b.tolist(), strict=True)]
+        for time, a, b in sorted(found):
+            self.touches.setdefault((min(a, b), max(a, b)), time)
 
     def _rows(self, entities: Any) -> np.ndarray:
         """The rows of the entities in the body arrays; -1 for static bodies."""
@@ -234,6 +263,13 @@ class PymunkEngine(Engine):
             "impacts": float(self._impacts),
             "solver_loops": float(self._pairs * self._iterations),
         }
+
+
+def carried(values: Any, old: Any, new: Any, start: Any) -> Any:
+    """``start`` (n, ...) for the ids ``new``, with the ``values`` of those that were among ``old``; both ascending."""
+    _, mine, theirs = np.intersect1d(new, old, assume_unique=True, return_indices=True)
+    start[mine] = values[theirs]
+    return start
 
 
 def engine_for(world: World, engine: str, iterations: int) -> Engine:

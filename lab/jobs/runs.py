@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
-import statistics
 import time
 import weakref
 from collections.abc import Callable, Iterable, Sequence
@@ -13,13 +12,14 @@ from collections.abc import Callable, Iterable, Sequence
 from ..cases.case import Case
 from ..commands.usage_errors import Problem
 from ..engines.cost import work_of
-from ..measure.norms import NORMS, OF_KIND, conserves, errors_of
-from ..measure.observation import Seen
+from ..measure.effects import at_worst
+from ..measure.norms import NORMS, OF_KIND, conserves, errors_of, norm_of
+from ..measure.observation import Seen, mean_of
 from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CHAOTIC, CUT, Cell, ErrorBar, Outcome, Point, Reference
 from .result_store import Store
-from .tasks import Task, mean_of, outcome_of, perform, stopped
+from .tasks import Task, outcome_of, perform, stopped
 from .workers import Lost, Pool, in_parallel
 
 FEW_SECONDS = 4.0  # of work in all: less takes not much longer than starting workers
@@ -35,7 +35,7 @@ class OutOfTimeError(Exception):
 
 
 class Runs:
-    """Performs tasks with ``workers`` processes; finished runs are kept in the store.
+    """Performs tasks with ``workers`` processes, or those of a Pool; finished runs are kept in the store.
 
     until
         on ``time.monotonic``: afterwards nothing runs, and :meth:`all` raises OutOfTimeError; so it does after Ctrl-C
@@ -45,9 +45,12 @@ class Runs:
     """
 
     def __init__(
-        self, workers: int | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
+        self, workers: int | Pool | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
         until: float = math.inf, stoppable: bool = False,
     ) -> None:  # fmt: skip
+        self._pool = workers if isinstance(workers, Pool) else Pool()
+        if isinstance(workers, Pool):
+            workers = max(getattr(workers, "size", 0), 2)
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
         self.workers, self.progress, self.until, self.stoppable = workers, progress, until, stoppable
@@ -56,7 +59,6 @@ class Runs:
         self.performed = 0
         self._store = Store() if store is None else store
         self._pace = PACE
-        self._pool = Pool()
         weakref.finalize(self, self._pool.end)
 
     def get(self, task: Task) -> Seen | None:
@@ -67,7 +69,8 @@ class Runs:
     def all(self, tasks: Iterable[Task], what: str) -> list[Seen]:
         """What all tasks showed, in order. OutOfTimeError if time is up before all are finished."""
         tasks = list(tasks)
-        missing = [dataclasses.replace(task, until=self.until) for task in tasks if task.key not in self._store]
+        until = self.until - time.monotonic() + time.time()
+        missing = [dataclasses.replace(task, until=until) for task in tasks if task.key not in self._store]
         total = sum(task.cost for task in tasks)
         left = sum(task.cost for task in missing)
         self.progress.begin(total, total - left)
@@ -129,8 +132,9 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
         raise Problem(f"{case.subject.name} has no reference: {failed[0]}")
     first, *others = seens
     case = _with_usable_norms(case, first)
-    apart = [errors_of(other, first, NORMS) for other in others]
-    agreement = {name: max(abs(errors[name]) for errors in apart) for name in NORMS}
+    names = (*NORMS, *case.norms)
+    apart = [errors_of(other, first, names) for other in others]
+    agreement = {name: max(abs(errors[name]) for errors in apart) for name in names}
     if conserves(first):
         agreement["energy"] = 0.0  # a conserved energy is known without a reference
     a, b, _ = case.reference_cells
@@ -167,14 +171,16 @@ def reference_tasks(case: Case) -> list[Task]:
 
 def _with_statistics(case: Case, one: list[Seen], other: list[Seen]) -> tuple[Case, Reference]:
     """The case with two ensembles as reference: if both are right, their means differ only by noise."""
-    seens, means = [*one, *other], (mean_of(one), mean_of(other))
-    both = mean_of(seens)
+    signed = [name for name, norm in NORMS.items() if norm.signed]
+    seens, means = [*one, *other], (mean_of(one, signed), mean_of(other, signed))
+    both = mean_of(seens, signed)
     case = _with_usable_norms(case, both)
     agreement, spread = {}, {}
     for name in case.norms:
-        values = [NORMS[name].measure(seen, both) for seen in seens]
-        agreement[name] = max(abs(NORMS[name].measure(mean, both)) for mean in means)
-        if NORMS[name].signed:
+        norm = norm_of(name)
+        values = [norm.measure(seen, both) for seen in seens]
+        agreement[name] = max(abs(norm.measure(mean, both)) for mean in means)
+        if norm.signed:
             bar = ErrorBar.of(values, signed=True)
             agreement[name] = max(agreement[name], bar.uncertainty)
             spread[name] = bar.uncertainty * len(values) ** 0.5
@@ -188,7 +194,7 @@ def _with_statistics(case: Case, one: list[Seen], other: list[Seen]) -> tuple[Ca
 
 def _with_usable_norms(case: Case, reference: Seen) -> Case:
     """The case with the norms that can be computed from the reference; Problem if there are none."""
-    usable = tuple(name for name in case.norms if NORMS[name].is_usable_with(reference))
+    usable = tuple(name for name in case.norms if norm_of(name).is_usable_with(reference))
     if not usable:
         others = ", ".join(name for name in OF_KIND[case.kind] if NORMS[name].is_usable_with(reference))
         raise Problem(
@@ -235,7 +241,7 @@ def point_of(outcomes: Sequence[Outcome]) -> Point:
             failures[outcome.failure] = failures.get(outcome.failure, 0) + 1
     names = list(good[0].errors) if good else []
     errors = {
-        name: ErrorBar.of([outcome.errors[name] for outcome in good], NORMS[name].signed) for name in names
+        name: ErrorBar.of([outcome.errors[name] for outcome in good], norm_of(name).signed) for name in names
     }
     counted = [outcome for outcome in outcomes if outcome.counts]
     counts = {
@@ -245,19 +251,5 @@ def point_of(outcomes: Sequence[Outcome]) -> Point:
     timed = [outcome.milliseconds for outcome in good if outcome.milliseconds is not None]
     return Point(
         outcomes[0].cell, len(outcomes), errors, failures, counts, work_of(counts), Spread.of(timed) if timed else None,
-        _worst_effects(good),
+        at_worst([outcome.effects for outcome in good]),
     )  # fmt: skip
-
-
-def _worst_effects(outcomes: Sequence[Outcome]) -> dict[str, float]:
-    """Each effect at its worst; energies, which have a sign and no worst, as their mean."""
-    found: dict[str, float] = {}
-    for outcome in outcomes:
-        for name, value in outcome.effects.items():
-            if name != "body" and abs(value) >= abs(found.get(name, 0.0)):
-                found[name] = value
-                if name == "place" and "body" in outcome.effects:
-                    found["body"] = outcome.effects["body"]
-    if "energy" in found:
-        found["energy"] = statistics.fmean(outcome.effects.get("energy", 0.0) for outcome in outcomes)
-    return found

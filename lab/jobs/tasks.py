@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import hashlib
 import math
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from ..engines.body_arrays import NotPlainError
 from ..measure.effects import effects_of
 from ..measure.norms import FAR, NORMS, errors_of, failure_of
 from ..measure.observation import Seen, observe
-from ..measure.survey import NUDGE, nudge
+from ..measure.survey import nudge
 from ..measure.timing import timed
 from ..measure.told_in_results import faults_in_results
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
@@ -31,7 +32,7 @@ FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds 
 
 @dataclass(frozen=True)
 class Task:
-    """One run. reference: it is one of the case's own references; until: when it is cut off, on ``time.monotonic``."""
+    """One run. reference: it is one of the case's own references; until: when it is cut off, on ``time.time``."""
 
     case: Case
     cell: Cell
@@ -75,7 +76,7 @@ def outcome_of(task: Task, seen: Seen, reference: Seen) -> Outcome:
     """The errors and effects of a run, against the reference."""
     kind = task.case.kind
     failure = failure_of(seen, None if kind == CHAOTIC else reference)
-    errors = {} if failure else errors_of(seen, reference, NORMS)
+    errors = {} if failure else errors_of(seen, reference, {**NORMS, **dict.fromkeys(task.case.norms)})
     effects = {} if failure else effects_of(seen, reference, kind)
     simulated = seen.simulated or seen.seconds
     return Outcome(
@@ -97,7 +98,8 @@ def bare_cost(task: Task) -> float | None:
     while len(passes) < PASSES[0] or (whole < BRIEF and len(passes) < PASSES[1]):
         with task.case.subject.attribute_errors(), contextlib.closing(world_of(task.case, task.cell, 0)) as world:
             spent = simulated = 0.0
-            left = max(int(task.case.seconds / task.cell.dt), 1)
+            world.step()  # the first one prepares what all others use
+            left = max(int(task.case.seconds / task.cell.dt) - 1, 1)
             while left:
                 count = min(BLOCK, left)
                 left -= count
@@ -122,7 +124,8 @@ def _observed(task: Task) -> Seen:
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled
             far = math.inf if case.kind == CHAOTIC else FAR * case.survey.trial.reach or math.inf
-            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, task.until)
+            until, values = task.until - time.time() + time.monotonic(), case.subject.values_of
+            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, until, values)
     finally:
         engine.close()
 
@@ -132,13 +135,15 @@ def world_of(case: Case, cell: Cell, repeat: int) -> World:
     seed = case.subject.seed + (repeat if case.kind == CHAOTIC else 0)
     world = case.subject.world(cell.settings(case.survey.settings), seed)
     if case.kind == CHAOTIC and not case.survey.seeded:
-        nudge(world, 1e3 * NUDGE * CaromEngine(world).size, repeat)
+        nudge(world, case.survey.nudge * CaromEngine(world).size, repeat)
     return world
 
 
 def engine_of(case: Case, cell: Cell, repeat: int) -> Engine:
     """An engine at the start of that repeat; Problem if pymunk cannot represent the scene."""
     if cell.engine == PYMUNK:
+        if case.subject.names or "order" in case.norms:
+            raise Problem(f"{case.subject.name} cannot be given to pymunk, which runs no systems and tells no order")
         cell_of_carom = dataclasses.replace(cell, integrator=case.survey.settings.integrator)
         world = world_of(case, cell_of_carom, repeat)
     else:
@@ -148,10 +153,3 @@ def engine_of(case: Case, cell: Cell, repeat: int) -> Engine:
     except NotPlainError as error:
         world.close()
         raise Problem(f"{case.subject.name} cannot be given to pymunk: {error}") from error
-
-
-def mean_of(seens: list[Seen]) -> Seen:
-    """The averaged statistics of several runs; all other fields are those of the first."""
-    signed = [name for name, norm in NORMS.items() if norm.signed]
-    means = {name: float(np.mean([getattr(seen, name) for seen in seens])) for name in signed}
-    return dataclasses.replace(seens[0], **means)

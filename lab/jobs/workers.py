@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, TypeVar
 
+from ..commands.usage_errors import one_line
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -63,6 +65,7 @@ class Pool:
     def __init__(self, executor: Callable[[int], Executor] = process_pool) -> None:
         self._make = executor
         self._executor: Executor | None = None
+        self.lost: tuple[type[Exception], ...] = ()  # raised for a task whose workers have died, after all tries
         self._others: set[Any] = set()
 
     def submit(self, workers: int, message: bytes) -> Future[Any]:
@@ -71,7 +74,7 @@ class Pool:
             self._others = set(multiprocessing.active_children())
             self._executor = self._make(workers)
         with _interrupts_held_back(), _main_hidden():
-            return self._executor.submit(_perform, message)
+            return self._executor.submit(run_message, message)
 
     def end(self) -> None:
         """Kill the processes at once."""
@@ -153,6 +156,9 @@ def _shared_out(
                     else:
                         yield tasks[index], Lost(tasks[index], f"its process ended {TRIES} times")
                     continue
+                except pool.lost as error:
+                    yield tasks[index], Lost(tasks[index], one_line(error))
+                    continue
                 if isinstance(result, Unknown):
                     logger.info("no worker can load task %d, it runs here: %s", index, result.reason)
                     result = function(tasks[index])
@@ -178,8 +184,10 @@ def _pickled(thing: Any) -> bytes | None:
         return None
 
 
-def _perform(message: bytes) -> Any:
-    """In a worker: one task."""
+def run_message(message: bytes, folder: str | None = None) -> Any:
+    """In a worker: one task. folder: the one in which its files are found."""
+    if folder is not None:
+        os.chdir(folder)
     try:
         function, task = pickle.loads(message)
     except (Exception, SystemExit) as error:  # imports user modules, which may raise anything

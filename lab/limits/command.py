@@ -71,6 +71,7 @@ def limits_command(
         with closing(build(None, variant)) as world:
             found = _watched(loaded, world, seconds, bar)
         build.__name__ = loaded.name
+        build.compared = loaded.compared  # type: ignore[attr-defined]
         outcome = outcome_of_steps(build, variant, seconds, budget, bar)
     _show(loaded.name, found, outcome, as_json)
 

@@ -11,7 +11,7 @@ from ...framework import World
 from ..cases.case import case_of
 from ..commands.usage_errors import Problem
 from ..jobs.runs import Runs
-from ..measure.effects import SHARE, in_words, metres, noticed
+from ..measure.effects import SHARE, in_words, metres, names_told, noticed
 from ..plain import Plain
 from ..reporting.progress import Progress
 from ..reporting.run_report import number
@@ -37,6 +37,8 @@ class StepOutcome(Plain):
         what gives way at the next longer step, ``beyond`` s; "" if none was tried
     refused
         why nothing was measured, else ""
+    compared
+        the names of what a game compares
     """
 
     longest: float = math.inf
@@ -45,6 +47,7 @@ class StepOutcome(Plain):
     link: str = ""
     beyond: float = math.inf
     refused: str = ""
+    compared: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """For JSON, which has no infinity."""
@@ -56,7 +59,8 @@ class StepOutcome(Plain):
             return [f"Outcome: not measured: {self.refused}"]
         lines = []
         if self.longest:
-            share = f"moves no body by more than {metres(SHARE * self.size)}, 1 % of the smallest one's size"
+            share = f"changes nothing that counts of {', '.join(self.compared)}" if self.compared else ""
+            share = share or f"moves no body by more than {metres(SHARE * self.size)}, 1 % of the smallest one's size"
             lines.append(f"Outcome: up to {number(self.longest)} s the step {share}, and nothing else is noticed.")
         if self.link:
             lines.append(f"Weakest link: at {number(self.beyond)} s {self.link}.")
@@ -87,7 +91,7 @@ def _outcome(case: CaseTrade) -> StepOutcome:
     if not points:
         return StepOutcome(refused="there was no time: take a larger --budget")
     size = next((point.effects["size"] for point in points if point.effects), 1.0)
-    found = StepOutcome(0.0, points[0].cell.dt, size)
+    found = StepOutcome(0.0, points[0].cell.dt, size, compared=names_told(points[0].effects))
     for point in points:
         if point.failed or noticed(point.effects):
             found.link, found.beyond = _link(point), point.cell.dt

@@ -9,12 +9,14 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..engines.adapters import Engine
+from ...framework import World
+from ..engines.adapters import Engine, carried
 from ..plain import Plain
 from ..trading.records import BLEW_UP, CUT, ESCAPED, NOT_FINITE
 from .body_shapes import Floats
@@ -57,6 +59,13 @@ class Seen(Plain):
         m, the smallest extent of the bodies
     milliseconds
         cost of a simulated second on this machine; None if it is not known
+    entities (n,)
+        the bodies at the end; fixed: they are those of the start; created: how many came; met: something touched
+    touches
+        pairs of entities and the time of their first contact, in order of time
+    values
+        what a game compares, see ``Subject.values_of``; spread: standard deviations from game to game, where these are
+        means over that many ``runs``
     """
 
     position: Floats
@@ -85,6 +94,13 @@ class Seen(Plain):
     milliseconds: float | None = None
     entities: list[int] = field(default_factory=list)
     detail: str = ""
+    fixed: bool = True
+    created: int = 0
+    met: bool = False
+    touches: list[tuple[int, int, float]] = field(default_factory=list)
+    values: dict[str, list[float]] = field(default_factory=dict)
+    spread: dict[str, float] = field(default_factory=dict)
+    runs: int = 1
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -100,12 +116,13 @@ def observe(
     walled: bool = True,
     far: float = math.inf,
     until: float = math.inf,
+    values: Callable[[World], dict[str, list[float]]] | None = None,
 ) -> Seen:
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
     a body outside the walls around all bodies has escaped. far: m from its start, a body there has blown up. until: on
-    ``time.monotonic``, the moment at which the run is cut off.
+    ``time.monotonic``, the moment at which the run is cut off. values: what a game compares, read at the end.
     """
     watch = _Watch(engine, seconds, walled, far)
     steps = _steps(seconds, dt, phase, whole_steps)
@@ -120,7 +137,21 @@ def observe(
                 watch.failure = CUT
             if watch.failure:
                 break
-        return watch.seen()
+        seen = watch.seen()
+        if values is not None and seen.failure is None:
+            seen.values = values(engine.world)
+        return seen
+
+
+def mean_of(seens: Sequence[Seen], names: Iterable[str]) -> Seen:
+    """The averages of several runs: of these fields, and of what a game compares; all else is that of the first."""
+    means: dict[str, Any] = {name: float(np.mean([getattr(seen, name) for seen in seens])) for name in names}
+    values, spread = {}, {}
+    for name in seens[0].values:
+        known = np.array([value for seen in seens if not np.isnan(value := seen.values.get(name, [np.nan])).any()])
+        values[name] = known.mean(axis=0).tolist() if len(known) else [math.nan]
+        spread[name] = float(known.std(axis=0, ddof=1).max()) if len(known) > 1 else 0.0
+    return dataclasses.replace(seens[0], **means, values=values, spread=spread, runs=len(seens))
 
 
 def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[float]:
@@ -140,6 +171,7 @@ class _Watch:
         self.failure: str | None = None
         self.start = engine.position
         self.settled = self.start
+        self.ids = engine.ids
         self.scale, self.energy_start = engine.energies
         self.reach = self.apex = self.worst = self.square = self.impulse = 0.0
         self.looks = self.impacts = self.late_impacts = 0
@@ -163,7 +195,7 @@ class _Watch:
     def look(self) -> None:
         """Now and then: places and energy."""
         engine = self.engine
-        position = engine.position
+        position = self._followed()
         kinetic, energy = engine.energies
         self.looks += 1
         if not (np.isfinite(position).all() and math.isfinite(kinetic)):
@@ -179,7 +211,7 @@ class _Watch:
         self.scale = max(self.scale, kinetic)
         if engine.time <= SETTLED * self.seconds:
             self.settled = position
-        if engine.time >= self.next_sample:
+        if engine.time >= self.next_sample and engine.fixed:  # sizes are known of those of the start
             self.next_sample += self.seconds * (1 - SETTLED) / SAMPLES
             depths = engine.overlaps()
             self.deepest = max(self.deepest, float(depths.max(initial=0.0)))
@@ -189,9 +221,19 @@ class _Watch:
         elif self.reach > self.far:
             self.failure = BLEW_UP
 
+    def _followed(self) -> Floats:
+        """The positions; what has come starts where it is seen first."""
+        engine = self.engine
+        position = engine.position
+        if engine.ids is not self.ids:
+            self.start = carried(self.start, self.ids, engine.ids, position.copy())
+            self.settled = carried(self.settled, self.ids, engine.ids, position.copy())
+            self.ids = engine.ids
+        return position
+
     def seen(self) -> Seen:
         engine = self.engine
-        position, velocity = engine.position, engine.velocity
+        position, velocity = self._followed(), engine.velocity
         late = (1 - EARLY) * self.seconds
         kinetic, energy = engine.energies
         speeds = np.sqrt((velocity * velocity).sum(axis=1))
@@ -221,5 +263,9 @@ class _Watch:
             simulated=engine.time,
             size=engine.size,
             entities=engine.ids.tolist(),
+            fixed=engine.fixed,
+            created=engine.created,
+            met=engine.met,
+            touches=sorted(((a, b, at) for (a, b), at in engine.touches.items()), key=lambda touch: touch[2]),
             milliseconds=1e3 * engine.spent / engine.timed_seconds if engine.timed_seconds else None,
         )

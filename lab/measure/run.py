@@ -76,6 +76,7 @@ class RunReport:
     escaped: dict[str, int] = field(default_factory=dict)  # outside, non_finite
     counters: dict[str, int] = field(default_factory=dict)  # the world's counters, totals
     faults: list[str] = field(default_factory=list)  # faults that did not stop the world
+    compared: dict[str, list[float]] = field(default_factory=dict)  # what a game counts, see Loaded.values_of
     state_hash: str = ""
     pictures: list[str] = field(default_factory=list)
 

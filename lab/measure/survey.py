@@ -7,6 +7,7 @@ the end to that at the start.
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +18,12 @@ from ..cases.subjects import Subject
 from ..commands.usage_errors import Problem
 from ..engines.adapters import CaromEngine
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
-from .observation import Seen, observe
+from .norms import distances
+from .observation import Seen, mean_of, observe
 from .told_in_results import faults_in_results
 
 NUDGE = 1e-10  # of the smallest body: the difference between the two starts
+SEEN = 0.01  # of the smallest body: where bodies come, what changes with so little cannot be followed
 CHAOS = 1e7  # a growth beyond this makes a nudge a thousandth of a body: chaotic
 STILL = 0.01  # sizes per second: slower bodies are at rest
 
@@ -40,7 +43,9 @@ class Survey:
     walled
         whether walls hold all bodies: a body beyond them in another run has escaped
     trial
-        the observation of the run with all impacts at their true times
+        the observation of the run with all impacts at their true times; of a chaotic game the mean of some
+    nudge
+        sizes of a body by which repeats of a chaotic scene without seeds differ
     """
 
     settings: Settings
@@ -57,13 +62,14 @@ class Survey:
     seeded: bool
     walled: bool
     trial: Seen
+    nudge: float = 1e3 * NUDGE
 
     @property
     def kind(self) -> str:
         """SMOOTH, IMPACTS, RESTING or CHAOTIC."""
         if not self.contacts:
             return CHAOTIC if self.growth > CHAOS else SMOOTH
-        if self.resting and self.speed <= STILL:
+        if self.resting and self.speed <= STILL and not self.trial.values:  # a game tells itself what matters
             return RESTING
         return CHAOTIC if self.growth > CHAOS else IMPACTS
 
@@ -71,6 +77,8 @@ class Survey:
     def why(self) -> str:
         """How the kind was determined, in a sentence."""
         grown = f"two starts {NUDGE:g} of a body apart grew {self.growth:.1e} times farther apart"
+        if self.growth == math.inf:
+            grown = f"bodies come, and a start {SEEN:g} of a body apart becomes another game"
         if not self.contacts:
             return f"nothing touches anything; {grown}" if self.kind == CHAOTIC else "nothing touches anything"
         if self.kind == RESTING:
@@ -91,22 +99,36 @@ def survey(subject: Subject, seconds: float) -> Survey:
     first, walled = _twin(subject, exact, seconds, 0.0, True), True
     if first.failure == ESCAPED:  # for example a ball that rolls off a platform
         first, walled = _twin(subject, exact, seconds, 0.0, False), False
-    second = _twin(subject, exact, seconds, NUDGE, False)
+    second = _twin(subject, exact, seconds, SEEN if first.created else NUDGE, False)
+    if first.created and _is_another(second, first):
+        growth = math.inf
+    else:
+        second = _twin(subject, exact, seconds, NUDGE, False) if first.created else second
+        growth = float(distances(second, first)[0].max(initial=0.0)) / _nudge_of(subject, settings)
+    if growth > CHAOS and subject.names:
+        other = second if growth == math.inf else _twin(subject, exact, seconds, SEEN, False)
+        first = mean_of([first, other], ())
     if not first.reach and not first.counts["solver_loops"]:
         raise Problem(f"{subject.name}: no body moves within {seconds:g} s: nothing to measure")
-    apart = float(np.abs(second.position - first.position).max(initial=0.0))
     return Survey(
         settings,
-        growth=apart / _nudge_of(subject, settings),
+        growth=growth,
         impacts=first.impacts,
-        contacts=sum(first.struck),
+        contacts=max(sum(first.struck), int(first.met)),
         resting=int(first.counts["solver_loops"] > 0),
         speed=first.speed,
         seeded=seeded,
         walled=walled,
         trial=first,
+        nudge=SEEN if growth == math.inf else 1e3 * NUDGE,
         **facts,
     )
+
+
+def _is_another(seen: Seen, first: Seen) -> bool:
+    """True if another start has led to other bodies, or has taken one where it is nowhere near."""
+    apart, _ = distances(seen, first)
+    return seen.entities != first.entities or float(apart.max(initial=0.0)) > first.size
 
 
 def _facts(name: str, world: World) -> dict[str, Any]:
@@ -156,7 +178,7 @@ def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float, w
         nudge(engine.world, nudged * engine.size)
     try:
         with subject.attribute_errors():
-            seen = observe(engine, seconds, settings.dt, walled=walled)
+            seen = observe(engine, seconds, settings.dt, walled=walled, values=subject.values_of)
         if seen.failure not in (None, ESCAPED):
             raise Problem(
                 f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed after {seen.simulated:.4g} s: "

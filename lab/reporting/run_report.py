@@ -106,6 +106,9 @@ def quality(report: RunReport) -> Table:
     table.add_row(
         "escaped bodies", f"{outside + broken:,}", ", ".join(parts), style=WARNING if parts else GOOD
     )
+    for name, values in report.compared.items():
+        place = ", ".join(f"{value:.4g}" for value in values)
+        table.add_row(name, "none" if any(map(math.isnan, values)) else f"({place})" if len(values) > 1 else place, "")
     return table
 
 

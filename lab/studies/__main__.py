@@ -17,6 +17,7 @@ COMMANDS = {
     "plugin-pairs": LateCommand(
         "studies.bench.command:pairs_command", "What a pair of a plugin costs, next to a built-in one and by hand."
     ),
+    "promises": LateCommand("studies.promises:promises_command", "What trade and tune promise, measured again."),
     "scaling": LateCommand("studies.bench.command:scaling_command", "How the time per body grows with their number."),
     "settings": LateCommand(
         "studies.settings.command:settings_command",

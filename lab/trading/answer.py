@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-from ..measure.effects import in_words, metres, severity
-from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Point
+from ..measure.effects import in_words, metres, severity, told
+from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Cell, Point
 from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
+ENOUGH = 2  # settings with this many times fewer runs than others are not told of
+CLEARLY = 10.0  # times
+MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
 
 
@@ -22,6 +26,8 @@ def answer(case: CaseTrade) -> list[str]:
     if not usable:
         failed = "; ".join(dict.fromkeys(failures(point) for point in points if point.failed))
         return [f"{case.scene}: nothing that was tried can be used{f': {failed}' if failed else ' yet'}"]
+    most = max(point.repeats for point in usable)
+    usable = [point for point in usable if ENOUGH * point.repeats >= most]  # less is known of the others
     chosen = recommended(case, usable)
     now = next((point for point in points if point.cell == case.own), None)
     name = " (as it has now)" if chosen is now else ""
@@ -29,11 +35,11 @@ def answer(case: CaseTrade) -> list[str]:
     lines.append(f"  cost     {cost_text(chosen)}")
     lines.append(f"  error    {_error(case, chosen)}")
     lines.append(f"  noticed  {noticed_text(chosen)}")
-    front = _front(usable)
-    cheaper = [point for point in front if _price(point) < 0.9 * _price(chosen)]
+    best = front(usable)
+    cheaper = [point for point in best if price(point) < 0.9 * price(chosen)]
     better = [
-        point for point in front
-        if severity(point.effects) * FACTOR <= severity(chosen.effects) and _price(point) > _price(chosen)
+        point for point in best
+        if severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
     ] if case.reference.trusts(case.norm, chosen.errors[case.norm].mean) else []  # fmt: skip
     if now is not None and now is not chosen:
         lines.append(f"  now      {_compared(case, now, chosen)}")
@@ -41,7 +47,7 @@ def answer(case: CaseTrade) -> list[str]:
         lines.append(f"  cheaper  {_compared(case, cheaper[-1], chosen)}")
     if better:
         lines.append(f"  better   {_compared(case, better[0], chosen)}")
-    lines.append(f"  known    {_known(case, points)}")
+    lines.append(f"  known    {_known(case, points, chosen.repeats)}")
     return lines
 
 
@@ -50,8 +56,8 @@ def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
     settings if they cost hardly more."""
     least = max(min(severity(point.effects) for point in usable), 1.0)
     good = [point for point in usable if severity(point.effects) <= (HARDLY * least if least > 1.0 else 1.0)]
-    cheapest = min(good, key=_price)
-    own = [point for point in good if point.cell == case.own and _price(point) < HARDLY * _price(cheapest)]
+    cheapest = min(good, key=price)
+    own = [point for point in good if point.cell == case.own and price(point) < HARDLY * price(cheapest)]
     return own[0] if own else cheapest
 
 
@@ -59,18 +65,33 @@ def _points(case: CaseTrade) -> list[Point]:
     return [point for curve in case.curves for point in curve.points if point.cell.engine == CAROM]
 
 
-def _price(point: Point) -> float:
+def price(point: Point) -> float:
     """Milliseconds per simulated second; work where nothing is timed."""
     return point.milliseconds.median if point.milliseconds else point.work
 
 
-def _front(usable: Sequence[Point]) -> list[Point]:
+def clearly_worse(points: Sequence[Point]) -> set[Cell]:
+    """The settings of which something is noticed CLEARLY more than of others that cost no more: more runs of them would
+    change no answer."""
+
+    def harm(point: Point) -> float:
+        return math.inf if point.failed else severity(point.effects)
+
+    return {
+        point.cell for point in points if harm(point) > 1.0 and any(
+            price(other) <= price(point) and CLEARLY * harm(other) <= harm(point)
+            for other in points if not other.failed
+        )
+    }  # fmt: skip
+
+
+def front(usable: Sequence[Point]) -> list[Point]:
     """The points of which none is cheaper and better at once, the cheapest first."""
-    front: list[Point] = []
-    for point in sorted(usable, key=lambda point: (_price(point), severity(point.effects))):
-        if not front or severity(point.effects) < severity(front[-1].effects):
-            front.append(point)
-    return front
+    found: list[Point] = []
+    for point in sorted(usable, key=lambda point: (price(point), severity(point.effects))):
+        if not found or severity(point.effects) < severity(found[-1].effects):
+            found.append(point)
+    return found
 
 
 def cost_text(point: Point) -> str:
@@ -83,6 +104,9 @@ def cost_text(point: Point) -> str:
 
 def _error(case: CaseTrade, point: Point) -> str:
     effects = point.effects
+    of_game = told(effects)
+    if of_game:
+        return "; ".join(of_game[:MOST_TOLD])
     if case.kind == RESTING and "sink" in effects:
         return f"{metres(effects['sink'])}: how deep what rests sinks into what it rests on"
     if case.kind not in (CHAOTIC, RESTING) and "place" in effects:
@@ -97,19 +121,19 @@ def noticed_text(point: Point) -> str:
 
 
 def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
-    ratio = _price(point) / _price(chosen)
+    ratio = price(point) / price(chosen)
     words = noticed_text(point)
-    if words == "nothing" and case.norm in point.errors and not point.failed:
+    if words == "nothing" and case.norm in point.errors and not point.failed and not told(point.effects):
         words = f"nothing; error {_error(case, point).partition(':')[0]}"
     return f"{point.line}: {ratio:.2g} times the cost; noticed: {words}"
 
 
-def _known(case: CaseTrade, points: Sequence[Point]) -> str:
+def _known(case: CaseTrade, points: Sequence[Point], repeats: int) -> str:
     runs = sum(point.repeats for point in points)
     text = f"from {runs:,} run{'s' * (runs != 1)} of {case.seconds:g} s with {len(points)} settings"
-    if case.repeats < case.whole:
-        text += f", {case.repeats} of {case.whole} {case.repeated}"
+    if repeats < case.whole:
+        text += f", {repeats} of {case.whole} {case.repeated} with these"
     if case.missing:
         text += f"; {case.missing} settings not tried yet"
-    short = case.repeats < case.whole or case.missing
+    short = repeats < case.whole or case.missing
     return text + ("; the same command goes on, --thorough does it all" if short else "")

@@ -27,6 +27,7 @@ from ..commands.options import (
     seed_number,
     shown_options,
     together,
+    workers_of,
     writable_folder,
 )
 from ..commands.usage_errors import Problem
@@ -77,6 +78,7 @@ def trade_command(
     budget: float,
     thorough: bool,
     workers: int | None,
+    cluster: str | None,
     kept: Path,
     out: Path,
     as_json: bool,
@@ -102,14 +104,14 @@ def trade_command(
     arguments = {
         "norms": norms, "seconds": seconds, "repeats": repeats, "steps": steps or (), "only": only,
         "against_pymunk": against == PYMUNK, "timing": not no_timing, "options": options,
-        "seed": seed_number(seed), "workers": workers, "command": _command_line(context),
+        "seed": seed_number(seed), "command": _command_line(context),
         "budget": None if thorough else budget,
     }  # fmt: skip
-    with Store(kept) as store:
+    with Store(kept) as store, workers_of(workers, cluster) as pool:
         try:
             with Bar(Console(stderr=True)) as bar:
                 show = _shown(bar) if output.plain else _nothing
-                result = trade(*targets, **arguments, store=store, progress=bar, show=show)
+                result = trade(*targets, **arguments, workers=pool, store=store, progress=bar, show=show)
                 files = _write(result, out)
                 if charts and result.stopped != STOPPED:
                     bar.say("charts")

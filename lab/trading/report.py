@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from ..cases.published import ERROR_UNIT, SOURCE, published
 from ..cases.published import NORM as ENERGY_SQUARE
 from ..commands.usage_errors import Problem, did_you_mean
+from ..measure.norms import MEAN
 from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
 from .code_line import python_line
@@ -50,13 +51,13 @@ def measured(trade: Trade) -> list[CaseTrade]:
 def check_norm(trade: Trade, norm: str | None) -> None:
     """Problem for a norm that no case has."""
     known = list(dict.fromkeys(name for case in trade.cases for name in case.norms))
-    if norm is not None and norm not in known:
+    if norm is not None and not {norm, MEAN + norm} & {*known}:
         raise Problem(f"no case here has the norm {norm!r}{did_you_mean(norm, known)}")
 
 
 def norm_of(case: CaseTrade, norm: str | None) -> str:
-    """``norm`` if the case has it, else its first."""
-    return norm if norm in case.norms and norm is not None else case.norm
+    """``norm`` if the case has it, or its mean over the seeds; else its first."""
+    return next((name for name in (norm, f"{MEAN}{norm}") if name in case.norms and name is not None), case.norm)
 
 
 def points_table(case: CaseTrade, norm: str) -> TextTable:

@@ -16,19 +16,22 @@ from ..cases.subjects import subject_of
 from ..commands.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
 from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, refined_reference, run_tasks
-from ..jobs.tasks import Task, engine_of
-from ..measure.norms import NORMS
-from ..measure.timing import CLOCK
+from ..jobs.tasks import Task, bare_cost, engine_of
+from ..jobs.workers import Pool
+from ..measure.norms import NORMS, check_norm, norm_of
+from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
+from .answer import clearly_worse, front
 from .code_line import python_line
-from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
+from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
 ROUNDING = 1e-12  # smaller errors are rounding, which has no order
 SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
-RUNNING = 0.9  # of the budget; the rest is for tables and charts
+RUNNING = 0.86  # of the budget; the rest is for timing what is told of again, tables and charts
+TURNS, MOST_TIMED = 3, 6  # of the settings timed again
 FIRST_LOOK = 4.0  # s: then what is known is shown, if something is
 
 Show = Callable[[CaseTrade], None]
@@ -84,7 +87,7 @@ def trade(
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
     budget: float | None = None,
-    workers: int | None = None,
+    workers: int | Pool | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
     command: str = "",
@@ -95,14 +98,15 @@ def trade(
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
     follow from the scene. budget: s for all together, spent on more and more exact looks; None: as long as it takes.
-    workers: processes at most, None for all cores (small amounts of work use none); store: finished runs, to be
-    continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; with it Ctrl-C ends the
-    study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
+    workers: processes at most, None for all cores (small amounts of work use none), or a Cluster; store: finished runs,
+    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; then Ctrl-C ends
+    the study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
     ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
-    for target in targets:
-        subject_of(target)
+    subjects = [subject_of(target, options, seed) for target in targets]
+    for name in norms:
+        check_norm(name, () if name in NORMS else [own for subject in subjects for own in subject.names])
     began = time.monotonic()
     runs = Runs(workers, store, progress, stoppable=show is not None)
     result = Trade({**machine(), "clock": CLOCK}, command, [])
@@ -143,6 +147,7 @@ class Study:
         own = case.survey.settings
         self.own = Cell(own.dt, own.integrator, own.collision, own.substeps, own.geometry)
         self.began = began
+        self.costs: dict[Cell, float] = {}  # ms per simulated second, timed again
         self.cells = self._nearest()
         self.case, self.reference = case.at(0), Reference(f"closed form: {case.form}")
         if case.reference is None:  # until there is a better one
@@ -158,7 +163,20 @@ class Study:
                 break
             if self.show is not None and effort < efforts[-1]:
                 self.show(self._known())
+        if self.timing and self.runs.until < math.inf and self.runs.stopped in ("", OUT_OF_TIME):
+            self._time_again()
         return self._known()
+
+    def _time_again(self) -> None:
+        """Time what the answer may tell of, in turns and with nothing else running: the first times were taken beside
+        other runs."""
+        told, _ = self._told_and_worse()
+        tasks = [Task(self.case, cell, 0) for cell in sorted(told, key=self._distance)[:MOST_TIMED]]
+        for _ in range(TURNS):
+            for task in tasks:
+                cost = bare_cost(task)
+                if cost is not None:
+                    self.costs[task.cell] = min(cost, self.costs.get(task.cell, math.inf))
 
     def _measure(self, case: Case) -> None:
         runs, name = self.runs, case.subject.name
@@ -173,13 +191,33 @@ class Study:
         )
         self.case, self.reference = case, reference
         self.cells = grids.grid(self.curves, case.steps)
-        tasks = sorted(run_tasks(case, self.cells), key=lambda task: (task.repeat, self._distance(task.cell)))
-        runs.all(tasks, f"{name}: {len(self.cells)} settings, {case.repeats_text}")
+        tasks = sorted(run_tasks(case, self.cells), key=self._later)
+        what = f"{name}: {len(self.cells)} settings, {case.repeats_text}"
+        if runs.until < math.inf and case.repeats > 1:
+            told, _ = self._told_and_worse()
+            runs.all([task for task in tasks if task.cell in told], what)
+            runs.all([task for task in tasks if task.repeat == 0], what)
+            told, worse = self._told_and_worse()
+            runs.all([task for task in tasks if task.cell in told], what)
+            tasks = [task for task in tasks if task.cell not in worse]
+        runs.all(tasks, what)
+
+    def _told_and_worse(self) -> tuple[set[Cell], set[Cell]]:
+        """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""
+        points = known_points(self.case.replace(repeats=1), self.cells, self.runs)
+        best = front([point for point in points if not point.failed])
+        return {self.own, *(point.cell for point in best)}, clearly_worse(points) - {self.own}
 
     def _nearest(self) -> tuple[Cell, ...]:
         """The scene's own settings, and with twice and half the step: known before there is a reference."""
         steps = [self.own.dt * factor for factor in (1, 2, 0.5)]
         return tuple(dataclasses.replace(self.own, dt=dt) for dt in steps if dt <= self.whole.steps[0])
+
+    def _later(self, task: Task) -> tuple[float, float]:
+        """Tasks run in this order: all settings once, the nearest first; of a chaotic scene, of which one run tells
+        little, the nearest are repeated before the farthest are tried."""
+        distance = self._distance(task.cell)
+        return (task.repeat + distance, distance) if task.case.kind == CHAOTIC else (task.repeat, distance)
 
     def _distance(self, cell: Cell) -> float:
         """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
@@ -200,6 +238,8 @@ class Study:
         points = known_points(self.case, self.cells, self.runs)
         for point in points:
             point.line = python_line(point.cell, self.case.survey.settings)
+            if point.cell in self.costs:
+                point.milliseconds = Spread.of([self.costs[point.cell]])
             point.milliseconds = point.milliseconds if self.timing else None
         found = summed_up(self.case, self.reference, points)
         missing = len(self.cells) - len(points)
@@ -226,7 +266,7 @@ def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> Case
         case.subject.description,
         case.kind,
         case.why,
-        {norm: NORMS[norm].text for norm in case.norms},
+        {norm: norm_of(norm).text for norm in case.norms},
         case.seconds,
         case.repeats,
         case.repeated,
@@ -247,8 +287,8 @@ def _tells(point: Point, norm: str, reference: Reference) -> bool:
     if point.failed or norm not in point.errors:
         return False
     error = point.errors[norm]
-    small = NORMS[norm].absolute or error.mean < SMALL
-    noise = CLEAR * error.uncertainty if NORMS[norm].signed else 0.0
+    small = norm_of(norm).absolute or error.mean < SMALL
+    noise = CLEAR * error.uncertainty if norm_of(norm).signed else 0.0
     return small and error.mean > max(ROUNDING, noise) and reference.trusts(norm, error.mean)
 
 

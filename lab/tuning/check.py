@@ -12,7 +12,8 @@ from ...framework import Settings
 from ..cases.case import Case, case_of
 from ..jobs.result_store import Store
 from ..jobs.runs import Runs, points_of
-from ..measure.norms import NORMS
+from ..jobs.workers import Pool
+from ..measure.norms import norm_of
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CAROM, Cell, Point, Reference
 from .search import Tuning, enough_repeats, exact_enough
@@ -66,7 +67,7 @@ def check(
     repeats: int | None = None,
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
-    workers: int | None = None,
+    workers: int | Pool | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
 ) -> Check:
@@ -88,7 +89,7 @@ def check(
     case, reference = exact_enough(case, tuning.norm, promise, absolute, runs)
     seen = case.reference
     assert seen is not None
-    scale = NORMS[tuning.norm].scale(seen, seen)
+    scale = norm_of(tuning.norm).scale(seen, seen)
     promise = promise / scale if absolute else promise
     case = enough_repeats(case, tuning.norm, reference.spread.get(tuning.norm, 0.0), promise)
     return Check(

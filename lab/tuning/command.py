@@ -24,10 +24,12 @@ from ..commands.options import (
     seed_number,
     shown_options,
     together,
+    workers_of,
 )
 from ..commands.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import STOPPED, Runs
+from ..measure.norms import NORMS, check_norm
 from ..reporting.output import Output
 from ..reporting.progress import Bar
 from ..trading.command import check_integrators
@@ -90,6 +92,7 @@ def tune_command(
     budget: float,
     thorough: bool,
     workers: int | None,
+    cluster: str | None,
     kept: Path,
     as_json: bool,
     as_markdown: bool,
@@ -110,24 +113,27 @@ def tune_command(
     for one in (target, *checked):
         subject_of(one)
     only = Only(integrators or (), collisions or (), substeps or (), geometries or ())
-    check_integrators([subject_of(target, options, seed_number(seed))], only.integrators)
+    subject = subject_of(target, options, seed_number(seed))
+    for name in norms:
+        check_norm(name, () if name in NORMS else subject.names)
+    check_integrators([subject], only.integrators)
     if max_error is None:
         raise Problem(MISSING)
     arguments = {
         "absolute": absolute, "seconds": seconds, "repeats": repeats, "steps": steps or (), "options": options,
         "only": only, "seed": seed_number(seed),
-        "workers": workers, "budget": None if thorough else budget,
+        "budget": None if thorough else budget,
     }  # fmt: skip
-    with Store(kept) as store, Bar(Console(stderr=True)) as bar:
+    with Store(kept) as store, workers_of(workers, cluster) as pool, Bar(Console(stderr=True)) as bar:
         try:
             show = _shown(bar) if output.plain else _nothing
             norm = norms[0] if norms else None
-            tuning = search(target, max_error, norm, store=store, progress=bar, show=show, **arguments)
+            tuning = search(target, max_error, norm, workers=pool, store=store, progress=bar, show=show, **arguments)
             balanced, found = None, []
             if not tuning.stopped:
-                balanced = measured_with(tuning.case, Settings.balanced(), Runs(workers, store, bar))
+                balanced = measured_with(tuning.case, Settings.balanced(), Runs(pool, store, bar))
             for other in checked if tuning.choice is not None and tuning.stopped != STOPPED else ():
-                found.append(_checked(tuning, other, absolute=absolute, workers=workers, store=store, progress=bar))
+                found.append(_checked(tuning, other, absolute=absolute, workers=pool, store=store, progress=bar))
         except KeyboardInterrupt:
             click.echo(f"carom: stopped; finished runs are kept in {kept}, the same command goes on", err=True)
             raise click.exceptions.Exit(STOPPED_CODE) from None

@@ -1,0 +1,70 @@
+"""What a player held, recorded by time: a game plays it back with steps of any length."""
+
+from __future__ import annotations
+
+import os
+from bisect import bisect_right
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Self
+
+ROUNDING = 1e-9  # s: times are sums of steps
+
+_read: dict[str, str] = {}  # the files that have been read: what is measured depends on them
+
+
+class Inputs:
+    """Keys, or any words, by the second from which on they are held.
+
+    changes: (time, "right jump") and so on, ascending by time. In a file each of them is a line, `1.25 right jump`.
+    """
+
+    def __init__(self, changes: Iterable[tuple[float, str]] = ()) -> None:
+        self._times: list[float] = []
+        self._held: list[frozenset[str]] = []
+        for time, words in changes:
+            self.record(time, words.split())
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Self:
+        """Inputs from a file; ValueError, with the line, for one that holds something else."""
+        text = Path(path).read_text(encoding="utf-8")
+        _read[str(path)] = text
+        found = cls()
+        for number, line in enumerate(text.splitlines(), 1):
+            time, *words = line.split() or [""]
+            try:
+                if time:
+                    found.record(float(time), words)
+            except ValueError as error:
+                raise ValueError(f"{path}, line {number}: {error}") from None
+        return found
+
+    def record(self, time: float, held: Iterable[str]) -> None:
+        """Call it in each step with what is held then; ValueError for a time before the last one."""
+        words = frozenset(held)
+        if self._times and time < self._times[-1]:
+            raise ValueError(f"{time:g} s is before {self._times[-1]:g} s")
+        if not self._held or words != self._held[-1]:
+            self._times.append(time)
+            self._held.append(words)
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """A line for each change."""
+        lines = [
+            f"{time!r} {' '.join(sorted(held))}".rstrip() for time, held in zip(self._times, self._held, strict=True)
+        ]
+        Path(path).write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+    def held(self, time: float, dt: float = 0.0) -> frozenset[str]:
+        """What is held at ``time``, or at any moment of the step that begins then: a longer step misses no key."""
+        first = max(bisect_right(self._times, time + ROUNDING) - 1, 0)
+        last = bisect_right(self._times, time + max(dt - ROUNDING, ROUNDING))
+        if last == 0:
+            return frozenset()
+        return frozenset().union(*self._held[first:last])
+
+
+def texts_read() -> str:
+    """The contents of all files of inputs that have been read."""
+    return "".join(_read[path] for path in sorted(_read))
