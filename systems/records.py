@@ -231,6 +231,7 @@ IMPACTS = Schema(
     until=number(),
     # impacts at the same time: the events, by member; lists of the members of each body
     together=integer(),  # for how many there must be room
+    group_visits=integer(),  # impacts in all passes over groups of this step
     searching=integer(),  # the one in the log after which pairs are searched, until search_end
     search_end=integer(),
     member=ints("int32"),

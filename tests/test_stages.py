@@ -144,7 +144,7 @@ def test_without_its_system_the_events_end_and_the_rest_goes_on():
 )
 def test_a_stage_that_the_step_cannot_keep_its_promises_for_is_refused(change, message):
     with pytest.raises(ValueError, match=f"stage check_finite.*{message}"):
-        check_stages((dataclasses.replace(CLOSING[0], **change),))
+        check_stages((dataclasses.replace(CLOSING[-1], **change),))
 
 
 def half_done(state, dt):

@@ -22,7 +22,7 @@ from .exact_sum import exact_sum
 from .impulses import FREE, deflect, log_impact, stands_still
 
 PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
-WORK = 1 << 18  # impacts in all passes: a heap of bodies that overlap is not worth more
+WORK = 1 << 16  # impacts in all passes of a step: a heap of bodies that overlap is not worth more
 AGREED = 8e-16  # of the largest speed
 SAME = 2e-15  # of a sum of energies
 ORTHOGONAL = 1e-12  # cosine of the angle between normals that have nothing to do with each other
@@ -80,6 +80,12 @@ def gained_along(state, m):
 
 
 @part
+def is_affordable(impacts, count):
+    """Whether this step may still solve a group of so many impacts."""
+    return impacts.group_visits + LEAST_PASSES * count <= WORK
+
+
+@part
 def solve_group(state, count):
     """Find the impulses of a group's impacts, into ``ahead``."""
     impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
@@ -94,7 +100,8 @@ def solve_group(state, count):
         impacts.weight[m] = 1.0 / heavy
         impacts.share[m] = impacts.ahead[m] = 0.0
     inertia = 1.0
-    for _ in range(max(LEAST_PASSES, min(PASSES, WORK // count))):
+    for _ in range(min(PASSES, (WORK - impacts.group_visits) // count)):
+        impacts.group_visits += count
         push_bodies(state, count, False)
         worst, largest, back = improve(state, count)
         if worst <= AGREED * largest:

@@ -43,7 +43,7 @@ def may_sink(state, dt):
 def begin_impacts(state, dt):
     """No impact has happened yet; the first search is among what may have met."""
     impacts, bodies, pairs = state.impacts, state.bodies, state.pairs
-    impacts.logged = impacts.capped = impacts.crossings = 0
+    impacts.logged = impacts.capped = impacts.crossings = impacts.group_visits = 0
     impacts.active = False
     if state.response_idle:
         return OK

@@ -14,7 +14,7 @@ from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_EVENTS, OK
 from ..integration.trajectory import rate_along, relative_path
-from .group import push_group, shoots, solve_group
+from .group import WORK, is_affordable, push_group, shoots, solve_group
 from .heap import heap_pop, heap_push
 from .impulses import BOUNCE, CROSS, FREE, bounce
 from .looks import NONE, link_pairs, look_at_landings
@@ -86,10 +86,11 @@ def put_back(impacts, event):
 def take_together(state, event, dt):
     """Carry out all impacts at the time of ``event``, which has been taken off the queue, if there are others.
 
-    Returns OK; NEED_EVENTS if there is no room, and nothing has changed then; -1 if there is none besides it.
+    Returns OK; NEED_EVENTS if there is no room, and nothing has changed then; -1 if there is none besides it, or no
+    work left for groups.
     """
     impacts, now = state.impacts, state.impacts.event_time[event]
-    if next_at(state, now, dt) < 0:
+    if impacts.group_visits >= WORK or next_at(state, now, dt) < 0:
         return -1
     most = 1
     for k in range(impacts.waiting):
@@ -181,18 +182,21 @@ def take_group(state, m, dt):
     """Carry out the impact of member m, and those that are connected with it.
 
     In a discrete world what overlaps when a step ends only seems to be at one time. There these impacts come one after
-    the other where all at once would shoot a body through a wall.
+    the other where all at once would shoot a body through a wall; so they do if there are too many for this step.
     """
     impacts, pairs, bodies, logged = state.impacts, state.pairs, state.bodies, state.impacts.logged
     first = impacts.member[m]
     impacts.now = impacts.event_time[first]
     count = find_group(state, m)
-    if count > 1:
+    solves = count > 1 and is_affordable(impacts, count)
+    if solves:
         solve_group(state, count)
-    if count > 1 and not (shoots(state, count) and not impacts.sweeps):
+    elif count > 1:
+        impacts.group_visits = WORK
+    if solves and not (shoots(state, count) and not impacts.sweeps):
         push_group(state, count, dt)
     else:
-        for g in range(count):
+        for g in range(count - 1, -1, -1):  # the last one off the queue is found first
             if impacts.group[g] != m:
                 put_back(impacts, impacts.member[impacts.group[g]])
         bounce(state, first, dt)
