@@ -238,3 +238,28 @@ def test_settings_and_wake_are_checked():
     world = sleepy_world()
     with pytest.raises(KeyError):
         world.wake(99)
+
+
+def test_the_contacts_of_the_last_sleeper_end_when_nothing_can_move_any_more():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    sleep(world, *boxes)
+    assert len(world.contacts) == 1
+    world.component_for_entity(boxes[0], RigidBody).kind = "static"
+    world.step()
+    assert (len(world.contacts), len(world.contacts.end)) == (0, 1)
+
+
+def test_contacts_that_were_read_before_going_back_are_no_trouble():
+    """With a handler the step asks which contacts have been disabled: of those that are shown now."""
+    world = sleepy_world()
+    world.on("contact_begin", lambda contact: None)
+    empty = world.snapshot()
+    sleep(world, *tower(world, 0.0, 1))
+    full = world.snapshot()
+    for snapshot, count in ((empty, 0), (full, 1), (empty, 0)):
+        list(world.contacts)
+        world.restore(snapshot)
+        assert len(world.contacts) == count
+        world.step()
+        assert len(world.contacts) == count

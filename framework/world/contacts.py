@@ -245,9 +245,9 @@ class ContactSource:
         """Those that touched in the step before, too."""
         raise NotImplementedError
 
-    def lively(self, enabled: np.ndarray) -> np.ndarray:
-        """``enabled`` of the rows of :meth:`columns` that take part in the step, of all of them."""
-        return enabled
+    def lively(self, columns: dict[str, np.ndarray]) -> np.ndarray:
+        """``enabled`` of those rows of these columns that take part in the step."""
+        return columns["enabled"]
 
     def record_impacts(self) -> None:
         """Add the impacts of the step that is running to the history, unless they are in it already."""
@@ -329,7 +329,7 @@ class Contacts(ContactRows):
         columns, so that all are."""
         if self._columns_of != self._source.version:
             return None
-        return self._source.lively(self._own_columns["enabled"])
+        return self._source.lively(self._own_columns)
 
     def defer(self, record: Callable[[], None]) -> None:
         """Let ``record`` be called when somebody reads the events, or before they are lost; most are never read."""

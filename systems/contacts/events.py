@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ class RecordedContacts(ContactSource):
         self.record: Callable[[str, Columns], None] = lambda history, columns: None
         self.stored: Any = ()  # those of what sleeps, which the records do not hold
         self.disturb: Callable[[np.ndarray], None] = lambda entities: None  # wakes these
-        self._lively: Any = None  # mask of the rows of the columns that the records hold; None: all
+        self._asleep: Any = None, None, None, None  # (columns, those of what sleeps, mask of these in them, enabled)
 
     @property
     def version(self) -> int:
@@ -47,21 +47,27 @@ class RecordedContacts(ContactSource):
             contacts, now = self._touching, self._touching.now
             count = int(contacts.counts[now])
             columns = {**self._rows(now, slice(count)), "enabled": contacts.enabled[now, :count].copy()}
-        self._lively = None
         if len(self.stored):
-            columns, self._lively = merged(columns, self._stored_rows())
+            columns, lively = merged(columns, self._stored_rows())
+            self._asleep = columns, self.stored.columns, ~lively, self.stored.columns["enabled"]
         return columns
 
-    def lively(self, enabled: np.ndarray) -> np.ndarray:
+    def lively(self, columns: Columns) -> np.ndarray:
         """Of what sleeps a contact that has been disabled wakes the two, and holds for one more step: a system that
         looks at velocities sees none of sleepers. The records hold the others."""
-        if self._lively is None:
+        enabled, stored = columns["enabled"], self.stored.columns
+        if not len(self.stored):
             return enabled
-        columns = self.stored.columns
-        changed = enabled[~self._lively] != columns["enabled"]
-        if changed.any():
+        if self._asleep[0] is not columns or self._asleep[1] is not stored:  # of another time: after a failed step
+            known = dict(zip(_pairs(stored), stored["enabled"].tolist(), strict=True))
+            found = [known.get(pair) for pair in _pairs(columns)]
+            mask = np.array([one is not None for one in found], bool)
+            self._asleep = columns, stored, mask, np.array([one for one in found if one is not None], bool)
+        _, _, asleep, before = self._asleep
+        changed = np.flatnonzero(asleep)[enabled[asleep] != before]
+        if len(changed):
             self.disturb(np.concatenate((columns["entity_a"][changed], columns["entity_b"][changed])))
-        return enabled[self._lively]
+        return enabled[~asleep]
 
     def stay_columns(self) -> Columns:
         now = self._touching.now
@@ -137,6 +143,10 @@ class RecordedContacts(ContactSource):
             "step": _repeated(state.step_number, len(hits)),
             "enabled": np.ones(len(hits), bool),
         }
+
+
+def _pairs(columns: Columns) -> Iterator[tuple[int, int]]:
+    return zip(columns["entity_a"].tolist(), columns["entity_b"].tolist(), strict=True)
 
 
 def _repeated(number: int, count: int) -> np.ndarray:

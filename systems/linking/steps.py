@@ -102,7 +102,7 @@ class StepLinks:
             "": True,
             "dynamic bodies": moves,
             "colliders": collides,
-            "contacts": collides or bool(state.contacts.counts.any()),
+            "contacts": collides or bool(state.contacts.counts.any()) or state.asleep > 0,  # sleepers have theirs
             "one level": collides and not state.several_levels,
             "several levels": collides and state.several_levels,
             "many bodies": collides and self._search.needs_grids(),
