@@ -12,6 +12,7 @@ from ...framework.vectors import dot, item, length, sub
 from ..broad_phase.boxes import statics_moved
 from ..codes import OK, WAKE, WAKE_TOUCHED
 from ..forces.stages import is_zero
+from ..islands import root_of
 from ..records import WATCHED
 from ..shapes.tolerances import contact_margin
 
@@ -271,15 +272,6 @@ def count_rest(state, dt, needed):
                 bodies.rest_position[i] = bodies.position[i]
             ripe |= bodies.rest_steps[i] >= needed and i < last
     return ripe
-
-
-@part
-def root_of(root, i):
-    """The row that stands for the island of row i."""
-    while root[i] != i:
-        root[i] = root[root[i]]
-        i = root[i]
-    return i
 
 
 @part

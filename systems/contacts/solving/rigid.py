@@ -14,6 +14,7 @@ import math
 
 from ....framework.compilation import part
 from ....framework.vectors import add_scaled, dot, length, negative, sub
+from ...islands import root_of
 from .heavy_light_blocks import OPPOSED, solve_blocks
 from .passes import solve_friction, solve_normals
 from .softness import SAG
@@ -24,15 +25,6 @@ CONVERGED = 1e-5  # of the extent, per substep: what rigid contacts may be wrong
 STEADY = 1e-3  # and of the speed that forces make in it
 MOST_PASSES, FEWEST_PASSES = 200, 16  # over a small island and a large one
 WORK = 50_000  # contacts that passes over an island may visit, if those are not the fewest
-
-
-@part
-def root_of(island, q):
-    """The first body of the island of body q."""
-    while island[q] != q:
-        island[q] = island[island[q]]
-        q = island[q]
-    return q
 
 
 @part
