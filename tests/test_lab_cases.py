@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
+from helpers_trade_scenes import BALL, scene_file
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -17,6 +19,7 @@ from carom.lab.commands.usage_errors import Problem
 from carom.lab.engines.adapters import CaromEngine, PymunkEngine
 from carom.lab.jobs.runs import Runs, refined_reference
 from carom.lab.jobs.tasks import Task
+from carom.lab.measure import survey as survey_module
 from carom.lab.measure.norms import NORMS
 from carom.lab.measure.observation import Seen, observe
 from carom.lab.measure.survey import survey
@@ -48,6 +51,25 @@ def stars(scale):
         return world
 
     return build
+
+
+def test_a_survey_that_is_shared_out_finds_the_same(tmp_path, monkeypatch):
+    ball, shared = subject_of(scene_file(tmp_path, BALL)), []
+
+    def each(function, tasks):
+        shared.extend(tasks)
+        return Runs(2).each(function, tasks)
+
+    alone = survey(ball, 1.0, each)
+    assert not shared
+    monkeypatch.setattr(survey_module, "LONG", 0.0)
+    together = survey(ball, 1.0, each)
+    assert shared == [(0.0, True), (survey_module.NUDGE, False)]
+    plain = [
+        {**dataclasses.asdict(found), "trial": {**found.trial.as_dict(), "milliseconds": None}}
+        for found in (alone, together)
+    ]
+    assert plain[0] == plain[1]
 
 
 @pytest.mark.parametrize(

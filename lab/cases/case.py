@@ -14,7 +14,7 @@ from typing import Any
 from ..commands.usage_errors import Problem
 from ..measure.norms import MEAN, NORMS, OF_KIND, check_norm, norm_of
 from ..measure.observation import Seen
-from ..measure.survey import Survey, survey
+from ..measure.survey import Each, Survey, one_by_one, survey
 from ..trading.records import CAROM, CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
 from . import grid as grids
 from .closed_forms import FORMS
@@ -195,11 +195,13 @@ def case_of(
     steps: Sequence[float] = (),
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
+    each: Each = one_by_one,
 ) -> Case:
     """A case for a scene name, a file, or a function build(settings, seed=0) -> World.
 
     norms: the first is the main one; seconds: of each run; repeats; steps: s, the step lengths of the grid. Values not
-    given come from the library or from a survey of the scene. Problem for a scene that cannot be measured.
+    given come from the library or from a survey of the scene, see ``survey`` for each. Problem for a scene that cannot
+    be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
     known = KNOWN.get(target, Known()) if isinstance(target, str) else Known()
@@ -207,7 +209,7 @@ def case_of(
     for name in norms:
         check_norm(name, subject.names)
     duration = seconds or known.seconds or subject.recommended[0]
-    facts = survey(subject, duration)
+    facts = survey(subject, duration, each)
     kind = facts.kind
     chosen = tuple(norms) or known.norms or subject.names or OF_KIND[kind]
     if kind == CHAOTIC:

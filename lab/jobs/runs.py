@@ -8,6 +8,7 @@ import math
 import time
 import weakref
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from ..cases.case import Case
 from ..commands.usage_errors import Problem
@@ -89,6 +90,17 @@ class Runs:
                 raise
             self._stop(STOPPED)
         return [seen for task in tasks if (seen := self.get(task)) is not None]
+
+    def each(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> list[Any]:
+        """The function's result for each task, in order. Problem for one that ends its process."""
+        tasks = list(tasks)
+        found: dict[int, Any] = {}
+        with contextlib.closing(in_parallel(function, tasks, self.workers, self._pool)) as results:
+            for task, result in results:
+                if isinstance(result, Lost):
+                    raise Problem(f"a trial run was lost: {result.reason}")
+                found[id(task)] = result
+        return [found[id(task)] for task in tasks]
 
     def _stop(self, why: str) -> None:
         self.stopped = self.stopped or why or OUT_OF_TIME

@@ -74,13 +74,13 @@ def outcome_of_steps(
     if not seconds:
         return StepOutcome(refused="it was not run")
     try:
-        case = case_of(build, seconds=seconds, seed=seed)
+        runs = Runs(None, None, progress, time.monotonic() + RUNNING * budget, stoppable=True)
+        case = case_of(build, seconds=seconds, seed=seed, each=runs.each)
         own = case.survey.settings
         longest = min(LONGEST, seconds / 3)
         steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)
         case = case.replace(steps=steps, given=("steps",))
         only = Only((own.integrator,), (own.collision,), (own.substeps,), (own.geometry,))
-        runs = Runs(None, None, progress, time.monotonic() + RUNNING * budget, stoppable=True)
         return _outcome(Study(case, only, False, False, runs, None, time.monotonic()).measured(EFFORTS))
     except Problem as problem:
         return StepOutcome(refused=problem.message)

@@ -7,7 +7,10 @@ the end to that at the start.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,12 +23,17 @@ from ..engines.adapters import CaromEngine
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 from .norms import distances
 from .observation import Seen, mean_of, observe
+from .timing import now
 from .told_in_results import faults_in_results
 
 NUDGE = 1e-10  # of the smallest body: the difference between the two starts
 SEEN = 0.01  # of the smallest body: where bodies come, what changes with so little cannot be followed
 CHAOS = 1e7  # a growth beyond this makes a nudge a thousandth of a body: chaotic
 STILL = 0.01  # sizes per second: slower bodies are at rest
+TRIED = 3  # steps that are timed
+LONG = 3.0  # s for both runs: then each has a process of its own
+
+Each = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
 
 
 @dataclass(frozen=True)
@@ -86,28 +94,38 @@ class Survey:
         return grown if self.kind == CHAOTIC else f"bodies meet; {grown}, which is no chaos"
 
 
+def one_by_one(function: Callable[[Any], Any], tasks: Iterable[Any]) -> list[Any]:
+    """The function's result for each task."""
+    return [function(task) for task in tasks]
+
+
 @faults_in_results()
-def survey(subject: Subject, seconds: float) -> Survey:
-    """Run the scene twice, with all impacts at their true times; Problem for one that cannot be measured."""
-    with_recommended = subject.world(None)
-    settings = with_recommended.settings
-    facts = _facts(subject.name, with_recommended)
-    with_recommended.close()
-    seeded = _seeded(subject, settings)
-    _obedient(subject, settings.replace(dt=settings.dt / 2, substeps=settings.substeps + 1)).close()
+def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
+    """Run the scene twice, with all impacts at their true times; Problem for one that cannot be measured.
+
+    each: what shares out long runs.
+    """
+    with closing(subject.world(None)) as recommended:
+        settings, start = recommended.settings, recommended.state_hash()
+        facts = _facts(subject.name, recommended)
+    seeded = _seeded(subject, settings, start)
     exact = settings.replace(collision="event_driven")
-    first, walled = _twin(subject, exact, seconds, 0.0, True), True
+    twins = _Twins(subject, exact, seconds)
+    with closing(_obedient(subject, exact.replace(dt=settings.dt / 2, substeps=settings.substeps + 1))) as other:
+        with subject.attribute_errors():
+            each_step = _time_of_step(other)
+        if 2 * seconds / settings.dt * each_step > LONG:
+            twins.share_out(each, (0.0, True), (SEEN if subject.names else NUDGE, False))
+        levels = _has_levels(other)
+    first, walled = twins.seen(0.0, True), True
     if first.failure == ESCAPED:  # for example a ball that rolls off a platform
-        first, walled = _twin(subject, exact, seconds, 0.0, False), False
-    second = _twin(subject, exact, seconds, SEEN if first.created else NUDGE, False)
-    if first.created and _is_another(second, first):
+        first, walled = twins.seen(0.0, False), False
+    if first.created and _is_another(twins.seen(SEEN), first):
         growth = math.inf
     else:
-        second = _twin(subject, exact, seconds, NUDGE, False) if first.created else second
-        growth = float(distances(second, first)[0].max(initial=0.0)) / _nudge_of(subject, settings)
+        growth = float(distances(twins.seen(NUDGE), first)[0].max(initial=0.0)) / _nudge_of(subject, settings)
     if growth > CHAOS and subject.names:
-        other = second if growth == math.inf else _twin(subject, exact, seconds, SEEN, False)
-        first = mean_of([first, other], ())
+        first = mean_of([first, twins.seen(SEEN)], ())
     if not first.reach and not first.counts["solver_loops"]:
         raise Problem(f"{subject.name}: no body moves within {seconds:g} s: nothing to measure")
     return Survey(
@@ -119,6 +137,7 @@ def survey(subject: Subject, seconds: float) -> Survey:
         speed=first.speed,
         seeded=seeded,
         walled=walled,
+        levels=levels,
         trial=first,
         nudge=SEEN if growth == math.inf else 1e3 * NUDGE,
         **facts,
@@ -137,19 +156,25 @@ def _facts(name: str, world: World) -> dict[str, Any]:
         raise Problem(f"{name}: there is no body that moves by itself: nothing to measure")
     gravity = bool(np.any(world.gravity) and np.any(dynamic.gravity_scale))
     constant = bool(np.any(dynamic.constant_force))
-    several = [len(world.components_for_entity(int(entity))) for entity in world.bodies.entity]
     return {
         "bodies": len(dynamic),
         "force_systems": bool(world.force_systems),
         "forces": gravity or constant or bool(world.force_systems),
         "damping": bool(np.any(dynamic.linear_damping)),
-        "levels": max(several) > 2 and _has_levels(world),
     }
 
 
+def _time_of_step(world: World) -> float:
+    """The seconds that a step takes when what it needs is there."""
+    began = 0.0
+    for _ in range(TRIED):
+        began = now()
+        world.step()
+    return now() - began
+
+
 def _has_levels(world: World) -> bool:
-    """True if a step tests first levels."""
-    world.step()
+    """True if its steps have tested first levels."""
     return world.stats().counters.get("first_level_tests", 0) > 0
 
 
@@ -172,7 +197,28 @@ def _nudge_of(subject: Subject, settings: Settings) -> float:
     return size
 
 
-def _twin(subject: Subject, settings: Settings, seconds: float, nudged: float, walled: bool) -> Seen:
+class _Twins:
+    """The runs of a survey, each performed once: by how far their starts are nudged, and whether walls hold all."""
+
+    def __init__(self, subject: Subject, settings: Settings, seconds: float) -> None:
+        self._run = functools.partial(_twin, subject, settings, seconds)
+        self._seen: dict[tuple[float, bool], Seen] = {}
+
+    def share_out(self, each: Each, *starts: tuple[float, bool]) -> None:
+        """Perform these runs at the same time."""
+        self._seen.update(zip(starts, each(self._run, starts), strict=True))
+
+    def seen(self, nudged: float, walled: bool = False) -> Seen:
+        """What that run has shown."""
+        start = nudged, walled
+        if start not in self._seen:
+            self._seen[start] = self._run(start)
+        return self._seen[start]
+
+
+@faults_in_results()
+def _twin(subject: Subject, settings: Settings, seconds: float, start: tuple[float, bool]) -> Seen:
+    nudged, walled = start
     engine = CaromEngine(_obedient(subject, settings))
     if nudged:
         nudge(engine.world, nudged * engine.size)
@@ -206,16 +252,15 @@ def _obedient(subject: Subject, settings: Settings) -> World:
     return world
 
 
-def _seeded(subject: Subject, settings: Settings) -> bool:
-    """True if seeds change the start; Problem if the same seed gives different worlds."""
+def _seeded(subject: Subject, settings: Settings, start: str) -> bool:
+    """True if seeds change the start, whose hash is given; Problem if the same seed gives different worlds."""
     hashes = []
-    for seed in (0, 0, 1):
-        world = subject.world(settings, seed)
-        hashes.append(world.state_hash())
-        world.close()
-    if hashes[0] != hashes[1]:
+    for seed in (0, 1):
+        with closing(subject.world(settings, subject.seed + seed)) as world:
+            hashes.append(world.state_hash())
+    if hashes[0] != start:
         raise Problem(
             f"{subject.name}: build makes another world each time, with the same settings and seed: draw what is "
             "random from numpy.random.default_rng(seed)"
         )
-    return hashes[0] != hashes[2]
+    return hashes[1] != start

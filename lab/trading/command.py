@@ -100,7 +100,6 @@ def trade_command(
         pymunk_module()
     output = Output.checked(" ".join((MARK, *targets)), as_json, as_markdown, into, None)
     writable_folder(out)
-    charts = _charts_there()
     arguments = {
         "norms": norms, "seconds": seconds, "repeats": repeats, "steps": steps or (), "only": only,
         "against_pymunk": against == PYMUNK, "timing": not no_timing, "options": options,
@@ -113,9 +112,9 @@ def trade_command(
                 show = _shown(bar) if output.plain else _nothing
                 result = trade(*targets, **arguments, workers=pool, store=store, progress=bar, show=show)
                 files = _write(result, out)
-                if charts and result.stopped != STOPPED:
+                if result.stopped != STOPPED:
                     bar.say("charts")
-                    files += [path for norm in norms or [None] for path in chart_module().draw(result, out, norm)]
+                    files += _charts(result, out, norms)
         except KeyboardInterrupt:
             click.echo(f"carom: stopped before anything was known; {_results(store)} kept in {kept}", err=True)
             raise click.exceptions.Exit(STOPPED_CODE) from None
@@ -159,14 +158,14 @@ def check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> None
                 subject.world(settings).close()
 
 
-def _charts_there() -> bool:
-    """True if matplotlib is installed; prints a note if not."""
+def _charts(result: Trade, out: Path, norms: Sequence[str]) -> list[Path]:
+    """Draw them; without matplotlib a note is all."""
     try:
-        chart_module()
+        draw = chart_module().draw
     except Problem as problem:
         click.echo(f"carom: {problem.message}", err=True)
-        return False
-    return True
+        return []
+    return [path for norm in norms or [None] for path in draw(result, out, norm)]
 
 
 def chart_module() -> Any:

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,12 +54,12 @@ class Only:
 
     def of(self, case: Case) -> tuple[Cell, ...]:
         """The methods of the case; a named field is varied even without effect. Problem if there is none."""
-        world = case.subject.world(None)
-        known = world.registry.integrators
-        world.close()
-        for name in self.integrators:
-            if name not in known:
-                raise Problem(f"no integrator {name!r}{did_you_mean(name, known)}")
+        if self.integrators:
+            with closing(case.subject.world(None)) as world:
+                known = world.registry.integrators
+            for name in self.integrators:
+                if name not in known:
+                    raise Problem(f"no integrator {name!r}{did_you_mean(name, known)}")
         found = grids.methods(case.survey)
         fields = {
             "integrator": self.integrators,
@@ -69,10 +70,10 @@ class Only:
         for field, wanted in fields.items():
             if wanted:
                 found = tuple(dataclasses.replace(cell, **{field: value}) for cell in found for value in wanted)
-        chosen = tuple(dict.fromkeys(grids.with_own_flight(cell) for cell in found))
-        for cell in chosen:
-            case.subject.world(cell.settings(case.survey.settings)).close()  # raises for unknown names
-        return chosen
+        if self != Only():
+            for cell in found:
+                case.subject.world(cell.settings(case.survey.settings)).close()  # raises for unknown names
+        return tuple(dict.fromkeys(grids.with_own_flight(cell) for cell in found))
 
 
 def trade(
@@ -120,8 +121,9 @@ def trade(
         progress.say(f"{name}: survey")
         try:
             case = case_of(
-                target, norms=norms, seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed
-            )
+                target, norms=norms, seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed,
+                each=runs.each,
+            )  # fmt: skip
             study = Study(case, only or Only(), against_pymunk, timing, runs, show, began)
             result.cases.append(study.measured(range(EFFORTS) if budget is not None else (EFFORTS - 1,)))
         except Problem as problem:

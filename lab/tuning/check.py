@@ -82,7 +82,7 @@ def check(
     runs = Runs(workers, store, progress)
     case = case_of(
         target, norms=(tuning.norm,), seconds=tuning.seconds if seconds is None else seconds,
-        repeats=tuning.repeats if repeats is None else repeats, options=options, seed=seed,
+        repeats=tuning.repeats if repeats is None else repeats, options=options, seed=seed, each=runs.each,
     )  # fmt: skip
     case = case.replace(survey=dataclasses.replace(case.survey, settings=settings))
     promise = tuning.target * tuning.scale if absolute else tuning.target

@@ -171,11 +171,12 @@ def search(
     if not (number and math.isfinite(max_error) and max_error > 0):
         raise ValueError(f"max_error must be a number above 0, got {max_error!r}")
     until = math.inf if budget is None else time.monotonic() + RUNNING * budget
+    runs = Runs(workers, store, progress, until, stoppable=show is not None)
     progress.say("survey")
     case = case_of(
-        target, norms=(norm,) if norm else (), seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed
-    )
-    runs = Runs(workers, store, progress, until, stoppable=show is not None)
+        target, norms=(norm,) if norm else (), seconds=seconds, repeats=repeats, steps=steps, options=options,
+        seed=seed, each=runs.each,
+    )  # fmt: skip
     found: Tuning | None = None
     for effort in range(EFFORTS - 1 if budget is None else 0, EFFORTS):
         try:
