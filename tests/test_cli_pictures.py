@@ -36,7 +36,6 @@ def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):
         "16 dynamic",
         "contacts",
         "energy",
-        "momentum drift",
         "deepest overlap",
         "escaped",
     )

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import json
+import pickle
+from contextlib import closing
 from pathlib import Path
 
 import helpers_cli
 import pytest
 from helpers_cli import refusal
+
+from carom.lab.jobs import runs
+from carom.lab.limits.command import Asked
+from carom.lab.trading import trade
 
 carom = helpers_cli.carom  # fixture
 
@@ -94,3 +100,44 @@ def test_the_command_tells_what_broke_while_it_watched(carom, tmp_path):
 )
 def test_the_command_refuses_in_one_line(carom, arguments, message):
     assert message in refusal(carom("limits", *arguments))
+
+
+SLIDES = """
+from carom.components import AABBCollider, RigidBody, Transform
+from carom.framework import World
+from carom.plugins import Physics
+
+seconds = 1.0
+
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2, gravity=(0, -10)), settings=settings)
+    world.create_entity(Transform((0, -0.5)), AABBCollider((5, 0.5)))
+    world.create_entity(Transform((0, 0.5)), RigidBody(linear_velocity=(1, 0)), AABBCollider((0.5, 0.5)))
+    world.create_entity(Transform((4, -0.5)), RigidBody(1.0, (-1, 0), kind="kinematic"), AABBCollider((0.5, 0.3)))
+    return world
+"""
+
+
+def test_little_time_gives_what_is_known_and_says_how_much_it_needs(carom, monkeypatch):
+    """Time is up as soon as references would run."""
+    def no_time(*_):
+        raise runs.OutOfTimeError
+
+    monkeypatch.setattr(trade, "refined_reference", no_time)
+    Path("slides.py").write_text(SLIDES)
+    result = carom("limits", "slides.py", "--budget", "30")
+    assert result.exit_code == 0, result.output
+    assert "Known from 3 runs of 1 s with 3 steps; rough, against a first run" in result.stdout
+    assert "only: --budget " in result.stdout
+    assert "sink" not in result.stdout  # a platform that moves through the floor is no overlap
+
+
+def test_a_scene_with_options_is_measured_in_other_processes_too():
+    asked = pickle.loads(pickle.dumps(Asked("gas2d", None, (("substeps", 3),), ("springs",))))
+    with closing(asked(None)) as world:
+        assert world.settings.substeps == 3
+        assert any(plugin.name == "springs" for plugin in world.plugins)
+    with closing(asked(world.settings.replace(substeps=2))) as other:
+        assert other.settings.substeps == 2
+    assert asked.__name__ == "gas2d"

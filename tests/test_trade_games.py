@@ -93,7 +93,7 @@ def test_a_game_that_spawns_is_compared_by_means_over_its_seeds(monkeypatch):
     assert point.effects["right fired"] == 15
     assert point.effects["runs"] == 3
     text = "\n".join(answer(result))
-    assert "fired: 15 on average instead of 15; one game differs from the next by 0" in text
+    assert "fired: 15 on average instead of 15" in text
 
 
 def test_without_a_name_for_it_bodies_are_matched_in_the_order_of_their_creation():
@@ -156,7 +156,8 @@ def test_a_mean_is_noticed_beyond_chance_and_beyond_what_games_differ_by():
 
     assert not noticed(effects(110.0, 1))
     assert not noticed(effects(90.0, 2))
-    assert noticed(effects(110.0, 16))
+    assert not noticed(effects(110.0, 16))  # four games are few: 3.2 standard errors may be chance
+    assert noticed(effects(120.0, 16))
     assert noticed(effects(70.0, 2))
     assert in_words(effects(130.0, 4)) == [
         "kills: 130 on average instead of 100; one game differs from the next by 8.2"

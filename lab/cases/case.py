@@ -210,17 +210,19 @@ def case_of(
         check_norm(name, subject.names)
     duration = seconds or known.seconds or subject.recommended[0]
     facts = survey(subject, duration, each)
-    kind = facts.kind
+    kind, why = facts.kind, facts.why
     chosen = tuple(norms) or known.norms or subject.names or OF_KIND[kind]
     if kind == CHAOTIC:
-        chosen = _statistics(subject, chosen, facts)
+        asked, chosen = chosen, _statistics(subject, chosen, facts)
+        left = [name for name in asked if not {name, MEAN + name} & {*chosen}]
+        why += f"; places have no mean: {', '.join(left)}" if left else ""
     ladder = _fitting(steps or known.steps or grids.steps_for(facts), duration)
     form, reference = _closed_form(subject, duration, kind, chosen)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
     times = repeats or known.repeats or _repeats(kind, chosen)
     found = Case(
-        subject, facts, kind, facts.why, chosen, duration, times, ladder, form, reference,
+        subject, facts, kind, why, chosen, duration, times, ladder, form, reference,
         () if reference is not None else _own_references(facts, ladder, bool(subject.names)),
         known.orders if duration == known.seconds else (), fineness=FINER, ensemble=ENSEMBLE,
         given=tuple(name for name, value in (("steps", steps), ("repeats", repeats)) if value),

@@ -52,7 +52,7 @@ class Subject:
         if self.build is not None:
             build = functools.partial(self.build, **dict(self.options))
             return Loaded(self.name, build, compared=getattr(self.build, "compared", None))
-        loaded = _load_once(self.target)
+        loaded = load_once(self.target)
         if not self.options:
             return loaded
         return dataclasses.replace(loaded, function=functools.partial(loaded.function, **dict(self.options)))
@@ -74,7 +74,7 @@ class Subject:
         """The seconds that the scene or file recommends, and its view or None."""
         if self.build is not None:
             return DEFAULT_SECONDS, None
-        loaded = _load_once(self.target)
+        loaded = load_once(self.target)
         return loaded.seconds or DEFAULT_SECONDS, loaded.view
 
     @property
@@ -84,7 +84,7 @@ class Subject:
             return _first_line(self.build.__doc__)
         if self.target in scenes.names():
             return scenes.get(self.target).description
-        module = getattr(_load_once(self.target).function, "__globals__", {})
+        module = getattr(load_once(self.target).function, "__globals__", {})
         return _first_line(module.get("__doc__"))
 
     @functools.cached_property
@@ -94,7 +94,7 @@ class Subject:
         if self.build is not None:
             text += _source_of(self.build)
         elif self.target not in scenes.names():
-            text += _text_around(_load_once(self.target))
+            text += _text_around(load_once(self.target))
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -139,7 +139,7 @@ def _source_of(function: Any) -> str:
         return text + repr(facts)
 
 
-def _load_once(target: str) -> Loaded:
+def load_once(target: str) -> Loaded:
     """Load a file; load it again only if it has changed."""
     path = Path(target)
     if target in scenes.names() or not path.is_file():
@@ -162,5 +162,5 @@ def subject_of(target: Any, options: Mapping[str, Any] | None = None, seed: int 
     chosen = tuple(sorted((options or {}).items()))
     if callable(target):
         return Subject(getattr(target, "__name__", "scene"), build=target, options=chosen, seed=seed)
-    loaded = _load_once(str(target))
+    loaded = load_once(str(target))
     return Subject(loaded.name, target=str(target), options=chosen, seed=seed)

@@ -122,7 +122,13 @@ class CaromEngine(Engine):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._sensors = np.array(sorted(sensor_entities(world)), np.int64)
+        self._sensors = sensor_entities(world)  # all that there were: what is touched may be deleted
+
+    def follow(self) -> None:
+        known = self._rows_then
+        super().follow()
+        if self._rows_then is not known:
+            self._sensors = np.union1d(self._sensors, sensor_entities(self.world))
 
     def step(self, dt: float) -> None:
         world = self.world
@@ -174,7 +180,8 @@ class CaromEngine(Engine):
 
     def overlaps(self) -> Floats:
         contacts, sizes = self.world.contacts, self.sizes
-        deep = (contacts.depth > 0) & self._solid()
+        moves = np.isin(contacts.entity_a, self.ids) | np.isin(contacts.entity_b, self.ids)  # platforms pass walls
+        deep = (contacts.depth > 0) & moves & self._solid()
         pairs = zip(contacts.entity_a[deep].tolist(), contacts.entity_b[deep].tolist(), strict=True)
         smaller = [min(sizes.get(a, math.inf), sizes.get(b, math.inf)) for a, b in pairs]
         return np.asarray(contacts.depth)[deep] / np.array(smaller, float)

@@ -60,6 +60,7 @@ class Runs:
         self.performed = 0
         self._store = Store() if store is None else store
         self._pace = PACE
+        self._spent = self._steps = 0.0
         weakref.finalize(self, self._pool.end)
 
     def get(self, task: Task) -> Seen | None:
@@ -71,7 +72,7 @@ class Runs:
         """What all tasks showed, in order. OutOfTimeError if time is up before all are finished."""
         tasks = list(tasks)
         until = self.until - time.monotonic() + time.time()
-        missing = [dataclasses.replace(task, until=until) for task in tasks if task.key not in self._store]
+        missing = [dataclasses.replace(task, until=until) for task in self._missing(tasks)]
         total = sum(task.cost for task in tasks)
         left = sum(task.cost for task in missing)
         self.progress.begin(total, total - left)
@@ -81,6 +82,7 @@ class Runs:
         few = left * self._pace < FEW_SECONDS
         if missing and (self.stopped or time.monotonic() > self.until):
             self._stop("")
+        began = time.monotonic()
         try:
             with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers, self._pool)) as results:
                 for task, record in results:
@@ -89,7 +91,16 @@ class Runs:
             if not self.stoppable:
                 raise
             self._stop(STOPPED)
+        finally:
+            self._spent += time.monotonic() - began
         return [seen for task in tasks if (seen := self.get(task)) is not None]
+
+    def seconds_for(self, tasks: Iterable[Task]) -> float:
+        """About how long those that are missing will take, by the time that others took."""
+        return sum(task.cost for task in self._missing(tasks)) * self._spent / max(self._steps, 1.0)
+
+    def _missing(self, tasks: Iterable[Task]) -> list[Task]:
+        return [task for task in tasks if task.key not in self._store]
 
     def each(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> list[Any]:
         """The function's result for each task, in order. Problem for one that ends its process."""
@@ -110,6 +121,7 @@ class Runs:
         if record["failure"] == CUT:
             self._stop("")
         self.performed += 1
+        self._steps += task.cost
         self._store.add(task.key, record)
         self.progress.advance(task.cost)
         if record["milliseconds"]:

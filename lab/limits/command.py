@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from contextlib import closing
+from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -12,8 +14,9 @@ import numpy as np
 from rich.console import Console
 
 from ...framework import Settings, World
+from ..cases.subjects import load_once
 from ..commands.choices import parse_assignments, preset
-from ..commands.loading import Loaded, load, stdout_kept_clean
+from ..commands.loading import Loaded, stdout_kept_clean
 from ..commands.options import budget_option, plugin_option, seed_number, seed_option, set_option, settings_option
 from ..commands.usage_errors import Problem
 from ..plugins.installed import plugin_named
@@ -58,22 +61,41 @@ def limits_command(
         raise Problem(f"--seconds must be a number of at least 0, not {seconds!r}")
     settings = preset(preset_name) if preset_name is not None else None
     changes, variant = parse_assignments(assignments), seed_number(seed)
-    added = [plugin_named(name) for name in plugins]
-    loaded = load(target)
+    began = time.monotonic()
+    scene = Asked(target, settings, tuple(changes.items()), plugins)
+    loaded = load_once(target)
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
-
-    def build(chosen: Settings | None, seed: int = 0) -> World:
-        """The scene as the command line has it."""
-        return loaded.build(*((settings, changes) if chosen is None else (chosen, {})), seed, added)
-
     with Bar(Console(stderr=True)) as bar:
-        with closing(build(None, variant)) as world:
+        with closing(scene(None, variant)) as world:
             found = _watched(loaded, world, seconds, bar)
-        build.__name__ = loaded.name
-        build.compared = loaded.compared  # type: ignore[attr-defined]
-        outcome = outcome_of_steps(build, variant, seconds, budget, bar)
+        outcome = outcome_of_steps(scene, variant, seconds, began, budget, bar)
     _show(loaded.name, found, outcome, as_json)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The scene as the command line has it: build(settings, seed=0) -> World, which worker processes can call too."""
+
+    target: str
+    settings: Settings | None
+    changes: tuple[tuple[str, Any], ...]
+    plugins: tuple[str, ...]
+
+    def __call__(self, settings: Settings | None, seed: int = 0) -> World:
+        added = [plugin_named(name) for name in self.plugins]
+        if settings is None:
+            return load_once(self.target).build(self.settings, dict(self.changes), seed, added)
+        return load_once(self.target).build(settings, {}, seed, added)
+
+    @property
+    def __name__(self) -> str:
+        return load_once(self.target).name
+
+    @property
+    def compared(self) -> Any:
+        """What the game is judged by, or None."""
+        return load_once(self.target).compared
 
 
 def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -> list[tuple[float, StepLimits]]:
@@ -98,11 +120,11 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
 
 
 def _show(name: str, found: list[tuple[float, StepLimits]], outcome: StepOutcome, as_json: bool) -> None:
-    time, tightest = min(found, key=lambda look: look[1].suggested)
+    at, tightest = min(found, key=lambda look: look[1].suggested)
     start = found[0][1]
     dt = min(outcome.longest, tightest.suggested)
     if as_json:
-        shortest: dict[str, Any] = {"time": time, **tightest.as_dict()}
+        shortest: dict[str, Any] = {"time": at, **tightest.as_dict()}
         plain = {
             "scene": name, "suggested": dt if math.isfinite(dt) else None, "outcome": outcome.as_dict(),
             "start": start.as_dict(), "tightest": shortest,
@@ -113,7 +135,7 @@ def _show(name: str, found: list[tuple[float, StepLimits]], outcome: StepOutcome
         click.echo(line)
     for limit, line in zip((tightest.stability, tightest.tunnelling), tightest.sentences(), strict=False):
         if limit < IN_VIEW:
-            click.echo(f"{line} (after {time:.3g} s)" if tightest.suggested != start.suggested else line)
+            click.echo(f"{line} (after {at:.3g} s)" if tightest.suggested != start.suggested else line)
 
 
 def _suggestion(dt: float, own: float, tightest: StepLimits, outcome: StepOutcome) -> str:
@@ -122,5 +144,5 @@ def _suggestion(dt: float, own: float, tightest: StepLimits, outcome: StepOutcom
     if dt == 0.0:
         if tightest.suggested == 0.0:
             return f"no step is stable: choose another integrator than {tightest.integrator}"
-        return f"no step that was tried keeps the outcome, not even {outcome.shortest:.4g} s: see carom trade"
+        return f"no step that was tried keeps the outcome, not even {number(outcome.shortest)} s: see carom trade"
     return f"dt up to {number(dt)} s; its step of {number(own)} s {'fits' if own <= dt * 1.000001 else 'is too long'}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,7 +14,8 @@ from ..measure.effects import SHARE, in_words, metres, names_told, noticed
 from ..plain import Plain
 from ..reporting.progress import Progress
 from ..reporting.run_report import number
-from ..trading.records import CaseTrade, Point
+from ..trading.answer import rough_text
+from ..trading.records import CaseTrade, Point, known_well
 from ..trading.report import failures
 from ..trading.trade import RUNNING, Only, Study
 
@@ -39,6 +39,8 @@ class StepOutcome(Plain):
         why nothing was measured, else ""
     compared
         the names of what a game compares
+    known
+        from how many runs, and what to think of them
     """
 
     longest: float = math.inf
@@ -48,6 +50,7 @@ class StepOutcome(Plain):
     beyond: float = math.inf
     refused: str = ""
     compared: tuple[str, ...] = ()
+    known: str = ""
 
     def as_dict(self) -> dict[str, object]:
         """For JSON, which has no infinity."""
@@ -64,34 +67,43 @@ class StepOutcome(Plain):
             lines.append(f"Outcome: up to {number(self.longest)} s the step {share}, and nothing else is noticed.")
         if self.link:
             lines.append(f"Weakest link: at {number(self.beyond)} s {self.link}.")
-        return lines
+        return [*lines, f"Known {self.known}."]
 
 
 def outcome_of_steps(
-    build: Callable[..., World], seed: int, seconds: float, budget: float, progress: Progress
+    build: Callable[..., World], seed: int, seconds: float, began: float, budget: float, progress: Progress
 ) -> StepOutcome:
-    """Run the scene with its own settings and several steps, for at most ``budget`` s."""
+    """Run the scene with its own settings and several steps, until ``budget`` s after ``began`` on
+    ``time.monotonic``."""
     if not seconds:
         return StepOutcome(refused="it was not run")
     try:
-        runs = Runs(None, None, progress, time.monotonic() + RUNNING * budget, stoppable=True)
+        runs = Runs(None, None, progress, began + RUNNING * budget, stoppable=True)
         case = case_of(build, seconds=seconds, seed=seed, each=runs.each)
         own = case.survey.settings
         longest = min(LONGEST, seconds / 3)
         steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)
         case = case.replace(steps=steps, given=("steps",))
         only = Only((own.integrator,), (own.collision,), (own.substeps,), (own.geometry,))
-        return _outcome(Study(case, only, False, False, runs, None, time.monotonic()).measured(EFFORTS))
+        return _outcome(Study(case, only, False, False, runs, None, began).measured(EFFORTS))
     except Problem as problem:
         return StepOutcome(refused=problem.message)
 
 
 def _outcome(case: CaseTrade) -> StepOutcome:
-    points = sorted((point for curve in case.curves for point in curve.points), key=lambda point: point.cell.dt)
+    points = known_well(point for curve in case.curves for point in curve.points)
+    points.sort(key=lambda point: point.cell.dt)
     if not points:
-        return StepOutcome(refused="there was no time: take a larger --budget")
+        more = f"--budget {math.ceil(case.needed / 10) * 10}" if case.needed else "a larger --budget"
+        return StepOutcome(refused=f"there was no time: {more} tells more")
     size = next((point.effects["size"] for point in points if point.effects), 1.0)
     found = StepOutcome(0.0, points[0].cell.dt, size, compared=names_told(points[0].effects))
+    runs = sum(point.repeats for point in points)
+    found.known = f"from {runs} runs of {number(case.seconds)} s with {len(points)} steps"
+    if case.rough:
+        found.known += f"; {rough_text(case)}"
+    elif case.missing or len(points) < sum(len(curve.points) for curve in case.curves):
+        found.known += "; others did not fit into the budget"
     for point in points:
         if point.failed or noticed(point.effects):
             found.link, found.beyond = _link(point), point.cell.dt

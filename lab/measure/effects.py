@@ -28,7 +28,8 @@ SHARE = 0.01  # of a body's size, or of the energy in a minute: less is not noti
 SPEED = 0.02  # sizes per second
 LATE = 0.01  # s
 OF_SPREAD = 0.5  # of the spread from game to game
-CHANCE = 2.0  # standard errors
+CHANCE = (12.7, 4.3, 3.2, 2.8, 2.6, 2.4, 2.4, 2.3, 2.3, 2.2)  # standard errors, 5 %, from 1 degree of freedom on
+OF_MANY = 2.0  # standard errors, from many
 NEVER = 1e9  # in the place of infinity: only one of the runs has the value
 HOW = ("never", "touches", "order")
 HOW_IN_WORDS = ("never touches {}", "touches {}, which it should not", "touches {} out of turn")
@@ -132,7 +133,9 @@ def limit_of(name: str, effects: Mapping[str, float]) -> float:
     """The least difference that would be noticed; of means it must be more than chance, and large beside what one game
     differs from the next."""
     spread, runs, known = effects.get(f"spread {name}", 0.0), effects.get("runs", 1.0), effects.get("known", 1.0)
-    return max(effects[f"limit {name}"], spread * max(OF_SPREAD, CHANCE * math.sqrt(1 / runs + 1 / known)))
+    freedom = int(known) - 1
+    chance = CHANCE[freedom - 1] if 0 < freedom <= len(CHANCE) else OF_MANY
+    return max(effects[f"limit {name}"], spread * max(OF_SPREAD, chance * math.sqrt(1 / runs + 1 / known)))
 
 
 def in_words(effects: Mapping[str, float], names: Any = None) -> list[str]:
@@ -195,7 +198,7 @@ def _of_game_in_words(what: str, name: str, value: float, effects: Mapping[str, 
     if what == "mean":
         spread = effects.get(f"spread {name}", 0.0)
         mean = f"{name}: {right + value:.4g} on average instead of {right:.4g}"
-        return f"{mean}; one game differs from the next by {spread:.2g}"
+        return f"{mean}; one game differs from the next by {spread:.2g}" if spread else mean
     if right == NEVER:
         return f"{name}: none, as it should be"
     return f"{name}: {right + value:.4g} instead of {right:.4g}" if value else f"{name}: {right:.4g}, as it should be"

@@ -187,6 +187,7 @@ class Meter:
         self.contact_counts: list[int] = []
         self.impacts = 0
         self.deepest, self.deepest_step = 0.0, None
+        self._sensors = set(sensor_entities(world).tolist())  # all that there were: what is touched may be deleted
         self.energies: list[float] = []
         self.kinetic_most = 0.0
         self.momenta: list[NDArray[np.float64]] = []
@@ -225,6 +226,7 @@ class Meter:
         else:
             self.step_seconds.append(seconds)
             self.measured += world.stats().totals - before
+        self._sensors.update(sensor_entities(world).tolist())
         depth = np.asarray(world.contacts.depth)
         self.contact_counts.append(len(depth))
         self.impacts += len(world.contacts.impacts)
@@ -286,11 +288,11 @@ class Meter:
         return Stats(self.measured, self.measured, self.world.stats().units)
 
     def _deepest_of_solids(self, depth: NDArray[np.float64]) -> float:
-        """The deepest overlap without sensors."""
-        sensors, contacts = sensor_entities(self.world), self.world.contacts
-        if len(sensors):
-            depth = depth[~(np.isin(contacts.entity_a, sensors) | np.isin(contacts.entity_b, sensors))]
-        return float(depth.max()) if len(depth) else 0.0
+        """The deepest overlap of a dynamic body, without sensors."""
+        contacts, sensors, dynamic = self.world.contacts, list(self._sensors), self.world.bodies.dynamic.entity
+        a, b = contacts.entity_a, contacts.entity_b
+        counts = (np.isin(a, dynamic) | np.isin(b, dynamic)) & ~(np.isin(a, sensors) | np.isin(b, sensors))
+        return float(depth[counts].max(initial=0.0))
 
     def _energy_changes(self) -> list[str]:
         """What in the present world adds or removes energy."""

@@ -90,15 +90,11 @@ def quality(report: RunReport) -> Table:
         kept = not report.energy_changes and math.isfinite(report.energy.relative)
         name, value = ("energy drift", _percent(report.energy)) if kept else ("energy", _from_to(report.energy))
         table.add_row(name, value, _energy_remark(report))
-    if report.momentum:
+    if report.momentum and not math.isfinite(report.momentum.relative):
+        table.add_row("momentum drift", "not representable", "momentum overflows")
+    elif report.momentum and report.momentum_conserved:
         remark = _drift_remark(report.momentum, "all mass times speed")
-        if not math.isfinite(report.momentum.relative):
-            remark = "momentum overflows"
-        elif not report.momentum_conserved:
-            remark = "not conserved here: gravity or walls act"
-        momentum = f"{100 * report.momentum.relative:.3g} %"
-        finite = math.isfinite(report.momentum.relative)
-        table.add_row("momentum drift", momentum if finite else "not representable", remark)
+        table.add_row("momentum drift", f"{100 * report.momentum.relative:.3g} %", remark)
     step = f"in step {report.deepest_overlap_step:,}" if report.deepest_overlap_step else ""
     table.add_row("deepest overlap", f"{report.deepest_overlap:.4g}", step)
     outside, broken = report.escaped["outside"], report.escaped["non_finite"]

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 
 from ..measure.effects import in_words, metres, severity, told
-from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Cell, Point
+from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Cell, Point, known_well
 from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
-ENOUGH = 2  # settings with this many times fewer runs than others are not told of
 CLEARLY = 10.0  # times
 MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
@@ -26,8 +25,7 @@ def answer(case: CaseTrade) -> list[str]:
     if not usable:
         failed = "; ".join(dict.fromkeys(failures(point) for point in points if point.failed))
         return [f"{case.scene}: nothing that was tried can be used{f': {failed}' if failed else ' yet'}"]
-    most = max(point.repeats for point in usable)
-    usable = [point for point in usable if ENOUGH * point.repeats >= most]  # less is known of the others
+    usable = known_well(usable)
     chosen = recommended(case, usable)
     now = next((point for point in points if point.cell == case.own), None)
     name = " (as it has now)" if chosen is now else ""
@@ -40,13 +38,15 @@ def answer(case: CaseTrade) -> list[str]:
     better = [
         point for point in best
         if severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
-    ] if case.reference.trusts(case.norm, chosen.errors[case.norm].mean) else []  # fmt: skip
+    ] if _can_be_better(case, chosen) else []  # fmt: skip
     if now is not None and now is not chosen:
         lines.append(f"  now      {_compared(case, now, chosen)}")
     if cheaper:
         lines.append(f"  cheaper  {_compared(case, cheaper[-1], chosen)}")
     if better:
         lines.append(f"  better   {_compared(case, better[0], chosen)}")
+    if case.kind == CHAOTIC:
+        lines.append(f"  judged   by means over seeds, because {case.why}")
     lines.append(f"  known    {_known(case, points, chosen.repeats)}")
     return lines
 
@@ -59,6 +59,12 @@ def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
     cheapest = min(good, key=price)
     own = [point for point in good if point.cell == case.own and price(point) < HARDLY * price(cheapest)]
     return own[0] if own else cheapest
+
+
+def _can_be_better(case: CaseTrade, chosen: Point) -> bool:
+    """True if something is known of its errors that others could improve; of games that is what would be noticed."""
+    improves = severity(chosen.effects) > 1.0 or not told(chosen.effects)
+    return improves and case.reference.trusts(case.norm, chosen.errors[case.norm].mean)
 
 
 def _points(case: CaseTrade) -> list[Point]:
@@ -135,5 +141,13 @@ def _known(case: CaseTrade, points: Sequence[Point], repeats: int) -> str:
         text += f", {repeats} of {case.whole} {case.repeated} with these"
     if case.missing:
         text += f"; {case.missing} settings not tried yet"
+    if case.rough:
+        return f"{text}; {rough_text(case)}"
     short = repeats < case.whole or case.missing
     return text + ("; the same command goes on, --thorough does it all" if short else "")
+
+
+def rough_text(case: CaseTrade) -> str:
+    """What to think of errors without references, and what it takes to have some."""
+    more = f": --budget {math.ceil(case.needed / 10) * 10} tells more" if case.needed else ""
+    return f"rough, against {case.reference.text} only{more}"

@@ -22,6 +22,7 @@ SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  #
 NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
 CUT = "cut off"  # of runs that time ended: these are no results
 FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: ended by an error
+ENOUGH = 2  # settings with this many times fewer runs than others are not told of
 TRUSTED = 10.0  # an error counts as measured if the references agree better by this factor
 
 
@@ -38,6 +39,11 @@ class Cell:
     substeps: int = 4
     geometry: str = "precise"
     engine: str = CAROM
+
+    @classmethod
+    def of(cls, settings: Settings) -> Cell:
+        """carom with these settings."""
+        return cls(settings.dt, settings.integrator, settings.collision, settings.substeps, settings.geometry)
 
     def settings(self, base: Settings) -> Settings:
         """``base`` with these fields; ValueError if Settings rejects one."""
@@ -212,6 +218,8 @@ class CaseTrade(Plain):
         the settings that the scene has
     missing
         number of settings that there was no time for
+    rough
+        there are no references yet; needed: about the budget, s, with which there are some, 0 if it is not known
     """
 
     scene: str
@@ -229,6 +237,8 @@ class CaseTrade(Plain):
     whole: int = 0
     own: Cell | None = None
     missing: int = 0
+    rough: bool = False
+    needed: float = 0.0
 
     @property
     def norm(self) -> str:
@@ -272,6 +282,13 @@ def observed_order(steps: Sequence[float], errors: Sequence[float]) -> float | N
         return None
     x, y = zip(*usable, strict=True)
     return statistics.linear_regression(x, y).slope
+
+
+def known_well(points: Iterable[Point]) -> list[Point]:
+    """Those with at least half as many runs as the one with most: less is known of the worst of the others."""
+    points = list(points)
+    most = max((point.repeats for point in points), default=0)
+    return [point for point in points if ENOUGH * point.repeats >= most]
 
 
 def by_method(points: Iterable[Point]) -> Mapping[Cell, list[Point]]:

@@ -12,7 +12,7 @@ from ..measure.norms import MEAN
 from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
 from .code_line import python_line
-from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
+from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade, known_well
 
 NOTHING = "-"
 DOUBTED = "*"  # marks an error that is too close to the reference's own
@@ -181,6 +181,7 @@ def choices(
     """
     chosen = norm_of(case, norm)
     engines = dict.fromkeys(point.cell.engine for curve in case.curves for point in curve.points)
+    known = {point.cell for point in known_well(point for curve in case.curves for point in curve.points)}
     made: list[tuple[float, str, tuple[Curve, Point] | None]] = []
     for target in targets:
         for engine in engines:
@@ -188,7 +189,7 @@ def choices(
                 (curve, point)
                 for curve in case.curves
                 for point in curve.points
-                if point.cell.engine == engine and point.meets(chosen, target)
+                if point.cell.engine == engine and point.cell in known and point.meets(chosen, target)
             ]
             usable = meeting and case.reference.trusts(chosen, target)
             made.append((target, engine, min(meeting, key=lambda found: found[1].work) if usable else None))

@@ -16,7 +16,15 @@ from ..cases.case import EFFORTS, Case, case_of, check_arguments
 from ..cases.subjects import subject_of
 from ..commands.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
-from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, refined_reference, run_tasks
+from ..jobs.runs import (
+    OUT_OF_TIME,
+    OutOfTimeError,
+    Runs,
+    known_points,
+    reference_tasks,
+    refined_reference,
+    run_tasks,
+)
 from ..jobs.tasks import Task, bare_cost, engine_of
 from ..jobs.workers import Pool
 from ..measure.norms import NORMS, check_norm, norm_of
@@ -34,6 +42,8 @@ ASYMPTOTIC = 4  # number of finest points used for the order
 RUNNING = 0.86  # of the budget; the rest is for timing what is told of again, tables and charts
 TURNS, MOST_TIMED = 3, 6  # of the settings timed again
 FIRST_LOOK = 4.0  # s: then what is known is shown, if something is
+
+TRIAL = Reference("a first run with all impacts at their true times")
 
 Show = Callable[[CaseTrade], None]
 
@@ -146,22 +156,26 @@ class Study:
         if peers:
             engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # raises, with the reason
         self.curves += peers
-        own = case.survey.settings
-        self.own = Cell(own.dt, own.integrator, own.collision, own.substeps, own.geometry)
+        self.own = Cell.of(case.survey.settings)
         self.began = began
         self.costs: dict[Cell, float] = {}  # ms per simulated second, timed again
         self.cells = self._nearest()
+        self.looked, self.needed = False, 0.0
+        self.rough = case.reference is None  # until there is a better one than the trial run
         self.case, self.reference = case.at(0), Reference(f"closed form: {case.form}")
-        if case.reference is None:  # until there is a better one
+        if self.rough:
             self.case = self.case.replace(reference=case.survey.trial)
-            self.reference = Reference("a first run with all impacts at their true times")
+            self.reference = TRIAL
 
     def measured(self, efforts: Sequence[int] = range(EFFORTS)) -> CaseTrade:
         """What is known when time is up, or when all is done."""
         for effort in efforts:
+            case = self.whole.at(effort)
             try:
-                self._measure(self.whole.at(effort))
+                self._measure(case)
             except OutOfTimeError:
+                if self.rough:
+                    self.needed = self._time_needed(case)
                 break
             if self.show is not None and effort < efforts[-1]:
                 self.show(self._known())
@@ -182,16 +196,12 @@ class Study:
 
     def _measure(self, case: Case) -> None:
         runs, name = self.runs, case.subject.name
-        if self.show is not None and runs.listener is None:
-            runs.listener = self._first_look
-            runs.all([Task(case, cell, 0) for cell in self.cells], f"{name}: as it is")
-            if runs.listener is not _nothing and runs.until < math.inf:
-                runs.listener = _nothing
-                self.show(self._known())
+        if not self.looked and (self.show is not None or runs.until < math.inf):
+            self._look(case)
         case, reference, _ = refined_reference(
             case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
         )
-        self.case, self.reference = case, reference
+        self.case, self.reference, self.rough = case, reference, False
         self.cells = grids.grid(self.curves, case.steps)
         tasks = sorted(run_tasks(case, self.cells), key=self._later)
         what = f"{name}: {len(self.cells)} settings, {case.repeats_text}"
@@ -203,6 +213,23 @@ class Study:
             runs.all([task for task in tasks if task.cell in told], what)
             tasks = [task for task in tasks if task.cell not in worse]
         runs.all(tasks, what)
+
+    def _look(self, case: Case) -> None:
+        """What can be known before there is a reference; shown when it is all there, or after FIRST_LOOK."""
+        self.looked, self.runs.listener = True, self._show_first
+        self.runs.all(run_tasks(case, self.cells), f"{case.subject.name}: as it is")
+        self._show_first(at_once=self.runs.until < math.inf)
+
+    def _show_first(self, at_once: bool = False) -> None:
+        if self.runs.listener is not None and (at_once or time.monotonic() > self.began + FIRST_LOOK):
+            self.runs.listener = None
+            if self.show is not None:
+                self.show(self._known())
+
+    def _time_needed(self, case: Case) -> float:
+        """About how long it takes to the first results against references, s, from the beginning."""
+        tasks = [*reference_tasks(case.coarse_reference()), *run_tasks(case, grids.grid(self.curves, case.steps))]
+        return (time.monotonic() - self.began + self.runs.seconds_for(tasks)) / RUNNING
 
     def _told_and_worse(self) -> tuple[set[Cell], set[Cell]]:
         """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""
@@ -231,11 +258,6 @@ class Study:
         halvings = math.log2(self.own.dt / cell.dt)
         return differ + (1.5 * halvings if halvings > 0 else -halvings)
 
-    def _first_look(self) -> None:
-        if self.show is not None and time.monotonic() > self.began + FIRST_LOOK:
-            self.runs.listener = _nothing
-            self.show(self._known())
-
     def _known(self) -> CaseTrade:
         points = known_points(self.case, self.cells, self.runs)
         for point in points:
@@ -245,11 +267,9 @@ class Study:
             point.milliseconds = point.milliseconds if self.timing else None
         found = summed_up(self.case, self.reference, points)
         missing = len(self.cells) - len(points)
-        return dataclasses.replace(found, whole=self.whole.repeats, own=self.own, missing=missing)
-
-
-def _nothing() -> None:
-    pass
+        return dataclasses.replace(
+            found, whole=self.whole.repeats, own=self.own, missing=missing, rough=self.rough, needed=self.needed
+        )
 
 
 def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> CaseTrade:

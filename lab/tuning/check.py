@@ -15,7 +15,7 @@ from ..jobs.runs import Runs, points_of
 from ..jobs.workers import Pool
 from ..measure.norms import norm_of
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..trading.records import CAROM, Cell, Point, Reference
+from ..trading.records import Cell, Point, Reference
 from .search import Tuning, enough_repeats, exact_enough
 
 TOLERATED = 2.0  # times the promised error: beyond it a warning is shown
@@ -100,13 +100,6 @@ def check(
 
 def measured_with(case: Case, settings: Settings, runs: Runs) -> Point:
     """The point of these settings over all repeats of a case; fields that no cell has keep the scene's values."""
-    cell = cell_of(settings)
+    cell = Cell.of(settings)
     (point,) = points_of(case, [cell], runs, f"{case.subject.name}: {case.repeats_text}")
     return point
-
-
-def cell_of(settings: Settings) -> Cell:
-    """The point of the grid with these settings."""
-    return Cell(
-        settings.dt, settings.integrator, settings.collision, settings.substeps, settings.geometry, CAROM
-    )

@@ -82,8 +82,11 @@ def _plain(point: Point | None) -> dict[str, Any] | None:
 def answer(tuning: Tuning) -> list[str]:
     """The settings to paste, what they cost, and what the next cheaper choice would change."""
     choice = tuning.choice
+    rough = f"rough, against {tuning.reference.text} only" if tuning.rough else ""
+    more = f"{tuning.stopped}, the same command goes on" if tuning.stopped else ""
     if choice is None:
-        return [tuning.why_not]
+        known = "; ".join(filter(None, (rough, more)))
+        return [tuning.why_not, *[f"  known    {known}"] * bool(known)]
     allowed = f"of the {_in_unit(tuning, tuning.target)} allowed"
     lines = [
         f"{tuning.scene}: use {tuning.line}",
@@ -103,8 +106,8 @@ def answer(tuning: Tuning) -> list[str]:
         ratio = compact(tuning.runner_up.work / choice.work, 2)
         lines.append(f"  else     {line}: {ratio} times the work, error {error}")
     repeats = f"{choice.repeats} {tuning.repeated if choice.repeats > 1 else tuning.repeated[:-1]}"
-    more = f"; {tuning.stopped}, the same command goes on" if tuning.stopped else ""
-    return [*lines, f"  known    from {len(tuning.trials)} trials, {repeats} of {number(tuning.seconds)} s{more}"]
+    known = f"from {len(tuning.trials)} trials, {repeats} of {number(tuning.seconds)} s"
+    return [*lines, f"  known    {'; '.join(filter(None, (known, rough, more)))}"]
 
 
 def _in_unit(tuning: Tuning, error: float) -> str:

@@ -31,7 +31,7 @@ from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
 from ..trading.records import TRUSTED, Cell, Point, Reference
-from ..trading.trade import RUNNING, TURNS, Only
+from ..trading.trade import RUNNING, TRIAL, TURNS, Only
 
 BELOW = 16  # a method's step is at least the smallest step of the case over this
 MOST_REPEATS = 400  # of a noisy statistic
@@ -98,6 +98,11 @@ class Tuning:
     stopped: str = ""
 
     @property
+    def rough(self) -> bool:
+        """True if there are no references yet."""
+        return self.reference is TRIAL
+
+    @property
     def settings(self) -> Settings:
         """The chosen settings; NothingMeetsError if there are none."""
         if self.choice is None:
@@ -127,7 +132,8 @@ class Tuning:
     def why_not(self) -> str:
         """A sentence for a search in which nothing meets the target."""
         best = min(self.trials, key=lambda trial: trial.error, default=None)
-        text = f"{self.scene}: no settings keep the {self.norm} error below {self.target:.3g}"
+        which = "its own settings do not" if self.rough else "no settings"
+        text = f"{self.scene}: {which} keep the {self.norm} error below {self.target:.3g}"
         if best is None or not math.isfinite(best.error):
             return f"{text}: every run failed"
         line = settings_line(best.cell, self.base)
@@ -178,17 +184,24 @@ def search(
         seed=seed, each=runs.each,
     )  # fmt: skip
     found: Tuning | None = None
+    if budget is not None:
+        found = _rough(case.at(0), float(max_error), absolute, only or Only(), runs)
+        if found is not None and show is not None:
+            show(found)
     for effort in range(EFFORTS - 1 if budget is None else 0, EFFORTS):
         try:
-            searching = _Search(case.at(effort), float(max_error), absolute, only or Only(), runs)
+            known = exact_enough(case.at(effort), case.norms[0], float(max_error), absolute, runs)
+            searching = _Search(*known, float(max_error), absolute, only or Only(), runs)
         except OutOfTimeError:
+            if found is not None:
+                found.stopped = found.stopped or runs.stopped
             break
         except NotExactError:
             if effort < EFFORTS - 1:
                 continue
             raise
         tuning = searching.result()
-        if not tuning.stopped or found is None or tuning.choice is not None:
+        if not tuning.stopped or found is None or found.rough or tuning.choice is not None:
             found = tuning
         if tuning.stopped:
             found.stopped = tuning.stopped
@@ -201,12 +214,23 @@ def search(
     return found
 
 
+def _rough(case: Case, max_error: float, absolute: bool, only: Only, runs: Runs) -> Tuning | None:
+    """The scene's own settings against the trial run, until there are references; None where they are not needed or
+    time is up."""
+    if case.reference is not None or not norm_of(case.norms[0]).is_usable_with(case.survey.trial):
+        return None
+    searching = _Search(case.replace(reference=case.survey.trial), TRIAL, max_error, absolute, only, runs)
+    return searching.own_only()
+
+
 class _Search:
-    def __init__(self, case: Case, max_error: float, absolute: bool, only: Only, runs: Runs) -> None:
+    def __init__(
+        self, case: Case, reference: Reference, max_error: float, absolute: bool, only: Only, runs: Runs
+    ) -> None:
         self.runs = runs
         self.norm = norm_of(case.norms[0])
         self.methods = only.of(case)
-        self.case, self.reference = exact_enough(case, self.norm.name, max_error, absolute, runs)
+        self.case, self.reference = case, reference
         seen = self.case.reference
         assert seen is not None
         self.scale = self.norm.scale(seen, seen)
@@ -227,11 +251,22 @@ class _Search:
         except OutOfTimeError:
             held = held or self._held_once()
         held.sort(key=lambda point: point.work)
-        case = self.case
         if held and self.runs.until < math.inf and self.runs.stopped in ("", OUT_OF_TIME):
-            costs = [bare_cost(Task(case, held[0].cell, 0)) for _ in range(TURNS)]  # the first was beside other runs
+            costs = [bare_cost(Task(self.case, held[0].cell, 0)) for _ in range(TURNS)]  # first it was beside others
             if any(costs):
                 held[0].milliseconds = Spread.of([min(filter(None, costs))])
+        return self._tuning(held)
+
+    def own_only(self) -> Tuning | None:
+        """The scene's own settings, if they hold; None if time is up before that is known."""
+        try:
+            held = self._hold(Cell.of(self.case.survey.settings))
+        except OutOfTimeError:
+            return None
+        return self._tuning([held] if held else [])
+
+    def _tuning(self, held: list[Point]) -> Tuning:
+        case = self.case
         return Tuning(
             case.subject.name, self.norm.name, self.norm.text, self.target, self.scale, case.seconds, case.repeats,
             case.repeated, self.reference, case.survey.settings, len(self.methods), case, held[0] if held else None,

@@ -137,7 +137,7 @@ def _tuned(game: Game, repeats: int, progress: Progress) -> GameChoices:
     runs, case = Runs(1, progress=progress), found.case
     points = {} if found.choice is None else {TUNED: found.choice}
     for name in PRESETS:
-        (points[name],) = points_of(case, [cell_of(preset(name))], runs, f"{game.label}: {name}")
+        (points[name],) = points_of(case, [Cell.of(preset(name))], runs, f"{game.label}: {name}")
     scale = game.per_unit * (found.scale if game.absolute else 1.0)
     choices = [_choice(game, name, point, found.base, scale, found.target) for name, point in points.items()]
     _time(choices, [partial(_world, case, point.cell) for point in points.values()], game.timed, repeats, progress)
@@ -145,12 +145,6 @@ def _tuned(game: Game, repeats: int, progress: Progress) -> GameChoices:
         game.name, game.label, game.needs, game.target * game.per_unit, game.unit, SEARCH,
         len({trial.cell for trial in found.trials}), choices,
     )  # fmt: skip
-
-
-def cell_of(settings: Settings) -> Cell:
-    """The fields of ``settings`` that the lab varies, as a cell."""
-    dials = [dial.name for dial in dataclasses.fields(Cell) if dial.name != "engine"]
-    return Cell(**{name: getattr(settings, name) for name in dials})
 
 
 def _choice(game: Game, name: str, point: Point, base: Settings, scale: float, target: float) -> Choice:
@@ -254,7 +248,7 @@ def _shot(name: str, settings: Settings, ccd: bool) -> Choice:
         work = work_of(counts_of(world)) / FLIGHT
     figures = {"of 8 wrong": wrong, f"of {BULLETS} out": out, "impacts capped": counters.get("capped_impacts", 0)}
     error = float(sum(figures.values()))
-    line = settings_line(cell_of(settings), settings)
+    line = settings_line(Cell.of(settings), settings)
     return Choice(
         name, f"{line} with RigidBody({CCD})" if ccd else line, error, error == 0, work,
         also={words: float(figure) for words, figure in figures.items()},
