@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sqlite3
+import subprocess
 import sys
+import time
 from contextlib import closing
 
 import pytest
 from click.testing import CliRunner
 from helpers_trade_scenes import BALL, scene_file
+from helpers_workers import Task, alive, marks, perform, until
 
 from carom.lab.cli import cli
 from carom.lab.commands.usage_errors import Problem
+from carom.lab.jobs import workers
 from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.workers import in_parallel
 
 SHORT = (
     "--seconds", "0.5", "--dt", "1/60,1/120", "--repeats", "2", "--no-timing", "--thorough", "--collisions", "discrete",
     "--integrators", "velocity_verlet",
 )  # fmt: skip
+PROCESSES = {"dashboard_address": None, "threads_per_worker": 1, "processes": True}
 
 
 def carom_command(*arguments):
@@ -48,8 +56,7 @@ def test_two_workers_of_a_cluster_give_the_same_bits(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(runs, "FEW_SECONDS", 0.0)
     scene_file(tmp_path, BALL)
-    settings = {"dashboard_address": None, "threads_per_worker": 1, "processes": True}
-    with distributed.LocalCluster(n_workers=2, **settings) as local:
+    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local:
         address = local.scheduler_address
         there = carom_command("trade", "mine.py", *SHORT, "--cluster", address, "--runs", "there.sqlite", "--json")
         with Cluster(address) as cluster:
@@ -74,3 +81,72 @@ def test_a_cluster_that_would_give_other_results_is_refused(monkeypatch):
     local = distributed.LocalCluster(1, threads_per_worker=2, processes=False, dashboard_address=None)
     with local, pytest.raises(Problem, match="has 2 threads"):
         cluster.Cluster(local.scheduler_address)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
+def test_a_worker_that_dies_costs_its_run_a_retry(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    from carom.lab.jobs.cluster import Cluster
+
+    what = ("square", "killed_once", "square", "square")
+    tasks = [Task(name, str(tmp_path), number) for number, name in enumerate(what)]
+    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local, Cluster(local.scheduler_address) as cluster:
+        results = list(in_parallel(perform, tasks, 2, cluster))
+    assert sorted(number for _, number in results) == [0, 1, 4, 9]
+    assert marks(tmp_path) == ["0", "1", "1 again", "2", "3"]
+
+
+@pytest.mark.slow
+def test_a_cluster_without_workers_does_not_outlast_the_time_there_is(tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    from carom.lab.jobs.cluster import Cluster
+
+    monkeypatch.setattr(workers, "GRACE", 0.0)
+    with distributed.LocalCluster(n_workers=1, **PROCESSES) as local, Cluster(local.scheduler_address) as cluster:
+        local.scale(0)
+        until(lambda: not local.scheduler_info["workers"])
+        with pytest.raises(TimeoutError):
+            list(in_parallel(perform, [Task("square", str(tmp_path), 1)], 2, cluster, time.monotonic() + 0.5))
+
+
+ENDED = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background of a shell
+from carom.__main__ import main
+main()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
+@pytest.mark.parametrize("where", ["here", "on a cluster"])
+def test_ctrl_c_ends_at_once_with_what_is_known(tmp_path, monkeypatch, where):
+    """The command prints what it knows after the first runs; nothing goes on running."""
+    monkeypatch.chdir(tmp_path)
+    scene_file(tmp_path, BALL)
+    words = ["trade", "mine.py", "--thorough", "--seconds", "20", "--no-timing"]
+
+    def stopped(*more):
+        command = [sys.executable, "-c", ENDED, *words, *more]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
+        file = tmp_path / "out" / "runs.sqlite"
+        until(lambda: file.exists() and len(kept(file)) > 4)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        assert process.returncode == 130, err
+        assert "mine.py: use Settings(" in out
+        assert "the same command goes on" in err
+        until(lambda: not alive(-process.pid))
+
+    if where == "here":
+        stopped("--workers", "2")
+        return
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local:
+        address = local.scheduler_address
+        stopped("--cluster", address)
+        with distributed.Client(address, set_as_default=False) as client:
+            until(lambda: not any(client.processing().values()))

@@ -7,7 +7,7 @@ import dataclasses
 import math
 import time
 import weakref
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import Any
 
 from ..cases.case import Case
@@ -84,9 +84,11 @@ class Runs:
             self._stop("")
         began = time.monotonic()
         try:
-            with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers, self._pool)) as results:
+            with contextlib.closing(self._results(missing, few)) as results:
                 for task, record in results:
                     self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
+        except TimeoutError:
+            self._stop("")
         except KeyboardInterrupt:
             if not self.stoppable:
                 raise
@@ -94,6 +96,9 @@ class Runs:
         finally:
             self._spent += time.monotonic() - began
         return [seen for task in tasks if (seen := self.get(task)) is not None]
+
+    def _results(self, tasks: Sequence[Task], few: bool) -> Generator[tuple[Task, Any], None, None]:
+        return in_parallel(perform, tasks, 1 if few else self.workers, self._pool, self.until)
 
     def seconds_for(self, tasks: Iterable[Task]) -> float:
         """About how long those that are missing will take, by the time that others took."""

@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import logging
+import math
 import multiprocessing
 import os
 import pickle
 import signal
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, TypeVar
 
-from ..commands.usage_errors import one_line
+from ..commands.usage_errors import Problem, one_line
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 TRIES = 2  # attempts at a task whose worker dies
+GRACE = 2.0  # s that tasks have to end by themselves when time is up
 
 logger = logging.getLogger("carom")
 
@@ -88,8 +99,9 @@ class Pool:
 
 
 def in_parallel(
-    function: Callable[[Task], Result], tasks: Iterable[Task], workers: int | None = None, pool: Pool | None = None
-) -> Generator[tuple[Task, Result | Lost], None, None]:
+    function: Callable[[Task], Result], tasks: Iterable[Task], workers: int | None = None, pool: Pool | None = None,
+    until: float = math.inf,
+) -> Generator[tuple[Task, Result | Lost], None, None]:  # fmt: skip
     """``(task, function(task))`` for each task, as they finish, from ``workers`` processes (None: all cores).
 
     If a worker dies (killed, out of memory, a crash), the tasks that were running are tried once more, one at a time;
@@ -103,7 +115,8 @@ def in_parallel(
     at once and silently; so does the death of this process. pool: kept for later calls if all went well; None: one for
     this call.
 
-    ValueError for fewer than one worker.
+    until: on ``time.monotonic``; TimeoutError if tasks in other processes have not ended GRACE s later. Problem if a
+    cluster is gone. ValueError for fewer than one worker.
     """
     tasks = list(tasks)
     if workers is None:
@@ -113,11 +126,11 @@ def in_parallel(
     alone = workers == 1 or multiprocessing.parent_process() is not None
     if alone or not tasks or _pickled(function) is None:
         return ((task, function(task)) for task in tasks)
-    return _shared_out(function, tasks, workers, Pool() if pool is None else pool, pool is not None)
+    return _shared_out(function, tasks, workers, Pool() if pool is None else pool, pool is not None, until)
 
 
 def _shared_out(
-    function: Callable[[Task], Result], tasks: Sequence[Task], most: int, pool: Pool, kept: bool
+    function: Callable[[Task], Result], tasks: Sequence[Task], most: int, pool: Pool, kept: bool, until: float
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
     waiting, suspects = deque(range(len(tasks))), deque[int]()  # suspects were running when a worker died
     tries = [0] * len(tasks)
@@ -143,7 +156,10 @@ def _shared_out(
                     broken = True
                     break
                 room -= 1
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            patience = None if until == math.inf else max(until + GRACE - time.monotonic(), 0.0)
+            done, _ = wait(running, patience, FIRST_COMPLETED)
+            if running and not done:
+                raise TimeoutError
             for future in done:
                 index = running.pop(future)
                 try:
@@ -156,6 +172,8 @@ def _shared_out(
                     else:
                         yield tasks[index], Lost(tasks[index], f"its process ended {TRIES} times")
                     continue
+                except CancelledError as error:
+                    raise Problem("the connection to the workers is lost") from error
                 except pool.lost as error:
                     yield tasks[index], Lost(tasks[index], one_line(error))
                     continue
