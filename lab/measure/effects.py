@@ -30,6 +30,7 @@ LATE = 0.01  # s
 OF_SPREAD = 0.5  # of the spread from game to game
 CHANCE = (12.7, 4.3, 3.2, 2.8, 2.6, 2.4, 2.4, 2.3, 2.3, 2.2)  # standard errors, 5 %, from 1 degree of freedom on
 OF_MANY = 2.0  # standard errors, from many
+FEW = 2  # games tell little of their spread
 NEVER = 1e9  # in the place of infinity: only one of the runs has the value
 HOW = ("never", "touches", "order")
 HOW_IN_WORDS = ("never touches {}", "touches {}, which it should not", "touches {} out of turn")
@@ -102,7 +103,10 @@ def at_worst(all_effects: Sequence[Mapping[str, float]]) -> dict[str, float]:
                         found[other] = effects[other]
     for name in found:
         if name == "energy" or name.startswith("mean "):
-            found[name] = statistics.fmean(effects.get(name, 0.0) for effects in all_effects)
+            found[name] = statistics.fmean(values := [effects.get(name, 0.0) for effects in all_effects])
+            spread = name.replace("mean ", "spread ", 1)
+            if spread in found and len(values) > 1 and max(map(abs, values)) < NEVER:
+                found[spread] = max(found[spread], statistics.stdev(values))
     return {**found, "runs": float(len(all_effects))} if found else found
 
 
@@ -133,6 +137,8 @@ def limit_of(name: str, effects: Mapping[str, float]) -> float:
     """The least difference that would be noticed; of means it must be more than chance, and large beside what one game
     differs from the next."""
     spread, runs, known = effects.get(f"spread {name}", 0.0), effects.get("runs", 1.0), effects.get("known", 1.0)
+    if known <= FEW and f"spread {name}" in effects:
+        spread = max(spread, effects[f"limit {name}"])
     freedom = int(known) - 1
     chance = CHANCE[freedom - 1] if 0 < freedom <= len(CHANCE) else OF_MANY
     return max(effects[f"limit {name}"], spread * max(OF_SPREAD, chance * math.sqrt(1 / runs + 1 / known)))

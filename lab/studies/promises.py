@@ -151,6 +151,8 @@ def deepest(world: World) -> float:
 
 def promises(text: str) -> Iterator[tuple[str, str, str]]:
     """(settings, "cost" or "cost of" another, words) and (settings, "error", words) of the last answer in the text."""
+    if ": use Settings" not in text:
+        return  # nothing was found, and nothing is promised
     answer = text[text.rindex(": use Settings") :].partition("\n\n")[0].splitlines()
     use = answer[0].split("use ", 1)[1].removesuffix(" (as it has now)")
     norm = ""

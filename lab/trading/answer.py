@@ -11,7 +11,7 @@ from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
-CLEARLY = 10.0  # times
+CLEARLY = 4.0  # times; start phases differ by less
 MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
 
@@ -34,7 +34,7 @@ def answer(case: CaseTrade) -> list[str]:
     lines.append(f"  error    {_error(case, chosen)}")
     lines.append(f"  noticed  {noticed_text(chosen)}")
     best = front(usable)
-    cheaper = [point for point in best if price(point) < 0.9 * price(chosen)]
+    cheaper = [point for point in best if point is not now and price(point) < 0.9 * price(chosen)]
     better = [
         point for point in best
         if severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
