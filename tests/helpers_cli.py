@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from carom.lab.cli import cli
+from carom.lab.cli.main import cli
 
 FALLING_BALL = """
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform

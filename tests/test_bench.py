@@ -21,7 +21,7 @@ from carom.lab.bench import results as bench_results
 from carom.lab.bench.against_pymunk import bench
 from carom.lab.bench.queries import QUERIES
 from carom.lab.bench.suite import LARGE, SUITE, Subject, Window, subjects
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.measure import timing as bench_clock
 from carom.lab.measure.timing import Spread

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.studies.__main__ import cli
 from carom.lab.studies.bench import collision_modes as bench_modes
 from carom.lab.studies.bench.collision_modes import COURSES, KINDS, ONE_SWEPT, Course, Modes, modes

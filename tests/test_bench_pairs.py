@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from carom.components import SphereCollider
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.studies.__main__ import cli
 from carom.lab.studies.bench import plugin_pairs as bench_pairs
 from carom.lab.studies.bench.plugin_pairs import DiscCollider, PairCosts, disc_sphere, pair_costs

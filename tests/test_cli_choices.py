@@ -11,7 +11,7 @@ from helpers_cli import refusal, report_of
 
 from carom import __version__, scenes
 from carom.framework import Settings
-from carom.lab.commands.choices import parse_assignments
+from carom.lab.cli.choices import parse_assignments
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 

@@ -88,7 +88,7 @@ def test_3d_is_drawn_too(carom, tmp_path, ball):
 
 
 def test_without_matplotlib_the_run_goes_on_and_says_what_is_missing(tmp_path):
-    code = "import sys; sys.modules['matplotlib'] = None; import carom.lab.cli as c; c.main()"
+    code = "import sys; sys.modules['matplotlib'] = None; import carom.lab.cli.main as c; c.main()"
     result = run_python(code, "run", "jump", "--steps", "2", "--json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "carom[plot]" in result.stderr

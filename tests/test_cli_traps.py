@@ -82,7 +82,7 @@ LATE = FALLING_BALL.replace(
 @pytest.mark.parametrize(("text", "factor"), [(SIBLING, 1), (LATE, 2)], ids=["at the top", "inside build"])
 def test_files_of_different_folders_have_their_own_siblings(tmp_path, text, factor):
     """``import params`` and packages, in the file and in its functions; nothing of it is left behind."""
-    from carom.lab.commands.loading import load
+    from carom.lab.cli.loading import load
 
     for number in (3, 7):
         folder = tmp_path / str(number)

@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from helpers_trade_scenes import BALL, scene_file
 from helpers_workers import Task, alive, marks, perform, until
 
-from carom.lab.cli import cli
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.main import cli
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import workers
 from carom.lab.jobs.result_store import Store
 from carom.lab.jobs.workers import in_parallel

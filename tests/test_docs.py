@@ -155,7 +155,7 @@ def test_the_game_of_the_readme_prints_what_the_page_says(namespace, capsys):
 
 
 def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
-    from carom.lab.cli import cli
+    from carom.lab.cli.main import cli
 
     monkeypatch.chdir(tmp_path)
     block, *_ = python_blocks(ROOT / "docs" / "scene-files.md")
@@ -167,7 +167,7 @@ def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
 
 @pytest.mark.slow
 def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_path):
-    from carom.lab.cli import cli
+    from carom.lab.cli.main import cli
 
     page = ROOT / "docs" / "which-collision.md"
     blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
@@ -185,7 +185,7 @@ def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_p
 
 
 def test_the_scene_file_page_has_every_option():
-    from carom.lab.commands.run import run_command
+    from carom.lab.cli.run import run_command
 
     text = (ROOT / "docs" / "scene-files.md").read_text(encoding="utf-8")
     parameters = run_command.params

@@ -11,8 +11,8 @@ import pytest
 from click.testing import CliRunner
 from oracles import convex_brute
 
-from carom.lab.commands.group import Commands
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.group import Commands
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.studies.geometry import command as geometry_command
 from carom.lab.studies.geometry import report as geometry_report
 from carom.lab.studies.geometry import study as geometry_measure

@@ -15,7 +15,7 @@ from carom.framework import ForceSystem, Settings, System, World
 from carom.lab import Only, suggest_dt
 from carom.lab.cases.case import case_of
 from carom.lab.cases.subjects import subject_of
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.engines.adapters import CaromEngine, PymunkEngine
 from carom.lab.jobs.runs import Runs, refined_reference
 from carom.lab.jobs.tasks import Task

@@ -9,7 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from carom.lab.commands.group import Commands
+from carom.lab.cli.group import Commands
 from carom.lab.studies.limits import report as limits_report
 from carom.lab.studies.limits.command import NAMES, limits_command
 from carom.lab.studies.limits.records import BREAKS, DOWN, UP, Axis, AxisLimits, BrokenError, Limits, Line, Method

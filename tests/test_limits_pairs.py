@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from carom.lab.commands.group import Commands
+from carom.lab.cli.group import Commands
 from carom.lab.studies.limits.command import limits_command
 from carom.lab.studies.limits.pairs import report
 from carom.lab.studies.limits.pairs.axes import AXES, KINDS, NAMES, PAIRS, ROUND, Draw

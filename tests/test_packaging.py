@@ -151,11 +151,11 @@ def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
         "LICENSE",
         "README.md",
         "framework/carom/py.typed",
-        "lab/cli.py",
+        "lab/cli/main.py",
     } <= names
 
 
-@pytest.mark.parametrize("code", ["import carom.framework, carom.plugins, carom.scenes", "import carom.lab.cli"])
+@pytest.mark.parametrize("code", ["import carom.framework, carom.plugins, carom.scenes", "import carom.lab.cli.main"])
 def test_the_compiler_is_not_loaded_by_an_import(code):
     """numba and llvmlite take longer than all the rest; a program that asks for help or lists scenes needs neither."""
     check = f"{code}, sys; print([name for name in ('numba', 'llvmlite') if name in sys.modules])"

@@ -13,7 +13,7 @@ from carom.components import RigidBody, Transform
 from carom.framework import CaromError, ForceSystem, Phase, System
 from carom.framework.compilation import kernel, log, timing
 from carom.framework.schedule.profile_report import Stats, Totals
-from carom.lab.cli import cli
+from carom.lab.cli.main import cli
 
 from .worlds import ball, floor, make_world, run
 

@@ -10,7 +10,7 @@ import pytest
 from helpers_processes import run_python
 from rich.console import Console
 
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs.result_store import Store
 from carom.lab.reporting.progress import Bar
 

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from carom.framework import Settings
-from carom.lab.commands.group import Commands
+from carom.lab.cli.group import Commands
 from carom.lab.measure.timing import Spread
 from carom.lab.studies.settings import (
     clock as settings_clock,

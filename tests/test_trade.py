@@ -16,7 +16,7 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import PhysicsWarning, World
 from carom.lab import Only, Trade, trade
 from carom.lab.cases import case as case_module
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.trading.records import (
     BLEW_UP,
     CHAOTIC,

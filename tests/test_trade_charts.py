@@ -8,7 +8,7 @@ import helpers_trade as made
 import pytest
 
 from carom.lab.cases import published
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.timing import Spread
 from carom.lab.pictures.curve_styles import FEW, styles
 from carom.lab.trading.charts import TIME, WORK, draw, figure, legend_text, quantities

@@ -14,7 +14,7 @@ from carom.framework import Component, Phase, System, World
 from carom.lab import Inputs, Only, trade
 from carom.lab.cases import case
 from carom.lab.cases.subjects import subject_of
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.effects import NEVER, at_worst, effects_of, in_words, noticed, told
 from carom.lab.measure.norms import errors_of, norm_of, other_touches
 from carom.lab.measure.observation import Seen, mean_of

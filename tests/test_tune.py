@@ -18,9 +18,9 @@ import carom.lab
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Settings, World
 from carom.lab import NothingMeetsError, Only, search, tune
-from carom.lab.cli import cli
-from carom.lab.commands.loading import load
-from carom.lab.commands.usage_errors import Problem
+from carom.lab.cli.loading import load
+from carom.lab.cli.main import cli
+from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import runs
 from carom.lab.tuning.check import check
 from carom.lab.tuning.search import Tuning

@@ -10,8 +10,8 @@ from helpers_processes import copied_cache, run_carom
 
 from carom import scenes
 from carom.framework.jit.cache import cache_folder
-from carom.lab.cli import cli
-from carom.lab.commands import warm_up
+from carom.lab.cli import warm_up
+from carom.lab.cli.main import cli
 
 FALLING = """
 from carom.components import RigidBody, Transform

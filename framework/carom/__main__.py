@@ -24,7 +24,7 @@ def main() -> None:
     """The entry point of the ``carom`` script."""
     sys.unraisablehook = stop_or_tell
     try:
-        from carom.lab.cli import main as command
+        from carom.lab.cli.main import main as command
 
         command()
     except KeyboardInterrupt:

@@ -20,7 +20,7 @@ import numpy as np
 from ... import scenes
 from ...framework import Settings, World
 from ...framework.compilation import log
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.body_arrays import moving_and_fixed
 from ..engines.pymunk_space import INDEXES, PymunkSpace
 from ..engines.quality import Quality

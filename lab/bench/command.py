@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ..commands.options import listed, out_option, shown_options, whole_number
-from ..commands.usage_errors import Problem
+from ..cli.options import listed, out_option, shown_options, whole_number
+from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..reporting.output import Output
 from ..reporting.progress import Bar

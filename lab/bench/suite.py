@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from ..commands.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem, did_you_mean
 
 SIZES = (1000, 10_000)
 LARGE = 100_000

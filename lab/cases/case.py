@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..measure.norms import MEAN, NORMS, OF_KIND, check_norm, norm_of
 from ..measure.observation import Seen
 from ..measure.survey import Each, Survey, one_by_one, survey

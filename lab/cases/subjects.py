@@ -19,7 +19,7 @@ from typing import Any
 
 from ... import scenes
 from ...framework import Settings, World
-from ..commands.loading import Loaded, load
+from ..cli.loading import Loaded, load
 from ..inputs import texts_read
 
 DEFAULT_SECONDS = 5.0  # if the subject does not define it

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..measure.body_shapes import Floats
 from .body_arrays import BodyArrays, NotPlainError, moving_and_fixed
 

@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Self
 
-from ..commands.usage_errors import Problem, one_line
+from ..cli.usage_errors import Problem, one_line
 from .workers import Pool, run_message
 
 PATIENCE = 10.0  # s to wait for the scheduler

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from ..commands.usage_errors import Problem, one_line
+from ..cli.usage_errors import Problem, one_line
 
 PATIENCE = 30.0  # s to wait for another process that writes
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import Any
 
 from ..cases.case import Case
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.cost import work_of
 from ..measure.effects import at_worst
 from ..measure.norms import NORMS, OF_KIND, conserves, errors_of, norm_of

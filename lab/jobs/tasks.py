@@ -14,7 +14,7 @@ import numpy as np
 
 from ...framework import World
 from ..cases.case import Case
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine, Engine, engine_for
 from ..engines.body_arrays import NotPlainError
 from ..measure.effects import effects_of

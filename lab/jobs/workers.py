@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, TypeVar
 
-from ..commands.usage_errors import Problem, one_line
+from ..cli.usage_errors import Problem, one_line
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

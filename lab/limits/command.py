@@ -15,10 +15,10 @@ from rich.console import Console
 
 from ...framework import Settings, World
 from ..cases.subjects import load_once
-from ..commands.choices import parse_assignments, preset
-from ..commands.loading import Loaded, stdout_kept_clean
-from ..commands.options import budget_option, plugin_option, seed_number, seed_option, set_option, settings_option
-from ..commands.usage_errors import Problem
+from ..cli.choices import parse_assignments, preset
+from ..cli.loading import Loaded, stdout_kept_clean
+from ..cli.options import budget_option, plugin_option, seed_number, seed_option, set_option, settings_option
+from ..cli.usage_errors import Problem
 from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
 from ..reporting.run_report import number

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ...framework import World
 from ..cases.case import case_of
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
 from ..measure.effects import SHARE, in_words, metres, names_told, noticed
 from ..plain import Plain

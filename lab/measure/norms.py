@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..commands.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem, did_you_mean
 from ..trading.records import BLEW_UP, CHAOTIC, IMPACTS, NOT_FINITE, RESTING, SMOOTH, TUNNELLED
 from .observation import Seen
 

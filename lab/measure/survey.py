@@ -18,7 +18,7 @@ import numpy as np
 
 from ...framework import Settings, World
 from ..cases.subjects import Subject
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 from .norms import distances

@@ -14,7 +14,7 @@ from ...framework import CaromError, Convex, Plugin, Settings, World
 from ...framework.jit.late import errors
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
-from ..commands.usage_errors import one_line
+from ..cli.usage_errors import one_line
 from .findings import Finding, Report, Subject, row_shown
 from .kernels import RaisedError, SupportCode, compiler_message
 from .pair_checks import TOLERANCE, PairChecks

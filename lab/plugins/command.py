@@ -9,8 +9,8 @@ from rich.table import Table
 
 from ...framework import Plugin
 from ...framework.plugins.discovery import offers
-from ..commands.group import Commands
-from ..commands.loading import stdout_kept_clean
+from ..cli.group import Commands
+from ..cli.loading import stdout_kept_clean
 from ..reporting.progress import Bar
 from .check import check_plugin
 from .findings import Report, Subject

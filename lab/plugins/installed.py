@@ -11,9 +11,9 @@ from typing import Any
 
 from ...framework import Plugin, PluginError
 from ...framework.plugins.discovery import GROUP, find
-from ..commands.loading import import_file, stdout_kept_clean
-from ..commands.siblings import module_of
-from ..commands.usage_errors import Problem, did_you_mean, one_line
+from ..cli.loading import import_file, stdout_kept_clean
+from ..cli.siblings import module_of
+from ..cli.usage_errors import Problem, did_you_mean, one_line
 
 
 def plugin_named(name: str) -> Plugin:

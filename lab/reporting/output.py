@@ -11,8 +11,8 @@ from typing import Any
 import click
 from rich.console import Console
 
-from ..commands.options import writable_folder
-from ..commands.usage_errors import Problem
+from ..cli.options import writable_folder
+from ..cli.usage_errors import Problem
 from .text_tables import TextTable, between_marks, replace_between_marks
 
 

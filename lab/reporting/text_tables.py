@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from ..cli import in_command
-from ..commands.group import LateCommand, LateCommands
+from ..cli.group import LateCommand, LateCommands
+from ..cli.main import in_command
 
 COMMANDS = {
     "geometry": LateCommand(

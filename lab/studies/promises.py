@@ -21,8 +21,8 @@ import numpy as np
 
 from ...components import AABBCollider, Transform
 from ...framework import Settings, World
-from ..commands.loading import import_file
-from ..commands.options import budget_option, shown_options
+from ..cli.loading import import_file
+from ..cli.options import budget_option, shown_options
 from ..reporting.output import Output
 from ..reporting.text_tables import TextTable
 

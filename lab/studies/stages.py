@@ -8,7 +8,7 @@ import click
 
 from ...framework.schedule.stages import Stage
 from ...systems.stage_list import CLOSING, ON_DEMAND, OPENING, SYSTEMS
-from ..commands.options import shown_options
+from ..cli.options import shown_options
 from ..reporting.output import Output
 from ..reporting.text_tables import TextTable
 

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..cases.published import SOURCE, published
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..pictures import canvas
 from ..pictures.curve_styles import Style, styles
 from ..reporting.run_report import number

@@ -16,8 +16,8 @@ from rich.console import Console
 
 from ..cases.grid import ALL_METHODS
 from ..cases.subjects import Subject, subject_of
-from ..commands.group import STOPPED as STOPPED_CODE
-from ..commands.options import (
+from ..cli.group import STOPPED as STOPPED_CODE
+from ..cli.options import (
     WORDS,
     KeepsWords,
     case_options,
@@ -30,7 +30,7 @@ from ..commands.options import (
     workers_of,
     writable_folder,
 )
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.result_store import Store
 from ..jobs.runs import STOPPED

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.cost import WEIGHTS
 from .records import CaseTrade, Curve, Point, Trade
 

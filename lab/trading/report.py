@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ..cases.published import ERROR_UNIT, SOURCE, published
 from ..cases.published import NORM as ENERGY_SQUARE
-from ..commands.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
 from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable

@@ -14,7 +14,7 @@ from ..bench.results import machine
 from ..cases import grid as grids
 from ..cases.case import EFFORTS, Case, case_of, check_arguments
 from ..cases.subjects import subject_of
-from ..commands.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem, did_you_mean
 from ..jobs.result_store import Store
 from ..jobs.runs import (
     OUT_OF_TIME,

@@ -14,8 +14,8 @@ from rich.console import Console
 
 from ...framework import Settings
 from ..cases.subjects import subject_of
-from ..commands.group import STOPPED as STOPPED_CODE
-from ..commands.options import (
+from ..cli.group import STOPPED as STOPPED_CODE
+from ..cli.options import (
     WORDS,
     KeepsWords,
     case_options,
@@ -26,7 +26,7 @@ from ..commands.options import (
     together,
     workers_of,
 )
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import STOPPED, Runs
 from ..measure.norms import NORMS, check_norm

@@ -20,7 +20,7 @@ from typing import Any
 from ...framework import CaromError, Settings
 from ..cases import grid as grids
 from ..cases.case import EFFORTS, Case, case_of
-from ..commands.usage_errors import Problem
+from ..cli.usage_errors import Problem
 from ..engines.cost import WEIGHTS
 from ..jobs.result_store import Store
 from ..jobs.runs import OUT_OF_TIME, OutOfTimeError, Runs, known_points, points_of, refined_reference

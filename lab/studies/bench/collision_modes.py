@@ -23,7 +23,7 @@ from ....framework import Settings, World
 from ....framework.compilation import log
 from ...bench.report import NOTHING, digits, span
 from ...bench.results import machine
-from ...commands.usage_errors import Problem
+from ...cli.usage_errors import Problem
 from ...measure.body_shapes import shapes_of
 from ...measure.escape import Enclosure
 from ...measure.timing import Spread, no_garbage_collection, timed

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...commands.loading import load
-from ...commands.options import listed, out_option, repeats_option, shown_options, whole_number
+from ...cli.loading import load
+from ...cli.options import listed, out_option, repeats_option, shown_options, whole_number
 from ...reporting.output import Output
 from ...reporting.progress import Bar
 from . import collision_modes as bench_modes

@@ -34,7 +34,7 @@ from ....systems.records import STATE
 from ....systems.shapes.linking.batches import is_sound
 from ...bench.report import digits, span
 from ...bench.results import machine
-from ...commands.usage_errors import Problem
+from ...cli.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, now
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ....scenes import gas
 from ...bench.report import digits, span
 from ...bench.results import machine
-from ...commands.usage_errors import Problem
+from ...cli.usage_errors import Problem
 from ...measure.timing import Spread, no_garbage_collection, timed
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress

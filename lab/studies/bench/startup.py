@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from ....framework.jit.cache import CACHE_FOLDER_VARIABLE
 from ...bench.report import digits, span
 from ...bench.results import machine
-from ...commands.usage_errors import Problem
+from ...cli.usage_errors import Problem
 from ...measure.timing import Spread
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress

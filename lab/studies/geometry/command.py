@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...commands.options import out_option, repeats_option, shown_options
+from ...cli.options import out_option, repeats_option, shown_options
 from ...reporting.output import Output
 from ...reporting.progress import Bar
 from . import report as geometry_report

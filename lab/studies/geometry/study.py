@@ -20,7 +20,7 @@ from ....framework import Phase, World
 from ....plugins import Physics, convex_polygon
 from ....plugins.convex_polygon import ConvexPolygonCollider
 from ...bench.results import machine
-from ...commands.usage_errors import Problem, did_you_mean
+from ...cli.usage_errors import Problem, did_you_mean
 from ...measure.timing import Spread, no_garbage_collection, now
 from ...reporting.progress import NO_PROGRESS, Progress
 from .objects import OBJECTS, Object

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...commands.options import (
+from ...cli.options import (
     listed,
     one_of,
     out_option,
@@ -18,7 +18,7 @@ from ...commands.options import (
     seed_option,
     shown_options,
 )
-from ...commands.usage_errors import Problem
+from ...cli.usage_errors import Problem
 from ...reporting.output import Output
 from ...reporting.progress import Bar
 from . import report as limits_report

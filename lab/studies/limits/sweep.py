@@ -13,7 +13,7 @@ import numpy as np
 
 from ....framework import CaromError
 from ...bench.results import machine
-from ...commands.usage_errors import did_you_mean, one_line
+from ...cli.usage_errors import did_you_mean, one_line
 from ...reporting.progress import NO_PROGRESS, Progress
 from . import axes_contacts as limits_axes_contacts
 from . import axes_motion as limits_axes

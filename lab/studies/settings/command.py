@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...commands.options import repeats_option, shown_options
-from ...commands.usage_errors import Problem
+from ...cli.options import repeats_option, shown_options
+from ...cli.usage_errors import Problem
 from ...reporting.output import Output
 from ...reporting.progress import Bar
 from .games import games_study, of_names

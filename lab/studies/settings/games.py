@@ -22,8 +22,8 @@ from ....framework import Settings, World
 from ....framework.settings import SWEPT_CAP
 from ...bench.results import machine
 from ...cases.case import Case
-from ...commands.choices import PRESETS, preset
-from ...commands.usage_errors import Problem, did_you_mean
+from ...cli.choices import PRESETS, preset
+from ...cli.usage_errors import Problem, did_you_mean
 from ...engines.cost import counts_of, work_of
 from ...jobs.runs import Runs, points_of
 from ...measure.escape import Enclosure

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from ...bench.report import NOTHING, digits
-from ...commands.choices import PRESETS
+from ...cli.choices import PRESETS
 from ...reporting.text_tables import TextTable
 from ...trading import code_line as settings_line
 from .records import Choice, GameChoices, GamesStudy, SettingsStudy

@@ -14,7 +14,7 @@ from typing import Any
 
 from ....framework import Settings, World
 from ...bench.results import machine
-from ...commands.usage_errors import Problem, did_you_mean
+from ...cli.usage_errors import Problem, did_you_mean
 from ...measure.timing import Spread
 from ...reporting.progress import NO_PROGRESS, Progress
 from . import scenes as at

@@ -15,7 +15,7 @@ from .....components import AABBCollider, RigidBody, SphereCollider, Transform
 from .....framework import CaromError, Settings, World
 from .....plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from .....plugins.springs import Springs
-from ....commands.usage_errors import one_line
+from ....cli.usage_errors import one_line
 from .axes import DROP, ROOM, STACK, Draw
 
 STEPS = {STACK: 60, DROP: 60, ROOM: 40}

@@ -7,22 +7,22 @@ import warnings
 
 import click
 
-from .. import __version__
-from ..framework.compilation import log
-from ..framework.errors import PhysicsWarning
-from .commands.group import LateCommand, LateCommands
+from ... import __version__
+from ...framework.compilation import log
+from ...framework.errors import PhysicsWarning
+from .group import LateCommand, LateCommands
 
 # By name: where it is, and its line in the help.
 COMMANDS = {
     "bench": LateCommand("bench.command:bench_command", "Time carom on this machine."),
     "limits": LateCommand("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
-    "plan": LateCommand("commands.plan:plan_command", "Show what a step of a scene runs, and why."),
+    "plan": LateCommand("cli.plan:plan_command", "Show what a step of a scene runs, and why."),
     "plugins": LateCommand("plugins.command:plugins_command", "List plugins, or check one."),
-    "run": LateCommand("commands.run:run_command", "Run a scene or a file and show what happened."),
-    "scenes": LateCommand("commands.scenes:scenes_command", "List the scenes of the library."),
+    "run": LateCommand("cli.run:run_command", "Run a scene or a file and show what happened."),
+    "scenes": LateCommand("cli.scenes:scenes_command", "List the scenes of the library."),
     "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, measured."),
     "tune": LateCommand("tuning.command:tune_command", "The cheapest settings that keep an error."),
-    "warm-up": LateCommand("commands.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
+    "warm-up": LateCommand("cli.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
 }
 
 
