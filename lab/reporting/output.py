@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib
 import json
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,6 +50,17 @@ class Output:
         if into is not None:
             between_marks(into, mark)
         return cls(mark, as_json, as_markdown, into, out, None if out is None else _charts(out, charts))
+
+    def as_it_comes(self, answer: Callable[[Any], list[str]]) -> Callable[[Any], None]:
+        """Prints what is known so far, with the seconds that it took, for a person; nothing for others."""
+        began = time.monotonic()
+
+        def show(known: Any) -> None:
+            if self.plain:
+                first, *lines = answer(known)
+                click.echo("\n".join([f"after {time.monotonic() - began:.0f} s: {first}", *lines, ""]))
+
+        return show
 
     def show(
         self, result: Any, tables: list[TextTable], remarks: list[str], page: list[TextTable] | None = None

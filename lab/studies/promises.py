@@ -53,11 +53,12 @@ class Kept:
     again: float
     chance: float = 0.0
     at_most: bool = False
+    at_least: bool = False
 
     @property
     def factor(self) -> float:
         """The larger over the smaller."""
-        if self.at_most and self.again <= self.printed:
+        if (self.at_most and self.again <= self.printed) or (self.at_least and self.again >= self.printed):
             return 1.0
         if abs(self.again - self.printed) <= self.chance:
             return 1.0
@@ -184,9 +185,10 @@ def kept(name: str, game: Game, settings: str, what: str, words: str) -> Iterato
         other = eval(what.removeprefix("cost of "), {"Settings": Settings})
         yield Kept(name, settings, "times the cost", float(words), game.cost(chosen) / game.cost(other))
         return
-    if found := re.fullmatch(r"([\d.e+-]+) % of the .+ allowed, in (.+)", words):
-        number, norm = found.groups()
-        yield Kept(name, settings, f"{norm}: error", float(number) / 100, _error(game, chosen, norm))
+    if found := re.fullmatch(r"(at least )?([\d.e+-]+) % of the .+ allowed, in (.+)", words):
+        least, number, norm = found.groups()
+        error = float(number) / 100, _error(game, chosen, norm)
+        yield Kept(name, settings, f"{norm}: error", *error, at_least=bool(least))
         return
     for phrase in re.split(r"; (?!one game)", words):
         if found := re.match(r"(.+): ([\d.e+-]+) on average instead of ([\d.e+-]+)", phrase):

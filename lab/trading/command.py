@@ -5,8 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import shlex
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -39,7 +38,7 @@ from ..reporting.progress import Bar
 from ..reporting.text_tables import TextTable
 from .answer import answer
 from .files import write_csv, write_json
-from .records import PYMUNK, CaseTrade, Trade
+from .records import PYMUNK, Trade
 from .report import COUNTS, cheapest, choice_lines, measured, remarks, tables
 from .summary import summaries
 from .trade import Only, trade
@@ -109,7 +108,7 @@ def trade_command(
     with Store(kept) as store, workers_of(workers, cluster) as pool:
         try:
             with Bar(Console(stderr=True)) as bar:
-                show = _shown(bar) if output.plain else _nothing
+                show = output.as_it_comes(answer)
                 result = trade(*targets, **arguments, workers=pool, store=store, progress=bar, show=show)
                 files = _write(result, out)
                 if result.stopped != STOPPED:
@@ -131,21 +130,6 @@ def trade_command(
     if result.stopped == STOPPED:
         click.echo(f"carom: stopped; finished runs are kept in {kept}, the same command goes on", err=True)
         raise click.exceptions.Exit(STOPPED_CODE)
-
-
-def _shown(bar: Bar) -> Callable[[CaseTrade], None]:
-    began = time.monotonic()
-
-    def show(case: CaseTrade) -> None:
-        """What is known so far, above the bar."""
-        lines = answer(case)
-        click.echo("\n".join([f"after {time.monotonic() - began:.0f} s: {lines[0]}", *lines[1:], ""]))
-
-    return show
-
-
-def _nothing(case: CaseTrade) -> None:
-    pass
 
 
 def check_integrators(subjects: Sequence[Subject], names: Sequence[str]) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import shlex
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +124,7 @@ def tune_command(
     }  # fmt: skip
     with Store(kept) as store, workers_of(workers, cluster) as pool, Bar(Console(stderr=True)) as bar:
         try:
-            show = _shown(bar) if output.plain else _nothing
+            show = output.as_it_comes(answer)
             norm = norms[0] if norms else None
             tuning = search(target, max_error, norm, workers=pool, store=store, progress=bar, show=show, **arguments)
             balanced, found = None, []
@@ -145,21 +143,6 @@ def tune_command(
         raise click.exceptions.Exit(STOPPED_CODE)
     if tuning.choice is None:
         raise click.exceptions.Exit(NONE_MEETS)
-
-
-def _shown(bar: Bar) -> Callable[[Tuning], None]:
-    began = time.monotonic()
-
-    def show(tuning: Tuning) -> None:
-        """What is known so far, above the bar."""
-        lines = answer(tuning)
-        click.echo("\n".join([f"after {time.monotonic() - began:.0f} s: {lines[0]}", *lines[1:], ""]))
-
-    return show
-
-
-def _nothing(tuning: Tuning) -> None:
-    pass
 
 
 def _checked(tuning: Tuning, target: str, **options: Any) -> Check:

@@ -99,7 +99,8 @@ def answer(tuning: Tuning) -> list[str]:
         next_one = max(missed, key=lambda trial: trial.work)
         line = settings_line(next_one.cell, tuning.base)
         ratio = compact(next_one.work / choice.work, 2)
-        lines.append(f"  cheaper  {line}: {ratio} times the work, error {_in_unit(tuning, next_one.error)}")
+        least = "at least " if next_one.repeats < tuning.repeats else ""
+        lines.append(f"  cheaper  {line}: {ratio} times the work, error {least}{_in_unit(tuning, next_one.error)}")
     if tuning.runner_up is not None:
         line = settings_line(tuning.runner_up.cell, tuning.base)
         error = _in_unit(tuning, tuning.runner_up.errors[tuning.norm].high)

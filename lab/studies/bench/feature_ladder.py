@@ -20,14 +20,13 @@ from ....plugins import Physics
 from ....scenes import gas
 from ...bench.report import digits, span
 from ...bench.results import machine
-from ...cli.usage_errors import Problem
-from ...measure.timing import Spread, no_garbage_collection, timed
+from ...measure.timing import Spread
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
+from .step_time import nanoseconds_per_step
 
 BODIES = 10_000
-WARM_UP_STEPS = 10
 STEPS = 60  # per repeat
 SPACING = 3.0  # m between bodies that never meet: they are 1 m wide and all have the same velocity
 
@@ -166,7 +165,7 @@ def ladder(bodies: int = BODIES, repeats: int = 5, progress: Progress = NO_PROGR
         for rung in (*RUNGS[first:], *RUNGS[:first]):
             progress.say(f"{rung.feature}, repeat {repeat + 1} of {repeats}")
             with contextlib.closing(rung.build(bodies, repeat)) as world:
-                found[rung.feature].append(_time(world, rung.feature, steps) / bodies)
+                found[rung.feature].append(nanoseconds_per_step(world, rung.feature, steps) / bodies)
                 calls[rung.feature] = _called(world)
                 sizes[rung.feature] = sum(column.bytes for column in world.plan().columns if column.of == "body")
             progress.advance(1)
@@ -177,22 +176,6 @@ def ladder(bodies: int = BODIES, repeats: int = 5, progress: Progress = NO_PROGR
         kernels = [name for name in calls[rung.feature] if name not in calls[rung.beside]]
         costs.append(Cost(rung.feature, rung.beside, Spread.of(values), extra, sizes[rung.feature], kernels))
     return Ladder(bodies, steps, repeats, machine(), costs)
-
-
-def _time(world: World, feature: str, steps: int) -> float:
-    """Nanoseconds per step."""
-
-    def take(count: int) -> None:
-        for _ in range(count):
-            world.step()
-
-    take(WARM_UP_STEPS)
-    for _ in range(2):  # kernels loaded during the first try are ready in the second
-        with no_garbage_collection():
-            seconds, counts, _ = timed(lambda: take(steps))
-        if counts:
-            return seconds / steps * 1e9
-    raise Problem(f"{feature}: kernels were compiled in all steps; run it once more")
 
 
 def _called(world: World) -> list[str]:

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from ....scenes import gas
 from ...bench.report import digits, span
 from ...bench.results import machine
-from ...cli.usage_errors import Problem
-from ...measure.timing import Spread, no_garbage_collection, timed
+from ...measure.timing import Spread
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
+from .step_time import nanoseconds_per_step
 
 SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 LARGEST = 1_000_000
-WARM_UP_STEPS = 10
 BODY_STEPS = 1_500_000  # per repeat: about the same time at every size
 FEWEST_STEPS, MOST_STEPS = 10, 1500
 TARGET = (10_000, 100_000, 2.5)  # from, to, largest allowed growth of the time per body
@@ -75,18 +74,7 @@ def _steps(n: int, body_steps: int) -> int:
 def _time(n: int, seed: int, steps: int) -> float:
     """Nanoseconds per body and step."""
     with contextlib.closing(gas.gas2d(seed=seed, n=n)) as world:
-
-        def take(count: int) -> None:
-            for _ in range(count):
-                world.step()
-
-        take(WARM_UP_STEPS)
-        for _ in range(2):  # kernels loaded during the first try are ready in the second
-            with no_garbage_collection():
-                seconds, counts, _ = timed(lambda: take(steps))
-            if counts:
-                return seconds / (steps * n) * 1e9
-    raise Problem(f"gas2d {n:,}: kernels were compiled in all steps; run it once more")
+        return nanoseconds_per_step(world, f"gas2d {n:,}", steps) / n
 
 
 def table(result: Scaling) -> TextTable:
