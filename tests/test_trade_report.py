@@ -74,7 +74,6 @@ def test_failures_in_words():
     failed = [text for text in column(rows, "failed") if text]
     assert failed == ["tunnelled", "2 of 64 escaped", "3 of 64 tunnelled"]
     assert rows.rows[0][3:5] == ("-", "-")  # none of 64 reached the end: no error
-    assert trade_report.failure_lines(made.smooth())[1] == "explicit euler, step 1/30 s: 2 of 64 escaped"
 
 
 def test_observed_order_beside_the_theory_once_for_each_curve():

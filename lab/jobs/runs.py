@@ -57,7 +57,6 @@ class Runs:
         self.workers, self.progress, self.until, self.stoppable = workers, progress, until, stoppable
         self.listener: Callable[[], None] | None = None
         self.stopped = ""
-        self.performed = 0
         self._store = Store() if store is None else store
         self._pace = PACE
         self._spent = self._steps = 0.0
@@ -125,7 +124,6 @@ class Runs:
     def _keep(self, task: Task, record: dict) -> None:
         if record["failure"] == CUT:
             self._stop("")
-        self.performed += 1
         self._steps += task.cost
         self._store.add(task.key, record)
         self.progress.advance(task.cost)

@@ -113,9 +113,9 @@ def _error(case: CaseTrade, point: Point) -> str:
     of_game = told(effects)
     if of_game:
         return "; ".join(of_game[:MOST_TOLD])
-    if case.kind == RESTING and "sink" in effects:
+    if case.kind == RESTING and effects.get("sink", -1.0) >= effects.get("place", 0.0):
         return f"{metres(effects['sink'])}: how deep what rests sinks into what it rests on"
-    if case.kind not in (CHAOTIC, RESTING) and "place" in effects:
+    if case.kind != CHAOTIC and "place" in effects:
         return f"{metres(effects['place'])}: how far a body ends from where it should after {case.seconds:g} s"
     bar = point.errors[case.norm]
     return f"{100 * bar.high:.2g} % in {case.norm} ({case.norms[case.norm].partition(';')[0]})"

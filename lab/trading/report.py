@@ -142,16 +142,6 @@ def failures(point: Point) -> str:
     return ", ".join(words)
 
 
-def failure_lines(case: CaseTrade) -> list[str]:
-    """A sentence for each point with failed repeats."""
-    return [
-        f"{curve.label}, step {number(point.cell.dt)} s: {failures(point)}"
-        for curve in case.curves
-        for point in curve.points
-        if point.failed
-    ]
-
-
 def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None) -> TextTable:
     """For each target and engine, the setting of least work that meets it in all repeats."""
     chosen = norm_of(case, norm)
