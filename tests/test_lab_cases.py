@@ -53,6 +53,13 @@ def stars(scale):
     return build
 
 
+def test_start_phases_are_spread_evenly_and_few_of_them_reach_far():
+    phase = case_of("oblique", repeats=3).phase
+    for count in (1, 2, 4, 64):
+        assert sorted(phase(repeat) for repeat in range(count)) == [(k + 1) / count for k in range(count)]
+    assert [phase(repeat) for repeat in range(3)] == [1.0, 0.5, 0.25]
+
+
 def test_a_survey_that_is_shared_out_finds_the_same(tmp_path, monkeypatch):
     ball, shared = subject_of(scene_file(tmp_path, BALL)), []
 

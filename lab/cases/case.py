@@ -133,10 +133,11 @@ class Case:
 
     def phase(self, repeat: int) -> float:
         """The length of the first step of that repeat, as a fraction of a step: spread evenly however many there are
-        (van der Corput's sequence)."""
+        (van der Corput's sequence, in the order of the Gray code: 1, 1/2, 1/4, 3/4, ...; so few reach far too)."""
         if self.kind == CHAOTIC:
             return 1.0
-        return 1.0 - sum((repeat >> k & 1) / 2 ** (k + 1) for k in range(repeat.bit_length()))
+        code = repeat ^ repeat >> 1
+        return 1.0 - sum((code >> k & 1) / 2 ** (k + 1) for k in range(code.bit_length()))
 
     def replace(self, **changes: Any) -> Case:
         return dataclasses.replace(self, **changes)
