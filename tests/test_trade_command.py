@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 from helpers_trade_scenes import BALL, BULLET, CROWD, scene_file
 
-from carom.lab import Trade, cli
+from carom.lab import Trade
+from carom.lab.cli.main import cli
 from carom.lab.jobs import runs as trade_runs
 from carom.lab.jobs.tasks import perform
 from carom.lab.measure.norms import NORMS
@@ -31,7 +32,7 @@ def carom(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: str):
-        return CliRunner(env={"COLUMNS": "200"}).invoke(cli.cli, ["trade", *arguments])
+        return CliRunner(env={"COLUMNS": "200"}).invoke(cli, ["trade", *arguments])
 
     return run
 
@@ -49,7 +50,7 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made")
     mine = scene_file(folder, BULLET, first_line="A bullet & <a wall>.")
     words = [mine, "--dt", "1/15,1/60", "--repeats", "4", "--workers", "1", "--against", "pymunk", "--thorough"]
-    result = CliRunner(env={"COLUMNS": "200"}).invoke(cli.cli, ["trade", *words, "--out", str(folder / "out")])
+    result = CliRunner(env={"COLUMNS": "200"}).invoke(cli, ["trade", *words, "--out", str(folder / "out")])
     assert result.exit_code == 0, result.output
     return folder / "out", result
 
