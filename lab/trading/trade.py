@@ -39,7 +39,7 @@ SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
-RUNNING = 0.86  # of the budget; the rest is for timing what is told of again, tables and charts
+RUNNING, TIMING = 0.86, 0.95  # of the budget; until then runs, and timing what is told of again; then tables and charts
 TURNS, MOST_TIMED = 3, 6  # of the settings timed again
 FIRST_LOOK = 4.0  # s: then what is known is shown, if something is
 
@@ -188,8 +188,11 @@ class Study:
         other runs."""
         told, _ = self._told_and_worse()
         tasks = [Task(self.case, cell, 0) for cell in sorted(told, key=self._distance)[:MOST_TIMED]]
+        last = self.runs.until + (TIMING / RUNNING - 1) * (self.runs.until - self.began)
         for _ in range(TURNS):
             for task in tasks:
+                if time.monotonic() > last:
+                    return
                 cost = bare_cost(task)
                 if cost is not None:
                     self.costs[task.cell] = min(cost, self.costs.get(task.cell, math.inf))
