@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import helpers_cli
 import pytest
 from helpers_cli import report_of
@@ -116,3 +118,38 @@ def test_the_rows_of_the_step_add_up(carom):
     report = report_of(carom("run", "gas2d", "--steps", "30", "--json", "--no-pictures"))
     assert 0 < sum(report["system_milliseconds"].values()) <= report["step_milliseconds_mean"]
     assert "everything else" in carom("run", "jump", "--steps", "30", "--no-pictures").stdout
+
+
+TOUCHED = """
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Component, System, World
+from carom.plugins import Physics
+
+
+class Coin(Component):
+    pass
+
+
+class Take(System):
+    def process(self, dt):
+        for coin, _, _ in self.world.contacts.begin.pairs(Coin, RigidBody):
+            self.world.delete_entity(coin)
+
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2), settings=settings)
+    world.add_system(Take())
+    world.create_entity(Transform((0, 0)), RigidBody(), AABBCollider((0.5, 0.5)))
+    world.create_entity(Transform((0.2, 0)), SphereCollider(0.3, sensor=True), Coin())
+    world.create_entity(Transform((5, 0)), AABBCollider((1, 1)))
+    world.create_entity(Transform((5.5, 0)), RigidBody(kind="kinematic"), AABBCollider((1, 1)))
+    return world
+"""
+
+
+def test_neither_what_is_taken_nor_a_platform_in_a_wall_is_an_overlap(carom):
+    Path("touched.py").write_text(TOUCHED)
+    report = report_of(carom("run", "touched.py", "--steps", "3", "--json", "--no-pictures"))
+    assert report["bodies"]["static"] == 1
+    assert report["contacts"]["most"] == 2
+    assert report["deepest_overlap"] == 0

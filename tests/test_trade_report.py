@@ -76,6 +76,17 @@ def test_failures_in_words():
     assert rows.rows[0][3:5] == ("-", "-")  # none of 64 reached the end: no error
 
 
+def test_a_setting_that_has_run_much_less_than_others_is_no_choice():
+    case = made.smooth(against=False)
+    (_, _, (_, point)), *_ = trade_report.choices(case, (0.1,), "position")
+    point.repeats = made.REPEATS // 2
+    assert trade_report.choices(case, (0.1,), "position")[0][2][1] is point
+    point.repeats -= 1
+    other = trade_report.choices(case, (0.1,), "position")[0][2][1]
+    assert other.repeats == made.REPEATS
+    assert other.work >= point.work
+
+
 def test_observed_order_beside_the_theory_once_for_each_curve():
     orders = [text for text in column(trade_report.points_table(made.smooth(), "position"), "order") if text]
     assert orders == ["1.00 (1)", "1.00 (1)", "2.00 (2)", "4.00 (4)", "4.00 (4)", "1.00 (1)"]

@@ -22,6 +22,8 @@ from carom.lab.cli.loading import load
 from carom.lab.cli.main import cli
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs import runs
+from carom.lab.tuning import report
+from carom.lab.tuning import search as tuning_search
 from carom.lab.tuning.check import check
 from carom.lab.tuning.search import Tuning
 from carom.plugins import Physics
@@ -156,6 +158,25 @@ def test_the_same_search_finds_the_same_with_one_worker_or_two(tmp_path):
 
 
 # -- what cannot be found -----------------------------------------------------------------------------------------
+
+
+def test_before_there_are_references_the_own_settings_are_told_of(tmp_path, monkeypatch):
+    """Time is up as soon as references would run."""
+
+    def no_time(*_):
+        raise runs.OutOfTimeError
+
+    monkeypatch.setattr(tuning_search, "exact_enough", no_time)
+    file, shown = scene_file(tmp_path, BALL), []
+    kept = search(file, 10.0, budget=30.0, workers=1, show=shown.append)
+    assert shown == [kept]
+    assert kept.rough
+    assert kept.choice is not None
+    assert kept.settings == Settings()
+    assert "rough, against a first run" in report.answer(kept)[-1]
+    missed = search(file, 1e-9, budget=30.0, workers=1)
+    assert missed.choice is None
+    assert "its own settings do not keep the position error" in report.answer(missed)[0]
 
 
 def test_when_nothing_keeps_the_error_the_best_is_named():
