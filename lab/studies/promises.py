@@ -207,11 +207,6 @@ def kept(name: str, game: Game, settings: str, what: str, words: str) -> Iterato
             right = float(game.play(Settings(**FINE)).values[own])
             values = [float(game.play(chosen, phase).values[own]) for phase in PHASES]
             yield Kept(name, settings, own, float(number), max(values, key=lambda value: abs(value - right)))
-        elif found := re.search(LENGTH + ": how far a body", phrase):
-            less, number, unit = found.groups()
-            names = game.play(chosen).values
-            apart = max(_apart(game, chosen, phase, own) for phase in PHASES for own in names)
-            yield Kept(name, settings, "a body: m off", float(number) * UNITS[unit], apart, at_most=bool(less))
         elif found := re.search(LENGTH + ": how deep", phrase) or re.search("bodies sink " + LENGTH, phrase):
             less, number, unit = found.groups()
             sunk = game.play(chosen).sunk

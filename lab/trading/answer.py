@@ -37,7 +37,8 @@ def answer(case: CaseTrade) -> list[str]:
     cheaper = [point for point in best if point is not now and price(point) < 0.9 * price(chosen)]
     better = [
         point for point in best
-        if severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
+        if point is not now and severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
+        and (case.kind != RESTING or _sink(point) < _sink(chosen))
     ] if _can_be_better(case, chosen) else []  # fmt: skip
     if now is not None and now is not chosen:
         lines.append(f"  now      {_compared(case, now, chosen)}")
@@ -59,6 +60,10 @@ def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
     cheapest = min(good, key=price)
     own = [point for point in good if point.cell == case.own and price(point) < HARDLY * price(cheapest)]
     return own[0] if own else cheapest
+
+
+def _sink(point: Point) -> float:
+    return point.effects.get("sink", 0.0)
 
 
 def _can_be_better(case: CaseTrade, chosen: Point) -> bool:
@@ -113,9 +118,9 @@ def _error(case: CaseTrade, point: Point) -> str:
     of_game = told(effects)
     if of_game:
         return "; ".join(of_game[:MOST_TOLD])
-    if case.kind == RESTING and effects.get("sink", -1.0) >= effects.get("place", 0.0):
+    if case.kind == RESTING and "sink" in effects:
         return f"{metres(effects['sink'])}: how deep what rests sinks into what it rests on"
-    if case.kind != CHAOTIC and "place" in effects:
+    if case.kind not in (CHAOTIC, RESTING) and "place" in effects:
         return f"{metres(effects['place'])}: how far a body ends from where it should after {case.seconds:g} s"
     bar = point.errors[case.norm]
     return f"{100 * bar.high:.2g} % in {case.norm} ({case.norms[case.norm].partition(';')[0]})"
