@@ -37,7 +37,8 @@ def answer(case: CaseTrade) -> list[str]:
     cheaper = [point for point in best if point is not now and price(point) < 0.9 * price(chosen)]
     better = [
         point for point in best
-        if point is not now and severity(point.effects) * FACTOR <= severity(chosen.effects) and price(point) > price(chosen)
+        if point is not now and price(point) > price(chosen)
+        and severity(point.effects) * FACTOR <= severity(chosen.effects)
         and (case.kind != RESTING or _sink(point) < _sink(chosen))
     ] if _can_be_better(case, chosen) else []  # fmt: skip
     if now is not None and now is not chosen:
