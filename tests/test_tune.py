@@ -179,6 +179,14 @@ def test_before_there_are_references_the_own_settings_are_told_of(tmp_path, monk
     assert "its own settings do not keep the position error" in report.answer(missed)[0]
 
 
+def test_a_search_that_has_tried_nothing_yet_does_not_replace_a_rough_answer(tmp_path, monkeypatch):
+    monkeypatch.setattr(tuning_search._Search, "_cheapest_two", lambda searching, _: searching.runs._stop(""))
+    kept = search(scene_file(tmp_path, BALL), 10.0, budget=30.0, workers=1)
+    assert kept.rough
+    assert kept.choice is not None
+    assert kept.stopped == runs.OUT_OF_TIME
+
+
 def test_when_nothing_keeps_the_error_the_best_is_named():
     options = {"steps": (1 / 15,), "repeats": 1, "workers": 1, "only": Only(integrators=("explicit_euler",))}
     found = search("spring", 1e-9, **options)

@@ -201,7 +201,7 @@ def search(
                 continue
             raise
         tuning = searching.result()
-        if not tuning.stopped or found is None or found.rough or tuning.choice is not None:
+        if not tuning.stopped or found is None or (found.rough and tuning.trials) or tuning.choice is not None:
             found = tuning
         if tuning.stopped:
             found.stopped = tuning.stopped
