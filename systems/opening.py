@@ -70,12 +70,13 @@ def read_bodies(state, dt):
             inverse_mass[i] = 0.0
     for i in range(state.dynamic if len(limit) > 0 else 0):
         limited |= (limit[i] == limit[i]) & (not out[i])
-    for i in range(state.dynamic, state.count):
+    for i in range(state.dynamic, state.count if state.statics_unread or state.inverse_masses_lent else state.moving):
         inverse_mass[i] = 0.0
     state.limits_speed = limited
     state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))
     if state.sweeping and not state.sweeps_ready:
         return NEED_SWEEPS
+    state.statics_unread = False
     rotated = state.collides and any_rotation(state)
     if rotated or state.rotated or state.rotation_stale:
         return ROTATE

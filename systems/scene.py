@@ -52,7 +52,10 @@ ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "h
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper")
 ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.
-ZERO_WHERE_STATIC = ("start_velocity", "path_velocity", "path_second", "path_third", "force_speed_change")
+ZERO_WHERE_STATIC = (
+    "start_velocity", "path_velocity", "path_second", "path_third", "force_speed_change", "impact_count",
+    "counted_impacts",
+)  # fmt: skip
 
 
 class Scene:
@@ -120,7 +123,7 @@ class Scene:
         for low, high in ((moving, min(count, start)), (max(moving, stop), count)):
             if low < high:
                 for column in self._zero:
-                    column[low:high] = 0.0
+                    column[low:high] = 0
         self._zero_rows = moving, count
         if self._columns_version != table.columns_version:
             self.bind_columns()
@@ -141,7 +144,7 @@ class Scene:
         self.linked = linked_shapes(self.registry, present, self.state.dimensions) if present else None
         self.parameters = ParameterRecords(self.linked) if self.linked else None
         self._bind_shapes()
-        self.state.statics_stale = self.state.rotation_stale = True
+        self.state.statics_stale = self.state.statics_unread = self.state.rotation_stale = True
 
     # -- bodies that come and go ------------------------------------------------------------------
 
@@ -339,10 +342,10 @@ class Scene:
         return rotation
 
     def refresh_statics(self) -> None:
-        """The boxes of static bodies are made again if any of these may have changed."""
+        """Static bodies are read, and their boxes made, again if any of them may have changed."""
         if self.table.static_version != self.static_version:
             self.static_version = self.table.static_version
-            self.state.statics_stale = True
+            self.state.statics_stale = self.state.statics_unread = True
 
 
 def any_rotated(rotation: np.ndarray) -> bool:

@@ -69,7 +69,7 @@ class Simulation(PhysicsServices):
         self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
         self._room = Room(self.state, self.scene, self.search)
         self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
-        self.table.on_make = self._follow_columns
+        self.table.on_make, self.table.on_lend = self._follow_columns, self._follow_lent
         handlers = {
             **self._room.handlers(self),
             CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
@@ -185,6 +185,12 @@ class Simulation(PhysicsServices):
         self.scene.bind_columns()
         if self.state.version == self.table.version:  # else the next refresh does it, when rows are known
             self.quarantine.bind()
+
+    def _follow_lent(self) -> None:
+        """Code of the game may write static rows of more columns than before."""
+        lent = self.table.lent
+        self.state.positions_lent, self.state.inverse_masses_lent = "position" in lent, "inverse_mass" in lent
+        self.quarantine.follow_lent()
 
     def _check(self) -> None:
         """Errors of colliders that changes of their columns may bring about in any step."""

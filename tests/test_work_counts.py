@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from carom import scenes
-from carom.components import RigidBody, Transform
-from carom.framework import Settings, StepError, World
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import PhysicsWarning, Settings, StepError, World
 from carom.framework.jit.records.schema import Column
 from carom.plugins import Physics
 from carom.systems.codes import CHECK_FLIGHT
@@ -103,3 +103,64 @@ def test_what_the_check_of_the_flight_has_seen_is_not_looked_for_again():
         world.step()
         assert not state.flight_usual
         assert state.finite
+
+
+def ball_above_a_box() -> tuple[World, int, int]:
+    world = World(Physics(dimensions=2, gravity=(0.0, -9.81)))
+    box = world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(5.0, 0.5), restitution=0.5))
+    world.create_entity(Transform((0.0, 1.0)), RigidBody(mass=1.0), SphereCollider(radius=0.5))
+    world.step()
+    return world, box, world.bodies.row_of(box)
+
+
+def test_static_rows_are_not_read_again_while_nothing_can_have_written_them():
+    """What is written into the table past all that code of the game can reach is not seen: no stage has looked."""
+    world, box, row = ball_above_a_box()
+    with world:
+        table, state = world.physics.table, world.physics.state
+        boxes = state.statics_version
+        table.arrays["position"][row] = 40.0
+        table.arrays["inverse_mass"][row] = 1.0
+        table.arrays["aabb_collider.restitution"][row] = np.nan
+        for _ in range(5):
+            world.step()
+        assert state.statics_version == boxes
+        assert state.bodies.inverse_mass[row] == 1.0
+        assert not world.faults
+        world.component_for_entity(box, Transform).rotation = 0.0  # any assignment to a static body
+        with pytest.warns(PhysicsWarning, match="restitution is nan"):
+            world.step()
+        assert state.statics_version > boxes
+        assert state.bodies.inverse_mass[row] == 0.0
+
+
+@pytest.mark.parametrize("taken", ["before", "between"])
+def test_static_rows_of_a_column_that_the_game_holds_are_read_in_each_step(taken):
+    world, _, row = ball_above_a_box()
+    with world:
+        state, boxes = world.physics.state, world.physics.state.statics_version
+        positions, inverse_masses = world.bodies.position, world.bodies.inverse_mass
+        restitutions = world.bodies.aabb_collider.restitution
+        if taken == "before":
+            world.step()
+        positions[row], inverse_masses[row], restitutions[row] = (40.0, 0.0), 1.0, np.nan
+        with pytest.warns(PhysicsWarning, match="restitution is nan"):
+            world.step()
+        assert state.statics_version > boxes
+        assert inverse_masses[row] == 0.0
+
+
+def test_memory_of_impacts_covers_rows_that_become_static():
+    """Impacts are counted for what moves; a body that has had some, and is static now, has none."""
+    world, _, _ = ball_above_a_box()
+    with world:
+        body = world.create_entity(
+            Transform((3.0, 0.45)), RigidBody(mass=1.0, linear_velocity=(0.0, -5.0)),
+            SphereCollider(radius=0.5, restitution=1.0),
+        )  # fmt: skip
+        world.step()
+        state = world.physics.state
+        assert state.bodies.impact_count[world.bodies.row_of(body)] == 1
+        world.component_for_entity(body, RigidBody).kind = "static"
+        world.step()
+        assert not state.bodies.impact_count[state.moving : state.count].any()

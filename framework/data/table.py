@@ -46,6 +46,8 @@ class Table:
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
         self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
+        self.lent: set[str] = set()  # columns whose static rows code of the game may write unseen
+        self.on_lend: Callable[[], None] = lambda: None  # called when these are more
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
         self.frames_applied = False  # whether a force was applied from outside since the last window
@@ -204,6 +206,13 @@ class Table:
             self.columns_version += 1
             self.on_make()
         return array
+
+    def lend(self, key: str) -> None:
+        """A view of all rows of that column is given away. Static rows change in no other way without a new
+        ``static_version``, so what is known of them holds for columns that have never been lent."""
+        if key not in self.lent:
+            self.lent.add(key)
+            self.on_lend()
 
     def write(self, key: str, rows: Any, values: np.ndarray) -> None:
         """Values for those rows, a slice or indices; defaults need no array."""

@@ -16,19 +16,19 @@ HITS, FRESH, NONE, MEMBERS, LANDINGS = -1, -2, -3, -4, -5
 
 @part
 def link_pairs(state):
-    """Chain the pairs of each body, ascending: heads[i] is the first of row i, then follows links[it], till -1.
-
-    An entry is twice the pair for its first body, one more for its second.
+    """Chain the pairs of each body that moves, ascending: heads[i] is the first of row i, then follows links[it], till
+    -1. An entry is twice the pair for its first body, one more for its second.
     """
     impacts, pairs = state.impacts, state.pairs
     heads, links = impacts.heads, impacts.links
-    for i in range(state.count):
+    for i in range(state.moving):
         heads[i] = -1
     for c in range(pairs.count - 1, -1, -1):
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            links[2 * c + side] = heads[i]
-            heads[i] = 2 * c + side
+            if i < state.moving:
+                links[2 * c + side] = heads[i]
+                heads[i] = 2 * c + side
     impacts.linked = True
 
 

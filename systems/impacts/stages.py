@@ -16,6 +16,7 @@ from .looks import HITS, LANDINGS, MEMBERS, NONE, choose_looks, link_pairs, look
 from .together import EQUAL, holds, put_back
 from .watch import watch_again
 
+BLOCK = 256  # bodies that are looked at before one that bounces is enough
 AHEAD = 4  # looks between the request of a body's rows and their use
 
 
@@ -23,9 +24,10 @@ AHEAD = 4  # looks between the request of a body's rows and their use
 def any_restitution(state):
     """Whether a collider of the scene bounces."""
     restitution, bounces = state.colliders.restitution, False
-    for slot in range(state.slot_count if len(restitution) > 0 else 0):
-        for i in range(state.count):
-            bounces |= restitution[slot, i] != 0.0
+    for start in range(0, state.count if len(restitution) > 0 else 0, BLOCK):
+        for slot in range(state.slot_count if not bounces else 0):
+            for i in range(start, min(start + BLOCK, state.count)):
+                bounces |= restitution[slot, i] != 0.0
     return bounces
 
 
@@ -48,7 +50,7 @@ def begin_impacts(state, dt):
     if state.response_idle:
         return OK
     impacts.sweeps = state.sweeping and state.moved
-    for i in range(state.count):
+    for i in range(state.moving):
         bodies.impact_count[i], bodies.counted_impacts[i] = 0, 0
     for c in range(pairs.count):
         pairs.crossed[c] = False
@@ -56,12 +58,21 @@ def begin_impacts(state, dt):
         return OK
     impacts.active = impacts.sweeps or any_restitution(state)
     impacts.may_sink = impacts.sweeps and may_sink(state, dt)
-    for i in range(state.count if impacts.sweeps else 0):
+    if impacts.sweeps:
+        begin_clusters(state)
+    begin_search(state, HITS, 0.0)
+    return OK
+
+
+@part
+def begin_clusters(state):
+    """Every body is a cluster of its own. Impacts change nothing of static ones."""
+    impacts, bodies = state.impacts, state.bodies
+    for i in range(state.moving if impacts.clusters_version == state.version else state.count):
         bodies.caught[i] = 0
         bodies.last_impact[i], bodies.cluster_inverse_mass[i] = -1.0, bodies.inverse_mass[i]
         bodies.cluster_root[i], bodies.cluster_next[i], bodies.cluster_tail[i] = i, -1, i
-    begin_search(state, HITS, 0.0)
-    return OK
+    impacts.clusters_version = state.version
 
 
 @part

@@ -56,9 +56,11 @@ def are_quaternions(values, start, stop, low, high):
 
 @part
 def is_column_sound(state, checked):
-    """Whether all rows of a column hold what the field allows."""
+    """Whether all rows of a column hold what the field allows; static ones only if they may have changed."""
     first = state.moving if checked.rows == STATIC_ROWS else 0
-    last = state.dynamic if checked.rows == DYNAMIC_ROWS else state.count
+    last = state.dynamic if checked.rows == DYNAMIC_ROWS else state.moving
+    if checked.rows != DYNAMIC_ROWS and (state.statics_unread or checked.lent):
+        last = state.count
     start, stop, low, high = first * checked.width, last * checked.width, checked.low, checked.high
     if checked.turns:
         return are_quaternions(checked.values, start, stop, low, high)

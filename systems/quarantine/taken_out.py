@@ -96,6 +96,7 @@ class Quarantine:
             self._checked = list(self._find_columns())
             self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
             self._bound = bound
+            self.follow_lent()
         for checked in self._checked:
             if isinstance(checked.column, ArrayColumn):  # its bounds grow with the number of arrays
                 checked.record.low, checked.record.high = checked.column.bounds()
@@ -108,6 +109,11 @@ class Quarantine:
         if self.told or len(self._state.bodies.quarantined):
             told = np.isin(self._table.column("entity"), list(self.told))  # also those that no column shows
             self._scene.take_out(self._find_bad() | told)
+
+    def follow_lent(self) -> None:
+        """The stages look at static rows of these columns in every step."""
+        for checked in self._checked:
+            checked.record.lent = checked.column.key in self._table.lent
 
     def _find_columns(self) -> Iterator[Checked]:
         """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
