@@ -12,7 +12,7 @@ from ..shapes.query import evaluate_against
 from .candidates import is_wanted, nan_vector, to_collider
 from .records import ENDLESS
 
-FIRST_BOX = 1.0  # half the size of the first box, in cells of the finest level
+FIRST_BOX = 0.5  # half the size of the first box, in cells of the finest level; measured: 1 takes longer, as does 0.2
 
 
 @inlined
