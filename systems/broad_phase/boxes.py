@@ -92,12 +92,13 @@ def measure_frame(state):
     for k in range(len(lowest)):
         lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
     for i in range(state.moving):
-        low, high = bodies.lower[i], bodies.upper[i]
+        low, high, longest = bodies.lower[i], bodies.upper[i], 0.0
         for k in range(len(low)):  # comparisons with nan are false
             lowest = replace(lowest, k, item(low, k) if item(low, k) < item(lowest, k) else item(lowest, k))
             highest = replace(highest, k, item(high, k) if item(high, k) > item(highest, k) else item(highest, k))
             edge = item(high, k) - item(low, k)
-            largest = edge if edge > largest else largest
+            longest = edge if edge > longest else longest
+        largest = longest if longest > largest else largest  # one comparison a body waits for the one before
     for k in range(len(lowest)):
         frame[LOWEST + k], frame[HIGHEST + k] = item(lowest, k), item(highest, k)
     frame[LARGEST] = largest

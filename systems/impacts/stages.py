@@ -17,6 +17,7 @@ from .together import EQUAL, holds, put_back
 from .watch import watch_again
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
+FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
 AHEAD = 4  # looks between the request of a body's rows and their use
 
 
@@ -192,7 +193,7 @@ def is_searched(state):
 
 @part
 def request_bodies(state, c):
-    """The bodies of pair c will be looked at soon: in large worlds each column of each is far away in memory."""
+    """The bodies of pair c will be looked at soon, and each column of each is far away in memory."""
     bodies, pairs = state.bodies, state.pairs
     for side in range(2):
         i = pairs.a[c] if side == 0 else pairs.b[c]
@@ -212,7 +213,7 @@ def request_bodies(state, c):
 
 def resolve_impacts(state, dt):
     """Bounce every pair that touches in its motion and approaches faster than the threshold."""
-    impacts, pairs = state.impacts, state.pairs
+    impacts, pairs, far = state.impacts, state.pairs, state.count >= FAR
     if not impacts.active:
         return OK
     while True:
@@ -224,9 +225,11 @@ def resolve_impacts(state, dt):
             state.needed = impacts.waiting + wanted
             return NEED_EVENTS
         state.looks_counted += wanted
+        for q in range(min(AHEAD, wanted) if far else 0):
+            request_bodies(state, impacts.looks[q])
         for q in range(wanted):
             c = impacts.looks[q]
-            if q + AHEAD < wanted:
+            if far and q + AHEAD < wanted:
                 request_bodies(state, impacts.looks[q + AHEAD])
             if pairs.is_solid[c] or impacts.sweeps:
                 consider(state, c, dt)
