@@ -489,6 +489,7 @@ STATE = Schema(
     velocity_kept=flag(),  # in kept_velocity; else start_velocity has it
     kept_rows=integer(),  # those of previous_position that the step may change
     flight_usual=flag(),  # after the flight no number was far out
+    flight_seen=integer(),  # rows of which the integrator has noted that already
     started=flag(),  # keep_start has run
     step_force_kept=flag(),
     impacts_recorded=flag(),  # in the history of world.contacts

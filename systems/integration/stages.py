@@ -61,6 +61,7 @@ def keep_start(state, dt):
     start of the one before."""
     bodies = state.bodies
     state.path_degree, state.drifted = state.usual_path_degree, False
+    state.flight_usual, state.flight_seen = True, 0
     state.started = True  # before anything is overwritten: previous_position then is what a failed step goes back to
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
@@ -79,6 +80,15 @@ def keep_start(state, dt):
     for i in range(state.moving):
         start[i] = velocity[i]
     return 0
+
+
+@inlined
+def is_near(x, v):
+    """Whether a body is neither far out nor fast, for every axis: one comparison, which is false if either is nan."""
+    near = True
+    for k in range(len(x)):
+        near &= abs(item(x, k)) + abs(item(v, k)) <= NEAR
+    return near
 
 
 @part
@@ -100,8 +110,12 @@ def drift(state, h):
     if state.drifted:
         state.path_degree = LINE
         position, velocity = bodies.position, bodies.linear_velocity
+        usual = True
         for i in range(dynamic):
-            position[i] = add_scaled(position[i], velocity[i], h)
+            x = add_scaled(position[i], velocity[i], h)
+            position[i] = x
+            usual &= is_near(x, velocity[i])
+        state.flight_usual, state.flight_seen = usual, dynamic
     return 0
 
 
@@ -113,12 +127,14 @@ def euler(state, h, with_new_velocity):
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity, force = bodies.position, bodies.linear_velocity, bodies.force
     inverse_mass, damping = bodies.inverse_mass, bodies.linear_damping
-    damped = any_damping(bodies, dynamic)
+    damped, usual = any_damping(bodies, dynamic), True
     for i in range(0 if damped else dynamic):  # no exponentials and no branches in this loop
         old = velocity[i]
         new = add(old, scale(scale(force[i], inverse_mass[i]), h))
-        velocity[i] = new
-        position[i] = add_scaled(position[i], new if with_new_velocity else old, h)
+        x = add_scaled(position[i], new if with_new_velocity else old, h)
+        velocity[i], position[i] = new, x
+        usual &= is_near(x, new)
+    state.flight_usual, state.flight_seen = usual, 0 if damped else dynamic
     for i in range(dynamic if damped else 0):
         c, decay, gain = damping[i], 1.0, h
         if c != 0.0:
@@ -265,6 +281,7 @@ def end_flight(state, dt):
     if state.step_force_kept and len(bodies.kept_step_force) == 0:
         return NEED_COLUMNS
     if state.limits_speed:
+        state.flight_usual, state.flight_seen = True, 0
         for i in range(dynamic):
             limit = bodies.max_linear_speed[i]
             velocity[i] = within(velocity[i], zero_of(state), limit)
@@ -298,12 +315,10 @@ def check_flight(state, dt):
 
     Where code of the game has run since the step began, columns are looked at once more.
     """
-    bodies, usual = state.bodies, True
+    bodies, usual = state.bodies, state.flight_usual
     position, velocity = bodies.position, bodies.linear_velocity
-    for i in range(state.moving):
-        x, v = position[i], velocity[i]
-        for k in range(len(x)):  # one comparison, which is false if either is nan
-            usual &= abs(item(x, k)) + abs(item(v, k)) <= NEAR
+    for i in range(state.flight_seen, state.moving):
+        usual &= is_near(position[i], velocity[i])
     state.flight_usual = usual
     if state.quarantining or (state.others_write and not are_columns_sound(state)):
         return CHECK_FLIGHT
