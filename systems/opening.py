@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..framework.compilation import part
 from ..framework.vectors import item
+from .broad_phase.seekers import ALL
 from .codes import NEED_SWEEPS, OK, ROTATE
 
 DISCRETE = 0
@@ -47,7 +48,7 @@ def keep_state(state, dt):
     state.news, state.step_force_kept, state.flight_usual = 0, False, False
     pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0
     impacts.logged = impacts.capped = 0
-    state.candidates.count = 0
+    state.candidates.count, state.candidates.seeker_count = 0, ALL
     state.row_a, state.unsound = NOTHING_TESTED, 0
     state.all_still, state.sleep_stages = False, 0
     state.kept_rows = state.moving if state.collides and not state.statics_stale else state.count

@@ -172,6 +172,8 @@ CANDIDATES = Schema(
     kind=ints("int32"),  # pair of shapes
     bucket=ints("int32"),  # candidates by pair of shapes
     bucket_starts=ints("int32"),
+    seeker_count=integer(),  # bodies that look for others, all others being still; ALL: every body does
+    seekers=ints("int32"),  # their rows, ascending
 )
 
 # Pairs whose layers meet, a's entity id the smaller, in canonical order.

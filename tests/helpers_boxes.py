@@ -16,7 +16,8 @@ from carom.systems.broad_phase.search import CandidateSearch
 from carom.systems.records import STATE
 
 SEARCH = (
-    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few, stages.search_static_grid,
+    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few, stages.test_seekers,
+    stages.search_static_grid,
 )  # fmt: skip
 
 

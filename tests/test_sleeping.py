@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from worlds import ball, box, make_world
 
-from carom.components import AABBCollider, RigidBody, Transform
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Settings, System, World
+from carom.plugins import Physics
+from carom.systems.broad_phase.seekers import MOST_SEEKERS
+from carom.systems.broad_phase.stages import SEEKERS, UNIFORM_GRID
 from tests.helpers_pairwise import pairwise
 from tests.helpers_sleeping import MODES, is_asleep, sleep, sleepy_world, tower
 
@@ -297,3 +300,66 @@ def test_what_is_held_apart_by_disabled_contacts_does_not_sleep():
     world.remove_system(off)
     world.step()
     assert len(world.contacts.begin) == 1
+
+
+class WakeWithinTheStep(System):
+    """Wakes an entity after the flight, when it is known already which bodies are awake in the step."""
+
+    phase = Phase.INTEGRATION
+
+    def __init__(self, entity, when):
+        self.entity, self.when = entity, when
+
+    def process(self, dt):
+        if self.world.step_count == self.when:
+            self.world.wake(self.entity)
+
+
+@pytest.mark.parametrize(("balls", "search"), [(3, SEEKERS), (MOST_SEEKERS, SEEKERS), (MOST_SEEKERS + 1, UNIFORM_GRID)])
+def test_a_few_balls_above_a_sleeping_crowd_are_tested_alone(balls, search):
+    """The search for pairs costs work for the few that are awake; what they do is the same as where nothing sleeps."""
+    places = []
+    for sleeping in (True, False):
+        with World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=Settings(sleeping=sleeping)) as world:
+            world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(1000.0, 0.5)))
+            x = np.arange(300) * 1.5
+            world.create_entities(
+                300, Transform.many(np.stack([x, np.full(300, 0.5)], axis=1)), RigidBody.many(mass=1.0),
+                AABBCollider.many(half_extents=(0.5, 0.5)),
+            )  # fmt: skip
+            flyers = world.create_entities(
+                balls, Transform.many(np.stack([x[:balls], np.full(balls, 9.0)], axis=1)),
+                RigidBody.many(mass=1.0, gravity_scale=0.0, linear_velocity=(0.5, 0.0)),
+                SphereCollider.many(radius=0.5, restitution=1.0),
+            )  # fmt: skip
+            for _ in range(120):
+                world.step()
+            if sleeping:
+                assert world.bodies.asleep.sum() == 300
+                assert world.physics.state.pair_search == search
+            for _ in range(120):
+                world.step()
+            places.append([world.component_for_entity(entity, Transform).position.copy() for entity in flyers])
+    assert np.array_equal(places[0], places[1])
+
+
+def test_a_body_that_is_woken_within_a_step_finds_what_it_touches():
+    """All bodies look for others in that step, not only those that were awake when it began."""
+    with World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=Settings(sleeping=True)) as world:
+        world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(50.0, 0.5)))
+        places = [(3.0 * k, 0.5 + h) for k in range(3) for h in range(2)]
+        boxes = world.create_entities(
+            6, Transform.many(places), RigidBody.many(mass=1.0), AABBCollider.many(half_extents=(0.5, 0.5))
+        )
+        world.create_entity(
+            Transform((0.0, 30.0)), RigidBody(mass=1.0, gravity_scale=0.0, linear_velocity=(0.1, 0.0)),
+            SphereCollider(radius=0.5),
+        )  # fmt: skip
+        world.add_system(WakeWithinTheStep(boxes[0], 200))
+        for _ in range(200):
+            world.step()
+        assert is_asleep(world, *boxes) == [True] * 6
+        contacts = len(world.contacts)
+        world.step()
+        assert is_asleep(world, *boxes) == [False, False, True, True, True, True]
+        assert len(world.contacts) == contacts

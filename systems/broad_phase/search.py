@@ -13,6 +13,7 @@ from ..codes import NEED_CANDIDATES, NEED_CELLS
 from .boxes import FRAME_SIZE
 from .plan import reason_of
 from .plugin_broad_phase import PluginBroadPhase
+from .seekers import ALL, MOST_SEEKERS
 from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_count
 from .static_grid import NEVER_BUILT, OUTSIDE_MAX, reserve_static_grid
 from .tree.tree import SpatialTree
@@ -38,6 +39,8 @@ class CandidateSearch:
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
             grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
+        state.candidates.reserve(MOST_SEEKERS, "seekers")
+        state.candidates.seeker_count = ALL
         state.static_grid.version = NEVER_BUILT
         state.pair_search = NO_SEARCH
         self.read_settings()

@@ -7,6 +7,8 @@
     more                         no more than move             uniform grid of what moves; static bodies look into it
     any number                   more                          static grid, into which what moves looks; static bodies
                                                                that are not in it, and what moves, as above
+    a few of them awake          any number                    these look at what moves, and at static bodies: in their
+                                                               grid, or each
 
 Where boxes differ too much in size for a grid, or crowd in one place, trees are used: Python builds these
 (FIND_IN_PYTHON).
@@ -18,6 +20,7 @@ from ...framework.compilation import part
 from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
 from .boxes import FRAME_SIZE
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
+from .seekers import ALL
 from .static_grid import build_static_grid, follow_rows
 from .uniform_grid import FULL, build_grid, look_around, look_inside, test_notes
 
@@ -29,7 +32,7 @@ CANDIDATE_LIMIT = 1 << 23
 UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 
 # Values of ``state.pair_search``: what finds the candidates of this step.
-NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN = range(6)
+NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN, SEEKERS = range(7)
 
 
 @part
@@ -50,6 +53,8 @@ def choose_search(state, dt):
         state.pair_search = PLUGIN
         return FIND_IN_PYTHON
     state.pair_search = choose_by_count(state.moving, state.count - state.moving)
+    if state.candidates.seeker_count != ALL and state.pair_search != STATIC_GRID:
+        state.pair_search = SEEKERS
     return OK
 
 
@@ -134,7 +139,9 @@ def use_uniform_grid(state):
 
 def search_uniform_grid(state, dt):
     """Many bodies move."""
-    if state.moving < UNIFORM_GRID_MIN or (state.pair_search != UNIFORM_GRID and state.pair_search != STATIC_GRID):
+    if state.moving < UNIFORM_GRID_MIN or state.candidates.seeker_count != ALL:
+        return OK
+    if state.pair_search != UNIFORM_GRID and state.pair_search != STATIC_GRID:
         return OK
     return use_uniform_grid(state)
 
@@ -157,7 +164,7 @@ def test_few(state, dt):
     """Few bodies move: every pair of them, and they with all static bodies that are in no grid."""
     moving, candidates, grid, all_static = state.moving, state.candidates, state.static_grid, True
     if state.pair_search == STATIC_GRID:
-        if moving >= UNIFORM_GRID_MIN and state.grid.suits:
+        if candidates.seeker_count != ALL or (moving >= UNIFORM_GRID_MIN and state.grid.suits):
             return OK
         all_static = False
     elif state.pair_search != BRUTE_FORCE:
@@ -175,13 +182,44 @@ def test_few(state, dt):
     return OK
 
 
+@part
+def test_others(state, s, stop, found):
+    """Pairs of seeker s and all rows before ``stop`` but the seekers before it, which have looked at it."""
+    seekers, start = state.candidates.seekers, 0
+    i = seekers[s]
+    for earlier in range(s + 1):
+        if found != FULL:
+            found = test_row(state, i, start, seekers[earlier], found)
+        start = seekers[earlier] + 1
+    return found if found == FULL else test_row(state, i, start, stop, found)
+
+
+def test_seekers(state, dt):
+    """A few bodies are awake: they look at all others but for static ones that are in a grid."""
+    candidates, grid, found = state.candidates, state.static_grid, 0
+    all_static = state.pair_search == SEEKERS
+    if candidates.seeker_count == ALL or not (all_static or state.pair_search == STATIC_GRID):
+        return OK
+    for s in range(candidates.seeker_count):
+        if found != FULL:
+            found = test_others(state, s, state.count if all_static else state.moving, found)
+        for k in range(0 if all_static else grid.outside_count):
+            if found != FULL:
+                found = test_row(state, candidates.seekers[s], grid.outside[k], grid.outside[k] + 1, found)
+    if found == FULL:
+        return need_more_room(state)
+    candidates.count = found
+    return OK
+
+
 def search_static_grid(state, dt):
     """What moves looks into the grid of what does not."""
     if state.pair_search != STATIC_GRID:
         return OK
-    found = state.candidates.count
-    for i in range(state.moving):
-        found = look_inside(state, state.static_grid, i, found)
+    candidates, found = state.candidates, state.candidates.count
+    every = candidates.seeker_count == ALL
+    for k in range(state.moving if every else candidates.seeker_count):
+        found = look_inside(state, state.static_grid, k if every else candidates.seekers[k], found)
         if found == FULL:
             return need_more_room(state)
     state.candidates.count = found

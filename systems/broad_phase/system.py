@@ -21,6 +21,7 @@ from .stages import (
     search_static_grid,
     search_uniform_grid,
     test_few,
+    test_seekers,
 )
 
 BOXES = ("lower", "upper")
@@ -57,6 +58,10 @@ class BroadPhase(StagedSystem):
         Stage(
             test_few, f"every pair of at most {BRUTE_FORCE_MAX} that move, and with what is in no grid", BOXES,
             ("candidates",), "colliders", f"less than {UNIFORM_GRID_MIN} bodies move",
+        ),
+        Stage(
+            test_seekers, "the few bodies that are awake, with all others but for static ones in a grid", BOXES,
+            ("candidates",), "sleeping", "few bodies are awake",
         ),
         Stage(
             search_static_grid, "what moves looks into the grid of what does not", (*BOXES, "static_grid"),

@@ -9,6 +9,7 @@ import numpy as np
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
+from ..broad_phase.seekers import ALL
 from ..room import Room
 from ..scene import SLEEP_COLUMNS, SLEEPING, Scene
 from ..tracking import CONTACTS as CONTACT_NUMBERS
@@ -155,6 +156,7 @@ class Sleepers:
         if still is not None:
             rows = rows[(rows >= 0) & (rows < self._table.stops[0])]
             still[rows[still[rows] > AWAKE]] = DISTURBED
+            self._state.candidates.seeker_count = ALL  # within a step they look for others already
 
     def wake_disturbed(self, dt: float) -> np.ndarray:
         """Those that are marked, and their islands; returns the rows of the dynamic ones."""
@@ -227,6 +229,7 @@ class Sleepers:
     def _exchange(self) -> None:
         """The pairs of which both are still are kept here, the others in the records; if nothing sleeps, nothing is."""
         state, memory, still = self._state, self._state.warm_start, self._still()
+        state.candidates.seeker_count = ALL  # in this step more are awake than were noted
         state.asleep = int(np.count_nonzero(still[: self._table.stops[0]] > AWAKE))
         if not state.asleep:
             still[still > AWAKE] = AWAKE

@@ -10,6 +10,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import record_at, zero_of
 from ...framework.vectors import dot, item, length, sub
 from ..broad_phase.boxes import statics_moved
+from ..broad_phase.seekers import ALL, seek
 from ..codes import OK, WAKE, WAKE_TOUCHED
 from ..forces.stages import is_zero
 from ..islands import root_of
@@ -138,9 +139,11 @@ def find_disturbed(state, dt):
 def put_to_rest(state):
     """Sleepers are where they rest, without speed; notes whether anything moves that could meet another."""
     bodies, still, zero, lively, fresh = state.bodies, state.bodies.still, zero_of(state), False, 0
+    state.candidates.seeker_count = 0
     for i in range(state.moving):
         if still[i] == AWAKE:
             lively |= bodies.shape[i] >= 0
+            seek(state, i)
             continue
         still[i] = STILL
         if i < state.dynamic:
@@ -150,6 +153,8 @@ def put_to_rest(state):
                 bodies.path_second[i], bodies.path_third[i] = zero, zero
     for i in range(state.moving, state.count):
         fresh += still[i] == AWAKE
+    if fresh > 0:  # sleepers have to look at these
+        state.candidates.seeker_count = ALL
     state.fresh_statics = fresh
     state.all_still = not lively and fresh == 0
 
