@@ -31,6 +31,8 @@ CANDIDATE_LIMIT = 1 << 23
 # scene of few bodies starts sooner if its kernels need not be compiled.
 UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 
+BLOCK = 64  # boxes that are ruled out together
+
 # Values of ``state.pair_search``: what finds the candidates of this step.
 NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN, SEEKERS = range(7)
 
@@ -172,7 +174,7 @@ def test_few(state, dt):
     found, stop = 0, state.count if all_static else moving
     for i in range(moving):
         if found != FULL:
-            found = test_row(state, i, i + 1, stop, found)
+            found = test_blocks(state, i, i + 1, stop, found)
     for k in range(0 if all_static else grid.outside_count):
         if found != FULL:
             found = test_row(state, grid.outside[k], 0, moving, found)
@@ -183,15 +185,29 @@ def test_few(state, dt):
 
 
 @part
+def test_blocks(state, i, start, stop, found):
+    """The same for many rows, of which few overlap: a block in which none does is ruled out without writing a pair."""
+    lower, upper = state.bodies.lower, state.bodies.upper
+    low, high = lower[i], upper[i]
+    for begin in range(start, stop, BLOCK):
+        end, any_meets = min(begin + BLOCK, stop), False
+        for k in range(begin, end):
+            any_meets |= boxes_overlap(low, high, lower[k], upper[k])
+        if any_meets and found != FULL:
+            found = test_row(state, i, begin, end, found)
+    return found
+
+
+@part
 def test_others(state, s, stop, found):
     """Pairs of seeker s and all rows before ``stop`` but the seekers before it, which have looked at it."""
     seekers, start = state.candidates.seekers, 0
     i = seekers[s]
     for earlier in range(s + 1):
         if found != FULL:
-            found = test_row(state, i, start, seekers[earlier], found)
+            found = test_blocks(state, i, start, seekers[earlier], found)
         start = seekers[earlier] + 1
-    return found if found == FULL else test_row(state, i, start, stop, found)
+    return found if found == FULL else test_blocks(state, i, start, stop, found)
 
 
 def test_seekers(state, dt):
