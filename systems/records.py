@@ -461,6 +461,7 @@ STATE = Schema(
     motion_version=integer(),  # changes whenever bodies may have moved
     stay_wanted=flag(),  # contact_stay has a handler
     thinnest_static=number(),  # m, the smallest extent of a static body, but for those without any
+    thinnest_moving=number(),
     hasty=flag(),  # a body is so fast that discrete collisions may miss what it passes:
     hasty_row=integer(),
     news=integer(),  # events of contacts that Python has to hear of

@@ -46,9 +46,9 @@ def smallest_of(vector):
 def find_extents(state, level, start, stop):
     """Half extents of one level of rows start..stop-1 and where it stands from the body's position; nan without one.
 
-    The smallest extent of the last level stays.
+    The smallest extent of the last level stays. Returns the least of these, but for bodies without any.
     """
-    bodies, offset, slots = state.bodies, state.colliders.offset, state.shapes.slots
+    bodies, offset, slots, thinnest = state.bodies, state.colliders.offset, state.shapes.slots, math.inf
     for i in range(start, stop):
         shape, half = bodies.levels[level, i], scale(zero_of(state), math.nan)
         if shape >= 0:
@@ -59,8 +59,10 @@ def find_extents(state, level, start, stop):
             bodies.level_offsets[level, i] = at
             half = half_extents(state, shape, i)
         smallest = smallest_of(half)
-        bodies.half_extents[i] = half
-        bodies.min_extent[i] = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
+        extent = 2.0 * smallest if smallest < math.inf else 0.0  # what has no end is to others as a point
+        bodies.half_extents[i], bodies.min_extent[i] = half, extent
+        thinnest = extent if 0.0 < extent < thinnest else thinnest
+    return thinnest
 
 
 @part
@@ -130,15 +132,18 @@ def box_rows(state, start, stop, motion):
         starts = bodies.previous_position
     if motion == SEARCHING:
         starts, ends = bodies.search_lower, bodies.search_upper
-    find_extents(state, 0, start, stop)
+    thinnest = find_extents(state, 0, start, stop)
     for i in range(start, stop):
         bodies.lower[i], bodies.upper[i] = box_level(state, 0, i, starts[i], ends[i])
     for level in range(1, state.level_count):
-        find_extents(state, level, start, stop)
+        thinnest = find_extents(state, level, start, stop)
         for i in range(start, stop):
             low, high = box_level(state, level, i, starts[i], ends[i])
             add_level(state, i, low, high)
-    if motion != STANDING:
+    if motion == STANDING:
+        state.thinnest_static = thinnest
+    else:
+        state.thinnest_moving = thinnest
         measure_frame(state)
     return 0
 
@@ -152,10 +157,6 @@ def box_statics(state, dt):
             bodies.previous_position[i] = bodies.position[i]
             bodies.static_position[i - moving] = bodies.position[i]
         call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
-        state.thinnest_static = math.inf
-        for i in range(moving, state.count):
-            if bodies.shape[i] >= 0 and bodies.min_extent[i] > 0.0:
-                state.thinnest_static = min(state.thinnest_static, bodies.min_extent[i])
         state.statics_stale = False
         state.statics_version += 1
     return OK

@@ -35,10 +35,9 @@ def any_restitution(state):
 @part
 def may_sink(state, dt):
     """Whether some approach that is too slow to bounce may lead through the thinnest of all within the step."""
-    bodies, fastest, thinnest = state.bodies, max(0.0, state.restitution_threshold), state.thinnest_static
+    bodies, fastest = state.bodies, max(0.0, state.restitution_threshold)
+    thinnest = min(state.thinnest_static, state.thinnest_moving)
     for i in range(state.moving):
-        extent = bodies.min_extent[i]
-        thinnest = min(thinnest, extent if extent > 0.0 else math.inf)
         fastest = max(fastest, 2.0 * bodies.force_speed_change[i])
     return fastest * dt > FAST * thinnest
 

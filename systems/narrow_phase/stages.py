@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ...framework.compilation import inlined, part
 from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
@@ -142,16 +140,13 @@ def is_solid_pair(state, a, b):
 def find_hasty(state, dt):
     """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
     no pair is swept, the two may have passed through each other."""
-    bodies, farthest, thinnest = state.bodies, 0.0, state.thinnest_static
+    bodies, farthest, thinnest = state.bodies, 0.0, min(state.thinnest_static, state.thinnest_moving)
     state.hasty, any_fast = False, False
     if state.sweeping or not state.moved:
         return
-    for i in range(state.moving):
-        extent = bodies.min_extent[i]
-        thinnest = min(thinnest, extent if extent > 0.0 and bodies.shape[i] >= 0 else math.inf)
-    for i in range(state.moving):  # seldom; squares, so that no roots are drawn
-        v, room = bodies.start_velocity[i], SURE * (bodies.min_extent[i] + thinnest) / dt
-        any_fast |= not dot(v, v) <= room * room
+    for i in range(state.moving):  # seldom; squares, so that there are no roots, nor divisions
+        v, room = bodies.start_velocity[i], SURE * (bodies.min_extent[i] + thinnest)
+        any_fast |= not dot(v, v) * (dt * dt) <= room * room
     for i in range(state.moving if any_fast else 0):
         if bodies.shape[i] >= 0:
             extent = bodies.min_extent[i]
