@@ -90,7 +90,7 @@ def gather(state, dt):
     for r in range(solver.contacts):
         c, k = pairs.resting[r], solver.starts[solver.colour[r]]
         solver.starts[solver.colour[r]] += 1
-        solver.slot[r] = k
+        solver.slot[r], solver.pair[k] = k, c
         solver.first[k], solver.second[k] = bodies.place[pairs.a[c]], bodies.place[pairs.b[c]]
     inverse_mass, nothing = bodies.inverse_mass, zero_of(state)
     for q in range(solver.bodies):
@@ -144,9 +144,8 @@ def put_back(state, dt):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     if solver.contacts > 0 and not state.sweeping:
         bound_throws(state, dt)
-    for r in range(solver.contacts):
-        k = solver.slot[r]
-        pairs.impulse[pairs.resting[r]] += solver.total[k] + solver.shock[k]
+    for k in range(solver.contacts):
+        pairs.impulse[solver.pair[k]] += solver.total[k] + solver.shock[k]
         if solver.worked[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True

@@ -210,8 +210,9 @@ def linearise(state, dt):
     """Of each contact at rest the normal and the gap where the step starts, and what the solver needs of its bodies."""
     pairs, bodies, solver, inverse_mass = state.pairs, state.bodies, state.solver, state.bodies.inverse_mass
     friction, slot_of_body, has_friction = state.colliders.friction, bodies.collider_slot, False
-    for r in range(solver.contacts):
-        c, k = pairs.resting[r], solver.slot[r]
+    solver.any_rigid = False
+    for k in range(solver.contacts):
+        c = solver.pair[k]
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         slop, d = slop_of(state, a, b), between_at_start(bodies, a, b)
         _, depth, normal, point = meet(state, a, b, d)
@@ -235,6 +236,7 @@ def linearise(state, dt):
         if not both_convex(state, bodies.shape[a], bodies.shape[b]):
             most, solver.varies[k] = CONCAVE_SAG, normal_varies(state, a, b, d)
         solver.rigid[k] = weight > most * state.substeps * state.substeps * solver.extent[k]
+        solver.any_rigid |= solver.rigid[k]
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu
         has_friction |= mu != 0.0

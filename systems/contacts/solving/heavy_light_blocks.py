@@ -30,18 +30,29 @@ def light_body_of(solver, k):
     return -1
 
 
+@part
+def bears_heavy(solver, k):
+    """Whether contact k is of a light body and a heavy one that can be moved."""
+    light = solver.light_of[k]
+    if light < 0:
+        return False
+    heavy = solver.second[k] if solver.first[k] == light else solver.first[k]
+    return solver.inverse_mass[heavy] > 0.0
+
+
 def find_blocks(state, dt):
     """Pairs of contacts that squeeze a light body; at most one block per body, in the order of the contacts."""
     solver, inverse_mass = state.solver, state.solver.inverse_mass
     for q in range(solver.bodies if solver.contacts > 0 else 0):
         solver.last[q] = -1
-    count = 0
+    count, solver.any_uneven = 0, False
     for k in range(solver.contacts):
         solver.in_block[k] = False
         light = light_body_of(solver, k)
         solver.light_of[k] = light
         if light < 0:
             continue
+        solver.any_uneven |= bears_heavy(solver, k)
         is_first = solver.first[k] == light
         outwards = solver.normal[k] if is_first else negative(solver.normal[k])
         heavy = solver.second[k] if is_first else solver.first[k]

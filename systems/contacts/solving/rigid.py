@@ -15,7 +15,7 @@ import math
 from ....framework.compilation import part
 from ....framework.vectors import add_scaled, dot, length, negative, sub
 from ...islands import root_of
-from .heavy_light_blocks import OPPOSED, solve_blocks
+from .heavy_light_blocks import OPPOSED, bears_heavy, solve_blocks
 from .passes import solve_friction, solve_normals
 from .softness import SAG
 
@@ -80,21 +80,10 @@ def leave_squeezed(solver):
 
 
 @part
-def bears_heavy(solver, k):
-    """Whether contact k is of a light body and a heavy one that can be moved."""
-    light = solver.light_of[k]
-    if light < 0:
-        return False
-    heavy = solver.second[k] if solver.first[k] == light else solver.first[k]
-    return solver.inverse_mass[heavy] > 0.0
-
-
-@part
 def harden_loaded(solver, h):
-    """In islands of light and heavy bodies contacts become rigid that would sag too much; returns whether some are."""
+    """In islands of light and heavy bodies contacts become rigid that would sag too much."""
     if not solver.islands_known:
         find_islands(solver)
-    any_rigid = False
     for q in range(solver.bodies):
         solver.open[q] = False
     for k in range(solver.contacts):
@@ -102,21 +91,16 @@ def harden_loaded(solver, h):
     for k in range(solver.contacts):
         most = (MOST_DEEP_SAG if solver.deep[k] else MOST_SAG) * solver.extent[k] * solver.mass[k]
         if solver.open[island_of(solver, k)] and SAG * solver.impulse[k] * h > most:
-            solver.rigid[k] = any_rigid = True
-    return any_rigid
+            solver.rigid[k] = solver.any_rigid = True
 
 
 @part
 def choose_rigid(solver, h):
     """Which contacts are rigid, and what they may be wrong by; returns whether there are any. ``converging``: those of
     their islands."""
-    any_rigid = any_uneven = False
-    for k in range(solver.contacts):
-        any_rigid |= solver.rigid[k]
-        any_uneven |= bears_heavy(solver, k)
-    if any_uneven:
-        any_rigid |= harden_loaded(solver, h)
-    if not any_rigid:
+    if solver.any_uneven:
+        harden_loaded(solver, h)
+    if not solver.any_rigid:
         return False
     if not solver.islands_known:
         find_islands(solver)

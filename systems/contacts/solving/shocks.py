@@ -38,22 +38,32 @@ def link_contacts(solver):
 
 
 @part
+def excess_speed(solver, k):
+    """How much faster contact k closes than what is open lets it."""
+    velocity = solver.velocity
+    return dot(sub(velocity[solver.first[k]], velocity[solver.second[k]]), solver.normal[k]) - solver.opening[k]
+
+
+@part
+def closes_fast(solver, k, dt):
+    """Whether contact k is a shock."""
+    return excess_speed(solver, k) * dt > SHOCK * solver.extent[k]
+
+
+@part
 def detect_shocks(solver, dt):
     """Ask the contacts that close fast, more than what is open lets them; returns whether there are any."""
-    velocity, first, second, inverse_mass = solver.velocity, solver.first, solver.second, solver.inverse_mass
-    found = False
+    inverse_mass, found = solver.inverse_mass, False
     for k in range(solver.contacts):
-        a, b = first[k], second[k]
-        speed = dot(sub(velocity[a], velocity[b]), solver.normal[k]) - solver.opening[k]
-        if speed * dt > SHOCK * solver.extent[k]:
+        if closes_fast(solver, k, dt):
             if not found:
                 found = True
                 begin_shocks(solver)
             solver.asked[k] = solver.busy[k >> RUN] = True
             for side in range(2):
-                q = a if side == 0 else b
+                q = solver.first[k] if side == 0 else solver.second[k]
                 if inverse_mass[q] > 0.0:
-                    solver.reach[q] = max(solver.reach[q], speed)
+                    solver.reach[q] = max(solver.reach[q], excess_speed(solver, k))
     return found
 
 

@@ -20,7 +20,7 @@ from .firm import leave_open
 from .heavy_light_blocks import hold_light, solve_blocks
 from .passes import solve_friction, solve_normals
 from .rigid import choose_rigid, converge, leave_out_rigid
-from .shocks import solve_shocks
+from .shocks import closes_fast, solve_shocks
 from .softness import DAMPING_RATIO, FREQUENCY
 
 RELAX_PASSES = 2
@@ -32,26 +32,45 @@ PUSH_LIMIT = 0.05  # of the extent, per step
 
 
 @part
-def measure(solver, h, bias_rate):
-    """What each contact asks of the speed along its normal, from where the bodies are now.
+def measure(solver, k, h, bias_rate):
+    """What contact k asks of the speed along its normal, from where the bodies are now.
 
     opening: at most closing what is open within a substep; pushing: in the pass that pushes, overlap is to open as
-    well, softly where ``soft`` says so. Returns whether some overlap is too deep for that.
+    well, softly where ``soft`` says so, unless it is too ``deep`` for that.
     """
-    first, second, normal, gap = solver.first, solver.second, solver.normal, solver.gap
-    shift, opening, pushing, soft, deep = solver.shift, solver.opening, solver.pushing, solver.soft, solver.deep
-    any_deep = False
+    room = solver.gap[k] + dot(sub(solver.shift[solver.second[k]], solver.shift[solver.first[k]]), solver.normal[k])
+    opening = pushing = max(0.0, room) / h
+    soft = deep = False
+    if room <= 0.0 and not solver.parting[k]:
+        deep = room < -DEEP * solver.extent[k]
+        if solver.rigid[k] or not deep:
+            pushing = bias_rate * max(room, -DEEP * solver.extent[k])
+            soft = not (solver.rigid[k] or solver.in_block[k] or solver.firm[k])
+    solver.opening[k], solver.pushing[k], solver.soft[k], solver.deep[k] = opening, pushing, soft, deep
+
+
+@part
+def measure_all(solver, h, bias_rate, dt):
+    """The same of all contacts, and which have pushed; returns (whether some are too deep, whether some close as fast
+    as shocks)."""
+    any_deep = any_fast = False
     for k in range(solver.contacts):
-        room = gap[k] + dot(sub(shift[second[k]], shift[first[k]]), normal[k])
-        opening[k] = pushing[k] = max(0.0, room) / h
-        soft[k] = deep[k] = False
-        if room <= 0.0 and not solver.parting[k]:
-            deep[k] = room < -DEEP * solver.extent[k]
-            any_deep |= deep[k]
-            if solver.rigid[k] or not deep[k]:
-                pushing[k] = bias_rate * max(room, -DEEP * solver.extent[k])
-                soft[k] = not (solver.rigid[k] or solver.in_block[k] or solver.firm[k])
-    return any_deep
+        solver.worked[k] |= solver.impulse[k] > 0.0
+        measure(solver, k, h, bias_rate)
+        any_deep |= solver.deep[k]
+        any_fast |= closes_fast(solver, k, dt)
+    return any_deep, any_fast
+
+
+@part
+def measure_moved(solver, h, bias_rate, dt):
+    """The same of the contacts of bodies that were pushed apart; returns whether some close as fast as shocks."""
+    moved, any_fast = solver.going, False
+    for k in range(solver.contacts):
+        if moved[solver.first[k]] or moved[solver.second[k]]:
+            measure(solver, k, h, bias_rate)
+            any_fast |= closes_fast(solver, k, dt)
+    return any_fast
 
 
 @part
@@ -71,15 +90,19 @@ def propagate(solver, begins):
 @part
 def push_deep(solver, substeps):
     """Move bodies that overlap deeply apart, a part of the way, without giving them speed."""
-    shift, inverse_mass = solver.shift, solver.inverse_mass
+    shift, inverse_mass, moved = solver.shift, solver.inverse_mass, solver.going
+    for q in range(solver.bodies):
+        moved[q] = False
     for k in range(solver.contacts):
         a, b, n = solver.first[k], solver.second[k], solver.normal[k]
+        if not (solver.deep[k] or moved[a] or moved[b]):
+            continue
         overlap = -solver.gap[k] - dot(sub(shift[b], shift[a]), n)
         if overlap > DEEP * solver.extent[k] and not (solver.parting[k] or solver.rigid[k]):
             push = min(PUSH_RATE * overlap, PUSH_LIMIT * solver.extent[k]) / substeps * solver.mass[k]
             shift[a] = add_scaled(shift[a], n, -push * inverse_mass[a])
             shift[b] = add_scaled(shift[b], n, push * inverse_mass[b])
-            solver.worked[k] = True
+            solver.worked[k] = moved[a] = moved[b] = True
 
 
 @part
@@ -128,16 +151,15 @@ def solve_substep(solver, h, substeps, passes, plastic, ends):
                 converge(solver, bias, softness, True, DEEP, h)
             converge(solver, bias, softness, turn == 0, math.inf, h)
         if turn == 0:
-            for k in range(solver.contacts):
-                solver.worked[k] |= solver.impulse[k] > 0.0
             for q in range(solver.bodies):
                 solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
-            if measure(solver, h, bias_rate):
+            any_deep, any_fast = measure_all(solver, h, bias_rate, h * substeps)
+            if any_deep:
                 push_deep(solver, substeps)
-                measure(solver, h, bias_rate)
+                any_fast |= measure_moved(solver, h, bias_rate, h * substeps)
             if ends:
                 leave_open(solver, h)
-            if plastic:
+            if plastic and any_fast:
                 solve_shocks(solver, h * substeps)
         turn += 1
     for k in range(solver.contacts):
@@ -156,13 +178,13 @@ def solve_contacts(state, dt):
         return OK
     h = dt / substeps
     omega = 2.0 * math.pi * FREQUENCY / h
+    _, any_fast = measure_all(solver, h, omega / (2.0 * DAMPING_RATIO + h * omega), dt)
     for k in range(solver.contacts):
         solver.total[k], solver.worked[k], solver.shock[k] = 0.0, False, 0.0
-    measure(solver, h, omega / (2.0 * DAMPING_RATIO + h * omega))
     solver.islands_known = solver.linked = False
     solver.shock_visits = solver.visits = 0
     plastic = state.impacts.logged == 0
-    if plastic:
+    if plastic and any_fast:
         solve_shocks(solver, dt)
     for step in range(substeps):
         before = LET_GO_PASSES if solver.any_unsettled and step == 0 else 0
