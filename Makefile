@@ -12,7 +12,8 @@ SCENE ?= asteroids
 ARGS ?=
 
 BIN := .venv/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet
+# Byte code is made of what is imported, when it is.
+PIP := $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile
 
 # An editable install holds the folder's path, so a clone that moved installs again.
 HERE := $(shell pwd | cksum | cut -d " " -f 1)

@@ -35,7 +35,7 @@ def matches_esper(world):
                 got = getattr(handle, name)
                 if isinstance(got, str):
                     got = component.columns[name].choices.index(got)
-                np.testing.assert_array_equal(in_row, np.nan if got is None else got)
+                assert np.array_equal(in_row, np.nan if got is None else got, equal_nan=True), (e, name)
         kind = components[RigidBody].kind if RigidBody in components else "static"
         assert e in getattr(bodies, kind).entity
     return True

@@ -19,7 +19,7 @@ from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
 
 ROOT = Path(__file__).resolve().parent.parent
-STEPS = 600
+STEPS = 200
 MODES = ("discrete", "continuous", "event_driven")
 
 

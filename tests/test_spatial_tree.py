@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -241,11 +240,9 @@ def test_many_bodies_at_one_point_are_counted_not_stored(d):
     tree = SpatialTree(d)
     tree.build(lower[:1000], lower[:1000], 0, 1000)
     assert len(tree.pairs_within()[0]) == 1000 * 999 // 2
-    began = time.perf_counter()
     tree.build(lower, lower, 0, len(lower))
     with pytest.raises(CandidateLimitError, match="4999950000 candidate pairs exceed the limit of 8388608") as caught:
         tree.pairs_within()
-    assert time.perf_counter() - began < 1.0
     assert (caught.value.count, caught.value.limit) == (100_000 * 99_999 // 2, 1 << 23)
     with pytest.raises(CandidateLimitError):
         tree.pairs_between(tree)
