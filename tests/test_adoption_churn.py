@@ -90,6 +90,7 @@ def test_entities_created_inside_a_step_join_at_the_next(world):
     assert world.component_for_entity(made[0], Transform).x == 6.0
 
 
+@pytest.mark.compiled
 def test_a_body_created_inside_another_parts_from_it(world):
     """ACCURACY C25."""
     ball(world, 0.0)
