@@ -6,7 +6,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, sub
 from ..integration.trajectory import ROUNDING, along, relative_path
-from ..shapes.dispatch import both_convex, evaluate, has_corner_rule, is_corner_touch
+from ..shapes.dispatch import both_convex, both_sharp, evaluate, has_corner_rule, is_corner_touch
 from ..shapes.tolerances import slop_of
 
 LOOKS = 24
@@ -40,6 +40,8 @@ def meets_at_corner(state, a, b, d, slop):
     other: what stays where it is does not catch."""
     bodies, shape = state.bodies, state.bodies.shape
     if not has_corner_rule(state, shape[a], shape[b]):
+        if not both_sharp(state, shape[a], shape[b]):
+            return False
         travel = sub(between(bodies, a, b), between_at_start(bodies, a, b))
         if length(travel) < STAYS_SLOPS * slop:
             return False

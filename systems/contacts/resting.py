@@ -9,7 +9,7 @@ from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
 from ..impacts.impulses import STOPPED, is_caught
 from ..shapes.dispatch import both_convex, mix, mix_friction
-from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
+from ..shapes.tolerances import contact_margin, slop_for, slop_of, smaller_extent
 from .approach import between, between_at_start, leg_start, meet, meets_at_corner, touch_on_way
 from .solving.softness import SAG
 
@@ -214,9 +214,10 @@ def linearise(state, dt):
     for k in range(solver.contacts):
         c = solver.pair[k]
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
-        slop, d = slop_of(state, a, b), between_at_start(bodies, a, b)
+        extent, d = smaller_extent(bodies, a, b), between_at_start(bodies, a, b)
+        slop = slop_for(state, extent)
         _, depth, normal, point = meet(state, a, b, d)
-        gap, apart = -depth, depth < -APART * smaller_extent(bodies, a, b)
+        gap, apart = -depth, depth < -APART * extent
         if apart or parting != STAYS or meets_at_corner(state, a, b, d, slop):
             far, gap, normal, point = far_touch(state, dt, a, b, between(bodies, a, b))
             if not far or parting != STAYS:
@@ -230,12 +231,12 @@ def linearise(state, dt):
         solver.mass[k] = 1.0 / (inverse_mass[a] + inverse_mass[b])
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
-        solver.extent[k] = smaller_extent(bodies, a, b)
+        solver.extent[k] = extent
         weight = SAG * max(bodies.force_speed_change[a], bodies.force_speed_change[b]) * dt
         most, solver.varies[k] = OWN_SAG, False
         if not both_convex(state, bodies.shape[a], bodies.shape[b]):
             most, solver.varies[k] = CONCAVE_SAG, normal_varies(state, a, b, d)
-        solver.rigid[k] = weight > most * state.substeps * state.substeps * solver.extent[k]
+        solver.rigid[k] = weight > most * state.substeps * state.substeps * extent
         solver.any_rigid |= solver.rigid[k]
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu

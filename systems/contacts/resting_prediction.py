@@ -99,8 +99,20 @@ def speed_before(bodies, i):
 
 
 @part
+def some_thrown(state):
+    """Whether any body is, by what its own forces change."""
+    bodies = state.bodies
+    for i in range(state.moving):
+        if bodies.supported[i] and is_thrown(bodies, i, THROWN * bodies.force_speed_change[i]):
+            return True
+    return False
+
+
+@part
 def drop_shocks(state):
     """Take back what was a shock: contacts at rest act against forces and against the little that bodies close with."""
+    if not some_thrown(state):
+        return False
     memory, bodies, now, any_thrown = state.warm_start, state.bodies, state.warm_start.now, False
     velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
     for m in range(memory.counts[now]):

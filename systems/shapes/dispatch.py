@@ -73,12 +73,18 @@ def has_corner_rule(state, shape_a, shape_b):
 
 
 @inlined
+def both_sharp(state, shape_a, shape_b):
+    """Whether both have corners."""
+    return state.shapes.sharp[shape_a] and state.shapes.sharp[shape_b]
+
+
+@inlined
 def is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
     """Whether the two touch by less than the slop and at a corner or an edge only, which is no contact."""
     shapes, kind = state.shapes, kind_of(state, shape_a, shape_b)
     address = shapes.corner[kind]
     if address == 0:
-        return shapes.sharp[shape_a] and shapes.sharp[shape_b] and gives_way(state, shape_a, a, shape_b, b, d, slop)
+        return both_sharp(state, shape_a, shape_b) and gives_way(state, shape_a, a, shape_b, b, d, slop)
     pa, pb = shapes.parameters[shape_a], shapes.parameters[shape_b]
     if (shape_a > shape_b) != shapes.flipped[kind]:
         return call_corner(address, state, pb, b, pa, a, negative(d), slop)

@@ -16,10 +16,16 @@ def smaller_extent(bodies, a, b):
 
 
 @inlined
-def slop_of(state, a, b):
-    """Metres that are nothing to this pair: as the settings say, or from the extents."""
+def slop_for(state, extent):
+    """Metres that are nothing to bodies of that extent: as the settings say, or a share of it."""
     fixed = state.slop
-    return fixed if fixed >= 0.0 else SLOP * smaller_extent(state.bodies, a, b)
+    return fixed if fixed >= 0.0 else SLOP * extent
+
+
+@inlined
+def slop_of(state, a, b):
+    """Metres that are nothing to this pair."""
+    return slop_for(state, smaller_extent(state.bodies, a, b))
 
 
 @inlined
