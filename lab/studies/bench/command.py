@@ -98,4 +98,4 @@ def startup_command(names: tuple[str, ...], repeats: int, as_json: bool, as_mark
     wanted = [load(name).name for name in names]
     with Bar(Console(stderr=True)) as bar:
         result = bench_startup.startup(wanted, repeats, bar)
-    output.show(result, [bench_startup.table(result)], [])
+    output.show(result, bench_startup.tables(result), [])

@@ -22,6 +22,12 @@ from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
 
 STEPS = 600  # after the first
+COMMANDS = {
+    "python -c pass": ["-c", "pass"],
+    "import carom.framework": ["-c", "import carom.framework"],
+    "carom --help": ["-m", "carom", "--help"],
+    "carom scenes": ["-m", "carom", "scenes"],
+}
 EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
 PROGRAM = f"""
 import json, sys, time
@@ -61,16 +67,18 @@ class Start:
 
 @dataclass
 class Startup(Plain):
-    """All starts that were measured; medians of the repeats."""
+    """All starts that were measured; medians of the repeats. ``commands``: processor seconds."""
 
     machine: dict[str, str]
     starts: list[Start]
+    commands: dict[str, Spread]
 
 
 def startup(scenes: Sequence[str] = ("asteroids",), repeats: int = 3, progress: Progress = NO_PROGRESS) -> Startup:
     """Start processes that build a scene and step it; the first of each repeat has an empty cache folder."""
     starts = []
     progress.begin(len(scenes) * (repeats + 1))
+    commands = {name: Spread.of([_seconds_of(command) for _ in range(repeats)]) for name, command in COMMANDS.items()}
     for scene in scenes:
         found: dict[str, list[dict[str, float]]] = {EMPTY: [], KEPT: [], SHIPPED: []}
         with tempfile.TemporaryDirectory() as portable:
@@ -84,7 +92,19 @@ def startup(scenes: Sequence[str] = ("asteroids",), repeats: int = 3, progress: 
                         found[kernels].append(_start(scene, folder, portable if kernels == SHIPPED else ""))
                 progress.advance(1)
         starts += [_of(scene, kernels, runs) for kernels, runs in found.items()]
-    return Startup(machine(), starts)
+    return Startup(machine(), starts, commands)
+
+
+def _seconds_of(command: list[str]) -> float:
+    """Processor seconds that it takes in a process of its own."""
+
+    def of_ended() -> float:
+        ended = os.times()
+        return ended.children_user + ended.children_system
+
+    before = of_ended()
+    _run([sys.executable, *command], {})
+    return of_ended() - before
 
 
 def _of(scene: str, kernels: str, runs: list[dict[str, float]]) -> Start:
@@ -113,8 +133,13 @@ def _run(command: list[str], environment: dict[str, str]) -> str:
     return done.stdout
 
 
-def table(result: Startup) -> TextTable:
-    """The times as a table."""
+def tables(result: Startup) -> list[TextTable]:
+    """The times of commands that need no kernel, and those of scenes."""
+    cells = [(name, digits(seconds.median), span(seconds)) for name, seconds in result.commands.items()]
+    return [TextTable("commands that need no kernel", ("command", "CPU s", "from .. to"), cells), _scenes(result)]
+
+
+def _scenes(result: Startup) -> TextTable:
     cells = [
         (
             start.scene, start.kernels, str(start.compiled), digits(start.seconds.median), span(start.seconds),
