@@ -64,6 +64,8 @@ def needed_functions(
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
     yield from (RUN_STAGES, TICKS_NOW, COPY_BLOCKS, MOVE_ROWS)
+    for place, function in LINKED_PARTS.items() if has_shapes else ():
+        yield linked_part(place, function, dimensions)
     for stage in STAGES:
         if stage.needed in conditions or stage.name in conditions:
             yield linked_stage(stage, STATE, dimensions)
@@ -71,8 +73,6 @@ def needed_functions(
     yield from query_kernels(dimensions).of_world(has_shapes)
     if linked is None:
         return
-    for place, function in LINKED_PARTS.items():
-        yield linked_part(place, function, dimensions)
     yield from linked.all_functions(sweeps=True)
     yield half_extents_call(dimensions)
     for query in queries:

@@ -117,11 +117,15 @@ class StepLinks:
             yield from linked.all_functions(self._state.sweeps_ready)
 
     def _parts(self) -> dict[int, Linked]:
-        """The parts of stages that are called by address; those of swept bodies only where there are
-        any."""
+        """The parts of stages that are called by address: those of swept bodies and of impacts at the same time only
+        where there may be any."""
         if not self._state.collides:
             return {}
-        places = (BOX_ROWS, *SWEPT) if self._state.sweeps_ready else (BOX_ROWS,)
+        places = [BOX_ROWS]
+        if self._state.sweeps_ready:
+            places.extend(SWEPT)
+        if np.any(self._state.colliders.restitution[:, : self._state.count]):
+            places.append(TAKE_TOGETHER)
         return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
 
     def link_shapes(self) -> None:
@@ -139,7 +143,7 @@ class StepLinks:
             links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self._state.dimensions).address
 
     def link_together(self) -> None:
-        """What impacts at the same time need, when there are such for the first time."""
+        """What impacts at the same time need, where nothing could bounce when the stages were linked."""
         part = linked_part(TAKE_TOGETHER, LINKED_PARTS[TAKE_TOGETHER], self._state.dimensions)
         self._state.links[TAKE_TOGETHER] = part.address
 
