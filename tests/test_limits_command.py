@@ -94,12 +94,28 @@ def test_the_command_tells_what_broke_while_it_watched(carom, tmp_path):
     ("arguments", "message"),
     [
         (["stack", "--seconds", "-1"], "--seconds must be a number of at least 0"),
+        (["stack", "--max-error", "0"], "--max-error takes metres above 0, not 0"),
         (["stak"], "no scene named 'stak'; did you mean 'stack'"),
         ([], "Missing argument"),
     ],
 )
 def test_the_command_refuses_in_one_line(carom, arguments, message):
     assert message in refusal(carom("limits", *arguments))
+
+
+FALLS = """
+from carom.components import RigidBody, Transform
+from carom.framework import World
+from carom.plugins import Physics
+
+seconds = 1.0
+
+
+def build(settings, seed=0):
+    world = World(Physics(dimensions=2, gravity=(0, -10)), settings=settings)
+    world.create_entity(Transform((0, 0)), RigidBody())
+    return world
+"""
 
 
 SLIDES = """
@@ -117,6 +133,21 @@ def build(settings, seed=0):
     world.create_entity(Transform((4, -0.5)), RigidBody(1.0, (-1, 0), kind="kinematic"), AABBCollider((0.5, 0.3)))
     return world
 """
+
+
+def test_the_step_follows_the_error_that_is_asked_for(carom):
+    """Semi-implicit Euler is off by g dt t / 2 in free fall: after 1 s 8 cm at 1/60 s, 1 cm at 1/480 s."""
+    Path("falls.py").write_text(FALLS)
+    steps = []
+    for most in ("0.1", "0.02"):
+        result = carom("limits", "falls.py", "--max-error", most, "--json")
+        assert result.exit_code == 0, result.output
+        steps.append(json.loads(result.stdout)["outcome"]["longest"])
+    for step, most in zip(steps, (0.1, 0.02), strict=True):
+        assert 5 * step <= most < 5 * 2 * step
+    assert "moves no body by more than 10 cm, and" in carom("limits", "falls.py", "--max-error", "0.1").stdout
+    Path("game.py").write_text(FALLS + "\n\ndef compared(world):\n    return {'height': 1.0}\n")
+    assert "says itself what counts" in refusal(carom("limits", "game.py", "--max-error", "0.1"))
 
 
 def test_little_time_gives_what_is_known_and_says_how_much_it_needs(carom, monkeypatch):

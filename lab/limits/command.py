@@ -34,6 +34,10 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
 @click.argument("target", metavar="SCENE|FILE.py")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
 @click.option("--seconds", type=float, help="How long to watch it (default: what it recommends; 0: its start).")
+@click.option(
+    "--max-error", "way", type=float, metavar="METRES",
+    help="How far a body may be from where it should (default: 1 % of the smallest one's size).",
+)  # fmt: skip
 @settings_option
 @set_option
 @seed_option
@@ -44,6 +48,7 @@ def limits_command(
     target: str,
     as_json: bool,
     seconds: float | None,
+    way: float | None,
     preset_name: str | None,
     assignments: tuple[str, ...],
     seed: str,
@@ -59,17 +64,21 @@ def limits_command(
     del traceback  # seen by Commands.main
     if seconds is not None and not 0 <= seconds < float("inf"):
         raise Problem(f"--seconds must be a number of at least 0, not {seconds!r}")
+    if way is not None and not 0 < way < float("inf"):
+        raise Problem(f"--max-error takes metres above 0, not {way:g}")
     settings = preset(preset_name) if preset_name is not None else None
     changes, variant = parse_assignments(assignments), seed_number(seed)
     began = time.monotonic()
     scene = Asked(target, settings, tuple(changes.items()), plugins)
     loaded = load_once(target)
+    if way is not None and loaded.compared is not None:
+        raise Problem(f"--max-error does not apply: {loaded.name} says itself what counts, in compared(world)")
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
     with Bar(Console(stderr=True)) as bar:
         with closing(scene(None, variant)) as world:
             found = _watched(loaded, world, seconds, bar)
-        outcome = outcome_of_steps(scene, variant, seconds, began, budget, bar)
+        outcome = outcome_of_steps(scene, variant, seconds, began, budget, bar, way)
     _show(loaded.name, found, outcome, as_json)
 
 

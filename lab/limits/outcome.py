@@ -33,6 +33,8 @@ class StepOutcome(Plain):
         if nothing was measured
     shortest
         s, of those tried; size: of a body, m
+    way
+        m, how far a body may be from where it should; None: a share of the size
     link
         what gives way at the next longer step, ``beyond`` s; "" if none was tried
     refused
@@ -46,6 +48,7 @@ class StepOutcome(Plain):
     longest: float = math.inf
     shortest: float = math.inf
     size: float = 1.0
+    way: float | None = None
     link: str = ""
     beyond: float = math.inf
     refused: str = ""
@@ -63,18 +66,30 @@ class StepOutcome(Plain):
         lines = []
         if self.longest:
             share = f"changes nothing that counts of {', '.join(self.compared)}" if self.compared else ""
-            share = share or f"moves no body by more than {metres(SHARE * self.size)}, 1 % of the smallest one's size"
-            lines.append(f"Outcome: up to {number(self.longest)} s the step {share}, and nothing else is noticed.")
+            lines.append(
+                f"Outcome: up to {number(self.longest)} s the step {share or self._way()}, and nothing else is noticed."
+            )
         if self.link:
             lines.append(f"Weakest link: at {number(self.beyond)} s {self.link}.")
         return [*lines, f"Known {self.known}."]
 
+    def _way(self) -> str:
+        if self.way is not None:
+            return f"moves no body by more than {metres(self.way)}"
+        return f"moves no body by more than {metres(SHARE * self.size)}, 1 % of the smallest one's size"
+
 
 def outcome_of_steps(
-    build: Callable[..., World], seed: int, seconds: float, began: float, budget: float, progress: Progress
+    build: Callable[..., World],
+    seed: int,
+    seconds: float,
+    began: float,
+    budget: float,
+    progress: Progress,
+    way: float | None = None,
 ) -> StepOutcome:
     """Run the scene with its own settings and several steps, until ``budget`` s after ``began`` on
-    ``time.monotonic``."""
+    ``time.monotonic``; way: see :class:`StepOutcome`."""
     if not seconds:
         return StepOutcome(refused="it was not run")
     try:
@@ -85,19 +100,19 @@ def outcome_of_steps(
         steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)
         case = case.replace(steps=steps, given=("steps",))
         only = Only((own.integrator,), (own.collision,), (own.substeps,), (own.geometry,))
-        return _outcome(Study(case, only, False, False, runs, None, began).measured(EFFORTS))
+        return _outcome(Study(case, only, False, False, runs, None, began).measured(EFFORTS), way)
     except Problem as problem:
         return StepOutcome(refused=problem.message)
 
 
-def _outcome(case: CaseTrade) -> StepOutcome:
+def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
     points = known_well(point for curve in case.curves for point in curve.points)
     points.sort(key=lambda point: point.cell.dt)
     if not points:
         more = f"--budget {math.ceil(case.needed / 10) * 10}" if case.needed else "a larger --budget"
         return StepOutcome(refused=f"there was no time: {more} tells more")
     size = next((point.effects["size"] for point in points if point.effects), 1.0)
-    found = StepOutcome(0.0, points[0].cell.dt, size, compared=names_told(points[0].effects))
+    found = StepOutcome(0.0, points[0].cell.dt, size, way, compared=names_told(points[0].effects))
     runs = sum(point.repeats for point in points)
     found.known = f"from {runs} runs of {number(case.seconds)} s with {len(points)} steps"
     if case.rough:
@@ -105,13 +120,13 @@ def _outcome(case: CaseTrade) -> StepOutcome:
     elif case.missing or len(points) < sum(len(curve.points) for curve in case.curves):
         found.known += "; others did not fit into the budget"
     for point in points:
-        if point.failed or noticed(point.effects):
-            found.link, found.beyond = _link(point), point.cell.dt
+        if point.failed or noticed(point.effects, way):
+            found.link, found.beyond = _link(point, way), point.cell.dt
             break
         found.longest = point.cell.dt
     return found
 
 
-def _link(point: Point) -> str:
+def _link(point: Point, way: float | None) -> str:
     """What would be noticed, the bodies and their places first."""
-    return "; ".join([failures(point)] * point.failed + in_words(point.effects))
+    return "; ".join([failures(point)] * point.failed + in_words(point.effects, noticed(point.effects, way)))

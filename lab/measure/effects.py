@@ -110,9 +110,9 @@ def at_worst(all_effects: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {**found, "runs": float(len(all_effects))} if found else found
 
 
-def noticed(effects: Mapping[str, float]) -> dict[str, float]:
-    """Those that would be noticed."""
-    return {name: effects[name] for name, times in _times_the_limit(effects).items() if times > 1}
+def noticed(effects: Mapping[str, float], way: float | None = None) -> dict[str, float]:
+    """Those that would be noticed; way: how far a body may be elsewhere, m (default: a share of its size)."""
+    return {name: effects[name] for name, times in _times_the_limit(effects, way).items() if times > 1}
 
 
 def severity(effects: Mapping[str, float]) -> float:
@@ -120,11 +120,12 @@ def severity(effects: Mapping[str, float]) -> float:
     return max(_times_the_limit(effects).values(), default=0.0)
 
 
-def _times_the_limit(effects: Mapping[str, float]) -> dict[str, float]:
+def _times_the_limit(effects: Mapping[str, float], way: float | None = None) -> dict[str, float]:
     size = effects.get("size", 1.0)
+    way = SHARE * size if way is None else way
     limits = {
-        "place": SHARE * size, "apex": SHARE * size, "contact": LATE, "impacts": 0.5, "sink": SHARE * size,
-        "jitter": SPEED * size, "energy": SHARE, "touches": 0.5,
+        "place": way, "apex": way, "contact": LATE, "impacts": 0.5, "sink": way, "jitter": SPEED * size,
+        "energy": SHARE, "touches": 0.5,
     }  # fmt: skip
     for word in effects:
         what, _, name = word.partition(" ")
