@@ -241,5 +241,6 @@ def test_the_kernels_that_are_compiled_are_those_of_the_plan(name):
         assert others == RUN
     else:
         assert RUN | {"bounds", "batch"} <= others <= RUN | SHAPES
+        assert ("take_together" in others) == (name == "restitution")  # before bodies first meet at the same time
     assert answers["3D"] == [str("3D" in name)]
     assert answers["boxes"] == [str(name not in ("drifting", "spheres"))]
