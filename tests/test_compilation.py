@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import gc
 import logging
+import types
 
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
 from carom.framework import compilation
-from carom.framework.compilation import inlined, kernel, part
+from carom.framework.compilation import inlined, kernel, packed, part
 from carom.framework.jit import cache as kernel_cache
 from carom.framework.jit.cache import cache_contents, cache_folder, clear_cache
 from carom.framework.jit.hash import deep_hash
@@ -151,6 +152,25 @@ def test_the_hash_follows_calls_constants_captured_values_and_options():
     hashes = [deep_hash(function) for function in different]
     assert len(set(hashes)) == len(hashes)
     assert deep_hash(summing(one)) == hashes[0]
+
+
+def shear(x, y, out):
+    for k in range(len(out) // 2):
+        out[2 * k], out[2 * k + 1] = x[2 * k] + 0.1 * y[2 * k], x[2 * k + 1] + 0.1 * y[2 * k + 1]
+
+
+def test_a_packed_kernel_is_another_one_with_the_same_bits(monkeypatch, tmp_path):
+    """LLVM's SLP vectorizer works on both components of a vector at once, and reorders no sum."""
+    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
+    plain, twin = kernel(shear), types.FunctionType(shear.__code__, globals(), "shear")
+    together = kernel(packed(twin))
+    assert deep_hash(plain) != deep_hash(together)
+    x, y = np.random.default_rng(3).normal(size=(2, 64)) * 1e3
+    one, other = np.zeros(64), np.zeros(64)
+    plain(x, y, one)
+    together(x, y, other)
+    assert one.tobytes() == other.tobytes()
+    assert one == pytest.approx(x + 0.1 * y)
 
 
 def test_functions_that_call_each_other_have_a_hash():

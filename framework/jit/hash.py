@@ -20,6 +20,8 @@ import numpy as np
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
+from ..compilation import is_packed
+
 # What numba makes other code for: its switches, by their names in the environment less NUMBA_.
 SWITCHES = (
     "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX",
@@ -70,6 +72,7 @@ def _feed(value: Any, digest: Any, seen: set[int]) -> None:
             return
         seen.add(id(value))
         _feed_code(value.__code__, digest)
+        digest.update(b"packed" if is_packed(value) else b"")
         captured = [cell.cell_contents for cell in value.__closure__ or ()]
         for item in [*captured, *(value.__defaults__ or ())]:
             _feed(item, digest, seen)

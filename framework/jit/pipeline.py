@@ -26,6 +26,8 @@ from numba.core.environment import lookup_environment
 from numba.core.transforms import canonicalize_cfg
 from numba.core.typing.templates import Signature
 
+from ..compilation import is_packed
+
 TRIED = (0, 62), (0, 68)  # the versions whose internals are as expected here
 
 _REPORTS = {typed_passes.AnnotateTypes, typed_passes.DumpParforDiagnostics}
@@ -80,6 +82,7 @@ class _KernelLibrary(JITCodeLibrary):
     """Takes in the parts that a kernel calls, directly or through others."""
 
     counts_references = False
+    packs = False  # see compilation.packed
 
     def finalize(self) -> None:
         # The linker skips what nothing has asked for so far: callers come before what they call.
@@ -94,7 +97,7 @@ class _KernelLibrary(JITCodeLibrary):
         if self.counts_references:
             super()._optimize_final_module()
         else:  # numba optimises twice, to drop counts in between
-            passes, builder = self._codegen._module_pass_manager()
+            passes, builder = self._codegen._module_pass_manager(**({"slp_vectorize": True} if self.packs else {}))
             passes.run(self._final_module, builder)
 
 
@@ -117,7 +120,7 @@ class _KernelLowering(_LOWERING):
     def run_pass(self, state: Any) -> bool:
         codegen = state.targetctx.codegen()
         library = state["library"] = _KernelLibrary(codegen, state.func_id.func_qualname)
-        library.counts_references = state.flags.nrt
+        library.counts_references, library.packs = state.flags.nrt, is_packed(state.func_id.func)
         library.enable_object_caching()
         super().run_pass(state)
         for variable in library._final_module.global_variables:

@@ -16,6 +16,7 @@ GRID = Schema(
     layer=integer(),
     total=integer(),
     frame=floats(),  # extent of the boxes in the grid, as ``state.frame``
+    scale=vectors(),  # one row; integers of a code per metre
     # one entry per box
     keys=ints("int32"),  # its cell
     order=ints("int32"),  # rows in the order of their cells

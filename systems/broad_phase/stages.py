@@ -16,7 +16,7 @@ Where boxes differ too much in size for a grid, or crowd in one place, trees are
 
 from __future__ import annotations
 
-from ...framework.compilation import part
+from ...framework.compilation import packed, part
 from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
 from .boxes import FRAME_SIZE
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
@@ -139,6 +139,7 @@ def use_uniform_grid(state):
     return OK
 
 
+@packed
 def search_uniform_grid(state, dt):
     """Many bodies move."""
     if state.moving < UNIFORM_GRID_MIN or state.candidates.seeker_count != ALL:

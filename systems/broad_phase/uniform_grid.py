@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, replace
 from .boxes import HIGHEST, LARGEST, LOWEST
@@ -103,18 +103,32 @@ def find_cells(grid, lower, upper, count):
     return fullest <= FULLEST and crowding <= CROWDED * count
 
 
+@inlined
+def code_bits(d):
+    """(bits from one coordinate in a code to the next, the largest integer of a coordinate)."""
+    field = CODE_BITS // (2 * d)
+    return field, (1 << (field - 1)) - 1
+
+
+@part
+def choose_codes(grid):
+    """What coordinates are multiplied by to become the integers of codes."""
+    frame, scale = grid.frame, zero_of(grid)
+    _, largest = code_bits(len(scale))
+    for q in range(len(scale)):
+        scale = replace(scale, q, largest / (frame[HIGHEST + q] - frame[LOWEST + q] + 1.0 / grid.inverse_cell))
+    grid.scale[0] = scale
+
+
 @part
 def place_boxes(grid, lower, upper, count):
     """The counting sort's last pass; afterwards directory[key] is where cell ``key`` begins."""
-    frame, total, zero = grid.frame, grid.total, zero_of(grid)
+    frame, total, scale, origin = grid.frame, grid.total, grid.scale[0], zero_of(grid)
     keys, directory, order, cells, codes = grid.keys, grid.directory, grid.order, grid.cells, grid.codes
-    d = len(zero)
-    field = CODE_BITS // (2 * d)
-    largest = (1 << (field - 1)) - 1
-    scale, origin = zero, zero
+    d = len(origin)
+    field, largest = code_bits(d)
     for q in range(d):
         origin = replace(origin, q, frame[LOWEST + q])
-        scale = replace(scale, q, largest / (frame[HIGHEST + q] - frame[LOWEST + q] + 1.0 / grid.inverse_cell))
     for i in range(count):
         key = keys[i]
         if key == total:  # invalid
@@ -135,6 +149,7 @@ def build_grid(grid, lower, upper, count):
     """Sort rows 0..count-1 of these columns into the cells; ``grid.suits``: whether they are even enough for it."""
     grid.suits = choose_cells(grid, count) and find_cells(grid, lower, upper, count)
     if grid.suits:
+        choose_codes(grid)
         place_boxes(grid, lower, upper, count)
 
 
@@ -210,21 +225,39 @@ def test_notes(state, held, found):
 
 
 @part
+def outline(grid, low, high):
+    """What codes of boxes are subtracted from to see whether they may overlap this one, which may reach out of the
+    grid; and a guard bit above each coordinate."""
+    frame, scale, code, guards = grid.frame, grid.scale[0], np.int64(0), np.int64(0)
+    d = len(low)
+    field, largest = code_bits(d)
+    for q in range(d):
+        origin, unit = frame[LOWEST + q], item(scale, q)
+        before = np.int64(min(max((item(low, q) - origin) * unit, 0.0), float(largest)))
+        behind = np.int64(min(max((item(high, q) - origin) * unit, 0.0), float(largest)))
+        code |= (behind << (q * field)) | ((largest - before) << ((d + q) * field))
+    for _ in range(2 * d):
+        guards = (guards << field) | (largest + 1)
+    return code | guards, guards
+
+
+@part
 def look_inside(state, grid, i, found):
     """Pairs of body i, which is not in the grid and of any size, with what is in it; returns as ``test_notes``."""
     bodies, candidates, frame, inverse = state.bodies, state.candidates, grid.frame, grid.inverse_cell
-    lower, upper, order, directory = bodies.lower, bodies.upper, grid.order, grid.directory
+    lower, upper, order, directory, codes = bodies.lower, bodies.upper, grid.order, grid.directory, grid.codes
     first, second, room = candidates.first, candidates.second, len(candidates.first)
     low, high, begin, last = lower[i], upper[i], lower[i], upper[i]
     for q in range(len(low)):
         if not item(low, q) <= item(high, q):
             return found
         origin = frame[LOWEST + q]
-        end = math.floor((frame[HIGHEST + q] - origin) * inverse)
-        start = min(max((item(low, q) - origin) * inverse - 0.5 - SLACK, 0.0), end + 1.0)
-        stop = min(max((item(high, q) - origin) * inverse + 0.5 + SLACK, -1.0), end)
-        begin, last = replace(begin, q, math.floor(start) + 1.0), replace(last, q, math.floor(stop) + 1.0)
-    x, after = int(begin[0]), max(int(last[0]) + 1, int(begin[0]))
+        end = np.int64((frame[HIGHEST + q] - origin) * inverse) + 1.0
+        start = min(max((item(low, q) - origin) * inverse - 0.5 - SLACK, 0.0), end)
+        stop = min(max((item(high, q) - origin) * inverse + 0.5 + SLACK, -1.0), end - 1.0)
+        begin, last = replace(begin, q, start + 1.0), replace(last, q, stop + 1.0)
+    code, guards = outline(grid, low, high)
+    x, after, one = int(begin[0]), max(int(last[0]) + 1, int(begin[0])), np.int64(1)
     deep = len(low) - 1
     for z in range(int(item(begin, deep)) if deep == 2 else 0, int(item(last, deep)) + 1 if deep == 2 else 1):
         for y in range(int(begin[1]), int(last[1]) + 1):
@@ -232,11 +265,14 @@ def look_inside(state, grid, i, found):
             place, behind = directory[at + x], directory[at + after]
             if found + (behind - place) > room:
                 return FULL
-            for k in range(place, behind):
-                there = order[k]
-                first[found] = there
-                second[found] = i
-                found += boxes_overlap(low, high, lower[there], upper[there])
+            for start in range(place, max(behind, place + 1), 8):  # at least once: a branch less to foresee
+                bits = eight_at(codes, start, code, guards) & ((one << min(behind - start, 8)) - 1)
+                while bits != 0:
+                    there = order[start + lowest_bit(bits)]
+                    bits &= bits - 1
+                    first[found] = there
+                    second[found] = i
+                    found += boxes_overlap(low, high, lower[there], upper[there])
     return found
 
 
@@ -247,6 +283,7 @@ def reserve_grid(grid, count):
     count = max(count, len(grid.keys) * 3 // 2)  # worlds that grow body by body allocate seldom
     grid.reserve(CHUNK + LONGEST, "notes")
     grid.reserve(count, "keys", "order", "cells")
+    grid.reserve(1, "scale")
     grid.codes = np.zeros(count + LANES, np.int64)
     grid.reserve(int(CELLS_PER_BOX * count) + SPARE_CELLS + 4, "directory")
     return True

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, length, scale, sub
+from ..broad_phase.lanes import lowest_bit
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
@@ -44,14 +45,13 @@ def colour_contacts(state):
         starts[k] = 0
     for r in range(solver.contacts):
         c = pairs.resting[r]
-        a, b, taken, colour = pairs.a[c], pairs.b[c], 0, 0
+        a, b, taken = pairs.a[c], pairs.b[c], 0
         p, q = number_body(state, a), number_body(state, b)
         if inverse_mass[a] > 0.0:
             taken |= used[p]
         if inverse_mass[b] > 0.0:
             taken |= used[q]
-        while colour < COLOURS - 1 and (taken >> colour) & 1:
-            colour += 1
+        colour = min(lowest_bit(~taken), COLOURS - 1)
         if inverse_mass[a] > 0.0:
             used[p] |= 1 << colour
         if inverse_mass[b] > 0.0:
@@ -144,8 +144,9 @@ def put_back(state, dt):
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
     if solver.contacts > 0 and not state.sweeping:
         bound_throws(state, dt)
-    for k in range(solver.contacts):
-        pairs.impulse[solver.pair[k]] += solver.total[k] + solver.shock[k]
+    for r in range(solver.contacts):
+        k = solver.slot[r]
+        pairs.impulse[pairs.resting[r]] += solver.total[k] + solver.shock[k]
         if solver.worked[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True

@@ -211,8 +211,8 @@ def linearise(state, dt):
     pairs, bodies, solver, inverse_mass = state.pairs, state.bodies, state.solver, state.bodies.inverse_mass
     friction, slot_of_body, has_friction = state.colliders.friction, bodies.collider_slot, False
     solver.any_rigid = False
-    for k in range(solver.contacts):
-        c = solver.pair[k]
+    for r in range(solver.contacts):  # in the order of the pairs, for the caches
+        c, k = pairs.resting[r], solver.slot[r]
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
         extent, d = smaller_extent(bodies, a, b), between_at_start(bodies, a, b)
         slop = slop_for(state, extent)

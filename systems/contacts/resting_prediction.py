@@ -7,7 +7,7 @@ shock is not repeated, and they never pull.
 
 from __future__ import annotations
 
-from ...framework.compilation import part
+from ...framework.compilation import packed, part
 from ...framework.vectors import add_scaled, dot, length, sub
 from ..codes import NEED_COLUMNS, OK
 from .solving.heavy_light_blocks import RATIO
@@ -41,6 +41,8 @@ def apply_remembered(state):
     """The impulses of the last step act on the velocities; work[m] is what acts of each."""
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
     velocity, inverse_mass, impulse = bodies.linear_velocity, bodies.inverse_mass, memory.work
+    for i in range(state.moving):
+        bodies.support_change[i] = velocity[i]  # of all, so that no branch asks which are supported
     for m in range(memory.counts[now]):
         a, b, total = memory.first[now, m], memory.second[now, m], memory.total[now, m]
         if a < 0 or b < 0 or total <= 0.0 or impulse[m] == 0.0:
@@ -49,9 +51,7 @@ def apply_remembered(state):
         impulse[m] = total
         for side in range(2):
             i = a if side == 0 else b
-            if inverse_mass[i] > 0.0 and not bodies.supported[i]:
-                bodies.supported[i] = True
-                bodies.support_change[i] = velocity[i]
+            bodies.supported[i] = inverse_mass[i] > 0.0
         n = memory.normal[now, m]
         velocity[a] = add_scaled(velocity[a], n, -total * inverse_mass[a])
         velocity[b] = add_scaled(velocity[b], n, total * inverse_mass[b])
@@ -129,6 +129,7 @@ def drop_shocks(state):
     return any_thrown
 
 
+@packed
 def predict_rest(state, dt):
     """Correct velocity, position and path of the bodies that were held in the last step.
 

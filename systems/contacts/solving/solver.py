@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from ....framework.compilation import part
+from ....framework.compilation import packed, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
 from ...codes import OK
 from .firm import leave_open
@@ -167,6 +167,7 @@ def solve_substep(solver, h, substeps, passes, plastic, ends):
         solver.worked[k] |= solver.impulse[k] > 0.0
 
 
+@packed
 def solve_contacts(state, dt):
     """Advance the bodies by the step's substeps under their mean acceleration and their contacts.
 
