@@ -34,22 +34,24 @@ from .records import IMPACTS
 from .scene import Scene
 
 COLOURS = 64
+CONTACTS_IN_WORD = 64  # see contacts.solving.shocks
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
 EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
 MEMBERS = ("member", "group", "is_left", "share", "before", "ahead", "weight", "terms", "rub")
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = (
-    "body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled", "newest", "reach",
-    "velocity_before", "velocity_way", "heaviest", "fastest", "island", "size", "open", "going", "across", "along",
-    "far", "worst", "stopper",
+    "body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled", "contacts_until",
+    "reach", "velocity_before", "velocity_way", "heaviest", "fastest", "island", "size", "open", "going", "across",
+    "along", "far", "worst", "stopper",
 )  # fmt: skip
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {
     "sum_forces": ("force",), "end_flight": ("kept_step_force",), "predict_rest": ("supported", "support_change"),
     "gather": ("held", "place"),
 }  # fmt: skip
-SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
+SOLVER_BATCH = ("batch", "change", "speed")
+SOLVER_OTHERS = ("starts", *SOLVER_BATCH, *SOLVER_BODIES)
 
 
 class Room:
@@ -63,6 +65,7 @@ class Room:
         state.warm_start.step, state.warm_start.substep = np.ones(2), np.ones(2)
         state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
         state.solver.starts = np.zeros(COLOURS, np.int64)
+        state.solver.reserve(CONTACTS_IN_WORD, *SOLVER_BATCH)
         state.frame = np.zeros(7)
         _grow_stacked(state.warm_start, 0)
         _grow_stacked(state.contacts, 0)

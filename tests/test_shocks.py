@@ -9,6 +9,7 @@ from worlds import make_world
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.systems.contacts.colours import COLOURS
 
 PASSES = 4 + 3 * 2 + 4  # over all contacts of a calm world: one that pushes in each substep, and those that relax
 
@@ -84,3 +85,19 @@ def test_a_blow_through_a_heap_agrees_with_the_oracle(friction):
         world.step()
         oracle.step()
         assert_agrees(world, oracle)
+
+
+def test_blows_to_a_body_with_more_contacts_than_colours_agree_with_the_oracle():
+    """Seventy balls above a board, of which the last eight fall on it: their contacts share a colour, and the board."""
+    world = make_world()
+    world.create_entity(Transform((0.0, 0.25)), RigidBody(), AABBCollider((40, 0.25)))
+    for k in range(70):
+        falls = k >= COLOURS
+        ball = RigidBody(mass=1.0 + 0.1 * k, linear_velocity=(0.0, -3.0 if falls else 0.0))
+        world.create_entity(Transform((1.1 * k - 38.0, 1.0 if falls else 1.002)), ball, SphereCollider(0.5))
+    oracle = Oracle(world)
+    world.step()
+    oracle.step()
+    assert_agrees(world, oracle)
+    assert world.physics.state.solver.contacts == 70
+    assert world.physics.state.solver.shock_visits > 2 * 8

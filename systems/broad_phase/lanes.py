@@ -52,17 +52,3 @@ def four_at(codes, at, code, guards):
 def eight_at(codes, at, code, guards):
     """The same for k below 8."""
     return sum(1 << k for k in range(8) if (int(code) - int(codes[at + k])) & guards == guards)
-
-
-def _emit_lowest(context: Any, builder: Any, arguments: Any, values: Any) -> Any:
-    return builder.cttz(values[0], ir.Constant(ir.IntType(1), 1))
-
-
-def _sign_lowest(bits: Any) -> Any:
-    return types.int64(types.int64)
-
-
-@_emitted(_emit_lowest, _sign_lowest)
-def lowest_bit(bits):
-    """The place of the lowest bit that is set; there must be one."""
-    return (int(bits) & -int(bits)).bit_length() - 1

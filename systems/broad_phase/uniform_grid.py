@@ -24,9 +24,10 @@ import numpy as np
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, replace
+from ..bits import lowest_bit
 from .boxes import HIGHEST, LARGEST, LOWEST
 from .brute_force import boxes_overlap
-from .lanes import eight_at, four_at, lowest_bit
+from .lanes import eight_at, four_at
 
 CELLS_PER_BOX = 2.0  # at most; cells grow where there is more room than that
 SPARE_CELLS = 64

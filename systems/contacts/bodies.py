@@ -5,13 +5,12 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, length, scale, sub
-from ..broad_phase.lanes import lowest_bit
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
+from .colours import colour_contacts
 from .resting_prediction import drop_support
 
-COLOURS = 62  # bits of a mask; contacts beyond share the last
 MOST_THROW = 2.0  # times the speed around it: what the solver may give a body in a discrete world
 
 
@@ -21,45 +20,6 @@ def note_squeezed(solver, i):
     if solver.squeezed == 0:
         solver.squeezed_row = i
     solver.squeezed += 1
-
-
-@part
-def number_body(state, i):
-    """The place of a row among the bodies of the solver, a new one if it has none yet."""
-    solver, place = state.solver, state.bodies.place
-    if place[i] < 0:
-        place[i] = solver.bodies
-        solver.body_row[solver.bodies] = i
-        solver.used[solver.bodies] = 0
-        solver.bodies += 1
-    return place[i]
-
-
-@part
-def colour_contacts(state):
-    """Number the bodies of the contacts and colour these: contacts of one colour share no body that moves."""
-    solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
-    used, starts = solver.used, solver.starts
-    solver.bodies = 0
-    for k in range(COLOURS + 2):
-        starts[k] = 0
-    for r in range(solver.contacts):
-        c = pairs.resting[r]
-        a, b, taken = pairs.a[c], pairs.b[c], 0
-        p, q = number_body(state, a), number_body(state, b)
-        if inverse_mass[a] > 0.0:
-            taken |= used[p]
-        if inverse_mass[b] > 0.0:
-            taken |= used[q]
-        colour = min(lowest_bit(~taken), COLOURS - 1)
-        if inverse_mass[a] > 0.0:
-            used[p] |= 1 << colour
-        if inverse_mass[b] > 0.0:
-            used[q] |= 1 << colour
-        solver.colour[r] = colour
-        starts[colour + 1] += 1
-    for k in range(1, COLOURS + 1):
-        starts[k] += starts[k - 1]
 
 
 @part
