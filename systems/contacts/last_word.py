@@ -30,7 +30,11 @@ def how_deep(state, a, b):
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
     d, start = between(bodies, a, b), leg_start(state, a, b)
     travel = sub(d, start)
-    way = length(travel)
+    way, allowed = length(travel), ALLOWED * extent
+    if way <= FAST * extent:  # usual: one look is enough
+        _, depth, normal, _ = meet(state, a, b, d)
+        if depth <= allowed:
+            return 0.0, normal
     _, deep, normal, _ = meet(state, a, b, start)
     if -deep > way:  # it does not get there
         return 0.0, normal
@@ -40,7 +44,7 @@ def how_deep(state, a, b):
         depth = -gap - dot(travel, normal)
     if not found:
         _, depth, normal, _ = meet(state, a, b, d)
-    return depth - max(deep, ALLOWED * extent), normal
+    return depth - max(deep, allowed), normal
 
 
 @part
