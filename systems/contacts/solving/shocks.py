@@ -138,8 +138,9 @@ def stop_batch(solver, word, bits):
     many)."""
     inverse_mass, reach, batch, count, many = solver.inverse_mass, solver.reach, solver.batch, 0, 0
     while bits != 0:
-        batch[count] = (word << WORD) + lowest_bit(bits)
-        bits &= bits - 1
+        at = lowest_bit(bits)
+        batch[count] = (word << WORD) + at
+        bits &= ~(np.int64(1) << at)
         count += 1
     for e in range(count):  # no branch waits for what comes out
         solver.change[e] = stop_contact(solver, batch[e])
@@ -172,14 +173,17 @@ def stop_asked(solver, start, stop, alone):
     asked, visits = solver.asked, 0
     for word in range(start >> WORD, ((stop - 1) >> WORD) + 1):
         begin, end = max(start - (word << WORD), 0), stop - (word << WORD)
-        rest = -(np.int64(1) << begin) & ((np.int64(1) << end) - 1 if end <= IN_WORD else np.int64(-1))
+        rest = np.int64(-1) << begin
+        if end <= IN_WORD:
+            rest &= ~(np.int64(-1) << end)
         while asked[word] & rest != 0:
             bits = asked[word] & rest
-            bits = bits & -bits if alone else bits
+            if alone:
+                bits = np.int64(1) << lowest_bit(bits)
             many, count = stop_batch(solver, word, bits)
             pass_on(solver, many)
             asked[word] &= ~bits
-            rest = rest & -bits & ~bits if alone else np.int64(0)
+            rest = rest & ((np.int64(-1) << lowest_bit(bits)) << 1) if alone else np.int64(0)
             visits += count
     return visits
 
