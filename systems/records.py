@@ -412,6 +412,7 @@ STATE = Schema(
     ranks_version=integer(),  # of the rows that ``bodies.rank`` is of
     origins_version=integer(),  # of the rows and of the boxes of static bodies that ``bodies.origin`` is of
     origins_statics=integer(),
+    support_version=integer(),  # of the rows of which no static one is marked as ``bodies.supported``
     gravity=vectors(),  # one row
     collides=flag(),
     several_levels=flag(),

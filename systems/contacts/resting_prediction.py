@@ -129,6 +129,16 @@ def drop_shocks(state):
     return any_thrown
 
 
+@part
+def forget_support(state):
+    """Nothing is supported yet; what cannot move never is, but other rows may have been there."""
+    supported = state.bodies.supported
+    if len(supported) > 0:
+        for i in range(state.moving if state.support_version == state.version else state.count):
+            supported[i] = False
+        state.support_version = state.version
+
+
 @packed
 def predict_rest(state, dt):
     """Correct velocity, position and path of the bodies that were held in the last step.
@@ -138,8 +148,7 @@ def predict_rest(state, dt):
     """
     bodies, memory = state.bodies, state.warm_start
     state.any_support = False
-    for i in range(state.count if len(bodies.supported) > 0 else 0):
-        bodies.supported[i] = False
+    forget_support(state)
     if state.response_idle or memory.counts[memory.now] == 0:
         return OK
     if len(bodies.support_change) == 0:
