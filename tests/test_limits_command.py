@@ -162,6 +162,8 @@ def test_little_time_gives_what_is_known_and_says_how_much_it_needs(carom, monke
     assert "Known from 3 runs of 1 s with 3 steps; rough, against a first run" in result.stdout
     assert "only: --budget " in result.stdout
     assert "sink" not in result.stdout  # a platform that moves through the floor is no overlap
+    Path("falls.py").write_text(FALLS)  # the first run is no more exact than the steps that differ from it
+    assert "not measured: there was no time for references: --budget " in carom("limits", "falls.py").stdout
 
 
 def test_a_scene_with_options_is_measured_in_other_processes_too():

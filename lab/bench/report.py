@@ -6,11 +6,10 @@ import math
 from typing import Any
 
 from ..measure.timing import Spread
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
+from ..wording import NOTHING, number
 from .results import Result, Row
 
-NOTHING = "-"
 CAROM_SETTINGS = ("dt", "integrator", "collision", "substeps")
 PYMUNK_SETTINGS = ("iterations", "collision_slop", "collision_bias", "damping", "threads", "sleeping")
 

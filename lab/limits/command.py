@@ -21,7 +21,7 @@ from ..cli.options import budget_option, plugin_option, seed_number, seed_option
 from ..cli.usage_errors import Problem
 from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
-from ..reporting.run_report import number
+from ..wording import number
 from .outcome import StepOutcome, outcome_of_steps
 from .step_length import StepLimits, step_limits
 

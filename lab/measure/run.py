@@ -25,6 +25,7 @@ from .impacts import PathImpact, path_impacts, with_corners
 
 TRACED_BODIES = 200  # in a picture
 CANDIDATES = 12_000  # bodies that are recorded, to choose from
+KEPT = 1e-3  # of the energy: one that has never changed by more is kept
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
 SAMPLES = 600  # of the energy, at most; of paths too if there are many
 FEW_STEPS, FEW_BODIES = 12, 60  # up to this size a run is shown step by step, with all its impacts
@@ -68,9 +69,9 @@ class RunReport:
     system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, without compilation
     profile: dict[str, Any] | None = None  # see profile_of; None unless requested
     energy: Drift | None = None
-    energy_changes: list[str] = field(default_factory=list)  # reasons why the scene does not conserve energy
+    energy_changes: list[str] = field(default_factory=list)  # what has changed it, besides the integrator
     momentum: Drift | None = None
-    momentum_conserved: bool = True  # False with fixed bodies or external forces
+    momentum_conserved: bool = True  # False with fixed bodies, gravity or force systems
     deepest_overlap: float = 0.0
     deepest_overlap_step: int | None = None
     escaped: dict[str, int] = field(default_factory=dict)  # outside, non_finite
@@ -267,9 +268,11 @@ class Meter:
             name: mean if self.step_seconds else math.nan for name, mean in stats.milliseconds.items()
         }
         report.energy = self._energy_drift()
-        report.energy_changes = self._energy_changes()
+        report.energy_changes = self._energy_changes(np.array(self.energies))
         report.momentum = self._momentum_drift()
-        report.momentum_conserved = not (len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity))
+        report.momentum_conserved = not (
+            len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity) or world.force_systems
+        )
         report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
         positions = np.asarray(bodies.dynamic.position)
         finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
@@ -294,19 +297,26 @@ class Meter:
         counts = (np.isin(a, dynamic) | np.isin(b, dynamic)) & ~(np.isin(a, sensors) | np.isin(b, sensors))
         return float(depth[counts].max(initial=0.0))
 
-    def _energy_changes(self) -> list[str]:
-        """What in the present world adds or removes energy."""
+    def _energy_changes(self, energies: NDArray[np.float64]) -> list[str]:
+        """What in the present world may have added or removed energy; nothing if it was kept."""
+        noise = KEPT * max(self.kinetic_most, float(np.abs(energies).max()))
+        if np.ptp(energies) <= noise:
+            return []
         bodies = self.world.bodies
         dynamic, reasons = bodies.dynamic, []
         any_pair = self.world.settings.restitution_mixing != "max"  # "max": a pair has at least a body's own value
         touched = bodies if any_pair else dynamic
         met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
-        if met and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
+        fell = (np.maximum.accumulate(energies) - energies).max() > noise  # an impact never adds any
+        if met and fell and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
             reasons.append("restitution below 1")
         if np.any(dynamic.linear_damping):
             reasons.append("damping")
-        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force):
+        own_forces = [force for force in self.world.force_systems if not hasattr(force, "potential_energy")]
+        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces:
             reasons.append("forces")
+        if any(not type(system).__module__.startswith("carom.systems.") for system in self.world.systems):
+            reasons.append("systems of the game")
         if np.any(bodies.kinematic.linear_velocity):
             reasons.append("kinematic bodies that move")
         if self.came_or_went:

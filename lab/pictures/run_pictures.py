@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgba_array
 
 from ..measure.body_shapes import Floats, Shapes, shapes_of
 from ..measure.run import QUIET, Run, RunReport, Traces
+from ..wording import counted
 from . import canvas
 from .canvas import Panel, Sheet
 from .marks import MOST_CONTACTS_3D, draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
@@ -143,8 +144,8 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
     norm = canvas.speed_norm(bodies.speed)
     part = _magnified(bodies, projection)
     subtitle = (
-        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({_counted(report.steps, 'step')})"
-        f"   ·   {_counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
+        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({counted(report.steps, 'step')})"
+        f"   ·   {counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
     )
     views = [frame, *([part] if part else [])]
     sheet = Sheet.new(report.scene, subtitle, views, numbered=projection.flat)
@@ -172,7 +173,7 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     count, moved = len(traces.entities), traces.moved
     over = f"{report.simulated_seconds:.4g} s"
     if traces.impacts is not None:
-        over = f"{_counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
+        over = f"{counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
     if not report.bodies["total"] and not count:
         subtitle = "no bodies"
     elif not count:
@@ -210,10 +211,6 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     return sheet
 
 
-def _counted(count: int, what: str, plural: str = "") -> str:
-    return f"{count:,} {what if count == 1 else plural or what + 's'}"
-
-
 def _that_moved(count: int) -> str:
     return "the one body that moved" if count == 1 else f"the {count:,} bodies that moved"
 
@@ -223,8 +220,8 @@ def _moving_bodies(report: RunReport) -> str:
     dynamic, kinematic = report.bodies["dynamic"], report.bodies["kinematic"]
     if not dynamic and not kinematic:
         return "no bodies" if not report.bodies["total"] else "only static bodies"
-    parts = [_counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
-    parts += [_counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
+    parts = [counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
+    parts += [counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
     return " and ".join(parts)
 
 

@@ -22,9 +22,9 @@ from ..cases.published import SOURCE, published
 from ..cli.usage_errors import Problem
 from ..pictures import canvas
 from ..pictures.curve_styles import Style, styles
-from ..reporting.run_report import number
+from ..wording import compact, number
 from .records import FAILURES, NOT_FINITE, TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
-from .report import check_norm, compact, error_heading, is_statistic, measured, norm_of, order
+from .report import check_norm, error_heading, is_statistic, measured, norm_of, order
 
 WORK, TIME = "work", "time"
 AXIS = {

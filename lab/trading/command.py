@@ -36,6 +36,7 @@ from ..jobs.runs import STOPPED
 from ..reporting.output import Output
 from ..reporting.progress import Bar
 from ..reporting.text_tables import TextTable
+from ..wording import counted
 from .answer import answer
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
@@ -115,7 +116,8 @@ def trade_command(
                     bar.say("charts")
                     files += _charts(result, out, norms)
         except KeyboardInterrupt:
-            click.echo(f"carom: stopped before anything was known; {_results(store)} kept in {kept}", err=True)
+            known = counted(len(store), "result")
+            click.echo(f"carom: stopped before anything was known; {known} kept in {kept}", err=True)
             raise click.exceptions.Exit(STOPPED_CODE) from None
     if output.plain:
         for case in result.cases:
@@ -163,10 +165,6 @@ def chart_module() -> Any:
 def _command_line(context: click.Context) -> str:
     """The command line that repeats the measurement from the start."""
     return shlex.join([*MARK.split(), *context.meta[WORDS]])
-
-
-def _results(store: Store) -> str:
-    return f"{len(store):,} result{'s' * (len(store) != 1)}"
 
 
 def _tables(result: Trade, norms: Sequence[str]) -> list[TextTable]:

@@ -9,12 +9,11 @@ from ..cases.published import ERROR_UNIT, SOURCE, published
 from ..cases.published import NORM as ENERGY_SQUARE
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
+from ..wording import NOTHING, compact, number
 from .code_line import python_line
 from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade, known_well
 
-NOTHING = "-"
 DOUBTED = "*"  # marks an error that is too close to the reference's own
 TARGETS = (0.1, 0.01, 0.001, 1e-6)
 ORDER_TOLERANCE = 0.3  # a larger difference between the observed and the theoretical order is significant
@@ -77,7 +76,7 @@ def points_table(case: CaseTrade, norm: str) -> TextTable:
             bar = point.errors.get(norm)
             row = [curve.label, "" if place else order(curve, norm), number(point.cell.dt), _error(case, norm, bar)]
             row += [compact(bar.high) if bar else NOTHING] * worst
-            row += [compact(point.work), *(counted(point.counts.get(name, 0.0)) for name in counts)]
+            row += [compact(point.work), *(_mean(point.counts.get(name, 0.0)) for name in counts)]
             row += [compact(point.milliseconds.median) if point.milliseconds else NOTHING] * timed
             row += [failures(point)] * failing
             rows.append(tuple(row))
@@ -262,20 +261,7 @@ def untrusted(case: CaseTrade, norm: str) -> list[Point]:
     return [point for point in points if not case.reference.trusts(norm, point.errors[norm].mean)]
 
 
-def compact(value: float, digits: int = 3) -> str:
-    """A number with that many significant digits: 0.0123, 1,230, 1.23e-5, 4.56e7."""
-    if not math.isfinite(value):
-        return f"{value:g}"
-    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
-    power = int(exponent)
-    if value == 0:
-        return "0"
-    if power < -3 or power > 5:
-        return f"{mantissa}e{power}"
-    return f"{float(f'{mantissa}e{power}'):,.{max(digits - 1 - power, 0)}f}"
-
-
-def counted(value: float) -> str:
+def _mean(value: float) -> str:
     """A mean of counts, without decimals if it is whole."""
     whole = abs(value) < 1e6 and math.isclose(value, round(value), rel_tol=1e-9)
     return f"{value:,.0f}" if whole else compact(value)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
+from ..wording import NOTHING, compact, number
 from .records import CaseTrade, Curve, Point, Trade
-from .report import NOTHING, TARGETS, compact, failures, measured, norm_of, order, target_text
+from .report import TARGETS, failures, measured, norm_of, order, target_text
 
 
 def summaries(trade: Trade, norm: str | None = None) -> list[TextTable]:

@@ -30,6 +30,7 @@ from ..jobs.workers import Pool
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
+from ..wording import counted
 from .answer import clearly_worse, front
 from .code_line import python_line
 from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
@@ -335,7 +336,7 @@ def label_of(method: Cell, others: Iterable[Cell]) -> str:
         if differs(lambda cell: cell.collision):
             parts.append(method.collision)
     if differs(lambda cell: cell.substeps):
-        parts.append(f"{method.substeps} substep{'s' * (method.substeps > 1)}")
+        parts.append(counted(method.substeps, "substep"))
     if differs(lambda cell: cell.geometry):
         parts.append(method.geometry)
     return ", ".join(parts)

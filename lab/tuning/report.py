@@ -7,14 +7,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..measure.effects import metres
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
 from ..trading.answer import cost_text, noticed_text
 from ..trading.code_line import settings_line
 from ..trading.records import Cell, ErrorBar, Point
-from ..trading.report import NOTHING, compact, target_text
+from ..trading.report import target_text
 from ..trading.trade import label_of
+from ..wording import NOTHING, compact, counted, metres, number
 from .check import TOLERATED, Check
 from .search import FAR_DEARER, Trial, Tuning
 
@@ -107,7 +106,7 @@ def answer(tuning: Tuning) -> list[str]:
         ratio = compact(tuning.runner_up.work / choice.work, 2)
         lines.append(f"  else     {line}: {ratio} times the work, error {error}")
     repeats = f"{choice.repeats} {tuning.repeated if choice.repeats > 1 else tuning.repeated[:-1]}"
-    known = f"from {len(tuning.trials)} trials, {repeats} of {number(tuning.seconds)} s"
+    known = f"from {counted(len(tuning.trials), 'trial')}, {repeats} of {number(tuning.seconds)} s"
     return [*lines, f"  known    {'; '.join(filter(None, (known, rough, more)))}"]
 
 
@@ -246,8 +245,8 @@ def _about(tuning: Tuning) -> list[str]:
         f"{tuning.norm}: {tuning.text}",
         f"reference: {tuning.reference.text}{apart}",
         f"target: {target_text(tuning.target, tuning.norm)}{units}, over {number(tuning.seconds)} s{repeated}",
-        f"{tuning.methods} {_plural('method', tuning.methods)} to choose from,"
-        f" {len(tuning.trials)} {_plural('trial', len(tuning.trials))}; the cheapest first",
+        f"{counted(tuning.methods, 'method')} to choose from, {counted(len(tuning.trials), 'trial')};"
+        " the cheapest first",
     ]
 
 
@@ -308,7 +307,3 @@ def _limits(tuning: Tuning) -> str:
 def _words(cell: Cell, tuning: Tuning) -> str:
     label = label_of(cell.method, {trial.cell.method for trial in tuning.trials} | {cell.method})
     return f"{label}, {number(cell.dt)} s"
-
-
-def _plural(word: str, count: int) -> str:
-    return word + "s" * (count != 1)
