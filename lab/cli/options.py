@@ -114,11 +114,6 @@ plugin_option = click.option(
 shown_options = together(
     click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."),
     click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown."),
-    click.option(
-        "--into",
-        type=click.Path(path_type=Path, dir_okay=False),
-        help="Also put the tables between the marks of this page.",
-    ),
 )
 
 

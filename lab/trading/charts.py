@@ -18,7 +18,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..cases.published import SOURCE, published
 from ..cli.usage_errors import Problem
 from ..pictures import canvas
 from ..pictures.curve_styles import Style, styles
@@ -31,9 +30,6 @@ AXIS = {
     WORK: "work per simulated second (weighted counts)",
     TIME: "wall time per simulated second, ms",
 }
-
-PUBLISHED_MARKERS = "12+|"
-PUBLISHED_COLOURS = ("#9aa7b6", "#c2a878", "#8fb59b", "#b79ac2")
 
 WIDTH, PLOT = 10.0, 5.2  # inches
 LEFT, RIGHT, TOP, AXIS_LABEL = 0.85, 0.3, 0.9, 0.75
@@ -98,7 +94,7 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
     sheet = Sheet(case, norm_of(case, norm), quantity)
     sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in _points(case))]
     drawn = list(zip(case.curves, styles(case.curves), strict=True))
-    entries = [_entry(curve, style, sheet.norm) for curve, style in drawn] + _published_entries(sheet)
+    entries = [_entry(curve, style, sheet.norm) for curve, style in drawn]
     sheet.notes = _notes(sheet)
     notes = [line for note in sheet.notes for line in textwrap.wrap(note, 135)]
     columns = 3 if max((len(str(entry.get_label())) for entry in entries), default=0) < 34 else 2
@@ -113,7 +109,6 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
     if sheet.kinds:
         sheet.strip = _axes(made, (LEFT + plot + STRIP_GAP, below, share - STRIP_GAP, PLOT))
     _set_limits(sheet)
-    _draw_published(sheet)
     for curve, style in drawn:
         _draw_curve(sheet, curve, style)
     _draw_failures(sheet, drawn)
@@ -181,11 +176,8 @@ def _set_limits(sheet: Sheet) -> None:
     """Set both axes to enclose everything drawn, with room at the left edge for errors of 0."""
     axes, norm = sheet.axes, sheet.norm
     bars = [bar for point in _points(sheet.case) if (bar := _bar(point, norm))]
-    others = published(sheet.case.scene, norm) if sheet.quantity == TIME else []
     errors = [e for bar in bars for e in (bar.low, bar.mean, bar.high) if 0 < e < math.inf]
-    errors += [point.error for point in others]
     costs = [cost for point in _points(sheet.case) if (cost := sheet.height(point))]
-    costs += [point.milliseconds for point in others]
     least, most = (min(errors), max(errors)) if errors else (10 * LEAST_ERROR, 1.0)
     if any(bar.mean <= 0 for bar in bars):
         least /= 10
@@ -281,28 +273,6 @@ def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
         sheet.axes.annotate(text, (x, y), color=style.colour, fontsize=7, zorder=5, **beside)
 
 
-def _published_entries(sheet: Sheet) -> list[Line2D]:
-    """Legend entries of the other engines."""
-    return [
-        Line2D([], [], ls=":", lw=1, color=colour, marker=marker, ms=8, mew=1.6, label=f"{engine}, published")
-        for engine, colour, marker in _published_styles(sheet)
-    ]
-
-
-def _published_styles(sheet: Sheet) -> list[tuple[str, str, str]]:
-    points = published(sheet.case.scene, sheet.norm) if sheet.quantity == TIME else []
-    engines = dict.fromkeys(point.engine for point in points)
-    return list(zip(engines, PUBLISHED_COLOURS, PUBLISHED_MARKERS, strict=False))
-
-
-def _draw_published(sheet: Sheet) -> None:
-    points = published(sheet.case.scene, sheet.norm)
-    for engine, colour, marker in _published_styles(sheet):
-        xs, ys = zip(*((p.error, p.milliseconds) for p in points if p.engine == engine), strict=True)
-        look: dict[str, Any] = {"ls": ":", "lw": 1.0, "marker": marker, "ms": 8, "mew": 1.6, "zorder": 2}
-        sheet.axes.plot(xs, ys, color=colour, label=f"{engine}, published", **look)
-
-
 def _notes(sheet: Sheet) -> list[str]:
     """The meaning of the marks used, and what could not be drawn."""
     case, norm, points = sheet.case, sheet.norm, _points(sheet.case)
@@ -327,8 +297,6 @@ def _notes(sheet: Sheet) -> list[str]:
         lines.append(f"The {what} of {failed} that failed is not known: their crosses are at the upper edge.")
     if len(costless) > failed:
         lines.append(f"The {what} of {len(costless) - failed} points is not known: they are not here.")
-    if published(case.scene, norm):
-        lines.append(f"{SOURCE}." if sheet.quantity == TIME else "What others published is in the chart of wall times.")
     return lines
 
 

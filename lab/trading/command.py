@@ -41,7 +41,6 @@ from .answer import answer
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
 from .report import COUNTS, cheapest, choice_lines, measured, remarks, tables
-from .summary import summaries
 from .trade import Only, trade
 
 MARK = "carom trade"
@@ -83,7 +82,6 @@ def trade_command(
     out: Path,
     as_json: bool,
     as_markdown: bool,
-    into: Path | None,
     traceback: bool,
 ) -> None:
     """Run scenes with all settings that matter in them: how large is the error, and what does it cost?
@@ -98,7 +96,7 @@ def trade_command(
     check_integrators(subjects, only.integrators)
     if against == PYMUNK:
         pymunk_module()
-    output = Output.checked(" ".join((MARK, *targets)), as_json, as_markdown, into, None)
+    output = Output.checked(as_json, as_markdown)
     writable_folder(out)
     arguments = {
         "norms": norms, "seconds": seconds, "repeats": repeats, "steps": steps or (), "only": only,
@@ -125,8 +123,7 @@ def trade_command(
     if result.stopped == STOPPED and not any(case.curves for case in result.cases):
         raise click.exceptions.Exit(STOPPED_CODE)
     choices = [cheapest(case) for case in measured(result)]
-    page = [*summaries(result), *choices]
-    output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)], page)
+    output.show(result, [*_tables(result, norms), *choices], [*remarks(result), *_lines(result)])
     for path in files:
         click.echo(f"written: {path}", err=True)
     if result.stopped == STOPPED:

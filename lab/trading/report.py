@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..cases.published import ERROR_UNIT, SOURCE, published
-from ..cases.published import NORM as ENERGY_SQUARE
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
 from ..reporting.text_tables import TextTable
@@ -14,6 +12,7 @@ from ..wording import NOTHING, compact, number
 from .code_line import python_line
 from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade, known_well
 
+ENERGY_SQUARE, ERROR_UNIT = "energy_square", "J²"  # the norm that has a unit
 DOUBTED = "*"  # marks an error that is too close to the reference's own
 TARGETS = (0.1, 0.01, 0.001, 1e-6)
 ORDER_TOLERANCE = 0.3  # a larger difference between the observed and the theoretical order is significant
@@ -28,18 +27,12 @@ COUNTS = {
 
 
 def tables(trade: Trade, norm: str | None = None) -> list[TextTable]:
-    """A table of all points for each case, and one of published results if there are any.
+    """A table of all points for each case.
 
     ``norm``: used for cases that have it; the others use their first one. Problem if no case has it.
     """
     check_norm(trade, norm)
-    made = []
-    for case in measured(trade):
-        chosen = norm_of(case, norm)
-        made.append(points_table(case, chosen))
-        if published(case.scene, chosen):
-            made.append(published_table(case.scene, chosen))
-    return made
+    return [points_table(case, norm_of(case, norm)) for case in measured(trade)]
 
 
 def measured(trade: Trade) -> list[CaseTrade]:
@@ -82,15 +75,6 @@ def points_table(case: CaseTrade, norm: str) -> TextTable:
             rows.append(tuple(row))
     title = f"{case.scene}: {norm}, and work per simulated second"
     return TextTable(title, tuple(headings), rows)
-
-
-def published_table(scene: str, norm: str) -> TextTable:
-    """Published results for this scene."""
-    rows = [
-        (point.engine, number(point.dt), compact(point.error), compact(point.milliseconds))
-        for point in published(scene, norm)
-    ]
-    return TextTable(f"{scene}: published", ("engine", "step, s", error_heading(norm), "ms on their machine"), rows)
 
 
 def error_heading(norm: str) -> str:
@@ -244,8 +228,6 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
     off = [f"{curve.label} {order(curve, norm)}" for curve in case.curves if off_theory(curve, norm)]
     if off:
         lines.append(f"observed orders more than {ORDER_TOLERANCE:g} from the theory's: {', '.join(off)}")
-    if published(case.scene, norm):
-        lines.append(SOURCE)
     return lines
 
 

@@ -94,7 +94,6 @@ def tune_command(
     kept: Path,
     as_json: bool,
     as_markdown: bool,
-    into: Path | None,
     traceback: bool,
 ) -> None:
     """Find the settings of least work that keep the error of a scene below --max-error in all repeats.
@@ -107,7 +106,7 @@ def tune_command(
     if len(norms) > 1:
         raise Problem(f"--norm: settings are tuned for one error, not for {' and '.join(norms)}")
     command = shlex.join([*MARK.split(), *context.meta[WORDS]])
-    output = Output.checked(" ".join((MARK, target)), as_json, as_markdown, into, None)
+    output = Output.checked(as_json, as_markdown)
     for one in (target, *checked):
         subject_of(one)
     only = Only(integrators or (), collisions or (), substeps or (), geometries or ())
@@ -157,7 +156,6 @@ def _show(result: TuneResult, output: Output) -> None:
     """Print tables and sentences; the line to paste comes last."""
     words, tuning = sentences(result), result.tuning
     pasted = [] if tuning.choice is None else [f"`{tuning.line}`"]
-    plain = not output.as_json and not output.as_markdown
-    output.show(result, tables(result), words if plain and output.into is None else [*words, *pasted])
-    if plain and tuning.choice is not None:
+    output.show(result, tables(result), words if output.plain else [*words, *pasted])
+    if output.plain and tuning.choice is not None:
         click.echo(f"\n{tuning.line}")

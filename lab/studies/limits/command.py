@@ -10,17 +10,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import (
-    listed,
-    one_of,
-    out_option,
-    seed_number,
-    seed_option,
-    shown_options,
-)
+from ...cli.options import listed, one_of, out_option, seed_number, seed_option
 from ...cli.usage_errors import Problem
-from ...reporting.output import Output
 from ...reporting.progress import Bar
+from ..page import PageOutput, shown_options
 from . import report as limits_report
 from .pairs import report as pairs_report
 from .pairs.axes import Draw
@@ -83,14 +76,14 @@ def limits_command(
         if quick and scenes is not None:
             raise Problem("--quick and --scenes exclude each other")
         wanted = scenes or (QUICK_SCENES if quick else SCENES)
-        output = Output.checked(PAIRS_MARK, as_json, as_markdown, into, None)
+        output = PageOutput.of(PAIRS_MARK, as_json, as_markdown, into, None)
         _cross(wanted, seed_number(seed), workers, output)
         return
     _refuse({"--seed": seed != "0"}, "needs --pairs")
-    _sweep(names, quick, long_runs, Output.checked(MARK, as_json, as_markdown, into, out))
+    _sweep(names, quick, long_runs, PageOutput.of(MARK, as_json, as_markdown, into, out))
 
 
-def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: Output) -> None:
+def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: PageOutput) -> None:
     if quick and long_runs:
         raise Problem("--quick and --long exclude each other")
     if output.charts is not None:
@@ -101,7 +94,7 @@ def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: 
     output.draw("draw_limits", result)
 
 
-def _cross(scenes: int, seed: int, workers: int | None, output: Output) -> None:
+def _cross(scenes: int, seed: int, workers: int | None, output: PageOutput) -> None:
     with Bar(Console(stderr=True)) as bar:
         result = pair_limits(scenes, seed, workers, bar)
     output.show(result, pairs_report.tables(result), pairs_report.remarks(result))

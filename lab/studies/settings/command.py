@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import repeats_option, shown_options
+from ...cli.options import repeats_option
 from ...cli.usage_errors import Problem
-from ...reporting.output import Output
 from ...reporting.progress import Bar
+from ..page import PageOutput, shown_options
 from .games import games_study, of_names
 from .records import GamesStudy, SettingsStudy
 from .report import game_remarks, game_tables, remarks, tables
@@ -42,7 +42,7 @@ def settings_command(
     if names and into is not None:
         raise Problem("--into fills the page with all of them: it takes no names")
     (of_names if games else of_fields)(names)  # raises for unknown names before anything runs
-    output = Output.checked(GAMES_MARK if games else FIELDS_MARK, as_json, as_markdown, into, None)
+    output = PageOutput.of(GAMES_MARK if games else FIELDS_MARK, as_json, as_markdown, into, None)
     found: GamesStudy | SettingsStudy
     with Bar(Console(stderr=True)) as bar:
         if games:
