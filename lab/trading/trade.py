@@ -6,7 +6,6 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ from ..bench.results import machine
 from ..cases import grid as grids
 from ..cases.case import EFFORTS, Case, case_of, check_arguments
 from ..cases.subjects import subject_of
-from ..cli.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import (
     OUT_OF_TIME,
@@ -65,12 +64,6 @@ class Only:
 
     def of(self, case: Case) -> tuple[Cell, ...]:
         """The methods of the case; a named field is varied even without effect. Problem if there is none."""
-        if self.integrators:
-            with closing(case.subject.world(None)) as world:
-                known = world.registry.integrators
-            for name in self.integrators:
-                if name not in known:
-                    raise Problem(f"no integrator {name!r}{did_you_mean(name, known)}")
         found = grids.methods(case.survey)
         fields = {
             "integrator": self.integrators,

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import listed, one_of, out_option, seed_number, seed_option
+from ...cli.options import listed, one_of, out_option, seed_option, traceback_option
 from ...cli.usage_errors import Problem
 from ...reporting.progress import Bar
 from ..page import PageOutput, shown_options
@@ -39,7 +39,7 @@ NAMES = tuple(axis.name for axis in AXES)
 @out_option("Draw a picture into this folder.")
 @shown_options
 @seed_option
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def limits_command(
     names: tuple[str, ...] | None,
     quick: bool,
@@ -52,15 +52,13 @@ def limits_command(
     as_markdown: bool,
     into: Path | None,
     out: Path | None,
-    seed: str,
-    traceback: bool,
+    seed: int,
 ) -> None:
     """Sweep one thing at a time until carom fails: the step, stiffness, speeds, ratios of masses and sizes, distance
     from the origin, towers, crowds, duration. Prints where the error passes 1 % and 10 %, and where it breaks.
 
     With --pairs: random scenes that cross these axes in pairs; prints what went wrong in each mode, and where.
     """
-    del traceback  # seen by Commands.main
     crossing = pairs or play is not None
     if not crossing:
         _refuse({"--scenes": scenes is not None, "--workers": workers is not None}, "needs --pairs")
@@ -71,15 +69,15 @@ def limits_command(
         _refuse(of_others, "does not go with --pairs or --play")
         if play is not None:
             _refuse({"--scenes": scenes is not None, "--into": into is not None}, "does not go with --play")
-            _play(seed_number(seed), play, as_json)
+            _play(seed, play, as_json)
             return
         if quick and scenes is not None:
             raise Problem("--quick and --scenes exclude each other")
         wanted = scenes or (QUICK_SCENES if quick else SCENES)
         output = PageOutput.of(PAIRS_MARK, as_json, as_markdown, into, None)
-        _cross(wanted, seed_number(seed), workers, output)
+        _cross(wanted, seed, workers, output)
         return
-    _refuse({"--seed": seed != "0"}, "needs --pairs")
+    _refuse({"--seed": seed != 0}, "needs --pairs")
     _sweep(names, quick, long_runs, PageOutput.of(MARK, as_json, as_markdown, into, out))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import repeats_option
+from ...cli.options import repeats_option, traceback_option
 from ...cli.usage_errors import Problem
 from ...reporting.progress import Bar
 from ..page import PageOutput, shown_options
@@ -24,7 +24,7 @@ FIELDS_MARK, GAMES_MARK = "studies settings", "studies settings games"
 @click.option("--games", is_flag=True, help="Kinds of games instead of fields: the cheapest settings for each.")
 @repeats_option(REPEATS, "Timed runs; the median counts.")
 @shown_options
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def settings_command(
     names: tuple[str, ...],
     games: bool,
@@ -32,13 +32,11 @@ def settings_command(
     as_json: bool,
     as_markdown: bool,
     into: Path | None,
-    traceback: bool,
 ) -> None:
     """Vary each field of Settings alone, in scenes where it matters: cost and error of its values. About two minutes.
 
     With --games: tune a scene of each kind of game to what such a game needs. NAMES: only these fields, or games.
     """
-    del traceback  # seen by Commands.main
     if names and into is not None:
         raise Problem("--into fills the page with all of them: it takes no names")
     (of_names if games else of_fields)(names)  # raises for unknown names before anything runs
