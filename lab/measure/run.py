@@ -267,9 +267,10 @@ class Meter:
         report.system_milliseconds = {
             name: mean if self.step_seconds else math.nan for name, mean in stats.milliseconds.items()
         }
-        report.energy = self._energy_drift()
-        report.energy_changes = self._energy_changes(np.array(self.energies))
-        report.momentum = self._momentum_drift()
+        energies = np.array(self.energies)
+        report.energy = _drift(energies, self.kinetic_most)  # the zero of a potential is arbitrary
+        report.energy_changes = self._energy_changes(energies)
+        report.momentum = _drift(np.array(self.momenta), self.momentum_scale)
         report.momentum_conserved = not (
             len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity) or world.force_systems
         )
@@ -308,7 +309,7 @@ class Meter:
         touched = bodies if any_pair else dynamic
         met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
         fell = (np.maximum.accumulate(energies) - energies).max() > noise  # an impact never adds any
-        if met and fell and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
+        if met and fell and (_restitutions(touched) < 1).any():
             reasons.append("restitution below 1")
         if np.any(dynamic.linear_damping):
             reasons.append("damping")
@@ -323,27 +324,14 @@ class Meter:
             reasons.append("bodies that came or went")
         return reasons
 
-    def _energy_drift(self) -> Drift:
-        """Relative to the largest kinetic energy seen: the zero of a potential is arbitrary."""
-        energies = np.array(self.energies)
-        scale = self.kinetic_most or 1.0
-        departure = (energies - energies[0]) / scale
-        return Drift(
-            float(energies[0]),
-            float(energies[-1]),
-            float(departure[-1]),
-            float(np.abs(departure).max()),
-            scale,
-        )
 
-    def _momentum_drift(self) -> Drift:
-        """The length of the change, relative to the largest sum of mass times speed seen."""
-        momenta = np.array(self.momenta)
-        scale = self.momentum_scale or 1.0
-        departure = np.linalg.norm(momenta - momenta[0], axis=1) / scale
-        return Drift(
-            momenta[0].tolist(), momenta[-1].tolist(), float(departure[-1]), float(departure.max()), scale
-        )
+def _drift(values: NDArray[np.float64], scale: float) -> Drift:
+    """Of samples of a number, or of a vector (n, d), of which the length of the change counts."""
+    scale = scale or 1.0
+    departure = values - values[0]
+    apart = np.abs(departure) if departure.ndim == 1 else np.linalg.norm(departure, axis=1)
+    change = departure[-1] if departure.ndim == 1 else apart[-1]
+    return Drift(values[0].tolist(), values[-1].tolist(), float(change / scale), float(apart.max() / scale), scale)
 
 
 def run(
@@ -390,15 +378,14 @@ def plain_settings(world: World) -> dict[str, Any]:
     return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
 
 
-def _restitutions(bodies: Any) -> list[NDArray[np.float64]]:
-    """The restitutions of ``bodies`` per collider type, for those that have the collider."""
+def _restitutions(bodies: Any) -> NDArray[np.float64]:
+    """Of all spheres and boxes of ``bodies``."""
     found = []
-    for collider in (SphereCollider, AABBCollider):
+    for name, collider in (("sphere_collider", SphereCollider), ("aabb_collider", AABBCollider)):
         has = np.asarray(bodies.has(collider), bool)
-        if has.any():
-            fields = bodies.sphere_collider if collider is SphereCollider else bodies.aabb_collider
-            found.append(np.asarray(fields.restitution)[has])
-    return found
+        if has.any():  # else there may be no such columns
+            found.append(getattr(bodies, name).restitution[has])
+    return np.concatenate([np.zeros(0), *found])
 
 
 def _kernels() -> tuple[int, int]:
