@@ -239,6 +239,4 @@ def _rows(case: Case) -> list[Row]:
 def _together(figures: list[dict[str, float]]) -> dict[str, float]:
     """Combine the repeats: the maximum of error figures, the mean of the others."""
     worst = ("overlap_max", "escaped", "drift", "sink")
-    return {
-        name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]
-    }
+    return {name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]}

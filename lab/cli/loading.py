@@ -165,9 +165,7 @@ def load(target: str) -> Loaded:
         return _load_file(path)
     if path.parent != Path():
         raise Problem(f"no file {target!r}: a file of one's own ends in .py")
-    raise Problem(
-        f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)"
-    )
+    raise Problem(f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)")
 
 
 def import_file(path: Path) -> ModuleType:

@@ -39,9 +39,7 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
     help="The folder where pictures go, or a file for that of the paths: NAME.png.",
 )
 @click.option("--view", "view_text", metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
-@click.option(
-    "--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."
-)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
 @click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
 @traceback_option
@@ -117,9 +115,7 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
     return max(0, round(wanted / dt))
 
 
-def _run_with_progress(
-    loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool
-) -> Run:
+def _run_with_progress(loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool) -> Run:
     with Bar(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
         bar.begin(steps)
         bar.say(loaded.name)

@@ -267,9 +267,7 @@ def point_of(outcomes: Sequence[Outcome]) -> Point:
         if outcome.failure is not None:
             failures[outcome.failure] = failures.get(outcome.failure, 0) + 1
     names = list(good[0].errors) if good else []
-    errors = {
-        name: ErrorBar.of([outcome.errors[name] for outcome in good], norm_of(name).signed) for name in names
-    }
+    errors = {name: ErrorBar.of([outcome.errors[name] for outcome in good], norm_of(name).signed) for name in names}
     counted = [outcome for outcome in outcomes if outcome.counts]
     counts = {
         name: sum(outcome.counts.get(name, 0.0) / outcome.seconds for outcome in counted) / len(counted)

@@ -61,9 +61,7 @@ class RunReport:
     kernels_compiled: int = 0
     kernels_loaded: int = 0
     bodies: dict[str, int] = field(default_factory=dict)
-    contacts: dict[str, float] = field(
-        default_factory=dict
-    )  # at the end, mean and most per step, impacts in total
+    contacts: dict[str, float] = field(default_factory=dict)  # at the end, mean and most per step, impacts in total
     step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
     step_milliseconds_mean: float = math.nan
     system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, without compilation

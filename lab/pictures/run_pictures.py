@@ -65,11 +65,7 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
     still = Still.of(run)
     ends = find_view(still, run.traces) if view is None else view
     projection = Projection.of(*(np.asarray(end, float) for end in ends))
-    frame = (
-        projection.frame()
-        if view is not None or projection.flat
-        else _tight_frame(still, run.traces, projection)
-    )
+    frame = projection.frame() if view is not None or projection.flat else _tight_frame(still, run.traces, projection)
     if is_file(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         return [draw_traces(run, still, projection, frame).save(out)]
@@ -98,9 +94,7 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
         highs.append(paths + size)
     low, high = np.concatenate(lows), np.concatenate(highs)
     if not len(low):
-        low, high = (
-            _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
-        )
+        low, high = _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
     lower, upper = low.min(axis=0), high.max(axis=0)
     fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
     for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # smallest first
@@ -225,9 +219,7 @@ def _moving_bodies(report: RunReport) -> str:
     return " and ".join(parts)
 
 
-def _draw_starts(
-    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
-) -> None:
+def _draw_starts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
     """The start positions, faintly."""
     paths = traces.positions[:, np.searchsorted(traces.entities, followed.entity)]
     first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have been created later
@@ -237,9 +229,7 @@ def _draw_starts(
     draw_bodies(panel, replace(followed, centre=places), faint, projection, zorder=2.2)
 
 
-def _draw_ghosts(
-    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
-) -> None:
+def _draw_ghosts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
     """The shapes at equal time intervals along the path."""
     positions = traces.positions
     when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]

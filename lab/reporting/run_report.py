@@ -49,11 +49,7 @@ def fault_lines(faults: list[str]) -> list[str]:
 
 
 def summary(report: RunReport) -> Text:
-    kinds = [
-        f"{report.bodies[kind]:,} {kind}"
-        for kind in ("dynamic", "kinematic", "static")
-        if report.bodies[kind]
-    ]
+    kinds = [f"{report.bodies[kind]:,} {kind}" for kind in ("dynamic", "kinematic", "static") if report.bodies[kind]]
     choice = {k: report.settings[k] for k in ("integrator", "collision", "substeps") if k in report.settings}
     text = Text()
     text.append(report.scene, style="bold")
@@ -112,9 +108,7 @@ def quality(report: RunReport) -> Table:
     table.add_row("deepest overlap", f"{report.deepest_overlap:.4g}", step)
     outside, broken = report.escaped["outside"], report.escaped["non_finite"]
     parts = [f"{outside:,} beyond the walls"] * bool(outside) + [f"{broken:,} not finite"] * bool(broken)
-    table.add_row(
-        "escaped bodies", f"{outside + broken:,}", ", ".join(parts), style=WARNING if parts else GOOD
-    )
+    table.add_row("escaped bodies", f"{outside + broken:,}", ", ".join(parts), style=WARNING if parts else GOOD)
     for name, values in report.compared.items():
         place = ", ".join(f"{value:.4g}" for value in values)
         table.add_row(name, "none" if any(map(math.isnan, values)) else f"({place})" if len(values) > 1 else place, "")

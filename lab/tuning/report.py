@@ -33,38 +33,32 @@ class TuneResult:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which cannot represent infinity: the error of a failed run is null."""
-        tuning = self.tuning
+        tuning, found = self.tuning, self.tuning.choice is not None
+        told = ("scene", "norm", "text", "target", "scale", "seconds", "repeats", "repeated", "methods")
+        checked = ("scene", "norm", "promise", "scale", "seconds", "tolerated", "refused")
         return {
             "command": self.command,
-            "scene": tuning.scene,
-            "norm": tuning.norm,
-            "text": tuning.text,
-            "target": tuning.target,
-            "scale": tuning.scale,
-            "seconds": tuning.seconds,
-            "repeats": tuning.repeats,
-            "repeated": tuning.repeated,
+            **{name: getattr(tuning, name) for name in told},
             "reference": dataclasses.asdict(tuning.reference),
-            "methods": tuning.methods,
-            "settings": None if tuning.choice is None else dataclasses.asdict(tuning.settings),
-            "line": None if tuning.choice is None else tuning.line,
-            "why_not": tuning.why_not if tuning.choice is None else "",
+            "settings": dataclasses.asdict(tuning.settings) if found else None,
+            "line": tuning.line if found else None,
+            "why_not": "" if found else tuning.why_not,
             "error": _finite(tuning.error),
-            "margin": _finite(tuning.margin) if tuning.choice is not None else None,
+            "margin": _finite(tuning.margin) if found else None,
             "choice": _plain(tuning.choice),
             "runner_up": _plain(tuning.runner_up),
             "balanced": _plain(self.balanced),
             "trials": [{**dataclasses.asdict(trial), "error": _finite(trial.error)} for trial in tuning.trials],
             "checks": [
                 {
-                    "scene": check.scene, "norm": check.norm, "promise": check.promise, "scale": check.scale,
-                    "seconds": check.seconds, "reference": dataclasses.asdict(check.reference),
-                    "point": _plain(check.point), "error": _finite(check.error), "times": _finite(check.times),
-                    "tolerated": check.tolerated, "refused": check.refused,
+                    **{name: getattr(check, name) for name in checked},
+                    "reference": dataclasses.asdict(check.reference),
+                    "point": _plain(check.point),
+                    **{name: _finite(getattr(check, name)) for name in ("error", "times")},
                 }
                 for check in self.checks
             ],
-        }  # fmt: skip
+        }
 
 
 def _finite(value: float) -> float | None:
