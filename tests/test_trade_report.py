@@ -52,15 +52,6 @@ def test_step_is_a_fraction_where_it_is_one_else_four_digits():
     assert column(trade_report.points_table(case, "position"), "step, s") == ["1/60", "0.006283"]
 
 
-def test_only_counts_that_say_something_are_shown():
-    table = trade_report.points_table(made.smooth(), "position")
-    assert {"steps", "force evaluations", "impacts"} <= set(table.headings)
-    assert not {"candidates", "pair tests", "solver loops"} & set(table.headings)
-    of_rk4 = [row for row in table.rows if row[0] == "rk4"]
-    place = table.headings.index("force evaluations")
-    assert [row[place] for row in of_rk4[:2]] == ["60", "120"]  # four per step of 1/15 s and of 1/30 s
-
-
 def test_wall_time_is_left_out_where_nothing_was_timed():
     assert "wall ms" in trade_report.points_table(made.smooth(), "position").headings
     assert "wall ms" not in trade_report.points_table(made.smooth(timed=False), "position").headings

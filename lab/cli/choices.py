@@ -48,11 +48,16 @@ def parse_view(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     except ValueError:
         numbers = ()
     half = len(numbers) // 2
-    lower, upper = numbers[:half], numbers[half:]
-    good = len(numbers) in (4, 6) and all(map(math.isfinite, numbers))
-    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+    view = numbers[:half], numbers[half:]
+    if not is_view(view):
         raise Problem(f"--view takes the lower and the upper corner, as in 0,0,4,3, not {text!r}")
-    return lower, upper
+    return view
+
+
+def is_view(view: tuple[tuple[float, ...], tuple[float, ...]]) -> bool:
+    """True for a lower and an upper corner in 2D or 3D."""
+    lower, upper = view
+    return len(lower) == len(upper) in (2, 3) and all(-math.inf < a < b < math.inf for a, b in zip(*view, strict=True))
 
 
 def apply(settings: Settings, values: dict[str, Any]) -> Settings:

@@ -22,7 +22,7 @@ import numpy as np
 
 from ... import scenes
 from ...framework import Plugin, Settings, World
-from .choices import apply
+from .choices import apply, is_view
 from .siblings import Siblings
 from .usage_errors import Problem, did_you_mean, one_line
 
@@ -250,8 +250,7 @@ def _view_of(path: Path, module: Any) -> Bounds | None:
         lower, upper = (tuple(float(x) for x in end) for end in value)
     except (TypeError, ValueError):
         lower, upper = (), ()
-    good = len(lower) == len(upper) in (2, 3) and np.isfinite([lower, upper]).all()
-    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+    if not is_view((lower, upper)):
         raise Problem(f"{path.name}: view must be (lower corner, upper corner), not {value!r}")
     return lower, upper
 

@@ -23,7 +23,7 @@ from ..pictures import canvas
 from ..pictures.curve_styles import Style, styles
 from ..wording import compact, number
 from .records import FAILURES, NOT_FINITE, TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
-from .report import check_norm, error_heading, is_statistic, measured, norm_of, order
+from .report import check_norm, error_heading, measured, norm_of, order
 
 WORK, TIME = "work", "time"
 AXIS = {
@@ -282,7 +282,9 @@ def _notes(sheet: Sheet) -> list[str]:
     if any(known is not None for curve in case.curves for known in (curve.orders.get(norm), curve.theory.get(norm))):
         lines.append("Order: of the error in the step, observed; in brackets what theory says.")
     if any(bar.high > bar.low for bar in bars):
-        span = "two standard errors either way" if is_statistic(case, norm) else "from the least to the largest error"
+        span = "from the least to the largest error"
+        if case.reference.is_statistic(norm):
+            span = "two standard errors either way"
         lines.append(f"Point: mean over the {case.repeated}; the line across it: {span}.")
     if any(not case.reference.trusts(norm, bar.mean) for bar in bars):
         apart = compact(case.reference.agreement[norm])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import shlex
 from collections.abc import Sequence
@@ -18,11 +17,10 @@ from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.runs import STOPPED
 from ..reporting.output import Output
-from ..reporting.text_tables import TextTable
 from .answer import answer
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
-from .report import COUNTS, cheapest, choice_lines, measured, remarks, tables
+from .report import cheapest, choice_lines, measured, remarks, tables
 from .trade import trade
 
 MARK = "carom trade"
@@ -70,7 +68,8 @@ def trade_command(
         for case in result.cases:
             click.echo("\n".join(answer(case)) + "\n")
     if any(case.curves for case in result.cases) or result.stopped != STOPPED:
-        shown = [*_tables(result, norms), *(cheapest(case) for case in measured(result))]
+        shown = [table for norm in norms or [None] for table in tables(result, norm)]
+        shown += [cheapest(case) for case in measured(result)]
         output.show(result, shown, [*remarks(result), *_lines(result)])
         for path in files:
             click.echo(f"written: {path}", err=True)
@@ -93,18 +92,6 @@ def chart_module() -> Any:
         return importlib.import_module(".charts", __package__)
     except ImportError as error:
         raise Problem("no charts, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'") from error
-
-
-def _tables(result: Trade, norms: Sequence[str]) -> list[TextTable]:
-    """The tables of each requested norm; of each case's first one if none was requested."""
-    return [_narrow(table) for norm in norms or [None] for table in tables(result, norm)]
-
-
-def _narrow(table: TextTable) -> TextTable:
-    """The table without the single counts, which are in the CSV file: a terminal is too narrow."""
-    kept = [place for place, heading in enumerate(table.headings) if heading not in COUNTS.values()]
-    rows = [tuple(row[place] for place in kept) for row in table.rows]
-    return dataclasses.replace(table, headings=tuple(table.headings[place] for place in kept), rows=rows)
 
 
 def _lines(result: Trade) -> list[str]:

@@ -193,6 +193,10 @@ class Reference:
     agreement: dict[str, float] = field(default_factory=dict)
     spread: dict[str, float] = field(default_factory=dict)
 
+    def is_statistic(self, norm: str) -> bool:
+        """True if single repeats are noise, so that a limit applies to the mean plus two standard errors."""
+        return norm in self.spread
+
     def trusts(self, norm: str, error: float) -> bool:
         """True if an error of that size can be distinguished from the reference's own."""
         return error >= TRUSTED * self.agreement.get(norm, 0.0)

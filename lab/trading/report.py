@@ -10,20 +10,12 @@ from ..measure.norms import MEAN
 from ..reporting.text_tables import TextTable
 from ..wording import NOTHING, compact, number
 from .code_line import python_line
-from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade, known_well
+from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade, known_well
 
 ENERGY_SQUARE, ERROR_UNIT = "energy_square", "J²"  # the norm that has a unit
 DOUBTED = "*"  # marks an error that is too close to the reference's own
 TARGETS = (0.1, 0.01, 0.001, 1e-6)
 ORDER_TOLERANCE = 0.3  # a larger difference between the observed and the theoretical order is significant
-COUNTS = {
-    "steps": "steps",
-    "force_evaluations": "force evaluations",
-    "candidates": "candidates",
-    "pairs": "pair tests",
-    "impacts": "impacts",
-    "solver_loops": "solver loops",
-}
 
 
 def tables(trade: Trade, norm: str | None = None) -> list[TextTable]:
@@ -55,21 +47,19 @@ def norm_of(case: CaseTrade, norm: str | None) -> str:
 def points_table(case: CaseTrade, norm: str) -> TextTable:
     """One row per point; columns without information are left out."""
     points = [point for curve in case.curves for point in curve.points]
-    counts = [name for name in COUNTS if any(point.counts.get(name) for point in points)]
     bars = [point.errors[norm] for point in points if norm in point.errors]
     worst = any(bar.high > bar.mean for bar in bars)
     timed = any(point.milliseconds for point in points)
     failing = any(point.failed for point in points)
-    headings = ["method", "order", "step, s", error_heading(norm)]
-    headings += [worst_heading(case, norm)] * worst + ["work"] + [COUNTS[name] for name in counts]
-    headings += ["wall ms"] * timed + ["failed"] * failing
+    headings = ["method", "order", "step, s", error_heading(norm), *[worst_heading(case.reference, norm)] * worst]
+    headings += ["work", *["wall ms"] * timed, *["failed"] * failing]
     rows = []
     for curve in case.curves:
         for place, point in enumerate(curve.points):
             bar = point.errors.get(norm)
             row = [curve.label, "" if place else order(curve, norm), number(point.cell.dt), _error(case, norm, bar)]
             row += [compact(bar.high) if bar else NOTHING] * worst
-            row += [compact(point.work), *(_mean(point.counts.get(name, 0.0)) for name in counts)]
+            row += [compact(point.work)]
             row += [compact(point.milliseconds.median) if point.milliseconds else NOTHING] * timed
             row += [failures(point)] * failing
             rows.append(tuple(row))
@@ -81,13 +71,8 @@ def error_heading(norm: str) -> str:
     return f"error, {ERROR_UNIT}" if norm == ENERGY_SQUARE else "error"
 
 
-def is_statistic(case: CaseTrade, norm: str) -> bool:
-    """True if single repeats are noise, so that the limit applies to the mean plus two standard errors."""
-    return norm in case.reference.spread
-
-
-def worst_heading(case: CaseTrade, norm: str) -> str:
-    return "mean + 2 s.e." if is_statistic(case, norm) else "worst"
+def worst_heading(reference: Reference, norm: str) -> str:
+    return "mean + 2 s.e." if reference.is_statistic(norm) else "worst"
 
 
 def _error(case: CaseTrade, norm: str, bar: ErrorBar | None) -> str:
@@ -139,8 +124,8 @@ def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | No
         time = compact(point.milliseconds.median) if point.milliseconds else NOTHING
         error = compact(point.errors[chosen].high)
         rows.append((*words, curve.label, number(point.cell.dt), error, compact(point.work), time))
-    headings = ("target", "engine", "method", "step, s", worst_heading(case, chosen), "work", "wall ms")
-    kept = "two standard errors beyond the mean" if is_statistic(case, chosen) else "in every repeat"
+    headings = ("target", "engine", "method", "step, s", worst_heading(case.reference, chosen), "work", "wall ms")
+    kept = "two standard errors beyond the mean" if case.reference.is_statistic(chosen) else "in every repeat"
     title = f"{case.scene}: the least work per simulated second that keeps {chosen} below the target {kept}"
     return TextTable(title, headings, rows, words=3)
 
@@ -241,9 +226,3 @@ def untrusted(case: CaseTrade, norm: str) -> list[Point]:
     """The points whose error is too small for the reference."""
     points = [point for curve in case.curves for point in curve.points if norm in point.errors]
     return [point for point in points if not case.reference.trusts(norm, point.errors[norm].mean)]
-
-
-def _mean(value: float) -> str:
-    """A mean of counts, without decimals if it is whole."""
-    whole = abs(value) < 1e6 and math.isclose(value, round(value), rel_tol=1e-9)
-    return f"{value:,.0f}" if whole else compact(value)

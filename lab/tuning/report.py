@@ -10,8 +10,8 @@ from typing import Any
 from ..reporting.text_tables import TextTable
 from ..trading.answer import cost_text, noticed_text
 from ..trading.code_line import settings_line
-from ..trading.records import Cell, ErrorBar, Point
-from ..trading.report import target_text
+from ..trading.records import ErrorBar, Point
+from ..trading.report import failures, target_text, worst_heading
 from ..trading.trade import label_of
 from ..wording import NOTHING, compact, counted, metres, number
 from .check import TOLERATED, Check
@@ -156,21 +156,13 @@ def compared_table(result: TuneResult) -> TextTable:
         bar = None if point.failed else point.errors[tuning.norm]
         work = NOTHING if tuning.choice is None else compact(point.work / tuning.choice.work)
         rows.append((
-            name, label_of(point.cell.method, cells), number(point.cell.dt), _worst(bar), _part(bar, tuning.target),
-            compact(point.work), work,
+            name, label_of(point.cell.method, cells), number(point.cell.dt), failures(point) or _worst(bar),
+            _part(bar, tuning.target), compact(point.work), work,
         ))  # fmt: skip
-    headings = ("", "method", "step, s", worst_heading(tuning), "of target", "work", "of choice's")
+    worst = worst_heading(tuning.reference, tuning.norm)
+    headings = ("", "method", "step, s", worst, "of target", "work", "of choice's")
     title = f"{tuning.scene}: {tuning.norm}, and work per simulated second"
     return TextTable(title, headings, rows, words=2)
-
-
-def worst_heading(tuning: Tuning) -> str:
-    return "mean + 2 s.e." if is_statistic(tuning) else "worst"
-
-
-def is_statistic(tuning: Tuning) -> bool:
-    """True if single repeats are noise, so that the limit applies to the mean plus two standard errors."""
-    return tuning.norm in tuning.reference.spread
 
 
 def checks_table(result: TuneResult) -> TextTable:
@@ -184,7 +176,8 @@ def checks_table(result: TuneResult) -> TextTable:
         rows.append((
             check.scene, number(check.seconds), _worst(_bar(check)), compact(check.promise), times, _kept(check),
         ))  # fmt: skip
-    headings = ("scene", "over, s", worst_heading(result.tuning), "promise", "times the promise", "")
+    worst = worst_heading(result.tuning.reference, result.tuning.norm)
+    headings = ("scene", "over, s", worst, "promise", "times the promise", "")
     return TextTable("on scenes that it was not tuned on", headings, rows)
 
 
@@ -216,14 +209,13 @@ def _error(error: float) -> str:
 
 
 def sentences(result: TuneResult) -> list[str]:
-    """The choice and the reasons for it; or that there is none."""
+    """What was searched, against what, and how far the result goes; or that there is none."""
     tuning = result.tuning
     lines = [result.command, *_about(tuning)]
     if tuning.choice is None:
         return [*lines, f"{tuning.why_not}."]
-    lines += [_chosen(tuning, tuning.choice), _second(tuning, tuning.choice)]
-    if result.balanced is not None:
-        lines.append(_against_balanced(result.balanced, tuning, tuning.choice))
+    if tuning.runner_up is None:
+        lines.append(f"no other method holds within {FAR_DEARER:g} times the work")
     lines += [line for check in result.checks if (line := check_line(check))]
     return [*lines, _limits(tuning)]
 
@@ -242,39 +234,6 @@ def _about(tuning: Tuning) -> list[str]:
         f"{counted(tuning.methods, 'method')} to choose from, {counted(len(tuning.trials), 'trial')};"
         " the cheapest first",
     ]
-
-
-def _chosen(tuning: Tuning, choice: Point) -> str:
-    bar = choice.errors[tuning.norm]
-    if is_statistic(tuning):
-        error = f"{compact(bar.high)}, two standard errors beyond the mean of {tuning.repeats} {tuning.repeated}"
-    elif tuning.repeats > 1:
-        error = f"{compact(bar.high)} in the worst of {tuning.repeats} {tuning.repeated}"
-    else:
-        error = f"{compact(bar.high)} in the one run"
-    margin = "an exact result" if math.isinf(tuning.margin) else f"a margin of {compact(tuning.margin)}"
-    return f"choice: {_words(choice.cell, tuning)}: {tuning.norm} {error}: {margin}; work {compact(choice.work)}"
-
-
-def _second(tuning: Tuning, choice: Point) -> str:
-    second = tuning.runner_up
-    if second is None:
-        return f"runner-up: no other method holds within {FAR_DEARER:g} times the work"
-    error, work = compact(second.errors[tuning.norm].high), compact(second.work / choice.work)
-    return f"runner-up: {_words(second.cell, tuning)}: {tuning.norm} {error} with {work} times the work"
-
-
-def _against_balanced(point: Point, tuning: Tuning, choice: Point) -> str:
-    ratio = point.work / choice.work
-    work = (
-        f"{compact(ratio)} times the work of the choice" if ratio >= 1
-        else f"1/{compact(1 / ratio)} of the work of the choice"
-    )  # fmt: skip
-    if point.failed:
-        return f"Settings.balanced(): {work}, and it fails: {', '.join(point.failures)}"
-    error = point.errors[tuning.norm].high
-    kept = "keeps the target" if error <= tuning.target else f"misses the target {compact(error / tuning.target)} times"
-    return f"Settings.balanced(): {work}; it {kept}"
 
 
 def check_line(check: Check) -> str:
@@ -296,8 +255,3 @@ def _limits(tuning: Tuning) -> str:
         f"measured on {tuning.scene} over {number(tuning.seconds)} s and nowhere else: larger speeds, stronger forces, "
         "other sizes or longer runs change the error; --check SCENE measures it there"
     )
-
-
-def _words(cell: Cell, tuning: Tuning) -> str:
-    label = label_of(cell.method, {trial.cell.method for trial in tuning.trials} | {cell.method})
-    return f"{label}, {number(cell.dt)} s"
