@@ -105,7 +105,7 @@ def outcome_of_steps(
 
 
 def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
-    points = known_well(point for curve in case.curves for point in curve.points)
+    points = known_well(case.points)
     points.sort(key=lambda point: point.cell.dt)
     if not points:
         return StepOutcome(refused=f"there was no time: {more_budget(case)} tells more")
@@ -115,7 +115,7 @@ def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
     found.known = f"from {counted(runs, 'run')} of {number(case.seconds)} s with {counted(len(points), 'step')}"
     if case.rough:
         found.known += f"; {rough_text(case)}"
-    elif case.missing or len(points) < sum(len(curve.points) for curve in case.curves):
+    elif case.missing or len(points) < len(case.points):
         found.known += "; others did not fit into the budget"
     for point in points:
         if point.failed or noticed(point.effects, way):

@@ -75,7 +75,7 @@ def _can_be_better(case: CaseTrade, chosen: Point) -> bool:
 
 
 def _points(case: CaseTrade) -> list[Point]:
-    return [point for curve in case.curves for point in curve.points if point.cell.engine == CAROM]
+    return [point for point in case.points if point.cell.engine == CAROM]
 
 
 def price(point: Point) -> float:

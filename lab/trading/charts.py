@@ -85,14 +85,14 @@ def draw(trade: Trade, folder: Path, norm: str | None = None) -> list[Path]:
 
 def quantities(case: CaseTrade) -> list[str]:
     """WORK, and TIME if a point was timed."""
-    timed = any(point.milliseconds for curve in case.curves for point in curve.points)
+    timed = any(point.milliseconds for point in case.points)
     return [WORK, TIME] if timed else [WORK]
 
 
 def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Figure:
     """One chart: WORK or TIME over the error of ``norm``, the case's first if it does not have it."""
     sheet = Sheet(case, norm_of(case, norm), quantity)
-    sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in _points(case))]
+    sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in case.points)]
     drawn = list(zip(case.curves, styles(case.curves), strict=True))
     entries = [_entry(curve, style, sheet.norm) for curve, style in drawn]
     sheet.notes = _notes(sheet)
@@ -142,10 +142,6 @@ def _entry(curve: Curve, style: Style, norm: str) -> Line2D:
     return Line2D([], [], label=legend_text(curve, norm), **look)
 
 
-def _points(case: CaseTrade) -> list[Point]:
-    return [point for curve in case.curves for point in curve.points]
-
-
 def _bar(point: Point, norm: str) -> ErrorBar | None:
     """The point's error bar, or None if its error is not a number."""
     bar = point.errors.get(norm)
@@ -175,9 +171,9 @@ def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
 def _set_limits(sheet: Sheet) -> None:
     """Set both axes to enclose everything drawn, with room at the left edge for errors of 0."""
     axes, norm = sheet.axes, sheet.norm
-    bars = [bar for point in _points(sheet.case) if (bar := _bar(point, norm))]
+    bars = [bar for point in sheet.case.points if (bar := _bar(point, norm))]
     errors = [e for bar in bars for e in (bar.low, bar.mean, bar.high) if 0 < e < math.inf]
-    costs = [cost for point in _points(sheet.case) if (cost := sheet.height(point))]
+    costs = [cost for point in sheet.case.points if (cost := sheet.height(point))]
     least, most = (min(errors), max(errors)) if errors else (10 * LEAST_ERROR, 1.0)
     if any(bar.mean <= 0 for bar in bars):
         least /= 10
@@ -275,7 +271,7 @@ def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
 
 def _notes(sheet: Sheet) -> list[str]:
     """The meaning of the marks used, and what could not be drawn."""
-    case, norm, points = sheet.case, sheet.norm, _points(sheet.case)
+    case, norm, points = sheet.case, sheet.norm, sheet.case.points
     bars = [bar for point in points if (bar := _bar(point, norm))]
     what = {WORK: "work", TIME: "wall time"}[sheet.quantity]
     lines = []

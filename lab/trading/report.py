@@ -46,7 +46,7 @@ def norm_of(case: CaseTrade, norm: str | None) -> str:
 
 def points_table(case: CaseTrade, norm: str) -> TextTable:
     """One row per point; columns without information are left out."""
-    points = [point for curve in case.curves for point in curve.points]
+    points = case.points
     bars = [point.errors[norm] for point in points if norm in point.errors]
     worst = any(bar.high > bar.mean for bar in bars)
     timed = any(point.milliseconds for point in points)
@@ -138,8 +138,8 @@ def choices(
     Engines are treated separately, because their counts are not comparable.
     """
     chosen = norm_of(case, norm)
-    engines = dict.fromkeys(point.cell.engine for curve in case.curves for point in curve.points)
-    known = {point.cell for point in known_well(point for curve in case.curves for point in curve.points)}
+    engines = dict.fromkeys(point.cell.engine for point in case.points)
+    known = {point.cell for point in known_well(case.points)}
     made: list[tuple[float, str, tuple[Curve, Point] | None]] = []
     for target in targets:
         for engine in engines:
@@ -224,5 +224,5 @@ def reference_line(case: CaseTrade, norm: str) -> str:
 
 def untrusted(case: CaseTrade, norm: str) -> list[Point]:
     """The points whose error is too small for the reference."""
-    points = [point for curve in case.curves for point in curve.points if norm in point.errors]
+    points = [point for point in case.points if norm in point.errors]
     return [point for point in points if not case.reference.trusts(norm, point.errors[norm].mean)]
