@@ -102,8 +102,10 @@ class Runs:
         return in_parallel(perform, tasks, 1 if few else self.workers, self._pool, self.until)
 
     def seconds_for(self, tasks: Iterable[Task]) -> float:
-        """About how long those that are missing will take, by the time that others took."""
-        return sum(task.cost for task in self._missing(tasks)) * self._spent / max(self._steps, 1.0)
+        """About how long those that are missing will take, by the time that others took; inf if none has finished."""
+        if not self._steps:
+            return math.inf
+        return sum(task.cost for task in self._missing(tasks)) * self._spent / self._steps
 
     def _missing(self, tasks: Iterable[Task]) -> list[Task]:
         return [task for task in tasks if task.key not in self._store]

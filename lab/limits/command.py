@@ -145,4 +145,6 @@ def _suggestion(dt: float, own: float, tightest: StepLimits, outcome: StepOutcom
         if tightest.suggested == 0.0:
             return f"no step is stable: choose another integrator than {tightest.integrator}"
         return f"no step that was tried keeps the outcome, not even {number(outcome.shortest)} s: see carom trade"
-    return f"dt up to {number(dt)} s; its step of {number(own)} s {'fits' if own <= dt * 1.000001 else 'is too long'}"
+    reason = " by its forces and speeds alone" if outcome.refused else ""
+    fits = "fits" if own <= dt * 1.000001 else "is too long"
+    return f"dt up to {number(dt)} s{reason}; its step of {number(own)} s {fits}"

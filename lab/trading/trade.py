@@ -224,9 +224,10 @@ class Study:
                 self.show(self._known())
 
     def _time_needed(self, case: Case) -> float:
-        """About how long it takes to the first results against references, s, from the beginning."""
+        """About how long it takes to the first results against references, s, from the beginning; 0: not known."""
         tasks = [*reference_tasks(case.coarse_reference()), *run_tasks(case, grids.grid(self.curves, case.steps))]
-        return (time.monotonic() - self.began + self.runs.seconds_for(tasks)) / RUNNING
+        left = self.runs.seconds_for(tasks)
+        return (time.monotonic() - self.began + left) / RUNNING if left < math.inf else 0.0
 
     def _told_and_worse(self) -> tuple[set[Cell], set[Cell]]:
         """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""

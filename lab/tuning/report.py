@@ -108,7 +108,7 @@ def _in_unit(tuning: Tuning, error: float) -> str:
     """An error in metres if the norm is one of place, else as a share."""
     if tuning.norm in ("position", "apex"):
         return metres(error * tuning.scale)
-    return f"{100 * error:.2g} %"
+    return f"{compact(100 * error, 2)} %"
 
 
 # -- tables -----------------------------------------------------------------------------------------------------

@@ -32,6 +32,7 @@ from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
 from ..trading.records import CHAOTIC, TRUSTED, Cell, Point, Reference
 from ..trading.trade import RUNNING, TRIAL, TURNS, Only
+from ..wording import counted
 
 BELOW = 16  # a method's step is at least the smallest step of the case over this
 MOST_REPEATS = 400  # of a noisy statistic
@@ -137,7 +138,7 @@ class Tuning:
         if best is None or not math.isfinite(best.error):
             return f"{text}: every run failed"
         line = settings_line(best.cell, self.base)
-        return f"{text}: the best of {len(self.trials)} trials has {best.error:.3g}, {line}"
+        return f"{text}: the best of {counted(len(self.trials), 'trial')} has {best.error:.3g}, {line}"
 
 
 def tune(build: Any, max_error: float = 1e-3, norm: str | None = None, **options: Any) -> Settings:
