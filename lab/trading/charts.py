@@ -59,6 +59,7 @@ class Sheet:
         return cost if cost and math.isfinite(cost) and cost > 0 else None
 
 
+@canvas.styled
 def draw(trade: Trade, folder: Path, norm: str | None = None) -> list[Path]:
     """Draw charts of all measured cases as PNG and SVG in ``folder``: by work and, if timed, by wall time.
 
@@ -89,6 +90,7 @@ def quantities(case: CaseTrade) -> list[str]:
     return [WORK, TIME] if timed else [WORK]
 
 
+@canvas.styled
 def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Figure:
     """One chart: WORK or TIME over the error of ``norm``, the case's first if it does not have it."""
     sheet = Sheet(case, norm_of(case, norm), quantity)
@@ -101,7 +103,7 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
     rows = -(-len(entries) // columns)
     below = AXIS_LABEL + ROW * rows + 0.15 + NOTE * len(notes) + 0.15
     size = (WIDTH, TOP + PLOT + below)
-    made = Figure(figsize=size, dpi=canvas.DPI, facecolor=canvas.BACKGROUND)
+    made = Figure(figsize=size)
     FigureCanvasAgg(made)
     share = STRIP * len(sheet.kinds) + STRIP_GAP if sheet.kinds else 0.0
     plot = WIDTH - LEFT - RIGHT - share
@@ -113,12 +115,12 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
         _draw_curve(sheet, curve, style)
     _draw_failures(sheet, drawn)
     _label_steps(sheet, drawn)
-    made.text(LEFT / WIDTH, 1 - 0.36 / size[1], case.scene, color=canvas.TEXT, fontsize=16, fontweight="bold")
+    made.text(LEFT / WIDTH, 1 - 0.36 / size[1], case.scene, fontsize=16, fontweight="bold")
     what = textwrap.shorten(f"{sheet.norm}: {case.norms[sheet.norm]}", 120, placeholder=" ...")
     made.text(LEFT / WIDTH, 1 - 0.66 / size[1], what, color=canvas.MUTED, fontsize=9.5)
     made.legend(
         handles=entries, ncols=columns, loc="upper left", bbox_to_anchor=(LEFT / WIDTH, (below - 0.62) / size[1]),
-        bbox_transform=made.transFigure, borderaxespad=0, frameon=False, labelcolor=canvas.TEXT, fontsize=8.5,
+        bbox_transform=made.transFigure, borderaxespad=0, frameon=False, fontsize=8.5,
         handlelength=2.6, labelspacing=0.45, borderpad=0,
     )  # fmt: skip
     for place, note in enumerate(notes):
@@ -160,11 +162,8 @@ def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
     """Axes at a position in inches from the lower left corner."""
     width, height = made.get_size_inches()
     left, bottom, across, up = place
-    axes = made.add_axes((left / width, bottom / height, across / width, up / height), facecolor=canvas.PANEL)
-    axes.tick_params(which="both", colors=canvas.MUTED, labelsize=8.5)
-    axes.set_axisbelow(True)
-    for spine in axes.spines.values():
-        spine.set_color(canvas.FRAME)
+    axes = made.add_axes((left / width, bottom / height, across / width, up / height))
+    axes.tick_params(which="both", labelsize=8.5)
     return axes
 
 
@@ -182,9 +181,9 @@ def _set_limits(sheet: Sheet) -> None:
     axes.set_yscale("log")
     axes.set_xlim(*sheet.errors)
     axes.set_ylim(*_widened(min(costs, default=1.0), max(costs, default=1.0)))
-    axes.grid(color=canvas.FRAME, lw=0.7)
-    axes.set_xlabel(error_heading(norm), color=canvas.MUTED, fontsize=9.5)
-    axes.set_ylabel(AXIS[sheet.quantity], color=canvas.MUTED, fontsize=9.5)
+    axes.grid(lw=0.7)
+    axes.set_xlabel(error_heading(norm), fontsize=9.5)
+    axes.set_ylabel(AXIS[sheet.quantity], fontsize=9.5)
     if sheet.strip is not None:
         strip = sheet.strip
         strip.set_yscale("log")
