@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ..bench.results import machine_line
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
 from ..reporting.text_tables import TextTable
@@ -178,15 +179,6 @@ def remarks(trade: Trade, norm: str | None = None) -> list[str]:
     for case in trade.cases:
         lines += [f"{case.scene}: {line}" for line in case_remarks(case, norm_of(case, norm))]
     return lines
-
-
-def machine_line(machine: dict[str, str]) -> str:
-    """Processor and system, then versions."""
-    rest = dict(machine)
-    place = [rest.pop(key) for key in ("processor", "system") if key in rest]
-    clock = [rest.pop("clock")] if "clock" in rest else []
-    versions = ", ".join(f"{name} {version}" for name, version in rest.items())
-    return "; ".join(filter(None, (", ".join(place), versions, *clock)))
 
 
 def case_remarks(case: CaseTrade, norm: str) -> list[str]:
