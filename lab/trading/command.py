@@ -12,7 +12,6 @@ import click
 
 from ..cases.subjects import subject_of
 from ..cli.options import WORDS, KeepsWords, out_option, shown_options, together, traceback_option, writable_folder
-from ..cli.studying import arguments_of, check_integrators, end_if_stopped, performing, study_options
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.runs import STOPPED
@@ -21,6 +20,7 @@ from .answer import answer
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
 from .report import cheapest, choice_lines, measured, remarks, tables
+from .session import arguments_of, check_integrators, end_if_stopped, performing, study_options
 from .trade import trade
 
 MARK = "carom trade"

@@ -10,11 +10,11 @@ import click
 from ...framework import Settings
 from ..cases.subjects import subject_of
 from ..cli.options import WORDS, KeepsWords, above_zero, shown_options, together, traceback_option
-from ..cli.studying import arguments_of, check_integrators, end_if_stopped, performing, study_options
 from ..cli.usage_errors import Problem
 from ..jobs.runs import STOPPED, Runs
 from ..measure.norms import NORMS, check_norm
 from ..reporting.output import Output
+from ..trading.session import arguments_of, check_integrators, end_if_stopped, performing, study_options
 from .check import Check, check, measured_with
 from .report import TuneResult, answer, sentences, tables
 from .search import Tuning, search

@@ -12,15 +12,15 @@ from rich.console import Console
 
 from ..cases.grid import ALL_METHODS
 from ..cases.subjects import Subject
+from ..cli.group import STOPPED
+from ..cli.options import case_options, only_options, runs_options, together
+from ..cli.usage_errors import Problem
 from ..jobs.cluster import Cluster
 from ..jobs.result_store import Store
 from ..jobs.runs import STOPPED as STUDY_STOPPED
 from ..reporting.progress import Bar
-from ..trading.trade import Only
 from ..wording import counted
-from .group import STOPPED
-from .options import case_options, only_options, runs_options, together
-from .usage_errors import Problem
+from .trade import Only
 
 study_options = together(case_options, only_options, runs_options)
 
