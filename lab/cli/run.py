@@ -13,6 +13,7 @@ from rich.console import Console
 from ...framework import Settings
 from ..measure.run import Run, run
 from ..plugins.installed import plugin_named
+from ..reporting.output import drawing_module
 from ..reporting.progress import Bar
 from ..reporting.run_report import print_report
 from .choices import parse_view
@@ -92,15 +93,12 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
     if no_pictures:
         return None
     try:
-        from ..pictures.run_pictures import draw_run, is_file
-    except ImportError:
-        click.echo(
-            "carom: no pictures, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'",
-            err=True,
-        )
+        pictures = drawing_module("pictures.run_pictures", "no pictures,")
+    except Problem as problem:
+        click.echo(f"carom: {problem.message}", err=True)
         return None
-    writable_folder(out.parent if is_file(out) else out, out)
-    return draw_run
+    writable_folder(out.parent if pictures.is_file(out) else out, out)
+    return pictures.draw_run
 
 
 def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:

@@ -37,7 +37,11 @@ class Output:
         """Problem for impossible options, raised before the long run. charts: the lab's module that draws."""
         if as_json and as_markdown:
             raise Problem("--json and --markdown exclude each other")
-        return Output(as_json, as_markdown, out, None if out is None else _charts(out, charts))
+        if out is None:
+            return Output(as_json, as_markdown, out, None)
+        module = drawing_module(charts, "--out:", "bench")
+        writable_folder(out)
+        return Output(as_json, as_markdown, out, module)
 
     def as_it_comes(self, answer: Callable[[Any], list[str]]) -> Callable[[Any], None]:
         """Prints what is known so far, with the seconds that it took, for a person; nothing for others."""
@@ -76,10 +80,10 @@ def as_markdown(tables: list[TextTable], remarks: list[str]) -> str:
     return "\n\n".join([*(table.markdown() for table in tables), *remarks])
 
 
-def _charts(out: Path, module: str) -> Any:
+def drawing_module(name: str, what: str, extra: str = "plot") -> Any:
+    """A module of the lab that draws; Problem, with the name of the extra, if matplotlib is missing."""
     try:
-        charts = importlib.import_module(f"..{module}", __package__)
+        return importlib.import_module(f"..{name}", __package__)
     except ImportError as error:
-        raise Problem("--out: matplotlib is missing; it comes with the extra: pip install 'carom[bench]'") from error
-    writable_folder(out)
-    return charts
+        reason = f"matplotlib is missing; it comes with the extra: pip install 'carom[{extra}]'"
+        raise Problem(f"{what} {reason}") from error

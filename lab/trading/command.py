@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +14,7 @@ from ..cli.options import WORDS, KeepsWords, out_option, shown_options, together
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs.runs import STOPPED
-from ..reporting.output import Output
+from ..reporting.output import Output, drawing_module
 from .answer import answer
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
@@ -79,19 +78,11 @@ def trade_command(
 def _charts(result: Trade, out: Path, norms: Sequence[str]) -> list[Path]:
     """Draw them; without matplotlib a note is all."""
     try:
-        draw = chart_module().draw
+        draw = drawing_module("trading.charts", "no charts,").draw
     except Problem as problem:
         click.echo(f"carom: {problem.message}", err=True)
         return []
     return [path for norm in norms or [None] for path in draw(result, out, norm)]
-
-
-def chart_module() -> Any:
-    """The module carom.lab.trading.charts; Problem, with the name of the extra, if matplotlib is missing."""
-    try:
-        return importlib.import_module(".charts", __package__)
-    except ImportError as error:
-        raise Problem("no charts, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'") from error
 
 
 def _lines(result: Trade) -> list[str]:
