@@ -28,17 +28,24 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
     """``["dt=1/120", "substeps=8"]`` as field values of the right types; Problem for anything else."""
     fields = {field.name: field for field in dataclasses.fields(Settings)}
     hints = typing.get_type_hints(Settings)
-    values: dict[str, Any] = {}
-    for assignment in assignments:
-        name, equals, text = (part.strip() for part in assignment.partition("="))
-        if not equals or not name:
-            raise Problem(f"--set takes field=value, not {assignment!r}")
+    texts = assigned("--set", "field=value", assignments)
+    for name in texts:
         if name not in fields:
             raise Problem(f"Settings has no field {name!r}{did_you_mean(name, fields)}")
-        if name in values:
-            raise Problem(f"--set gives {name} twice")
-        values[name] = _parse(name, text, hints[name])
-    return values
+    return {name: _parse(name, text, hints[name]) for name, text in texts.items()}
+
+
+def assigned(option: str, form: str, assignments: Iterable[str]) -> dict[str, str]:
+    """``["n=100"]`` as texts by name; Problem, with the form that they must have, for others."""
+    texts: dict[str, str] = {}
+    for assignment in assignments:
+        name, equals, text = (part.strip() for part in assignment.partition("="))
+        if not equals or not name.isidentifier():
+            raise Problem(f"{option} takes {form}, not {assignment!r}")
+        if name in texts:
+            raise Problem(f"{option} gives {name} twice")
+        texts[name] = text
+    return texts
 
 
 def parse_view(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from ..cases.grid import COLLISIONS
-from .choices import parse_assignments, preset
+from .choices import assigned, parse_assignments, preset
 from .usage_errors import Problem, did_you_mean
 
 GEOMETRIES = ("precise", "bounds")
@@ -178,17 +178,10 @@ def _step(text: str) -> float:
 
 def _build_options(assignments: tuple[str, ...]) -> dict[str, Any]:
     """["n=100", "height=2.5"] as keywords; a number where it is one, else a word."""
-    found: dict[str, Any] = {}
-    for assignment in assignments:
-        name, equals, text = (part.strip() for part in assignment.partition("="))
-        if not equals or not name.isidentifier():
-            raise Problem(f"--option takes NAME=VALUE, a keyword of the scene's build, not {assignment!r}")
-        if name in ("settings", "seed"):
-            raise Problem(f"--option cannot set {name}: the command does")
-        if name in found:
-            raise Problem(f"--option gives {name} twice")
-        found[name] = _number_or_word(text)
-    return found
+    texts = assigned("--option", "NAME=VALUE, a keyword of the scene's build", assignments)
+    for name in texts.keys() & {"settings", "seed"}:
+        raise Problem(f"--option cannot set {name}: the command does")
+    return {name: _number_or_word(text) for name, text in texts.items()}
 
 
 def _number_or_word(text: str) -> int | float | str:
