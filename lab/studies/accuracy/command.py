@@ -13,7 +13,7 @@ from ...jobs.result_store import Store
 from ...reporting.progress import Bar
 from ...trading.charts import draw
 from ...trading.records import PYMUNK
-from ...trading.report import cheapest, remarks
+from ...trading.report import cheapest, choice_lines, remarks
 from ...trading.trade import trade
 from ..page import PageOutput, shown_options
 from .published import SOURCE, published
@@ -40,7 +40,8 @@ def accuracy_command(
         result = trade(scene, against_pymunk=against == PYMUNK, store=store, progress=bar, command=command)
     (case,) = result.cases
     others = published(case.scene, case.norm)
-    output.show(result, [summary(case), cheapest(case)], [*remarks(result), *[SOURCE] * bool(others)])
+    pasted = [f"{case.scene}, {target}: {line}" for target, line in choice_lines(case)]
+    output.show(result, [summary(case), cheapest(case)], [*remarks(result), *[SOURCE] * bool(others), *pasted])
     case.curves += others
     if out is not None:
         for path in draw(result, out):
