@@ -73,9 +73,9 @@ ACCURACY := spring orbit jump bouncing stack thermal_gas
 
 figures: $(BENCH)
 	for scene in $(ACCURACY); do \
-	  $(BIN)/carom trade $$scene --thorough --against pymunk --out out/$$scene --into docs/tables/accuracy.md || exit 1; \
+	  $(STUDIES) accuracy $$scene --against pymunk --out out/$$scene --into docs/tables/accuracy.md || exit 1; \
 	done
-	$(BIN)/carom trade billiards --thorough --out out/billiards --into docs/tables/accuracy.md
+	$(STUDIES) accuracy billiards --out out/billiards --into docs/tables/accuracy.md
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
 	$(STUDIES) limits --long --into docs/tables/limits.md --out docs/pictures

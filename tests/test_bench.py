@@ -262,17 +262,10 @@ def test_json_is_all_there_is_on_stdout(carom, tiny):
     assert read.rows[0].scene == "fastgas"
 
 
-def test_tables_pages_and_charts(carom, tiny, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("before\n<!-- carom bench -->\nold\n<!-- end of carom bench -->\nafter\n")
-    done = carom(*TINY, "--markdown", "--into", "page.md", "--out", "pictures")
+def test_tables_and_charts(carom, tiny, tmp_path):
+    done = carom(*TINY, "--markdown", "--out", "pictures")
     assert done.exit_code == 0, done.stderr
     assert "| fastgas 20 |" in done.stdout
-    text = page.read_text()
-    assert text.startswith("before\n<!-- carom bench -->\n\n**ms per step")
-    assert text.endswith("\n\n<!-- end of carom bench -->\nafter\n")
-    assert "old" not in text
-    assert done.stdout.strip() in text
     assert (tmp_path / "pictures" / "bench.png").stat().st_size > 1000
     plain = carom(*TINY)
     assert "fastgas 20" in plain.stdout
@@ -343,7 +336,6 @@ def test_without_pymunk_it_times_carom_and_says_what_is_missing(carom, tiny, no_
         (["bench", "--sizes", "0"], ["--sizes", "'0'"]),
         (["bench", "--quick", "--large"], ["--quick"]),
         (["bench", "--json", "--markdown"], ["exclude each other"]),
-        (["bench", "--into", "nowhere.md"], ["--into nowhere.md"]),
         (["bench", "--repeats", "0"], ["--repeats"]),
     ],
     ids=lambda value: " ".join(value[1:]) if value and value[0] == "bench" else "",
@@ -355,13 +347,6 @@ def test_wrong_names_and_values(carom, arguments, words):
     assert len(lines) == 1
     for word in words:
         assert word in lines[0]
-
-
-def test_a_page_without_the_marks_is_refused_before_the_run(carom, tmp_path):
-    (tmp_path / "page.md").write_text("nothing\n")
-    done = carom("bench", "--into", "page.md")
-    assert done.exit_code == 2
-    assert "<!-- carom bench -->" in done.stderr
 
 
 def test_ctrl_c_stops_with_one_line(carom, monkeypatch):

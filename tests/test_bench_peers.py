@@ -41,7 +41,7 @@ def test_every_subject_translates():
         assert kinetic_energy(mass, peer.state()[1]) == pytest.approx(world.kinetic_energy())
         assert len(peer.space.shapes) == sum(int(part.shaped.sum()) for part in moving_and_fixed(world))
         assert all(math.isinf(body.moment) for body in peer.bodies)
-        own.close()
+        own.world.close()
 
 
 @pytest.mark.parametrize("index", peer_pymunk.INDEXES)
@@ -64,7 +64,7 @@ def test_a_disc_and_a_box_fall_and_bounce_alike(index):
         np.testing.assert_allclose(own.state()[0], peer.state()[0], atol=0.5)
     assert np.all(lowest < [0.75, 0.5])
     np.testing.assert_allclose(peer.state()[0], [(0, 3.5), (4, 3.25)], atol=0.3)
-    own.close()
+    own.world.close()
 
 
 def test_friction_means_the_same_in_both_engines():

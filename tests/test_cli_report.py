@@ -9,6 +9,8 @@ import pytest
 from helpers_cli import report_of
 from helpers_processes import copied_cache, run_carom
 
+from carom.lab.reporting.run_report import fault_lines
+
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 
 
@@ -106,6 +108,26 @@ def test_energy_that_is_not_conserved_says_why(carom):
     assert report["energy_changes"] == ["restitution below 1", "damping"]
 
 
+def test_energy_that_is_kept_has_no_reason_to_change(carom):
+    """Boxes at rest: their restitution is 0, and no impact has taken anything."""
+    result = carom("run", "stack", "--no-pictures")
+    assert "490 J" in result.stdout
+    assert "changed by" not in result.stdout
+
+
+def test_a_system_may_have_changed_the_energy(carom, ball):
+    pushed = """
+class Push(System):
+    def process(self, dt):
+        self.world.bodies.dynamic.linear_velocity[:] *= 1.5
+"""
+    text = ball.read_text().replace("def build", f"from carom.framework import System\n{pushed}\ndef build", 1)
+    ball.write_text(text.replace("    return world", "    world.add_system(Push())\n    return world"))
+    report = report_of(carom("run", "ball.py", "--steps", "9", "--json", "--no-pictures"))
+    assert "systems of the game" in report["energy_changes"]
+    assert "restitution below 1" not in report["energy_changes"]
+
+
 def test_sensors_do_not_overlap(carom, ball):
     sensor = "    world.create_entity(Transform((0, 9)), AABBCollider(half_extents=(3, 3), sensor=True))"
     ball.write_text(ball.read_text().replace("    return world", f"{sensor}\n    return world"))
@@ -153,3 +175,18 @@ def test_neither_what_is_taken_nor_a_platform_in_a_wall_is_an_overlap(carom):
     assert report["bodies"]["static"] == 1
     assert report["contacts"]["most"] == 2
     assert report["deepest_overlap"] == 0
+
+
+def test_faults_of_one_kind_share_a_line():
+    fast = [f"entity {number}: too fast: set its ccd" for number in range(3433, 3438)]
+    faults = [*fast, "entity 7: not finite", "no room left"]
+    assert fault_lines(faults) == [
+        "entities 3433, 3434, 3435 and 2 more: too fast: set its ccd", "entity 7: not finite", "no room left",
+    ]  # fmt: skip
+    assert fault_lines([f"fault {n}" for n in "abcde"])[3:] == ["and 2 other faults"]
+
+
+def test_forces_from_outside_change_the_momentum(carom):
+    result = carom("run", "spring", "--steps", "9", "--no-pictures")
+    assert "energy drift" in result.stdout
+    assert "momentum" not in result.stdout

@@ -93,7 +93,7 @@ def test_the_command_tells_what_broke_while_it_watched(carom, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["stack", "--seconds", "-1"], "--seconds must be a number of at least 0"),
+        (["stack", "--seconds", "-1"], "--seconds takes a number of at least 0"),
         (["stack", "--max-error", "0"], "--max-error takes metres above 0, not 0"),
         (["stak"], "no scene named 'stak'; did you mean 'stack'"),
         ([], "Missing argument"),
@@ -162,6 +162,8 @@ def test_little_time_gives_what_is_known_and_says_how_much_it_needs(carom, monke
     assert "Known from 3 runs of 1 s with 3 steps; rough, against a first run" in result.stdout
     assert "only: --budget " in result.stdout
     assert "sink" not in result.stdout  # a platform that moves through the floor is no overlap
+    Path("falls.py").write_text(FALLS)  # the first run is no more exact than the steps that differ from it
+    assert "not measured: there was no time for references: --budget " in carom("limits", "falls.py").stdout
 
 
 def test_a_scene_with_options_is_measured_in_other_processes_too():

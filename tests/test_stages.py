@@ -14,7 +14,7 @@ from carom.framework import System, World
 from carom.framework.jit.records.record import make_record
 from carom.framework.jit.records.schema import Schema, flags, integer, ints, number, vectors
 from carom.framework.schedule.stages import Program, Stage
-from carom.lab.reporting.text_tables import between_marks
+from carom.lab.studies.page import between_marks
 from carom.lab.studies.stages import Stages
 from carom.plugins import Physics
 from carom.systems import ContactEvents

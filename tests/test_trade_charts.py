@@ -7,7 +7,6 @@ from xml.etree import ElementTree
 import helpers_trade as made
 import pytest
 
-from carom.lab.cases import published
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.timing import Spread
 from carom.lab.pictures.curve_styles import FEW, styles
@@ -186,25 +185,6 @@ def test_points_of_unknown_cost_are_counted():
     case = made.bouncing()
     case.curves[2].points[0].work = 0.0
     assert any("work of 1 points is not known" in text for text in words(figure(case)))
-
-
-# -- what others published --------------------------------------------------------------------------------------
-
-
-def test_published_points_share_the_axes_of_wall_time():
-    chart = figure(made.bouncing(), TIME)
-    for engine in ("RaiSim", "ODE", "Bullet", "DART"):
-        points = [(p.error, p.milliseconds) for p in published.BOUNCING if p.engine == engine]
-        assert lines(plot(chart), f"{engine}, published") == points
-        assert f"{engine}, published" in legend(chart)
-    note = " ".join(words(chart))
-    assert "SimBenchmark" in note
-    assert "another machine (Intel i7-7700HQ, 49 balls)" in note
-
-
-def test_published_points_belong_to_one_scene_and_norm():
-    assert not any("published" in text for text in legend(figure(made.bouncing(), WORK)))
-    assert not any("published" in text for text in legend(figure(made.smooth(), TIME)))
 
 
 # -- colours, lines, markers ------------------------------------------------------------------------------------

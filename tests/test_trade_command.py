@@ -170,18 +170,6 @@ def test_when_time_is_up_what_is_known_is_told(carom):
     assert trade_in(Path("out/trade")).stopped == "time is up"
 
 
-def test_tables_go_into_a_page(carom, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("# Mine\n\n<!-- carom trade jump -->\nold\n<!-- end of carom trade jump -->\nend\n")
-    result = carom("jump", *SHORT, "--into", "page.md")
-    assert result.exit_code == 0, result.output
-    text = page.read_text()
-    assert "old" not in text
-    assert "| velocity verlet |" in text
-    assert f"carom trade jump {' '.join(SHORT)} --into page.md" in text
-    assert text.endswith("\nend\n")
-
-
 def test_without_matplotlib_everything_but_pictures(carom, monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"] + ["carom.lab.trading.charts"]:
         monkeypatch.delitem(sys.modules, name, raising=False)
@@ -238,7 +226,6 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
     (("spring", "--option", "n=1", "--option", "n=2"), "--option gives n twice"),
     (("spring", "--option", "mass=3"), "mass"),
     (("spring", "--json", "--markdown"), "--json and --markdown exclude each other"),
-    (("spring", "--into", "page.md"), "--into page.md"),
     (("spring", "--no-timign"), "--no-timing"),
 ])  # fmt: skip
 def test_wrong_input_is_refused_at_once_in_one_line(carom, monkeypatch, arguments, words):

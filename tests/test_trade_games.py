@@ -115,10 +115,10 @@ def seen(values, **more):
     ([3.205], [3.2005], 0.0045 / 3.2005, []),
     ([3.3], [3.2005], 0.0995 / 3.2005, ["x: 3.3 instead of 3.2"]),
     ([math.nan], [3.0], 1.0, ["x: none instead of 3"]),
-    ([3.0], [math.nan], 1.0, ["x: some, and there should be none"]),
+    ([3.0], [math.nan], 1.0, ["x: there is one, and there should be none"]),
     ([math.nan], [math.nan], 0.0, []),
     ([math.nan], [0.0, 3.0], 1.0, ["x: none, and there should be one"]),
-    ([0.0, 3.0], [math.nan], 1.0, ["x: some, and there should be none"]),
+    ([0.0, 3.0], [math.nan], 1.0, ["x: there is one, and there should be none"]),
     ([0.0, 1.0], [0.0, 3.0], 0.5, ["x ends 2 m from where it should"]),
     ([0.0, 1.0], [0.0, 1.009], 0.009 / 4, []),
 ])  # fmt: skip

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -38,16 +38,8 @@ LOOKS = 10  # at the quality of the states, per window
 REHEARSAL_SEED, REHEARSAL_STEPS = 1000, 30  # of the untimed run before the first repeat, which compiles the kernels
 
 
-class Engine(Protocol):
-    """A physics engine with a scene loaded."""
-
-    def step(self, count: int) -> None: ...
-    def state(self) -> tuple[Floats, Floats]: ...
-    def close(self) -> None: ...
-
-
 class CaromWorld:
-    """The Engine interface for carom."""
+    """A world of carom, stepped and read as a PymunkSpace is."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -64,9 +56,8 @@ class CaromWorld:
         order = np.argsort(bodies.entity, kind="stable")
         return np.array(bodies.position)[order], np.array(bodies.linear_velocity)[order]
 
-    def close(self) -> None:
-        """Close the world."""
-        self.world.close()
+
+Engines = dict[str, CaromWorld | PymunkSpace]
 
 
 @dataclass
@@ -132,13 +123,12 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
     """One repeat of one case, by all engines."""
     waited = log.waited
     if repeat == 0:
-        with contextlib.closing(CaromWorld(case.build(REHEARSAL_SEED))) as rehearsal:
-            rehearsal.step(REHEARSAL_STEPS)
+        with contextlib.closing(case.build(REHEARSAL_SEED)) as rehearsal:
+            CaromWorld(rehearsal).step(REHEARSAL_STEPS)
             if peer:
-                PymunkSpace(rehearsal.world).step(REHEARSAL_STEPS)
-    with contextlib.ExitStack() as stack:
-        world = case.build(repeat)
-        engines: dict[str, Any] = {CAROM: stack.enter_context(contextlib.closing(CaromWorld(world)))}
+                PymunkSpace(rehearsal).step(REHEARSAL_STEPS)
+    with contextlib.closing(case.build(repeat)) as world:
+        engines: Engines = {CAROM: CaromWorld(world)}
         case.bodies = len(world.bodies.dynamic)
         indexes = [] if not peer else [case.peer] if case.peer else _indexes(world)
         for index in indexes:
@@ -159,7 +149,7 @@ def _indexes(world: World) -> list[str]:
     return list(INDEXES if moving_and_fixed(world)[0].shaped.any() else INDEXES[:1])
 
 
-def _run_windows(case: Case, world: World, engines: dict[str, Engine], progress: Progress) -> None:
+def _run_windows(case: Case, world: World, engines: Engines, progress: Progress) -> None:
     moving, fixed = moving_and_fixed(world)
     enclosure = Enclosure.around(world)
     quality = {name: Quality(moving, fixed, enclosure) for name in engines}
@@ -181,7 +171,7 @@ def _run_windows(case: Case, world: World, engines: dict[str, Engine], progress:
 def _run_window(
     case: Case,
     window: Window,
-    engines: dict[str, Engine],
+    engines: Engines,
     quality: dict[str, Quality],
     progress: Progress,
     effort_per_step: float,
@@ -239,6 +229,4 @@ def _rows(case: Case) -> list[Row]:
 def _together(figures: list[dict[str, float]]) -> dict[str, float]:
     """Combine the repeats: the maximum of error figures, the mean of the others."""
     worst = ("overlap_max", "escaped", "drift", "sink")
-    return {
-        name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]
-    }
+    return {name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]}

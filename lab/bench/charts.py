@@ -17,6 +17,7 @@ TARGET = "#ffd43b"
 ROW_HEIGHT = 0.42  # inches
 
 
+@canvas.styled
 def draw_ratios(result: Result, folder: Path) -> Path | None:
     """Draw bars of pymunk's time over carom's on a logarithmic scale; None if nothing was compared."""
     rows = [row for row in reversed(result.rows) if row.ratio is not None]
@@ -37,24 +38,20 @@ def draw_ratios(result: Result, folder: Path) -> Path | None:
     axes.set_yticks(list(places), [row.label for row in rows])
     shown = [r.low for r in ratios] + [r.high for r in ratios] + [t for _, t in targets] + [1.0]
     axes.set_xlim(min(shown) / 1.3, max(shown) * 1.5)
-    axes.set_xlabel("times as fast (line: from the least to the largest repeat)", color=canvas.MUTED)
+    axes.set_xlabel("times as fast (line: from the least to the largest repeat)")
     _plain_numbers(axes)
     if targets:
-        axes.legend(facecolor=canvas.PANEL, edgecolor=canvas.FRAME, labelcolor=canvas.TEXT, loc="best")
+        axes.legend(loc="best")
     return saved(axes, folder / "bench.png")
 
 
+@canvas.styled
 def new_axes(title: str, height: float) -> Any:
-    size = (canvas.LONG_SIDE, height)
-    figure = Figure(figsize=size, dpi=canvas.DPI, facecolor=canvas.BACKGROUND, layout="constrained")
+    figure = Figure(figsize=(canvas.LONG_SIDE, height), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot(facecolor=canvas.PANEL)
-    axes.set_title(title, color=canvas.TEXT, fontsize=15, fontweight="bold", loc="left")
-    axes.tick_params(colors=canvas.MUTED)
-    axes.grid(axis="x", color=canvas.FRAME)
-    axes.set_axisbelow(True)
-    for spine in axes.spines.values():
-        spine.set_color(canvas.FRAME)
+    axes = figure.add_subplot()
+    axes.set_title(title, fontsize=15, fontweight="bold", loc="left")
+    axes.grid(axis="x")
     return axes
 
 

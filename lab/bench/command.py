@@ -49,7 +49,6 @@ def bench_command(
     out: Path | None,
     as_json: bool,
     as_markdown: bool,
-    into: Path | None,
 ) -> None:
     """Time scenes of the library in carom and in pymunk, on the same bodies, in one process."""
     if quick and (sizes or large):
@@ -59,7 +58,7 @@ def bench_command(
     if large:
         asked = tuple(sorted({*asked, LARGE}))
     repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
-    output = Output.checked("carom bench", as_json, as_markdown, into, out)
+    output = Output.checked(as_json, as_markdown, out)
     peer = not no_peer and _peer_there()
     with Bar(Console(stderr=True)) as bar:
         result = bench(wanted, asked, repeats, peer, bar)

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...framework import World
 from ...scenes import gas, player_query
-from ..engines.pymunk_space import PymunkSpace
 from ..measure.body_shapes import Floats
 from ..measure.timing import no_garbage_collection, timed
 
@@ -34,30 +33,6 @@ class Query:
     peer: Callable[[Any, Floats, float], float]
 
 
-def _own_boxes(world: World, places: Floats, side: float) -> float:
-    return len(world.query_aabbs(places - BOX_SIDE / 2, places + BOX_SIDE / 2).entities)
-
-
-def _peer_boxes(space: PymunkSpace, places: Floats, side: float) -> float:
-    return space.boxes(places - BOX_SIDE / 2, places + BOX_SIDE / 2)
-
-
-def _own_spheres(world: World, places: Floats, side: float) -> float:
-    return len(world.query_spheres(places, REACH).entities)
-
-
-def _peer_spheres(space: PymunkSpace, places: Floats, side: float) -> float:
-    return space.spheres(places, REACH)
-
-
-def _own_nearest(world: World, places: Floats, side: float) -> float:
-    return float(np.mean(world.query_nearests(places, max_distances=REACH).distance))
-
-
-def _peer_nearest(space: PymunkSpace, places: Floats, side: float) -> float:
-    return float(np.mean(space.nearest(places, REACH)))
-
-
 def _rays(places: Floats, side: float) -> tuple[Floats, Floats]:
     """Rays from one side of the box to the other at the heights of the places; both ends (m, 2), outside all discs."""
     ends = np.full((2, *places.shape), EDGE)
@@ -72,17 +47,27 @@ def _own_rays(world: World, places: Floats, side: float) -> float:
     return float(np.mean(world.ray_casts(starts, ways, np.linalg.norm(ways, axis=1)).fraction))
 
 
-def _peer_rays(space: PymunkSpace, places: Floats, side: float) -> float:
-    starts, ends = _rays(places, side)
-    return float(np.mean(space.rays(starts, ends)))
-
-
 QUERIES = (
-    Query("box 4 x 4", "hits", _own_boxes, _peer_boxes),
-    Query("disc r = 2", "hits", _own_spheres, _peer_spheres),
-    Query("nearest within 2", "mean distance", _own_nearest, _peer_nearest),
-    Query("ray across", "share of the way", _own_rays, _peer_rays),
-)
+    Query(
+        "box 4 x 4", "hits",
+        lambda world, places, _: len(world.query_aabbs(places - BOX_SIDE / 2, places + BOX_SIDE / 2).entities),
+        lambda space, places, _: space.boxes(places - BOX_SIDE / 2, places + BOX_SIDE / 2),
+    ),
+    Query(
+        "disc r = 2", "hits",
+        lambda world, places, _: len(world.query_spheres(places, REACH).entities),
+        lambda space, places, _: space.spheres(places, REACH),
+    ),
+    Query(
+        "nearest within 2", "mean distance",
+        lambda world, places, _: float(np.mean(world.query_nearests(places, max_distances=REACH).distance)),
+        lambda space, places, _: float(np.mean(space.nearest(places, REACH))),
+    ),
+    Query(
+        "ray across", "share of the way", _own_rays,
+        lambda space, places, side: float(np.mean(space.rays(*_rays(places, side)))),
+    ),
+)  # fmt: skip
 
 
 def time_queries(

@@ -6,11 +6,10 @@ import math
 from typing import Any
 
 from ..measure.timing import Spread
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
-from .results import Result, Row
+from ..wording import NOTHING, number
+from .results import Result, Row, machine_line
 
-NOTHING = "-"
 CAROM_SETTINGS = ("dt", "integrator", "collision", "substeps")
 PYMUNK_SETTINGS = ("iterations", "collision_slop", "collision_bias", "damping", "threads", "sleeping")
 
@@ -93,11 +92,7 @@ def answers(rows: list[Row]) -> TextTable:
 def remarks(result: Result) -> list[str]:
     """Machine and engine settings, one line each."""
     compiling = sum({(row.name, row.bodies): row.compile_seconds for row in result.rows}.values())
-    versions = {**result.machine}
-    place = ", ".join(versions.pop(key) for key in ("processor", "system"))
-    clock = versions.pop("clock")
-    lines = [f"{place}; {', '.join(f'{name} {version}' for name, version in versions.items())}; {clock}"]
-    lines.append(f"compiling and loading kernels: {compiling:.1f} s, not counted")
+    lines = [machine_line(result.machine), f"compiling and loading kernels: {compiling:.1f} s, not counted"]
     for engine, names in (("carom", CAROM_SETTINGS), ("pymunk", PYMUNK_SETTINGS)):
         values = result.settings.get(engine)
         if values:

@@ -74,6 +74,15 @@ def machine() -> dict[str, str]:
     return {"processor": _processor(), "system": platform.system(), "clock": CLOCK, **versions}
 
 
+def machine_line(machine: dict[str, str]) -> str:
+    """Processor and system, then versions."""
+    rest = dict(machine)
+    place = [rest.pop(key) for key in ("processor", "system") if key in rest]
+    clock = [rest.pop("clock")] if "clock" in rest else []
+    versions = ", ".join(f"{name} {version}" for name, version in rest.items())
+    return "; ".join(filter(None, (", ".join(place), versions, *clock)))
+
+
 def _processor() -> str:
     """The processor's name; on Linux from /proc, because Python does not provide it."""
     try:

@@ -131,6 +131,11 @@ class Case:
             return None
         return grids.theory(cell, norm, self.survey)
 
+    def scale(self, norm: str) -> float:
+        """What errors in this norm are relative to, in the scene's units, by the reference that there is."""
+        assert self.reference is not None
+        return norm_of(norm).scale(self.reference, self.reference)
+
     def phase(self, repeat: int) -> float:
         """The length of the first step of that repeat, as a fraction of a step: spread evenly however many there are
         (van der Corput's sequence, in the order of the Gray code: 1, 1/2, 1/4, 3/4, ...; so few reach far too)."""

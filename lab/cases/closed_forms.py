@@ -60,9 +60,7 @@ def swinging(world: World, seconds: float) -> Seen:
     x, v, mass = _start(world)
     stiffness = world.force_systems[0].stiffness  # type: ignore[attr-defined]
     total = world.kinetic_energy() + world.potential_energy()
-    return _seen(
-        lambda t: spring(t, stiffness, mass[0], x, v)[0], seconds, world, False, [], energy_scale=total
-    )
+    return _seen(lambda t: spring(t, stiffness, mass[0], x, v)[0], seconds, world, False, [], energy_scale=total)
 
 
 def kepler(world: World, seconds: float) -> Seen:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import types
 import typing
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -14,16 +14,7 @@ from ...framework import Settings
 from .usage_errors import Problem, did_you_mean, one_line
 
 PRESETS = ("fast", "balanced", "accurate")
-WORDS_FOR_BOOL = {
-    "true": True,
-    "yes": True,
-    "on": True,
-    "1": True,
-    "false": False,
-    "no": False,
-    "off": False,
-    "0": False,
-}
+BOOLEANS = {**dict.fromkeys(("true", "yes", "on", "1"), True), **dict.fromkeys(("false", "no", "off", "0"), False)}
 
 
 def preset(name: str) -> Settings:
@@ -37,17 +28,24 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
     """``["dt=1/120", "substeps=8"]`` as field values of the right types; Problem for anything else."""
     fields = {field.name: field for field in dataclasses.fields(Settings)}
     hints = typing.get_type_hints(Settings)
-    values: dict[str, Any] = {}
-    for assignment in assignments:
-        name, equals, text = (part.strip() for part in assignment.partition("="))
-        if not equals or not name:
-            raise Problem(f"--set takes field=value, not {assignment!r}")
+    texts = assigned("--set", "field=value", assignments)
+    for name in texts:
         if name not in fields:
             raise Problem(f"Settings has no field {name!r}{did_you_mean(name, fields)}")
-        if name in values:
-            raise Problem(f"--set gives {name} twice")
-        values[name] = _parse(name, text, hints[name])
-    return values
+    return {name: _parse(name, text, hints[name]) for name, text in texts.items()}
+
+
+def assigned(option: str, form: str, assignments: Iterable[str]) -> dict[str, str]:
+    """``["n=100"]`` as texts by name; Problem, with the form that they must have, for others."""
+    texts: dict[str, str] = {}
+    for assignment in assignments:
+        name, equals, text = (part.strip() for part in assignment.partition("="))
+        if not equals or not name.isidentifier():
+            raise Problem(f"{option} takes {form}, not {assignment!r}")
+        if name in texts:
+            raise Problem(f"{option} gives {name} twice")
+        texts[name] = text
+    return texts
 
 
 def parse_view(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -57,11 +55,16 @@ def parse_view(text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     except ValueError:
         numbers = ()
     half = len(numbers) // 2
-    lower, upper = numbers[:half], numbers[half:]
-    good = len(numbers) in (4, 6) and all(map(math.isfinite, numbers))
-    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+    view = numbers[:half], numbers[half:]
+    if not is_view(view):
         raise Problem(f"--view takes the lower and the upper corner, as in 0,0,4,3, not {text!r}")
-    return lower, upper
+    return view
+
+
+def is_view(view: tuple[tuple[float, ...], tuple[float, ...]]) -> bool:
+    """True for a lower and an upper corner in 2D or 3D."""
+    lower, upper = view
+    return len(lower) == len(upper) in (2, 3) and all(-math.inf < a < b < math.inf for a, b in zip(*view, strict=True))
 
 
 def apply(settings: Settings, values: dict[str, Any]) -> Settings:
@@ -75,66 +78,37 @@ def apply(settings: Settings, values: dict[str, Any]) -> Settings:
 def _parse(name: str, text: str, hint: Any) -> Any:
     """``text`` as the first of the hint's types that accepts it."""
     kinds = _kinds(hint)
-    for kind in kinds:
+    words: dict[str, Any] = {str(word): word for kind in kinds for word in typing.get_args(kind)}  # of Literals
+    if text in words:
+        return words[text]
+    readers = [READERS[kind] for kind in READERS if kind in kinds]
+    for read, _ in readers:
         try:
-            return _as_kind(text, kind)
-        except ValueError:
+            return read(text)
+        except (ValueError, KeyError, ZeroDivisionError):
             continue
-    words = [
-        word for kind in kinds if typing.get_origin(kind) is typing.Literal for word in typing.get_args(kind)
-    ]
     if words:
-        raise Problem(f"--set {name}: no choice {text!r}{did_you_mean(text, map(str, words))}")
-    raise Problem(f"--set {name} takes {' or '.join(_in_words(kind) for kind in kinds)}, not {text!r}")
+        raise Problem(f"--set {name}: no choice {text!r}{did_you_mean(text, words)}")
+    raise Problem(f"--set {name} takes {' or '.join(what for _, what in readers)}, not {text!r}")
 
 
 def _kinds(hint: Any) -> list[Any]:
-    """The members of a union, flattened; a plain string last, because it accepts any text."""
-    origin = typing.get_origin(hint)
-    if origin in (typing.Union, types.UnionType):
-        members = [kind for member in typing.get_args(hint) for kind in _kinds(member)]
-        return sorted(members, key=lambda kind: kind is str)
+    """The members of a union, flattened."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        return [kind for member in typing.get_args(hint) for kind in _kinds(member)]
     return [hint]
 
 
-def _as_kind(text: str, kind: Any) -> Any:
-    if typing.get_origin(kind) is typing.Literal:
-        for word in typing.get_args(kind):
-            if str(word) == text:
-                return word
-        raise ValueError
-    if kind in (None, type(None)):
-        if text.lower() == "none":
-            return None
-        raise ValueError
-    if kind is bool:
-        try:
-            return WORDS_FOR_BOOL[text.lower()]
-        except KeyError:
-            raise ValueError from None
-    if kind is int:
-        return int(text)
-    if kind is float:
-        return float(_fraction(text)) if "/" in text else float(text)
-    if kind is str:
-        return text
-    raise ValueError  # a type that cannot be written on a command line
+def _number(text: str) -> float:
+    """1/120 is an exact time step."""
+    return float(Fraction(text.replace(" ", ""))) if "/" in text else float(text)
 
 
-def _fraction(text: str) -> Fraction:
-    """1/120 as an exact time step."""
-    try:
-        return Fraction(text.replace(" ", ""))
-    except ZeroDivisionError:
-        raise ValueError from None
-
-
-def _in_words(kind: Any) -> str:
-    known = {
-        int: "a whole number",
-        float: "a number",
-        bool: "true or false",
-        str: "a word",
-        type(None): "none",
-    }
-    return known.get(kind, getattr(kind, "__name__", str(kind)))
+# How each type is read, and what it is called; the first that accepts a text has it.
+READERS: dict[Any, tuple[Callable[[str], Any], str]] = {
+    int: (int, "a whole number"),
+    float: (_number, "a number"),
+    bool: (lambda text: BOOLEANS[text.lower()], "true or false"),
+    type(None): (lambda text: {"none": None}[text.lower()], "none"),
+    str: (str, "a word"),
+}

@@ -22,7 +22,7 @@ import numpy as np
 
 from ... import scenes
 from ...framework import Plugin, Settings, World
-from .choices import apply
+from .choices import apply, is_view
 from .siblings import Siblings
 from .usage_errors import Problem, did_you_mean, one_line
 
@@ -165,9 +165,7 @@ def load(target: str) -> Loaded:
         return _load_file(path)
     if path.parent != Path():
         raise Problem(f"no file {target!r}: a file of one's own ends in .py")
-    raise Problem(
-        f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)"
-    )
+    raise Problem(f"no scene named {target!r}{did_you_mean(target, scenes.names())} (a file of one's own ends in .py)")
 
 
 def import_file(path: Path) -> ModuleType:
@@ -252,8 +250,7 @@ def _view_of(path: Path, module: Any) -> Bounds | None:
         lower, upper = (tuple(float(x) for x in end) for end in value)
     except (TypeError, ValueError):
         lower, upper = (), ()
-    good = len(lower) == len(upper) in (2, 3) and np.isfinite([lower, upper]).all()
-    if not good or not all(a < b for a, b in zip(lower, upper, strict=True)):
+    if not is_view((lower, upper)):
         raise Problem(f"{path.name}: view must be (lower corner, upper corner), not {value!r}")
     return lower, upper
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 from collections.abc import Callable, Iterable
@@ -12,7 +11,7 @@ from typing import Any
 import click
 
 from ..cases.grid import COLLISIONS
-from .choices import parse_assignments
+from .choices import assigned, parse_assignments, preset
 from .usage_errors import Problem, did_you_mean
 
 GEOMETRIES = ("precise", "bounds")
@@ -49,10 +48,21 @@ def _read(read: Callable[[Any], Any]) -> Callable[[click.Context, click.Paramete
     return lambda context, parameter, given: read(given) if given is not None else None
 
 
-def seed_number(text: str) -> int:
+def _seed_number(text: str) -> int:
     if not text.strip().isdecimal():
         raise Problem(f"--seed takes a whole number of at least 0, not {text!r}")
     return int(text)
+
+
+def above_zero(option: str, what: str = "a number above 0", zero: bool = False) -> Callable[..., Any]:
+    """A callback for click that refuses a number that is not finite and above 0; ``zero``: 0 will do."""
+
+    def checked(value: float) -> float:
+        if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+            raise Problem(f"{option} takes {what}, not {value:g}")
+        return value
+
+    return _read(checked)
 
 
 def listed(option: str, what: str, read: Callable[[str], Any]) -> Callable[[Any, Any, str | None], Any]:
@@ -96,29 +106,33 @@ def one_of(option: str, known: Iterable[str]) -> Callable[[str], str]:
 
 # -- worlds -----------------------------------------------------------------------------------------------------
 
-settings_option = click.option(
-    "--settings", "preset_name", metavar="fast|balanced|accurate", help="Default: what the scene recommends."
-)
-set_option = click.option(
-    "--set", "assignments", multiple=True, metavar="FIELD=VALUE", help="Set one field of Settings; repeatable."
-)
 seed_option = click.option(
-    "--seed", default="0", show_default=True, metavar="NUMBER", help="Which variant of the scene: 0, 1, 2, ..."
+    "--seed", default="0", show_default=True, metavar="NUMBER", callback=_read(_seed_number),
+    help="Which variant of the scene: 0, 1, 2, ...",
+)  # fmt: skip
+traceback_option = click.option(  # seen by Commands.main
+    "--traceback", is_flag=True, expose_value=False, help="Show in full where an error came from."
 )
-plugin_option = click.option(
-    "--plugin", "plugins", multiple=True, metavar="NAME", help="Add an installed plugin to the world; repeatable."
-)
+world_options = together(
+    click.option(
+        "--settings", metavar="fast|balanced|accurate", callback=_read(preset),
+        help="Default: what the scene recommends.",
+    ),
+    click.option(
+        "--set", "changes", multiple=True, metavar="FIELD=VALUE", callback=_read(parse_assignments),
+        help="Set one field of Settings; repeatable.",
+    ),
+    seed_option,
+    click.option(
+        "--plugin", "plugins", multiple=True, metavar="NAME", help="Add an installed plugin to the world; repeatable."
+    ),
+)  # fmt: skip
 
 # -- results ----------------------------------------------------------------------------------------------------
 
 shown_options = together(
     click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."),
     click.option("--markdown", "as_markdown", is_flag=True, help="Print the tables as Markdown."),
-    click.option(
-        "--into",
-        type=click.Path(path_type=Path, dir_okay=False),
-        help="Also put the tables between the marks of this page.",
-    ),
 )
 
 
@@ -154,12 +168,6 @@ def writable_folder(folder: Path, option: Path | None = None) -> None:
 # -- what is measured -------------------------------------------------------------------------------------------
 
 
-def _seconds(value: float) -> float:
-    if not (math.isfinite(value) and value > 0):
-        raise Problem(f"--seconds takes a number above 0, not {value:g}")
-    return value
-
-
 def _step(text: str) -> float:
     """"1/60" as seconds."""
     step = float(parse_assignments([f"dt={text}"])["dt"])
@@ -170,17 +178,10 @@ def _step(text: str) -> float:
 
 def _build_options(assignments: tuple[str, ...]) -> dict[str, Any]:
     """["n=100", "height=2.5"] as keywords; a number where it is one, else a word."""
-    found: dict[str, Any] = {}
-    for assignment in assignments:
-        name, equals, text = (part.strip() for part in assignment.partition("="))
-        if not equals or not name.isidentifier():
-            raise Problem(f"--option takes NAME=VALUE, a keyword of the scene's build, not {assignment!r}")
-        if name in ("settings", "seed"):
-            raise Problem(f"--option cannot set {name}: the command does")
-        if name in found:
-            raise Problem(f"--option gives {name} twice")
-        found[name] = _number_or_word(text)
-    return found
+    texts = assigned("--option", "NAME=VALUE, a keyword of the scene's build", assignments)
+    for name in texts.keys() & {"settings", "seed"}:
+        raise Problem(f"--option cannot set {name}: the command does")
+    return {name: _number_or_word(text) for name, text in texts.items()}
 
 
 def _number_or_word(text: str) -> int | float | str:
@@ -198,7 +199,7 @@ case_options = together(
         help="What the error is the error of; repeatable, the first counts (default: what suits the scene).",
     ),
     click.option(
-        "--seconds", type=float, metavar="S", callback=_read(_seconds), help="Simulated time of each run."
+        "--seconds", type=float, metavar="S", callback=above_zero("--seconds"), help="Simulated time of each run."
     ),
     click.option(
         "--repeats", type=click.IntRange(min=1), metavar="N", help="Runs of each setting: start phases or seeds."
@@ -239,26 +240,9 @@ only_options = together(
 
 # -- execution of runs ------------------------------------------------------------------------------------------
 
-def _budget(value: float) -> float:
-    if not (math.isfinite(value) and value > 0):
-        raise Problem(f"--budget takes seconds above 0, not {value:g}")
-    return value
-
-
-def workers_of(workers: int | None, cluster: str | None) -> contextlib.AbstractContextManager[Any]:
-    """What performs the runs, for the time of a command: a number of processes, or a cluster."""
-    if cluster is None:
-        return contextlib.nullcontext(workers)
-    if workers is not None:
-        raise Problem("--workers and --cluster exclude each other")
-    from ..jobs.cluster import Cluster
-
-    return Cluster(cluster)
-
-
 budget_option = click.option(
-    "--budget", type=float, metavar="S", default=60.0, show_default=True, callback=_read(_budget),
-    help="Seconds to spend; what is known by then is the answer.",
+    "--budget", type=float, metavar="S", default=60.0, show_default=True,
+    callback=above_zero("--budget", "seconds above 0"), help="Seconds to spend; what is known by then is the answer.",
 )  # fmt: skip
 runs_options = together(
     budget_option,

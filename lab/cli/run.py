@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
 
+from ...framework import Settings
 from ..measure.run import Run, run
 from ..plugins.installed import plugin_named
+from ..reporting.output import drawing_module
 from ..reporting.progress import Bar
 from ..reporting.run_report import print_report
-from .choices import parse_assignments, parse_view, preset
+from .choices import parse_view
 from .loading import Loaded, load, stdout_kept_clean
-from .options import plugin_option, seed_number, seed_option, set_option, settings_option, writable_folder
+from .options import above_zero, traceback_option, world_options, writable_folder
 from .usage_errors import Problem
 
 DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
@@ -26,11 +27,11 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 @click.command("run", short_help="Run a scene or a file and show what happened.")
 @click.argument("target", metavar="SCENE|FILE.py")
 @click.option("--steps", type=click.IntRange(min=0), help="How many steps to take.")
-@click.option("--seconds", type=float, help="How long to simulate (default: what the scene recommends).")
-@settings_option
-@set_option
-@seed_option
-@plugin_option
+@click.option(
+    "--seconds", type=float, callback=above_zero("--seconds", "a number of at least 0", zero=True),
+    help="How long to simulate (default: what the scene recommends).",
+)  # fmt: skip
+@world_options
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -39,36 +40,27 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
     help="The folder where pictures go, or a file for that of the paths: NAME.png.",
 )
 @click.option("--view", "view_text", metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
-@click.option(
-    "--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout."
-)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
 @click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def run_command(
     target: str,
     steps: int | None,
     seconds: float | None,
-    preset_name: str | None,
-    assignments: tuple[str, ...],
-    seed: str,
+    settings: Settings | None,
+    changes: dict[str, Any],
+    seed: int,
     plugins: tuple[str, ...],
     out: Path,
     view_text: str | None,
     as_json: bool,
     no_pictures: bool,
     profile: bool,
-    traceback: bool,
 ) -> None:
     """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
-    del traceback  # seen by Commands.main
-    settings = preset(preset_name) if preset_name is not None else None
-    changes = parse_assignments(assignments)
     if steps is not None and seconds is not None:
         raise Problem("--steps and --seconds exclude each other")
-    if seconds is not None and not (math.isfinite(seconds) and seconds >= 0):
-        raise Problem(f"--seconds takes a number of at least 0, not {seconds:g}")
-    number = seed_number(seed)
     added = [plugin_named(name) for name in plugins]
     loaded = load(target)
     if view_text is not None:
@@ -76,12 +68,12 @@ def run_command(
     draw = _drawing(no_pictures, out)
     screen = Console(stderr=True)
 
-    world = loaded.build(settings, changes, number, added)
+    world = loaded.build(settings, changes, seed, added)
     if loaded.view is not None and len(loaded.view[0]) != world.dimensions:
         raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
         steps = _steps_for(loaded, seconds, world.settings.dt)
-    finished = _run_with_progress(loaded, world, steps, number, screen, profile)
+    finished = _run_with_progress(loaded, world, steps, seed, screen, profile)
     finished.report.compared = loaded.values_of(finished.world)
     if draw is not None:
         with screen.status("drawing ..."):
@@ -101,15 +93,12 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
     if no_pictures:
         return None
     try:
-        from ..pictures.run_pictures import draw_run, is_file
-    except ImportError:
-        click.echo(
-            "carom: no pictures, matplotlib is missing; it comes with the extra: pip install 'carom[plot]'",
-            err=True,
-        )
+        pictures = drawing_module("pictures.run_pictures", "no pictures,")
+    except Problem as problem:
+        click.echo(f"carom: {problem.message}", err=True)
         return None
-    writable_folder(out.parent if is_file(out) else out, out)
-    return draw_run
+    writable_folder(out.parent if pictures.is_file(out) else out, out)
+    return pictures.draw_run
 
 
 def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:
@@ -124,9 +113,7 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
     return max(0, round(wanted / dt))
 
 
-def _run_with_progress(
-    loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool
-) -> Run:
+def _run_with_progress(loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool) -> Run:
     with Bar(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
         bar.begin(steps)
         bar.say(loaded.name)

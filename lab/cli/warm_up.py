@@ -22,6 +22,7 @@ from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from ..reporting.progress import Bar
 from .loading import Loaded, load, stdout_kept_clean
+from .options import traceback_option
 from .portable import compile_portable, copy_used
 from .usage_errors import Problem
 
@@ -55,13 +56,12 @@ class Row:
 )
 @click.option("--clear", is_flag=True, help="Empty the cache folder instead; old versions' kernels are in it too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def warm_up_command(
     targets: tuple[str, ...], everything: bool, dimensions: str | None, portable: Path | None, clear: bool,
-    as_json: bool, traceback: bool,
+    as_json: bool,
 ) -> None:
     """Compile what the scenes or files need; without any: what worlds of the shapes that ship need."""
-    del traceback  # seen by Commands.main
     if clear and (targets or everything or dimensions or portable):
         raise Problem("--clear goes alone: it compiles nothing")
     if targets and (everything or dimensions):

@@ -91,9 +91,6 @@ class PymunkSpace:
         sleeping = math.isfinite(self.space.sleep_time_threshold)
         return {**{name: getattr(self.space, name) for name in names}, "sleeping": sleeping}
 
-    def close(self) -> None:
-        """Nothing to release."""
-
     # -- queries, one by one as pymunk takes them ------------------------------------------------------
 
     def boxes(self, lower: Floats, upper: Floats) -> int:

@@ -5,22 +5,24 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import math
+import statistics
 import time
 import weakref
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import Any
 
 from ..cases.case import Case
 from ..cli.usage_errors import Problem
 from ..engines.cost import work_of
-from ..measure.effects import at_worst
-from ..measure.norms import NORMS, OF_KIND, conserves, errors_of, norm_of
+from ..measure.effects import at_worst, effects_of
+from ..measure.norms import NORMS, OF_KIND, conserves, errors_of, failure_of, norm_of
 from ..measure.observation import Seen, mean_of
 from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..trading.records import CHAOTIC, CUT, Cell, ErrorBar, Outcome, Point, Reference
+from ..trading.records import CHAOTIC, CUT, Cell, ErrorBar, Point, Reference
 from .result_store import Store
-from .tasks import Task, outcome_of, perform, stopped
+from .tasks import Task, perform, stopped
 from .workers import Lost, Pool, in_parallel
 
 FEW_SECONDS = 4.0  # of work in all: less takes not much longer than starting workers
@@ -100,8 +102,10 @@ class Runs:
         return in_parallel(perform, tasks, 1 if few else self.workers, self._pool, self.until)
 
     def seconds_for(self, tasks: Iterable[Task]) -> float:
-        """About how long those that are missing will take, by the time that others took."""
-        return sum(task.cost for task in self._missing(tasks)) * self._spent / max(self._steps, 1.0)
+        """About how long those that are missing will take, by the time that others took; inf if none has finished."""
+        if not self._steps:
+            return math.inf
+        return sum(task.cost for task in self._missing(tasks)) * self._spent / self._steps
 
     def _missing(self, tasks: Iterable[Task]) -> list[Task]:
         return [task for task in tasks if task.key not in self._store]
@@ -244,13 +248,8 @@ def known_points(case: Case, cells: Iterable[Cell], runs: Runs) -> list[Point]:
     """The points of the cells of which there are finished runs, over those repeats."""
     if case.reference is None:
         return []
-    points = []
-    for cell in cells:
-        tasks = run_tasks(case, [cell])
-        seens = [(task, seen) for task in tasks if (seen := runs.get(task)) is not None]
-        if seens:
-            points.append(point_of([outcome_of(task, seen, case.reference) for task, seen in seens]))
-    return points
+    seens = {cell: [seen for task in run_tasks(case, [cell]) if (seen := runs.get(task)) is not None] for cell in cells}
+    return [point_of(case, cell, found) for cell, found in seens.items() if found]
 
 
 def points_of(case: Case, cells: Sequence[Cell], runs: Runs, what: str) -> list[Point]:
@@ -259,24 +258,23 @@ def points_of(case: Case, cells: Sequence[Cell], runs: Runs, what: str) -> list[
     return known_points(case, cells, runs)
 
 
-def point_of(outcomes: Sequence[Outcome]) -> Point:
-    """The point of one cell, from its repeats."""
-    good = [outcome for outcome in outcomes if outcome.failure is None]
-    failures: dict[str, int] = {}
-    for outcome in outcomes:
-        if outcome.failure is not None:
-            failures[outcome.failure] = failures.get(outcome.failure, 0) + 1
-    names = list(good[0].errors) if good else []
+def point_of(case: Case, cell: Cell, seens: Sequence[Seen]) -> Point:
+    """The point of one cell from what its repeats showed, against the reference of the case."""
+    reference = case.reference
+    assert reference is not None
+    failures = [failure_of(seen, None if case.kind == CHAOTIC else reference) for seen in seens]
+    good = [seen for seen, failure in zip(seens, failures, strict=True) if failure is None]
+    found = [errors_of(seen, reference, {**NORMS, **dict.fromkeys(case.norms)}) for seen in good]
     errors = {
-        name: ErrorBar.of([outcome.errors[name] for outcome in good], norm_of(name).signed) for name in names
+        name: ErrorBar.of([errors[name] for errors in found], norm_of(name).signed) for name in (found or [{}])[0]
     }
-    counted = [outcome for outcome in outcomes if outcome.counts]
+    known = [seen for seen in seens if seen.counts]
     counts = {
-        name: sum(outcome.counts.get(name, 0.0) / outcome.seconds for outcome in counted) / len(counted)
-        for name in (counted[0].counts if counted else ())
+        name: statistics.fmean(seen.counts.get(name, 0.0) / (seen.simulated or seen.seconds) for seen in known)
+        for name in (known[0].counts if known else ())
     }
-    timed = [outcome.milliseconds for outcome in good if outcome.milliseconds is not None]
+    timed = [seen.milliseconds for seen in good if seen.milliseconds is not None]
     return Point(
-        outcomes[0].cell, len(outcomes), errors, failures, counts, work_of(counts), Spread.of(timed) if timed else None,
-        at_worst([outcome.effects for outcome in good]),
+        cell, len(seens), errors, dict(Counter(filter(None, failures))), counts, work_of(counts),
+        Spread.of(timed) if timed else None, at_worst([effects_of(seen, reference, case.kind) for seen in good]),
     )  # fmt: skip

@@ -17,13 +17,12 @@ from ..cases.case import Case
 from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine, Engine, engine_for
 from ..engines.body_arrays import NotPlainError
-from ..measure.effects import effects_of
-from ..measure.norms import FAR, NORMS, errors_of, failure_of
+from ..measure.norms import FAR
 from ..measure.observation import Seen, observe
 from ..measure.survey import nudge
 from ..measure.timing import timed
 from ..measure.told_in_results import faults_in_results
-from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell, Outcome
+from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell
 
 BRIEF, AWHILE, PASSES = 0.1, 0.2, (2, 12)  # s; passes of a run that is timed, at least and at most
 BLOCK = 20  # steps
@@ -70,18 +69,6 @@ def perform(task: Task) -> dict[str, Any]:
 def stopped(task: Task, why: str) -> Seen:
     """The observation of a run that an error ended."""
     return Seen(np.zeros((0, 2)), failure=STOPPED, detail=why, seconds=task.case.seconds)
-
-
-def outcome_of(task: Task, seen: Seen, reference: Seen) -> Outcome:
-    """The errors and effects of a run, against the reference."""
-    kind = task.case.kind
-    failure = failure_of(seen, None if kind == CHAOTIC else reference)
-    errors = {} if failure else errors_of(seen, reference, {**NORMS, **dict.fromkeys(task.case.norms)})
-    effects = {} if failure else effects_of(seen, reference, kind)
-    simulated = seen.simulated or seen.seconds
-    return Outcome(
-        task.cell, task.repeat, errors, failure, seen.counts, simulated, seen.detail, effects, seen.milliseconds
-    )
 
 
 def _run(task: Task) -> Seen:

@@ -15,13 +15,12 @@ from rich.console import Console
 
 from ...framework import Settings, World
 from ..cases.subjects import load_once
-from ..cli.choices import parse_assignments, preset
 from ..cli.loading import Loaded, stdout_kept_clean
-from ..cli.options import budget_option, plugin_option, seed_number, seed_option, set_option, settings_option
+from ..cli.options import above_zero, budget_option, traceback_option, world_options
 from ..cli.usage_errors import Problem
 from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
-from ..reporting.run_report import number
+from ..wording import number
 from .outcome import StepOutcome, outcome_of_steps
 from .step_length import StepLimits, step_limits
 
@@ -33,41 +32,33 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
 @click.command("limits", short_help="How long a scene's step may be, and what limits it.")
 @click.argument("target", metavar="SCENE|FILE.py")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
-@click.option("--seconds", type=float, help="How long to watch it (default: what it recommends; 0: its start).")
 @click.option(
-    "--max-error", "way", type=float, metavar="METRES",
+    "--seconds", type=float, callback=above_zero("--seconds", "a number of at least 0", zero=True),
+    help="How long to watch it (default: what it recommends; 0: its start).",
+)  # fmt: skip
+@click.option(
+    "--max-error", "way", type=float, metavar="METRES", callback=above_zero("--max-error", "metres above 0"),
     help="How far a body may be from where it should (default: 1 % of the smallest one's size).",
 )  # fmt: skip
-@settings_option
-@set_option
-@seed_option
-@plugin_option
+@world_options
 @budget_option
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def limits_command(
     target: str,
     as_json: bool,
     seconds: float | None,
     way: float | None,
-    preset_name: str | None,
-    assignments: tuple[str, ...],
-    seed: str,
+    settings: Settings | None,
+    changes: dict[str, Any],
+    seed: int,
     plugins: tuple[str, ...],
     budget: float,
-    traceback: bool,
 ) -> None:
     """How long the step of a scene, or of a file that defines build(settings, seed=0), may be, and what limits it.
 
     The scene runs with longer and shorter steps until a player would notice the difference, and its forces and speeds
     are examined on the way.
     """
-    del traceback  # seen by Commands.main
-    if seconds is not None and not 0 <= seconds < float("inf"):
-        raise Problem(f"--seconds must be a number of at least 0, not {seconds!r}")
-    if way is not None and not 0 < way < float("inf"):
-        raise Problem(f"--max-error takes metres above 0, not {way:g}")
-    settings = preset(preset_name) if preset_name is not None else None
-    changes, variant = parse_assignments(assignments), seed_number(seed)
     began = time.monotonic()
     scene = Asked(target, settings, tuple(changes.items()), plugins)
     loaded = load_once(target)
@@ -76,9 +67,9 @@ def limits_command(
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
     with Bar(Console(stderr=True)) as bar:
-        with closing(scene(None, variant)) as world:
+        with closing(scene(None, seed)) as world:
             found = _watched(loaded, world, seconds, bar)
-        outcome = outcome_of_steps(scene, variant, seconds, began, budget, bar, way)
+        outcome = outcome_of_steps(scene, seed, seconds, began, budget, bar, way)
     _show(loaded.name, found, outcome, as_json)
 
 
@@ -154,4 +145,6 @@ def _suggestion(dt: float, own: float, tightest: StepLimits, outcome: StepOutcom
         if tightest.suggested == 0.0:
             return f"no step is stable: choose another integrator than {tightest.integrator}"
         return f"no step that was tried keeps the outcome, not even {number(outcome.shortest)} s: see carom trade"
-    return f"dt up to {number(dt)} s; its step of {number(own)} s {'fits' if own <= dt * 1.000001 else 'is too long'}"
+    reason = " by its forces and speeds alone" if outcome.refused else ""
+    fits = "fits" if own <= dt * 1.000001 else "is too long"
+    return f"dt up to {number(dt)} s{reason}; its step of {number(own)} s {fits}"

@@ -10,14 +10,14 @@ from ...framework import World
 from ..cases.case import case_of
 from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
-from ..measure.effects import SHARE, in_words, metres, names_told, noticed
+from ..measure.effects import SHARE, in_words, names_told, noticed
 from ..plain import Plain
 from ..reporting.progress import Progress
-from ..reporting.run_report import number
-from ..trading.answer import rough_text
+from ..trading.answer import more_budget, rough_text
 from ..trading.records import CaseTrade, Point, known_well
 from ..trading.report import failures
 from ..trading.trade import RUNNING, Only, Study
+from ..wording import counted, metres, number
 
 STEPS = (8, 4, 2, 1, 1 / 2, 1 / 4, 1 / 8)  # of the scene's own, as long as they are steps of a game
 LONGEST = 1 / 10  # s
@@ -65,18 +65,17 @@ class StepOutcome(Plain):
             return [f"Outcome: not measured: {self.refused}"]
         lines = []
         if self.longest:
-            share = f"changes nothing that counts of {', '.join(self.compared)}" if self.compared else ""
-            lines.append(
-                f"Outcome: up to {number(self.longest)} s the step {share or self._way()}, and nothing else is noticed."
-            )
+            moved = f"the step moves no body by more than {self._way()}, and nothing else is noticed"
+            kept = f"nothing would be noticed in {', '.join(self.compared)}" if self.compared else moved
+            lines.append(f"Outcome: up to {number(self.longest)} s {kept}.")
         if self.link:
             lines.append(f"Weakest link: at {number(self.beyond)} s {self.link}.")
         return [*lines, f"Known {self.known}."]
 
     def _way(self) -> str:
         if self.way is not None:
-            return f"moves no body by more than {metres(self.way)}"
-        return f"moves no body by more than {metres(SHARE * self.size)}, 1 % of the smallest one's size"
+            return metres(self.way)
+        return f"{metres(SHARE * self.size)}, 1 % of the smallest one's size"
 
 
 def outcome_of_steps(
@@ -106,24 +105,25 @@ def outcome_of_steps(
 
 
 def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
-    points = known_well(point for curve in case.curves for point in curve.points)
+    points = known_well(case.points)
     points.sort(key=lambda point: point.cell.dt)
     if not points:
-        more = f"--budget {math.ceil(case.needed / 10) * 10}" if case.needed else "a larger --budget"
-        return StepOutcome(refused=f"there was no time: {more} tells more")
+        return StepOutcome(refused=f"there was no time: {more_budget(case)} tells more")
     size = next((point.effects["size"] for point in points if point.effects), 1.0)
     found = StepOutcome(0.0, points[0].cell.dt, size, way, compared=names_told(points[0].effects))
     runs = sum(point.repeats for point in points)
-    found.known = f"from {runs} runs of {number(case.seconds)} s with {len(points)} steps"
+    found.known = f"from {counted(runs, 'run')} of {number(case.seconds)} s with {counted(len(points), 'step')}"
     if case.rough:
         found.known += f"; {rough_text(case)}"
-    elif case.missing or len(points) < sum(len(curve.points) for curve in case.curves):
+    elif case.missing or len(points) < len(case.points):
         found.known += "; others did not fit into the budget"
     for point in points:
         if point.failed or noticed(point.effects, way):
             found.link, found.beyond = _link(point, way), point.cell.dt
             break
         found.longest = point.cell.dt
+    if case.rough and not found.longest:  # no step can be blamed by a run that is no more exact than it
+        return StepOutcome(refused=f"there was no time for references: {more_budget(case)} tells more")
     return found
 
 

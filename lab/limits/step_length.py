@@ -1,7 +1,7 @@
 """The longest safe step of a world: by the stability of its integrator, and by tunnelling.
 
-    limits = step_limits(world)         # the reasons; prints as sentences
-    world.settings = world.settings.replace(dt=min(1 / 60, suggest_dt(world)))
+limits = step_limits(world)         # the reasons; prints as sentences
+world.settings = world.settings.replace(dt=min(1 / 60, suggest_dt(world)))
 """
 
 from __future__ import annotations
@@ -174,9 +174,7 @@ def step_limits(world: World) -> StepLimits:
     settings = world.settings
     passage = first_passage(world) if settings.collision == "discrete" else None
     oscillation = _first_to_grow(integrator, modes)
-    return StepLimits(
-        settings.dt, services.integration.integrator_name, settings.collision, oscillation, passage
-    )
+    return StepLimits(settings.dt, services.integration.integrator_name, settings.collision, oscillation, passage)
 
 
 def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:

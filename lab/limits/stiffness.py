@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -57,7 +56,7 @@ class Modes:
 
 
 class Forces:
-    """The forces of a world's dynamic bodies as functions of their state; a context manager that restores the state.
+    """The forces of a world's dynamic bodies as functions of their state: see :func:`forces_of`.
 
     Vectors have one number per degree of freedom, times the root of its mass, so that the matrices of forces with a
     potential are symmetric.
@@ -79,25 +78,14 @@ class Forces:
             "linear_velocity": _power_of_two(SHIFT * (float(np.abs(velocity).max(initial=0.0)) or length)),
         }
 
-    def __enter__(self) -> Self:
-        self._services.refresh_for_queries()  # the stages see the bodies that there are
-        self._restoring = unmeasured(self._services.state)
-        self._restoring.__enter__()
-        self._world.__enter__()
-        try:
-            self._rest = self._sum()
-        except BaseException:
-            self.__exit__(None, None, None)
-            raise
-        return self
+    def begin(self) -> None:
+        """Sum the forces at the present state; ValueError if they are not finite."""
+        self._rest = self._sum()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._world.__exit__(kind, error, traceback)
+    def restore(self) -> None:
+        """Put back the state of the bodies."""
         for name, column in self._columns.items():
             column[:] = self._kept[name]
-        self._restoring.__exit__(kind, error, traceback)
 
     def __len__(self) -> int:
         return len(self._root)
@@ -141,6 +129,20 @@ class Forces:
 
 
 @contextmanager
+def forces_of(world: World) -> Iterator[Forces]:
+    """The forces of a world, which is as it was afterwards, to the bit."""
+    services: Any = world.physics
+    services.refresh_for_queries()  # the stages see the bodies that there are
+    with unmeasured(services.state), world:
+        forces = Forces(world)
+        try:
+            forces.begin()
+            yield forces
+        finally:
+            forces.restore()
+
+
+@contextmanager
 def unmeasured(state: Record) -> Iterator[None]:
     """Leave no trace of the stages that run inside: neither in what the world measures nor in what it knows of its
     forces."""
@@ -162,7 +164,7 @@ def modes_of(world: World) -> Modes:
     """
     if not world.force_systems or not len(world.bodies.dynamic):
         return _joined([])
-    with Forces(world) as forces:
+    with forces_of(world) as forces:
         if len(forces) > DENSE:
             return _joined([_extreme(forces.stiffness, forces.drag, np.arange(len(forces)), forces)])
         unit = np.eye(len(forces))

@@ -52,9 +52,7 @@ class Shapes:
 
     def at(self, places: Floats) -> Shapes:
         """A single shape, repeated at each of the places (m, d)."""
-        repeated = {
-            name: np.repeat(getattr(self, name), len(places), axis=0) for name in self.__dataclass_fields__
-        }
+        repeated = {name: np.repeat(getattr(self, name), len(places), axis=0) for name in self.__dataclass_fields__}
         return Shapes(**{**repeated, "centre": places})
 
     def where(self, chosen: NDArray[np.bool_]) -> Shapes:
@@ -73,9 +71,7 @@ def shapes_of(world: World) -> Shapes:
     entities, centres, halves, rounds, sensors = [], [], [], [], []
     for entity, (transform, sphere) in world.get_components(Transform, SphereCollider):
         entities.append(entity)
-        centres.append(
-            np.asarray(transform.position) + _turned(transform.rotation, sphere.offset, dimensions)
-        )
+        centres.append(np.asarray(transform.position) + _turned(transform.rotation, sphere.offset, dimensions))
         halves.append(np.full(dimensions, float(sphere.radius)))
         rounds.append(True)
         sensors.append(bool(sphere.sensor))
@@ -137,11 +133,7 @@ def _is_unrotated(rotation: object) -> bool:
 
 def _turned(rotation: object, offset: object, dimensions: int) -> Floats:
     vector = np.broadcast_to(np.asarray(offset, float), (dimensions,))
-    return (
-        vector
-        if not vector.any() or _is_unrotated(rotation)
-        else rotation_matrix(rotation, dimensions) @ vector
-    )
+    return vector if not vector.any() or _is_unrotated(rotation) else rotation_matrix(rotation, dimensions) @ vector
 
 
 def _stretched(rotation: object, half_extents: object, dimensions: int) -> Floats:

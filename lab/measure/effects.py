@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..trading.records import CHAOTIC, RESTING
+from ..wording import metres
 from .norms import conserves, difference, distances, energy_scale, other_touches
 from .observation import Seen
 
@@ -201,7 +202,7 @@ def _of_game_in_words(what: str, name: str, value: float, effects: Mapping[str, 
         return f"{name.removeprefix('at ')} ends {metres(value)} from where it should"
     right = effects[f"right {name}"]
     if abs(value) == NEVER:
-        return f"{name}: {'some, and there should be none' if value > 0 else f'none instead of {right:.4g}'}"
+        return f"{name}: {'there is one, and there should be none' if value > 0 else f'none instead of {right:.4g}'}"
     if what == "mean":
         spread = effects.get(f"spread {name}", 0.0)
         mean = f"{name}: {right + value:.4g} on average instead of {right:.4g}"
@@ -209,13 +210,3 @@ def _of_game_in_words(what: str, name: str, value: float, effects: Mapping[str, 
     if right == NEVER:
         return f"{name}: none, as it should be"
     return f"{name}: {right + value:.4g} instead of {right:.4g}" if value else f"{name}: {right:.4g}, as it should be"
-
-
-def metres(value: float) -> str:
-    """A length: 4.2 mm, 12 cm, 3.4 m; the unit is that of the scene."""
-    size = abs(value)
-    if size < 1e-6:
-        return "less than 0.001 mm"
-    if size < 0.01:
-        return f"{1e3 * size:.2g} mm"
-    return f"{100 * size:.2g} cm" if size < 1 else f"{size:.3g} m"

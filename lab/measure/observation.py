@@ -133,11 +133,11 @@ def observe(
             watch.count()
             if done % every == 0 or done == len(steps):
                 watch.look()
-            if watch.failure is None and time.monotonic() > until:
-                watch.failure = CUT
-            if watch.failure:
+            if watch.seen.failure is None and time.monotonic() > until:
+                watch.seen.failure = CUT
+            if watch.seen.failure:
                 break
-        seen = watch.seen()
+        seen = watch.finished()
         if values is not None and seen.failure is None:
             seen.values = values(engine.world)
         return seen
@@ -164,19 +164,16 @@ def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[f
 
 
 class _Watch:
-    """Observes the engine after each step."""
+    """Observes the engine after each step; ``seen`` is what it has shown so far."""
 
     def __init__(self, engine: Engine, seconds: float, walled: bool, far: float) -> None:
-        self.engine, self.seconds, self.walled, self.far = engine, seconds, walled, far
-        self.failure: str | None = None
-        self.start = engine.position
-        self.settled = self.start
+        self.engine, self.walled, self.far = engine, walled, far
+        self.start = self.settled = engine.position
         self.ids = engine.ids
-        self.scale, self.energy_start = engine.energies
-        self.reach = self.apex = self.worst = self.square = self.impulse = 0.0
-        self.looks = self.impacts = self.late_impacts = 0
-        self.times: list[float] = []
-        self.deepest, self.mean_overlaps = 0.0, [0.0]
+        kinetic, energy = engine.energies
+        self.seen = Seen(self.start, energy_start=energy, energy_scale=kinetic, seconds=seconds)
+        self.looks, self.squares, self.impulse, self.late_impacts = 0, 0.0, 0.0, 0
+        self.mean_overlaps = [0.0]
         self.next_sample = SETTLED * seconds
         gravity = np.asarray(engine.world.gravity, float)
         size = float(np.linalg.norm(gravity))
@@ -184,42 +181,42 @@ class _Watch:
 
     def count(self) -> None:
         """After each step: its impacts."""
-        engine = self.engine
-        self.impacts += len(engine.times)
-        if len(self.times) < MOST_TIMES:
-            self.times += engine.times
-        if engine.time > EARLY * self.seconds:
+        engine, seen = self.engine, self.seen
+        seen.impacts += len(engine.times)
+        if len(seen.times) < MOST_TIMES:
+            seen.times += engine.times
+        if engine.time > EARLY * seen.seconds:
             self.impulse += engine.impulse
             self.late_impacts += len(engine.times)
 
     def look(self) -> None:
         """Now and then: places and energy."""
-        engine = self.engine
+        engine, seen = self.engine, self.seen
         position = self._followed()
         kinetic, energy = engine.energies
         self.looks += 1
         if not (np.isfinite(position).all() and math.isfinite(kinetic)):
-            self.failure = NOT_FINITE
+            seen.failure = NOT_FINITE
             return
         way = position - self.start
-        self.reach = max(self.reach, float(np.sqrt((way * way).sum(axis=1).max(initial=0.0))))
+        seen.reach = max(seen.reach, float(np.sqrt((way * way).sum(axis=1).max(initial=0.0))))
         if self.up is not None and len(way):
-            self.apex = max(self.apex, float((way @ self.up).max()))
-        departure = abs(energy - self.energy_start)
-        self.worst = max(self.worst, departure)
-        self.square += departure * departure
-        self.scale = max(self.scale, kinetic)
-        if engine.time <= SETTLED * self.seconds:
+            seen.apex = max(seen.apex, float((way @ self.up).max()))
+        departure = abs(energy - seen.energy_start)
+        seen.energy_worst = max(seen.energy_worst, departure)
+        self.squares += departure * departure
+        seen.energy_scale = max(seen.energy_scale, kinetic)
+        if engine.time <= SETTLED * seen.seconds:
             self.settled = position
         if engine.time >= self.next_sample and engine.fixed:  # sizes are known of those of the start
-            self.next_sample += self.seconds * (1 - SETTLED) / SAMPLES
+            self.next_sample += seen.seconds * (1 - SETTLED) / SAMPLES
             depths = engine.overlaps()
-            self.deepest = max(self.deepest, float(depths.max(initial=0.0)))
+            seen.overlap = max(seen.overlap, float(depths.max(initial=0.0)))
             self.mean_overlaps.append(float(depths.sum()) / max(len(position), 1))
         if self.walled and engine.enclosure.outside(position):
-            self.failure = ESCAPED
-        elif self.reach > self.far:
-            self.failure = BLEW_UP
+            seen.failure = ESCAPED
+        elif seen.reach > self.far:
+            seen.failure = BLEW_UP
 
     def _followed(self) -> Floats:
         """The positions; what has come starts where it is seen first."""
@@ -231,41 +228,28 @@ class _Watch:
             self.ids = engine.ids
         return position
 
-    def seen(self) -> Seen:
-        engine = self.engine
+    def finished(self) -> Seen:
+        """At the end: what is known only then."""
+        engine, seen = self.engine, self.seen
         position, velocity = self._followed(), engine.velocity
-        late = (1 - EARLY) * self.seconds
-        kinetic, energy = engine.energies
-        speeds = np.sqrt((velocity * velocity).sum(axis=1))
-        way = np.sqrt(((position - self.settled) ** 2).sum(axis=1))
-        return Seen(
-            position=position,
-            reach=self.reach,
-            apex=self.apex,
-            energy=energy,
-            energy_start=self.energy_start,
-            energy_worst=self.worst,
-            energy_square=self.square / max(self.looks, 1),
-            energy_scale=self.scale,
-            kinetic=kinetic,
-            impacts=self.impacts,
-            times=sorted(self.times)[:MOST_TIMES],
-            pressure=self.impulse / late,
-            rate=self.late_impacts / late,
-            overlap=self.deepest,
-            overlap_mean=float(np.mean(self.mean_overlaps)),
-            speed=float(speeds.max(initial=0.0)) / engine.size,
-            drift=float(way.max(initial=0.0)) / engine.size,
-            struck=engine.struck.tolist(),
-            failure=self.failure,
-            counts=engine.counts(),
-            seconds=self.seconds,
-            simulated=engine.time,
-            size=engine.size,
-            entities=engine.ids.tolist(),
-            fixed=engine.fixed,
-            created=engine.created,
-            met=engine.met,
-            touches=sorted(((a, b, at) for (a, b), at in engine.touches.items()), key=lambda touch: touch[2]),
-            milliseconds=1e3 * engine.spent / engine.timed_seconds if engine.timed_seconds else None,
-        )
+        seen.position, seen.entities = position, engine.ids.tolist()
+        seen.kinetic, seen.energy = engine.energies
+        seen.energy_square = self.squares / max(self.looks, 1)
+        seen.times = sorted(seen.times)[:MOST_TIMES]
+        late = (1 - EARLY) * seen.seconds
+        seen.pressure, seen.rate = self.impulse / late, self.late_impacts / late
+        seen.overlap_mean = float(np.mean(self.mean_overlaps))
+        seen.size = engine.size
+        seen.speed = _longest(velocity) / seen.size
+        seen.drift = _longest(position - self.settled) / seen.size
+        seen.struck, seen.met = engine.struck.tolist(), engine.met
+        seen.touches = sorted(((a, b, at) for (a, b), at in engine.touches.items()), key=lambda touch: touch[2])
+        seen.fixed, seen.created = engine.fixed, engine.created
+        seen.counts, seen.simulated = engine.counts(), engine.time
+        if engine.timed_seconds:
+            seen.milliseconds = 1e3 * engine.spent / engine.timed_seconds
+        return seen
+
+
+def _longest(vectors: Floats) -> float:
+    return float(np.sqrt((vectors * vectors).sum(axis=1)).max(initial=0.0))

@@ -25,6 +25,7 @@ from .impacts import PathImpact, path_impacts, with_corners
 
 TRACED_BODIES = 200  # in a picture
 CANDIDATES = 12_000  # bodies that are recorded, to choose from
+KEPT = 1e-3  # of the energy: one that has never changed by more is kept
 QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
 SAMPLES = 600  # of the energy, at most; of paths too if there are many
 FEW_STEPS, FEW_BODIES = 12, 60  # up to this size a run is shown step by step, with all its impacts
@@ -60,17 +61,15 @@ class RunReport:
     kernels_compiled: int = 0
     kernels_loaded: int = 0
     bodies: dict[str, int] = field(default_factory=dict)
-    contacts: dict[str, float] = field(
-        default_factory=dict
-    )  # at the end, mean and most per step, impacts in total
+    contacts: dict[str, float] = field(default_factory=dict)  # at the end, mean and most per step, impacts in total
     step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
     step_milliseconds_mean: float = math.nan
     system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, without compilation
     profile: dict[str, Any] | None = None  # see profile_of; None unless requested
     energy: Drift | None = None
-    energy_changes: list[str] = field(default_factory=list)  # reasons why the scene does not conserve energy
+    energy_changes: list[str] = field(default_factory=list)  # what has changed it, besides the integrator
     momentum: Drift | None = None
-    momentum_conserved: bool = True  # False with fixed bodies or external forces
+    momentum_conserved: bool = True  # False with fixed bodies, gravity or force systems
     deepest_overlap: float = 0.0
     deepest_overlap_step: int | None = None
     escaped: dict[str, int] = field(default_factory=dict)  # outside, non_finite
@@ -266,10 +265,13 @@ class Meter:
         report.system_milliseconds = {
             name: mean if self.step_seconds else math.nan for name, mean in stats.milliseconds.items()
         }
-        report.energy = self._energy_drift()
-        report.energy_changes = self._energy_changes()
-        report.momentum = self._momentum_drift()
-        report.momentum_conserved = not (len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity))
+        energies = np.array(self.energies)
+        report.energy = _drift(energies, self.kinetic_most)  # the zero of a potential is arbitrary
+        report.energy_changes = self._energy_changes(energies)
+        report.momentum = _drift(np.array(self.momenta), self.momentum_scale)
+        report.momentum_conserved = not (
+            len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity) or world.force_systems
+        )
         report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
         positions = np.asarray(bodies.dynamic.position)
         finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
@@ -294,46 +296,40 @@ class Meter:
         counts = (np.isin(a, dynamic) | np.isin(b, dynamic)) & ~(np.isin(a, sensors) | np.isin(b, sensors))
         return float(depth[counts].max(initial=0.0))
 
-    def _energy_changes(self) -> list[str]:
-        """What in the present world adds or removes energy."""
+    def _energy_changes(self, energies: NDArray[np.float64]) -> list[str]:
+        """What in the present world may have added or removed energy; nothing if it was kept."""
+        noise = KEPT * max(self.kinetic_most, float(np.abs(energies).max()))
+        if np.ptp(energies) <= noise:
+            return []
         bodies = self.world.bodies
         dynamic, reasons = bodies.dynamic, []
         any_pair = self.world.settings.restitution_mixing != "max"  # "max": a pair has at least a body's own value
         touched = bodies if any_pair else dynamic
         met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
-        if met and any(float(np.min(values)) < 1 for values in _restitutions(touched) if len(values)):
+        fell = (np.maximum.accumulate(energies) - energies).max() > noise  # an impact never adds any
+        if met and fell and (_restitutions(touched) < 1).any():
             reasons.append("restitution below 1")
         if np.any(dynamic.linear_damping):
             reasons.append("damping")
-        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force):
+        own_forces = [force for force in self.world.force_systems if not hasattr(force, "potential_energy")]
+        if np.any(dynamic.constant_force) or np.any(dynamic.applied_force) or own_forces:
             reasons.append("forces")
+        if any(not type(system).__module__.startswith("carom.systems.") for system in self.world.systems):
+            reasons.append("systems of the game")
         if np.any(bodies.kinematic.linear_velocity):
             reasons.append("kinematic bodies that move")
         if self.came_or_went:
             reasons.append("bodies that came or went")
         return reasons
 
-    def _energy_drift(self) -> Drift:
-        """Relative to the largest kinetic energy seen: the zero of a potential is arbitrary."""
-        energies = np.array(self.energies)
-        scale = self.kinetic_most or 1.0
-        departure = (energies - energies[0]) / scale
-        return Drift(
-            float(energies[0]),
-            float(energies[-1]),
-            float(departure[-1]),
-            float(np.abs(departure).max()),
-            scale,
-        )
 
-    def _momentum_drift(self) -> Drift:
-        """The length of the change, relative to the largest sum of mass times speed seen."""
-        momenta = np.array(self.momenta)
-        scale = self.momentum_scale or 1.0
-        departure = np.linalg.norm(momenta - momenta[0], axis=1) / scale
-        return Drift(
-            momenta[0].tolist(), momenta[-1].tolist(), float(departure[-1]), float(departure.max()), scale
-        )
+def _drift(values: NDArray[np.float64], scale: float) -> Drift:
+    """Of samples of a number, or of a vector (n, d), of which the length of the change counts."""
+    scale = scale or 1.0
+    departure = values - values[0]
+    apart = np.abs(departure) if departure.ndim == 1 else np.linalg.norm(departure, axis=1)
+    change = departure[-1] if departure.ndim == 1 else apart[-1]
+    return Drift(values[0].tolist(), values[-1].tolist(), float(change / scale), float(apart.max() / scale), scale)
 
 
 def run(
@@ -380,15 +376,14 @@ def plain_settings(world: World) -> dict[str, Any]:
     return {k: v if isinstance(v, plain) else getattr(v, "name", None) or str(v) for k, v in values.items()}
 
 
-def _restitutions(bodies: Any) -> list[NDArray[np.float64]]:
-    """The restitutions of ``bodies`` per collider type, for those that have the collider."""
+def _restitutions(bodies: Any) -> NDArray[np.float64]:
+    """Of all spheres and boxes of ``bodies``."""
     found = []
-    for collider in (SphereCollider, AABBCollider):
+    for name, collider in (("sphere_collider", SphereCollider), ("aabb_collider", AABBCollider)):
         has = np.asarray(bodies.has(collider), bool)
-        if has.any():
-            fields = bodies.sphere_collider if collider is SphereCollider else bodies.aabb_collider
-            found.append(np.asarray(fields.restitution)[has])
-    return found
+        if has.any():  # else there may be no such columns
+            found.append(getattr(bodies, name).restitution[has])
+    return np.concatenate([np.zeros(0), *found])
 
 
 def _kernels() -> tuple[int, int]:

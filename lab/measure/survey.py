@@ -110,22 +110,32 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
         facts = _facts(subject.name, recommended)
     seeded = _seeded(subject, settings, start)
     exact = settings.replace(collision="event_driven")
-    twins = _Twins(subject, exact, seconds)
+    run = functools.partial(_twin, subject, exact, seconds)
+    known: dict[tuple[float, bool], Seen] = {}  # by how far the start is nudged, and whether walls hold all
+
+    def seen(nudged: float, walled: bool = False) -> Seen:
+        start = nudged, walled
+        if start not in known:
+            known[start] = run(start)
+        return known[start]
+
     with closing(_obedient(subject, exact.replace(dt=settings.dt / 2, substeps=settings.substeps + 1))) as other:
         with subject.attribute_errors():
             each_step = _time_of_step(other)
         if 2 * seconds / settings.dt * each_step > LONG:
-            twins.share_out(each, (0.0, True), (SEEN if subject.names else NUDGE, False))
-        levels = _has_levels(other)
-    first, walled = twins.seen(0.0, True), True
+            starts = (0.0, True), (SEEN if subject.names else NUDGE, False)
+            known.update(zip(starts, each(run, starts), strict=True))
+        levels = other.stats().counters.get("first_level_tests", 0) > 0
+    first, walled = seen(0.0, True), True
     if first.failure == ESCAPED:  # for example a ball that rolls off a platform
-        first, walled = twins.seen(0.0, False), False
-    if first.created and _is_another(twins.seen(SEEN), first):
+        first, walled = seen(0.0, False), False
+    if first.created and _is_another(seen(SEEN), first):
         growth = math.inf
     else:
-        growth = float(distances(twins.seen(NUDGE), first)[0].max(initial=0.0)) / _nudge_of(subject, settings)
+        nudged = seen(NUDGE)
+        growth = float(distances(nudged, first)[0].max(initial=0.0)) / (NUDGE * nudged.size)
     if growth > CHAOS and subject.names:
-        first = mean_of([first, twins.seen(SEEN)], ())
+        first = mean_of([first, seen(SEEN)], ())
     if not first.reach and not first.counts["solver_loops"]:
         raise Problem(f"{subject.name}: no body moves within {seconds:g} s: nothing to measure")
     return Survey(
@@ -173,11 +183,6 @@ def _time_of_step(world: World) -> float:
     return now() - began
 
 
-def _has_levels(world: World) -> bool:
-    """True if its steps have tested first levels."""
-    return world.stats().counters.get("first_level_tests", 0) > 0
-
-
 def nudge(world: World, size: float, seed: int = 0) -> None:
     """Move every dynamic body by up to ``size`` along each axis, at random from ``seed``.
 
@@ -188,32 +193,6 @@ def nudge(world: World, size: float, seed: int = 0) -> None:
     axes = np.ptp(position, axis=0) > 0 if len(position) > 1 else np.ones(position.shape[1], bool)
     axes |= np.any(dynamic.linear_velocity, axis=0) | (np.asarray(world.gravity) != 0)
     position += np.random.default_rng(seed).uniform(-size, size, position.shape) * axes
-
-
-def _nudge_of(subject: Subject, settings: Settings) -> float:
-    world = subject.world(settings)
-    size = NUDGE * CaromEngine(world).size
-    world.close()
-    return size
-
-
-class _Twins:
-    """The runs of a survey, each performed once: by how far their starts are nudged, and whether walls hold all."""
-
-    def __init__(self, subject: Subject, settings: Settings, seconds: float) -> None:
-        self._run = functools.partial(_twin, subject, settings, seconds)
-        self._seen: dict[tuple[float, bool], Seen] = {}
-
-    def share_out(self, each: Each, *starts: tuple[float, bool]) -> None:
-        """Perform these runs at the same time."""
-        self._seen.update(zip(starts, each(self._run, starts), strict=True))
-
-    def seen(self, nudged: float, walled: bool = False) -> Seen:
-        """What that run has shown."""
-        start = nudged, walled
-        if start not in self._seen:
-            self._seen[start] = self._run(start)
-        return self._seen[start]
 
 
 @faults_in_results()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
@@ -28,6 +29,13 @@ BODY_COLOURS = (
 )  # fmt: skip
 
 DPI = 120
+STYLE: dict[Any, Any] = {
+    "figure.facecolor": BACKGROUND, "figure.dpi": DPI, "savefig.facecolor": BACKGROUND, "axes.facecolor": PANEL,
+    "axes.edgecolor": FRAME, "axes.labelcolor": MUTED, "axes.axisbelow": True, "axes.titlecolor": TEXT,
+    "xtick.color": MUTED, "ytick.color": MUTED, "grid.color": FRAME, "text.color": TEXT, "legend.facecolor": PANEL,
+    "legend.edgecolor": FRAME, "legend.labelcolor": TEXT,
+}  # fmt: skip
+styled = matplotlib.rc_context(STYLE)  # a decorator of what makes figures
 LONG_SIDE = 10.0  # inches, of the longer side of a single panel; the shorter follows from the view
 LONG_SIDE_OF_TWO = 7.2
 LONGEST_RATIO = 5.0  # of a panel's sides
@@ -60,6 +68,7 @@ class Sheet:
     footer: Any
 
     @classmethod
+    @styled
     def new(cls, title: str, subtitle: str, views: list[View], numbered: bool) -> Sheet:
         """``views``: two corners in the plane for each panel; ``numbered``: the first one has a scale."""
         spans = [np.maximum(upper - lower, np.finfo(float).tiny) for lower, upper in views]
@@ -69,7 +78,7 @@ class Sheet:
         widths = [max(height * ratio, SHORTEST) for ratio in ratios]
         total_width = sum(widths) + GAP * (len(views) - 1) + 2 * MARGIN
         total_height = height + HEADER + FOOTER
-        figure = Figure(figsize=(total_width, total_height), dpi=DPI, facecolor=BACKGROUND)
+        figure = Figure(figsize=(total_width, total_height))
         FigureCanvasAgg(figure)
 
         def place(left: float, bottom: float, width: float, height: float) -> Any:
@@ -84,12 +93,9 @@ class Sheet:
             middle, half = (lower + upper) / 2, np.array([width, height]) / unit / 2
             axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
             axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-            axes.set_facecolor(PANEL)
-            axes.tick_params(colors=MUTED, labelsize=7, length=2, pad=2)
+            axes.tick_params(labelsize=7, length=2, pad=2)
             if number or not numbered:
                 axes.tick_params(labelbottom=False, labelleft=False, length=0)
-            for spine in axes.spines.values():
-                spine.set_color(FRAME)
             panels.append(Panel(axes, 72 * unit))
             left += width + GAP
         header = place(0, total_height - HEADER, total_width, HEADER)

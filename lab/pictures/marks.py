@@ -36,15 +36,11 @@ def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
         places, _, _ = projection.plane(corners(*seen))
         segments += [places[list(edge)] for edge in edges()]
         filled += [places[rows] for _, _, rows in faces()]
-    panel.axes.add_collection(
-        PolyCollection(filled, facecolors=canvas.WALL, alpha=0.13, linewidths=0, zorder=1)
-    )
+    panel.axes.add_collection(PolyCollection(filled, facecolors=canvas.WALL, alpha=0.13, linewidths=0, zorder=1))
     _lines(panel, segments, colors=canvas.WALL_EDGE, linewidths=0.6, alpha=0.7, zorder=1.1)
 
 
-def draw_bodies(
-    panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3
-) -> None:
+def draw_bodies(panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3) -> None:
     """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors dashed."""
     if bodies.sensor.any():
         draw_sensors(panel, bodies.where(bodies.sensor), projection, colours[bodies.sensor], zorder)
@@ -133,9 +129,7 @@ def _draw_solids(
     panel.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
 
 
-def draw_contacts(
-    panel: Panel, points: Floats, normals: Floats, diameter: float, projection: Projection
-) -> None:
+def draw_contacts(panel: Panel, points: Floats, normals: Floats, diameter: float, projection: Projection) -> None:
     """A dot at each contact point, with a line along its normal; ``diameter`` is a typical body's."""
     if not len(points) or (not projection.flat and len(points) > MOST_CONTACTS_3D):
         return
@@ -148,9 +142,7 @@ def draw_contacts(
     panel.axes.plot(places[:, 0], places[:, 1], "o", **style, zorder=6)
 
 
-def draw_arrows(
-    panel: Panel, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float
-) -> float:
+def draw_arrows(panel: Panel, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float) -> float:
     """Velocity arrows of the visible bodies; returns how many seconds an arrow stands for (0: none)."""
     start, _, depth = projection.plane(bodies.centre)
     x, y = panel.axes.get_xlim(), panel.axes.get_ylim()
@@ -191,14 +183,10 @@ def draw_paths(panel: Panel, positions: Floats, colours: Floats, projection: Pro
     else:
         opacity, width = 0.25 + 0.75 * age**1.2, 0.9 + 1.3 * age
     rgba[..., 3] = opacity if projection.flat else opacity * (0.25 + 0.75 * depth[1:])
-    _lines(
-        panel, list(segments[drawn]), colors=rgba[drawn], linewidths=width[drawn], capstyle="butt", zorder=2.5
-    )
+    _lines(panel, list(segments[drawn]), colors=rgba[drawn], linewidths=width[drawn], capstyle="butt", zorder=2.5)
 
 
-def _draw_flat(
-    panel: Panel, shapes: Shapes, colours: Floats, edge: str, outline: float, zorder: float
-) -> None:
+def _draw_flat(panel: Panel, shapes: Shapes, colours: Floats, edge: str, outline: float, zorder: float) -> None:
     discs, boxes = shapes.where(shapes.round), shapes.where(~shapes.round)
     style: dict[str, Any] = {"edgecolors": edge, "linewidths": outline, "zorder": zorder}
     if len(discs.entity):
@@ -214,9 +202,7 @@ def _ellipses(panel: Panel, centres: Floats, widths: Floats, **style: Any) -> No
     transform = panel.axes.transData
     angles = np.zeros(len(widths))
     panel.axes.add_collection(
-        EllipseCollection(
-            widths, widths, angles, units="xy", offsets=centres, offset_transform=transform, **style
-        )
+        EllipseCollection(widths, widths, angles, units="xy", offsets=centres, offset_transform=transform, **style)
     )
 
 

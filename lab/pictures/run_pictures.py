@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgba_array
 
 from ..measure.body_shapes import Floats, Shapes, shapes_of
 from ..measure.run import QUIET, Run, RunReport, Traces
+from ..wording import counted
 from . import canvas
 from .canvas import Panel, Sheet
 from .marks import MOST_CONTACTS_3D, draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
@@ -64,11 +65,7 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
     still = Still.of(run)
     ends = find_view(still, run.traces) if view is None else view
     projection = Projection.of(*(np.asarray(end, float) for end in ends))
-    frame = (
-        projection.frame()
-        if view is not None or projection.flat
-        else _tight_frame(still, run.traces, projection)
-    )
+    frame = projection.frame() if view is not None or projection.flat else _tight_frame(still, run.traces, projection)
     if is_file(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         return [draw_traces(run, still, projection, frame).save(out)]
@@ -97,9 +94,7 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
         highs.append(paths + size)
     low, high = np.concatenate(lows), np.concatenate(highs)
     if not len(low):
-        low, high = (
-            _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
-        )
+        low, high = _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
     lower, upper = low.min(axis=0), high.max(axis=0)
     fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
     for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # smallest first
@@ -143,8 +138,8 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
     norm = canvas.speed_norm(bodies.speed)
     part = _magnified(bodies, projection)
     subtitle = (
-        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({_counted(report.steps, 'step')})"
-        f"   ·   {_counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
+        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({counted(report.steps, 'step')})"
+        f"   ·   {counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
     )
     views = [frame, *([part] if part else [])]
     sheet = Sheet.new(report.scene, subtitle, views, numbered=projection.flat)
@@ -172,7 +167,7 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     count, moved = len(traces.entities), traces.moved
     over = f"{report.simulated_seconds:.4g} s"
     if traces.impacts is not None:
-        over = f"{_counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
+        over = f"{counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
     if not report.bodies["total"] and not count:
         subtitle = "no bodies"
     elif not count:
@@ -210,10 +205,6 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     return sheet
 
 
-def _counted(count: int, what: str, plural: str = "") -> str:
-    return f"{count:,} {what if count == 1 else plural or what + 's'}"
-
-
 def _that_moved(count: int) -> str:
     return "the one body that moved" if count == 1 else f"the {count:,} bodies that moved"
 
@@ -223,14 +214,12 @@ def _moving_bodies(report: RunReport) -> str:
     dynamic, kinematic = report.bodies["dynamic"], report.bodies["kinematic"]
     if not dynamic and not kinematic:
         return "no bodies" if not report.bodies["total"] else "only static bodies"
-    parts = [_counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
-    parts += [_counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
+    parts = [counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
+    parts += [counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
     return " and ".join(parts)
 
 
-def _draw_starts(
-    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
-) -> None:
+def _draw_starts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
     """The start positions, faintly."""
     paths = traces.positions[:, np.searchsorted(traces.entities, followed.entity)]
     first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have been created later
@@ -240,9 +229,7 @@ def _draw_starts(
     draw_bodies(panel, replace(followed, centre=places), faint, projection, zorder=2.2)
 
 
-def _draw_ghosts(
-    panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection
-) -> None:
+def _draw_ghosts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
     """The shapes at equal time intervals along the path."""
     positions = traces.positions
     when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]

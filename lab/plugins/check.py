@@ -20,7 +20,6 @@ from .kernels import RaisedError, SupportCode, compiler_message
 from .pair_checks import TOLERANCE, PairChecks
 from .samples import ORDINARY, Rows, directions, poses, rows
 
-SUPPORTS = 2000  # directions tested
 BOXES = 400  # boxes given to a broad phase
 STEPS = 3
 

@@ -11,6 +11,7 @@ from ...framework import Plugin
 from ...framework.plugins.discovery import offers
 from ..cli.group import Commands
 from ..cli.loading import stdout_kept_clean
+from ..cli.options import traceback_option
 from ..reporting.progress import Bar
 from .check import check_plugin
 from .findings import Report, Subject
@@ -20,11 +21,10 @@ FOUND = 1  # exit code of a check with findings
 
 
 @click.group("plugins", cls=Commands, invoke_without_command=True, short_help="List plugins, or check one.")
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 @click.pass_context
-def plugins_command(context: click.Context, traceback: bool) -> None:
+def plugins_command(context: click.Context) -> None:
     """List the plugins that installed packages offer: name, version, package, what each adds."""
-    del traceback  # seen by Commands.main
     if context.invoked_subcommand is not None:
         return
     with stdout_kept_clean():
@@ -48,13 +48,12 @@ def plugins_command(context: click.Context, traceback: bool) -> None:
 
 @plugins_command.command("check", short_help="Try a plugin with thousands of random and extreme inputs.")
 @click.argument("target", metavar="NAME|MODULE|FILE.py")
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
-def check_command(target: str, traceback: bool) -> int:
+@traceback_option
+def check_command(target: str) -> int:
     """Check what a plugin brings, compiled as worlds compile it; exit code 1 if something is wrong.
 
     TARGET: the name of an installed plugin, a module, or a file; all plugins that it defines are checked.
     """
-    del traceback  # seen by Commands.main
     found = plugins_of(target)
     console, findings = Console(), 0
     with Bar(Console(stderr=True)) as status:

@@ -1,4 +1,4 @@
-"""Output of a benchmark's result: the terminal, JSON, Markdown, a page, a chart."""
+"""Output of a command's result: the terminal, JSON, Markdown, a chart."""
 
 from __future__ import annotations
 
@@ -15,17 +15,15 @@ from rich.console import Console
 
 from ..cli.options import writable_folder
 from ..cli.usage_errors import Problem
-from .text_tables import TextTable, between_marks, replace_between_marks
+from .text_tables import TextTable
 
 
 @dataclass(frozen=True)
 class Output:
-    """``mark`` names the section of the page; ``charts`` is the module that draws, or None."""
+    """``charts``: the module that draws, or None."""
 
-    mark: str
     as_json: bool
     as_markdown: bool
-    into: Path | None
     out: Path | None
     charts: Any
 
@@ -34,22 +32,16 @@ class Output:
         """True if a person reads stdout."""
         return not self.as_json and not self.as_markdown
 
-    @classmethod
-    def checked(
-        cls,
-        mark: str,
-        as_json: bool,
-        as_markdown: bool,
-        into: Path | None,
-        out: Path | None,
-        charts: str = "bench.charts",
-    ) -> Output:
+    @staticmethod
+    def checked(as_json: bool, as_markdown: bool, out: Path | None = None, charts: str = "bench.charts") -> Output:
         """Problem for impossible options, raised before the long run. charts: the lab's module that draws."""
         if as_json and as_markdown:
             raise Problem("--json and --markdown exclude each other")
-        if into is not None:
-            between_marks(into, mark)
-        return cls(mark, as_json, as_markdown, into, out, None if out is None else _charts(out, charts))
+        if out is None:
+            return Output(as_json, as_markdown, out, None)
+        module = drawing_module(charts, "--out:", "bench")
+        writable_folder(out)
+        return Output(as_json, as_markdown, out, module)
 
     def as_it_comes(self, answer: Callable[[Any], list[str]]) -> Callable[[Any], None]:
         """Prints what is known so far, with the seconds that it took, for a person; nothing for others."""
@@ -62,24 +54,18 @@ class Output:
 
         return show
 
-    def show(
-        self, result: Any, tables: list[TextTable], remarks: list[str], page: list[TextTable] | None = None
-    ) -> None:
-        """Print the result, and write the tables into the page; ``page``: other tables for the page."""
-        markdown = _markdown(tables, remarks)
+    def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
+        """Print the result."""
         if self.as_json:
             click.echo(json.dumps(result.as_dict(), indent=2))
         elif self.as_markdown:
-            click.echo(markdown)
+            click.echo(as_markdown(tables, remarks))
         else:
             console = Console()
             for table in tables:
                 table.show(console)
             for remark in remarks:
                 console.print(remark, style="dim", highlight=False)
-        if self.into is not None:
-            replace_between_marks(self.into, self.mark, markdown if page is None else _markdown(page, remarks))
-            click.echo(f"tables: {self.into}", err=True)
 
     def draw(self, function: str, result: Any) -> None:
         """Draw the chart if requested, and print its path."""
@@ -89,14 +75,15 @@ class Output:
         click.echo(f"chart: {picture}" if picture is not None else "no chart: nothing is compared", err=True)
 
 
-def _markdown(tables: list[TextTable], remarks: list[str]) -> str:
+def as_markdown(tables: list[TextTable], remarks: list[str]) -> str:
+    """The tables, then the remarks, as Markdown."""
     return "\n\n".join([*(table.markdown() for table in tables), *remarks])
 
 
-def _charts(out: Path, module: str) -> Any:
+def drawing_module(name: str, what: str, extra: str = "plot") -> Any:
+    """A module of the lab that draws; Problem, with the name of the extra, if matplotlib is missing."""
     try:
-        charts = importlib.import_module(f"..{module}", __package__)
+        return importlib.import_module(f"..{name}", __package__)
     except ImportError as error:
-        raise Problem("--out: matplotlib is missing; it comes with the extra: pip install 'carom[bench]'") from error
-    writable_folder(out)
-    return charts
+        reason = f"matplotlib is missing; it comes with the extra: pip install 'carom[{extra}]'"
+        raise Problem(f"{what} {reason}") from error

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from ..measure.run import Drift, RunReport
+from ..wording import counted, number
 from .profile import milliseconds, profile_table
 
 GOOD, WARNING = "green", "bold yellow"
 FAULTS_SHOWN = 3
+AT_REST = 1e-2  # of the energy: a smaller kinetic energy is no scale for a drift
 
 
 def print_report(report: RunReport, console: Console) -> None:
@@ -25,33 +29,39 @@ def print_report(report: RunReport, console: Console) -> None:
         console.print(profile_table(report.profile, report.step_milliseconds_mean))
         console.print(f"not in it: {report.compile_seconds:.3g} s for the steps that compiled or loaded kernels\n")
     console.print(quality(report))
-    for fault in report.faults[:FAULTS_SHOWN]:
-        console.print(f"! {fault}", style=WARNING, highlight=False)
-    if len(report.faults) > FAULTS_SHOWN:
-        console.print(
-            f"! and {len(report.faults) - FAULTS_SHOWN:,} more of the kind", style=WARNING, highlight=False
-        )
+    for line in fault_lines(report.faults):
+        console.print(f"! {line}", style=WARNING, highlight=False)
+
+
+def fault_lines(faults: list[str]) -> list[str]:
+    """A line for each kind of fault, with the first entities that have it."""
+    kinds: dict[str, list[str]] = {}
+    for fault in faults:
+        entity, what = re.fullmatch(r"(?:entity (\d+): )?(.*)", fault, re.DOTALL).groups()  # type: ignore[union-attr]
+        kinds.setdefault(what, []).extend([entity] * (entity is not None))
+    lines = []
+    for what, entities in list(kinds.items())[:FAULTS_SHOWN]:
+        more = f" and {len(entities) - FAULTS_SHOWN:,} more" * (len(entities) > FAULTS_SHOWN)
+        word = "entity" if len(entities) == 1 else "entities"
+        lines.append(f"{word} {', '.join(entities[:FAULTS_SHOWN])}{more}: {what}" if entities else what)
+    others = len(kinds) - len(lines)
+    return [*lines, f"and {counted(others, 'other fault')}"] if others else lines
 
 
 def summary(report: RunReport) -> Text:
-    kinds = [
-        f"{report.bodies[kind]:,} {kind}"
-        for kind in ("dynamic", "kinematic", "static")
-        if report.bodies[kind]
-    ]
+    kinds = [f"{report.bodies[kind]:,} {kind}" for kind in ("dynamic", "kinematic", "static") if report.bodies[kind]]
     choice = {k: report.settings[k] for k in ("integrator", "collision", "substeps") if k in report.settings}
     text = Text()
     text.append(report.scene, style="bold")
     text.append(f"  {report.dimensions}D, {', '.join(kinds) or 'no bodies'}\n")
     text.append(
-        f"{report.steps:,} step{'s' * (report.steps != 1)}"
-        f" of {number(report.settings['dt'])} s = {report.simulated_seconds:.4g} s"
+        f"{counted(report.steps, 'step')} of {number(report.settings['dt'])} s = {report.simulated_seconds:.4g} s"
         f" in {report.wall_seconds:.3g} s"
     )
     if report.kernels_compiled:
-        text.append(f" ({report.compile_seconds:.3g} s of it compiling {report.kernels_compiled} kernels)")
+        text.append(f" ({report.compile_seconds:.3g} s of it compiling {counted(report.kernels_compiled, 'kernel')})")
     elif report.kernels_loaded:
-        text.append(f" ({report.compile_seconds:.3g} s of it loading {report.kernels_loaded} kernels)")
+        text.append(f" ({report.compile_seconds:.3g} s of it loading {counted(report.kernels_loaded, 'kernel')})")
     text.append(f"\n{', '.join(f'{name} {value}' for name, value in choice.items())}, seed {report.seed}\n")
     return text
 
@@ -85,11 +95,10 @@ def quality(report: RunReport) -> Table:
         f"{contacts['end']:,}",
         f"at the end; {contacts['mean']:.4g} per step, at most {contacts['most']:,}",
     )
-    table.add_row("impacts", f"{contacts['impacts']:,}", "in all")
+    bounced = "in all" if contacts["impacts"] or not contacts["most"] else "nothing bounced"
+    table.add_row("impacts", f"{contacts['impacts']:,}", bounced)
     if report.energy:
-        kept = not report.energy_changes and math.isfinite(report.energy.relative)
-        name, value = ("energy drift", _percent(report.energy)) if kept else ("energy", _from_to(report.energy))
-        table.add_row(name, value, _energy_remark(report))
+        table.add_row(*_energy_row(report.energy, report.energy_changes))
     if report.momentum and not math.isfinite(report.momentum.relative):
         table.add_row("momentum drift", "not representable", "momentum overflows")
     elif report.momentum and report.momentum_conserved:
@@ -99,45 +108,22 @@ def quality(report: RunReport) -> Table:
     table.add_row("deepest overlap", f"{report.deepest_overlap:.4g}", step)
     outside, broken = report.escaped["outside"], report.escaped["non_finite"]
     parts = [f"{outside:,} beyond the walls"] * bool(outside) + [f"{broken:,} not finite"] * bool(broken)
-    table.add_row(
-        "escaped bodies", f"{outside + broken:,}", ", ".join(parts), style=WARNING if parts else GOOD
-    )
+    table.add_row("escaped bodies", f"{outside + broken:,}", ", ".join(parts), style=WARNING if parts else GOOD)
     for name, values in report.compared.items():
         place = ", ".join(f"{value:.4g}" for value in values)
         table.add_row(name, "none" if any(map(math.isnan, values)) else f"({place})" if len(values) > 1 else place, "")
     return table
 
 
-def number(value: float) -> str:
-    """Four digits, and 1/60 if the value is exactly that."""
-    if (
-        0 < value < 1
-        and abs(1 / value - round(1 / value)) < 1e-9 * round(1 / value)
-        and round(1 / value) > 10
-    ):
-        return f"1/{round(1 / value)}"
-    return f"{value:.4g}"
-
-
-def _energy_remark(report: RunReport) -> str:
-    if report.energy is None or not math.isfinite(report.energy.relative):
-        return "energy overflows"
-    if report.energy_changes:
-        return f"changed by {', '.join(report.energy_changes)}"
-    return _drift_remark(report.energy, "peak kinetic energy")
-
-
-def _from_to(drift: Drift) -> str:
-    """Of an energy that changes by intent."""
-    if not math.isfinite(drift.relative):
-        return "not representable"
-    return f"{drift.start:.3g} to {drift.end:.3g} J"
-
-
-def _percent(drift: Drift) -> str:
-    if not math.isfinite(drift.relative):
-        return "not representable"
-    return f"{100 * drift.relative:+.3g} %"
+def _energy_row(energy: Drift, changes: list[str]) -> tuple[str, str, str]:
+    """Of an energy that changes by intent from what to what; else the drift."""
+    if not math.isfinite(energy.relative):
+        return "energy", "not representable", "energy overflows"
+    if changes:
+        return "energy", f"{energy.start:.3g} to {energy.end:.3g} J", f"changed by {', '.join(changes)}"
+    if energy.scale < AT_REST * np.abs(energy.start):
+        return "energy", f"{energy.end:.3g} J", "as at the start"
+    return "energy drift", f"{100 * energy.relative:+.3g} %", _drift_remark(energy, "peak kinetic energy")
 
 
 def _drift_remark(drift: Drift, scale: str) -> str:

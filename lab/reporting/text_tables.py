@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
-
-from ..cli.usage_errors import Problem
 
 
 @dataclass(frozen=True)
@@ -36,26 +33,3 @@ class TextTable:
         rules = ["---" if number < self.words else "---:" for number in range(len(self.headings))]
         lines = [f"| {' | '.join(cells)} |" for cells in (self.headings, rules, *self.rows)]
         return "\n".join([f"**{self.title}**", "", *lines])
-
-
-def between_marks(path: Path, name: str) -> tuple[str, str, str]:
-    """A page up to the comment ``<!-- name -->``, to ``<!-- end of name -->`` and after; Problem if one is missing."""
-    first, last = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    try:
-        page = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise Problem(f"--into {path}: {error.strerror or error}") from error
-    before, mark, rest = page.partition(first)
-    inside, end, after = rest.partition(last)
-    if not (mark and end):
-        raise Problem(f"--into {path}: it has no line {first} with a line {last} after it")
-    return before + mark, inside, end + after
-
-
-def replace_between_marks(path: Path, name: str, text: str) -> None:
-    """Replace the text between the two comments of a page; Problem if they are missing."""
-    before, _, after = between_marks(path, name)
-    try:
-        path.write_text(f"{before}\n\n{text}\n\n{after}", encoding="utf-8")
-    except OSError as error:
-        raise Problem(f"--into {path}: {error.strerror or error}") from error

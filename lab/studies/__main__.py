@@ -8,12 +8,16 @@ from ..cli.group import LateCommand, LateCommands
 from ..cli.main import in_command
 
 COMMANDS = {
+    "accuracy": LateCommand(
+        "studies.accuracy.command:accuracy_command", "What speed costs in accuracy, in scenes with a known answer."
+    ),
     "geometry": LateCommand(
         "studies.geometry.command:geometry_command", "False positives and cost of levels of collision geometry."
     ),
     "ladder": LateCommand("studies.bench.command:ladder_command", "What each feature costs, switched on alone."),
     "limits": LateCommand("studies.limits.command:limits_command", "Where carom fails, one axis at a time or two."),
     "modes": LateCommand("studies.bench.command:modes_command", "What each kind of collision costs, and what it buys."),
+    "page": LateCommand("studies.page:page_command", "Put what a carom command prints into a page."),
     "plugin-pairs": LateCommand(
         "studies.bench.command:pairs_command", "What a pair of a plugin costs, next to a built-in one and by hand."
     ),

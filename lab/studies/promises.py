@@ -22,9 +22,9 @@ import numpy as np
 from ...components import AABBCollider, Transform
 from ...framework import Settings, World
 from ..cli.loading import import_file
-from ..cli.options import budget_option, shown_options
-from ..reporting.output import Output
+from ..cli.options import budget_option
 from ..reporting.text_tables import TextTable
+from .page import PageOutput, shown_options
 
 MARK = "studies promises"
 FINE = {"dt": 1 / 1920, "integrator": "velocity_verlet", "collision": "event_driven", "substeps": 32}
@@ -295,7 +295,7 @@ def promises_command(
     files: tuple[Path, ...], budget: float, printed: Path | None, as_json: bool, as_markdown: bool, into: Path | None
 ) -> None:
     """Run `carom trade` and `tune` on each file, then recompute what their answers promise."""
-    output = Output.checked(MARK, as_json, as_markdown, into, None)
+    output = PageOutput.of(MARK, as_json, as_markdown, into, None)
     found: list[Kept] = []
     for path in files:
         game = Game(path)

@@ -8,9 +8,8 @@ import click
 
 from ...framework.schedule.stages import Stage
 from ...systems.stage_list import CLOSING, ON_DEMAND, OPENING, SYSTEMS
-from ..cli.options import shown_options
-from ..reporting.output import Output
 from ..reporting.text_tables import TextTable
+from .page import PageOutput, shown_options
 
 OPENS, CLOSES, DEMANDED = "start of the step", "end of the step", "on demand"
 
@@ -19,7 +18,7 @@ OPENS, CLOSES, DEMANDED = "start of the step", "end of the step", "on demand"
 @shown_options
 def stages_command(as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """List all stages of a step in their order. A scene runs those that it needs: ``carom plan`` shows which."""
-    output = Output.checked("studies stages", as_json, as_markdown, into, None)
+    output = PageOutput.of("studies stages", as_json, as_markdown, into, None)
     listed = Stages()
     output.show(listed, [listed.table()], [])
 

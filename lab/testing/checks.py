@@ -33,7 +33,8 @@ class Conserved:
         self.momentum_scale = self._sum_of_momenta()
         self._entities = self._start = _ids(world)
         self._last = self.momentum, self.energy  # where the bodies were last known to be the same
-        self._systems: list[System] = [_Before(self), _After(self)] if following else []
+        calls = _Calls(Phase.START, self.account), _Calls(Phase.END, self.note)  # around all that is there now
+        self._systems: list[System] = [*calls] if following else []
         for system in self._systems:
             world.add_system(system)
 
@@ -114,28 +115,15 @@ class Conserved:
         )
 
 
-class _Before(System):
-    """Before anything else of the step."""
+class _Calls(System):
+    """Calls a function once a step, in that phase."""
 
-    phase = Phase.START
-
-    def __init__(self, kept: Conserved) -> None:
-        self.kept = kept
-
-    def process(self, dt: float) -> None:
-        self.kept.account()
-
-
-class _After(System):
-    """After all that was there when following began."""
-
-    phase = Phase.END
-
-    def __init__(self, kept: Conserved) -> None:
-        self.kept = kept
+    def __init__(self, phase: Phase, function: Callable[[], None]) -> None:
+        self.phase = phase  # type: ignore[misc]
+        self.function = function
 
     def process(self, dt: float) -> None:
-        self.kept.note()
+        self.function()
 
 
 def _ids(world: World) -> Integers:

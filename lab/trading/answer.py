@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..measure.effects import in_words, metres, severity, told
+from ..measure.effects import in_words, severity, told
+from ..wording import counted, metres
 from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Cell, Point, known_well
 from .report import failures
 
@@ -74,7 +75,7 @@ def _can_be_better(case: CaseTrade, chosen: Point) -> bool:
 
 
 def _points(case: CaseTrade) -> list[Point]:
-    return [point for curve in case.curves for point in curve.points if point.cell.engine == CAROM]
+    return [point for point in case.points if point.cell.engine == CAROM]
 
 
 def price(point: Point) -> float:
@@ -142,11 +143,11 @@ def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
 
 def _known(case: CaseTrade, points: Sequence[Point], repeats: int) -> str:
     runs = sum(point.repeats for point in points)
-    text = f"from {runs:,} run{'s' * (runs != 1)} of {case.seconds:g} s with {len(points)} settings"
+    text = f"from {counted(runs, 'run')} of {case.seconds:g} s with {counted(len(points), 'setting')}"
     if repeats < case.whole:
         text += f", {repeats} of {case.whole} {case.repeated} with these"
     if case.missing:
-        text += f"; {case.missing} settings not tried yet"
+        text += f"; {counted(case.missing, 'setting')} not tried yet"
     if case.rough:
         return f"{text}; {rough_text(case)}"
     short = repeats < case.whole or case.missing
@@ -155,5 +156,10 @@ def _known(case: CaseTrade, points: Sequence[Point], repeats: int) -> str:
 
 def rough_text(case: CaseTrade) -> str:
     """What to think of errors without references, and what it takes to have some."""
-    more = f": --budget {math.ceil(case.needed / 10) * 10} tells more" if case.needed else ""
+    more = f": {more_budget(case)} tells more" if case.needed else ""
     return f"rough, against {case.reference.text} only{more}"
+
+
+def more_budget(case: CaseTrade) -> str:
+    """The budget with which there are references, as far as that is known."""
+    return f"--budget {math.ceil(case.needed / 10) * 10}" if case.needed else "a larger --budget"

@@ -18,22 +18,18 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..cases.published import SOURCE, published
 from ..cli.usage_errors import Problem
 from ..pictures import canvas
 from ..pictures.curve_styles import Style, styles
-from ..reporting.run_report import number
+from ..wording import compact, number
 from .records import FAILURES, NOT_FINITE, TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
-from .report import check_norm, compact, error_heading, is_statistic, measured, norm_of, order
+from .report import check_norm, error_heading, measured, norm_of, order
 
 WORK, TIME = "work", "time"
 AXIS = {
     WORK: "work per simulated second (weighted counts)",
     TIME: "wall time per simulated second, ms",
 }
-
-PUBLISHED_MARKERS = "12+|"
-PUBLISHED_COLOURS = ("#9aa7b6", "#c2a878", "#8fb59b", "#b79ac2")
 
 WIDTH, PLOT = 10.0, 5.2  # inches
 LEFT, RIGHT, TOP, AXIS_LABEL = 0.85, 0.3, 0.9, 0.75
@@ -63,6 +59,7 @@ class Sheet:
         return cost if cost and math.isfinite(cost) and cost > 0 else None
 
 
+@canvas.styled
 def draw(trade: Trade, folder: Path, norm: str | None = None) -> list[Path]:
     """Draw charts of all measured cases as PNG and SVG in ``folder``: by work and, if timed, by wall time.
 
@@ -89,23 +86,24 @@ def draw(trade: Trade, folder: Path, norm: str | None = None) -> list[Path]:
 
 def quantities(case: CaseTrade) -> list[str]:
     """WORK, and TIME if a point was timed."""
-    timed = any(point.milliseconds for curve in case.curves for point in curve.points)
+    timed = any(point.milliseconds for point in case.points)
     return [WORK, TIME] if timed else [WORK]
 
 
+@canvas.styled
 def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Figure:
     """One chart: WORK or TIME over the error of ``norm``, the case's first if it does not have it."""
     sheet = Sheet(case, norm_of(case, norm), quantity)
-    sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in _points(case))]
+    sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in case.points)]
     drawn = list(zip(case.curves, styles(case.curves), strict=True))
-    entries = [_entry(curve, style, sheet.norm) for curve, style in drawn] + _published_entries(sheet)
+    entries = [_entry(curve, style, sheet.norm) for curve, style in drawn]
     sheet.notes = _notes(sheet)
     notes = [line for note in sheet.notes for line in textwrap.wrap(note, 135)]
     columns = 3 if max((len(str(entry.get_label())) for entry in entries), default=0) < 34 else 2
     rows = -(-len(entries) // columns)
     below = AXIS_LABEL + ROW * rows + 0.15 + NOTE * len(notes) + 0.15
     size = (WIDTH, TOP + PLOT + below)
-    made = Figure(figsize=size, dpi=canvas.DPI, facecolor=canvas.BACKGROUND)
+    made = Figure(figsize=size)
     FigureCanvasAgg(made)
     share = STRIP * len(sheet.kinds) + STRIP_GAP if sheet.kinds else 0.0
     plot = WIDTH - LEFT - RIGHT - share
@@ -113,17 +111,16 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
     if sheet.kinds:
         sheet.strip = _axes(made, (LEFT + plot + STRIP_GAP, below, share - STRIP_GAP, PLOT))
     _set_limits(sheet)
-    _draw_published(sheet)
     for curve, style in drawn:
         _draw_curve(sheet, curve, style)
     _draw_failures(sheet, drawn)
     _label_steps(sheet, drawn)
-    made.text(LEFT / WIDTH, 1 - 0.36 / size[1], case.scene, color=canvas.TEXT, fontsize=16, fontweight="bold")
+    made.text(LEFT / WIDTH, 1 - 0.36 / size[1], case.scene, fontsize=16, fontweight="bold")
     what = textwrap.shorten(f"{sheet.norm}: {case.norms[sheet.norm]}", 120, placeholder=" ...")
     made.text(LEFT / WIDTH, 1 - 0.66 / size[1], what, color=canvas.MUTED, fontsize=9.5)
     made.legend(
         handles=entries, ncols=columns, loc="upper left", bbox_to_anchor=(LEFT / WIDTH, (below - 0.62) / size[1]),
-        bbox_transform=made.transFigure, borderaxespad=0, frameon=False, labelcolor=canvas.TEXT, fontsize=8.5,
+        bbox_transform=made.transFigure, borderaxespad=0, frameon=False, fontsize=8.5,
         handlelength=2.6, labelspacing=0.45, borderpad=0,
     )  # fmt: skip
     for place, note in enumerate(notes):
@@ -147,10 +144,6 @@ def _entry(curve: Curve, style: Style, norm: str) -> Line2D:
     return Line2D([], [], label=legend_text(curve, norm), **look)
 
 
-def _points(case: CaseTrade) -> list[Point]:
-    return [point for curve in case.curves for point in curve.points]
-
-
 def _bar(point: Point, norm: str) -> ErrorBar | None:
     """The point's error bar, or None if its error is not a number."""
     bar = point.errors.get(norm)
@@ -169,23 +162,17 @@ def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
     """Axes at a position in inches from the lower left corner."""
     width, height = made.get_size_inches()
     left, bottom, across, up = place
-    axes = made.add_axes((left / width, bottom / height, across / width, up / height), facecolor=canvas.PANEL)
-    axes.tick_params(which="both", colors=canvas.MUTED, labelsize=8.5)
-    axes.set_axisbelow(True)
-    for spine in axes.spines.values():
-        spine.set_color(canvas.FRAME)
+    axes = made.add_axes((left / width, bottom / height, across / width, up / height))
+    axes.tick_params(which="both", labelsize=8.5)
     return axes
 
 
 def _set_limits(sheet: Sheet) -> None:
     """Set both axes to enclose everything drawn, with room at the left edge for errors of 0."""
     axes, norm = sheet.axes, sheet.norm
-    bars = [bar for point in _points(sheet.case) if (bar := _bar(point, norm))]
-    others = published(sheet.case.scene, norm) if sheet.quantity == TIME else []
+    bars = [bar for point in sheet.case.points if (bar := _bar(point, norm))]
     errors = [e for bar in bars for e in (bar.low, bar.mean, bar.high) if 0 < e < math.inf]
-    errors += [point.error for point in others]
-    costs = [cost for point in _points(sheet.case) if (cost := sheet.height(point))]
-    costs += [point.milliseconds for point in others]
+    costs = [cost for point in sheet.case.points if (cost := sheet.height(point))]
     least, most = (min(errors), max(errors)) if errors else (10 * LEAST_ERROR, 1.0)
     if any(bar.mean <= 0 for bar in bars):
         least /= 10
@@ -194,9 +181,9 @@ def _set_limits(sheet: Sheet) -> None:
     axes.set_yscale("log")
     axes.set_xlim(*sheet.errors)
     axes.set_ylim(*_widened(min(costs, default=1.0), max(costs, default=1.0)))
-    axes.grid(color=canvas.FRAME, lw=0.7)
-    axes.set_xlabel(error_heading(norm), color=canvas.MUTED, fontsize=9.5)
-    axes.set_ylabel(AXIS[sheet.quantity], color=canvas.MUTED, fontsize=9.5)
+    axes.grid(lw=0.7)
+    axes.set_xlabel(error_heading(norm), fontsize=9.5)
+    axes.set_ylabel(AXIS[sheet.quantity], fontsize=9.5)
     if sheet.strip is not None:
         strip = sheet.strip
         strip.set_yscale("log")
@@ -281,38 +268,18 @@ def _label_steps(sheet: Sheet, drawn: list[tuple[Curve, Style]]) -> None:
         sheet.axes.annotate(text, (x, y), color=style.colour, fontsize=7, zorder=5, **beside)
 
 
-def _published_entries(sheet: Sheet) -> list[Line2D]:
-    """Legend entries of the other engines."""
-    return [
-        Line2D([], [], ls=":", lw=1, color=colour, marker=marker, ms=8, mew=1.6, label=f"{engine}, published")
-        for engine, colour, marker in _published_styles(sheet)
-    ]
-
-
-def _published_styles(sheet: Sheet) -> list[tuple[str, str, str]]:
-    points = published(sheet.case.scene, sheet.norm) if sheet.quantity == TIME else []
-    engines = dict.fromkeys(point.engine for point in points)
-    return list(zip(engines, PUBLISHED_COLOURS, PUBLISHED_MARKERS, strict=False))
-
-
-def _draw_published(sheet: Sheet) -> None:
-    points = published(sheet.case.scene, sheet.norm)
-    for engine, colour, marker in _published_styles(sheet):
-        xs, ys = zip(*((p.error, p.milliseconds) for p in points if p.engine == engine), strict=True)
-        look: dict[str, Any] = {"ls": ":", "lw": 1.0, "marker": marker, "ms": 8, "mew": 1.6, "zorder": 2}
-        sheet.axes.plot(xs, ys, color=colour, label=f"{engine}, published", **look)
-
-
 def _notes(sheet: Sheet) -> list[str]:
     """The meaning of the marks used, and what could not be drawn."""
-    case, norm, points = sheet.case, sheet.norm, _points(sheet.case)
+    case, norm, points = sheet.case, sheet.norm, sheet.case.points
     bars = [bar for point in points if (bar := _bar(point, norm))]
     what = {WORK: "work", TIME: "wall time"}[sheet.quantity]
     lines = []
     if any(known is not None for curve in case.curves for known in (curve.orders.get(norm), curve.theory.get(norm))):
         lines.append("Order: of the error in the step, observed; in brackets what theory says.")
     if any(bar.high > bar.low for bar in bars):
-        span = "two standard errors either way" if is_statistic(case, norm) else "from the least to the largest error"
+        span = "from the least to the largest error"
+        if case.reference.is_statistic(norm):
+            span = "two standard errors either way"
         lines.append(f"Point: mean over the {case.repeated}; the line across it: {span}.")
     if any(not case.reference.trusts(norm, bar.mean) for bar in bars):
         apart = compact(case.reference.agreement[norm])
@@ -327,8 +294,6 @@ def _notes(sheet: Sheet) -> list[str]:
         lines.append(f"The {what} of {failed} that failed is not known: their crosses are at the upper edge.")
     if len(costless) > failed:
         lines.append(f"The {what} of {len(costless) - failed} points is not known: they are not here.")
-    if published(case.scene, norm):
-        lines.append(f"{SOURCE}." if sheet.quantity == TIME else "What others published is in the chart of wall times.")
     return lines
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 import math
@@ -62,37 +63,27 @@ def write_csv(trade: Trade, path: Path) -> Path:
 
 
 def _rows(case: CaseTrade, curve: Curve, point: Point) -> Iterator[dict[str, object]]:
-    cell, time = point.cell, point.milliseconds
+    of_point = {
+        **{name: getattr(case, name) for name in ("scene", "target", "kind", "seconds")},
+        "method": curve.label,
+        **dataclasses.asdict(point.cell),
+        "repeats": point.repeats,
+        "failed": "; ".join(f"{kind} {count}" for kind, count in point.failures.items() if count),
+        "work": point.work,
+        **{name: point.counts.get(name) for name in WEIGHTS},
+    }
+    if point.milliseconds:
+        time = point.milliseconds
+        of_point |= {"wall_ms": time.median, "wall_ms_low": time.low, "wall_ms_high": time.high}
     for norm in case.norms:
-        bar, theory = point.errors.get(norm), curve.theory.get(norm)
-        yield {
-            "scene": case.scene,
-            "target": case.target,
-            "kind": case.kind,
-            "seconds": case.seconds,
-            "method": curve.label,
-            "engine": cell.engine,
-            "integrator": cell.integrator,
-            "collision": cell.collision,
-            "substeps": cell.substeps,
-            "geometry": cell.geometry,
-            "dt": cell.dt,
-            "norm": norm,
-            "error": bar.mean if bar else None,
-            "error_low": bar.low if bar else None,
-            "error_high": bar.high if bar else None,
-            "error_uncertainty": bar.uncertainty if bar else None,
-            "trusted": int(case.reference.trusts(norm, bar.mean)) if bar else None,
-            "order": curve.orders.get(norm),
-            "theory": "exact" if theory == math.inf else theory,
-            "repeats": point.repeats,
-            "failed": "; ".join(f"{kind} {count}" for kind, count in point.failures.items() if count),
-            "work": point.work,
-            **{name: point.counts.get(name) for name in WEIGHTS},
-            "wall_ms": time.median if time else None,
-            "wall_ms_low": time.low if time else None,
-            "wall_ms_high": time.high if time else None,
-        }
+        theory = curve.theory.get(norm)
+        row = {**of_point, "norm": norm, "order": curve.orders.get(norm)}
+        row["theory"] = "exact" if theory == math.inf else theory
+        if norm in point.errors:
+            bar = dataclasses.asdict(point.errors[norm])
+            row |= {"error": bar.pop("mean"), **{f"error_{name}": value for name, value in bar.items()}}
+            row["trusted"] = int(case.reference.trusts(norm, row["error"]))
+        yield row
 
 
 def _write(path: Path, text: str) -> Path:

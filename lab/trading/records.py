@@ -67,37 +67,6 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Outcome(Plain):
-    """One run of one cell.
-
-    repeat
-        number of the start phase or seed
-    errors
-        by norm; empty if the run failed
-    failure
-        None, or one of FAILURES; ``detail`` gives more information
-    counts
-        of the whole run, the same on every machine: steps, force_evaluations, candidates, pairs, impacts, solver_loops
-    seconds
-        simulated
-    effects
-        what could be noticed, see :mod:`carom.lab.measure.effects`
-    milliseconds
-        cost of a simulated second on this machine
-    """
-
-    cell: Cell
-    repeat: int
-    errors: dict[str, float]
-    failure: str | None
-    counts: dict[str, float]
-    seconds: float
-    detail: str = ""
-    effects: dict[str, float] = field(default_factory=dict)
-    milliseconds: float | None = None
-
-
-@dataclass(frozen=True)
 class ErrorBar:
     """An error over all repeats: mean, least, largest, and the standard error of the mean.
 
@@ -128,13 +97,14 @@ class Point(Plain):
     failures
         number of failed repeats, by kind
     counts
-        per simulated second, means over the repeats
+        per simulated second, means over the repeats, the same on every machine: steps, force_evaluations, candidates,
+        pairs, impacts, solver_loops
     work
         weighted sum of the counts, see :mod:`carom.lab.engines.cost`; per simulated second
     milliseconds
         time per simulated second on this machine; None if it was not timed
     effects
-        what could be noticed, each at its worst of all repeats
+        what could be noticed, each at its worst of all repeats, see :mod:`carom.lab.measure.effects`
     line
         the code that sets the settings
     """
@@ -193,6 +163,10 @@ class Reference:
     agreement: dict[str, float] = field(default_factory=dict)
     spread: dict[str, float] = field(default_factory=dict)
 
+    def is_statistic(self, norm: str) -> bool:
+        """True if single repeats are noise, so that a limit applies to the mean plus two standard errors."""
+        return norm in self.spread
+
     def trusts(self, norm: str, error: float) -> bool:
         """True if an error of that size can be distinguished from the reference's own."""
         return error >= TRUSTED * self.agreement.get(norm, 0.0)
@@ -243,6 +217,11 @@ class CaseTrade(Plain):
     @property
     def norm(self) -> str:
         return next(iter(self.norms))
+
+    @property
+    def points(self) -> list[Point]:
+        """Those of all curves."""
+        return [point for curve in self.curves for point in curve.points]
 
 
 @dataclass

@@ -5,42 +5,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..cases.published import ERROR_UNIT, SOURCE, published
-from ..cases.published import NORM as ENERGY_SQUARE
+from ..bench.results import machine_line
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
+from ..wording import NOTHING, compact, number
 from .code_line import python_line
-from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade, known_well
+from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade, known_well
 
-NOTHING = "-"
+ENERGY_SQUARE, ERROR_UNIT = "energy_square", "J²"  # the norm that has a unit
 DOUBTED = "*"  # marks an error that is too close to the reference's own
 TARGETS = (0.1, 0.01, 0.001, 1e-6)
 ORDER_TOLERANCE = 0.3  # a larger difference between the observed and the theoretical order is significant
-COUNTS = {
-    "steps": "steps",
-    "force_evaluations": "force evaluations",
-    "candidates": "candidates",
-    "pairs": "pair tests",
-    "impacts": "impacts",
-    "solver_loops": "solver loops",
-}
 
 
 def tables(trade: Trade, norm: str | None = None) -> list[TextTable]:
-    """A table of all points for each case, and one of published results if there are any.
+    """A table of all points for each case.
 
     ``norm``: used for cases that have it; the others use their first one. Problem if no case has it.
     """
     check_norm(trade, norm)
-    made = []
-    for case in measured(trade):
-        chosen = norm_of(case, norm)
-        made.append(points_table(case, chosen))
-        if published(case.scene, chosen):
-            made.append(published_table(case.scene, chosen))
-    return made
+    return [points_table(case, norm_of(case, norm)) for case in measured(trade)]
 
 
 def measured(trade: Trade) -> list[CaseTrade]:
@@ -62,22 +47,20 @@ def norm_of(case: CaseTrade, norm: str | None) -> str:
 
 def points_table(case: CaseTrade, norm: str) -> TextTable:
     """One row per point; columns without information are left out."""
-    points = [point for curve in case.curves for point in curve.points]
-    counts = [name for name in COUNTS if any(point.counts.get(name) for point in points)]
+    points = case.points
     bars = [point.errors[norm] for point in points if norm in point.errors]
     worst = any(bar.high > bar.mean for bar in bars)
     timed = any(point.milliseconds for point in points)
     failing = any(point.failed for point in points)
-    headings = ["method", "order", "step, s", error_heading(norm)]
-    headings += [worst_heading(case, norm)] * worst + ["work"] + [COUNTS[name] for name in counts]
-    headings += ["wall ms"] * timed + ["failed"] * failing
+    headings = ["method", "order", "step, s", error_heading(norm), *[worst_heading(case.reference, norm)] * worst]
+    headings += ["work", *["wall ms"] * timed, *["failed"] * failing]
     rows = []
     for curve in case.curves:
         for place, point in enumerate(curve.points):
             bar = point.errors.get(norm)
             row = [curve.label, "" if place else order(curve, norm), number(point.cell.dt), _error(case, norm, bar)]
             row += [compact(bar.high) if bar else NOTHING] * worst
-            row += [compact(point.work), *(counted(point.counts.get(name, 0.0)) for name in counts)]
+            row += [compact(point.work)]
             row += [compact(point.milliseconds.median) if point.milliseconds else NOTHING] * timed
             row += [failures(point)] * failing
             rows.append(tuple(row))
@@ -85,26 +68,12 @@ def points_table(case: CaseTrade, norm: str) -> TextTable:
     return TextTable(title, tuple(headings), rows)
 
 
-def published_table(scene: str, norm: str) -> TextTable:
-    """Published results for this scene."""
-    rows = [
-        (point.engine, number(point.dt), compact(point.error), compact(point.milliseconds))
-        for point in published(scene, norm)
-    ]
-    return TextTable(f"{scene}: published", ("engine", "step, s", error_heading(norm), "ms on their machine"), rows)
-
-
 def error_heading(norm: str) -> str:
     return f"error, {ERROR_UNIT}" if norm == ENERGY_SQUARE else "error"
 
 
-def is_statistic(case: CaseTrade, norm: str) -> bool:
-    """True if single repeats are noise, so that the limit applies to the mean plus two standard errors."""
-    return norm in case.reference.spread
-
-
-def worst_heading(case: CaseTrade, norm: str) -> str:
-    return "mean + 2 s.e." if is_statistic(case, norm) else "worst"
+def worst_heading(reference: Reference, norm: str) -> str:
+    return "mean + 2 s.e." if reference.is_statistic(norm) else "worst"
 
 
 def _error(case: CaseTrade, norm: str, bar: ErrorBar | None) -> str:
@@ -156,8 +125,8 @@ def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | No
         time = compact(point.milliseconds.median) if point.milliseconds else NOTHING
         error = compact(point.errors[chosen].high)
         rows.append((*words, curve.label, number(point.cell.dt), error, compact(point.work), time))
-    headings = ("target", "engine", "method", "step, s", worst_heading(case, chosen), "work", "wall ms")
-    kept = "two standard errors beyond the mean" if is_statistic(case, chosen) else "in every repeat"
+    headings = ("target", "engine", "method", "step, s", worst_heading(case.reference, chosen), "work", "wall ms")
+    kept = "two standard errors beyond the mean" if case.reference.is_statistic(chosen) else "in every repeat"
     title = f"{case.scene}: the least work per simulated second that keeps {chosen} below the target {kept}"
     return TextTable(title, headings, rows, words=3)
 
@@ -170,8 +139,8 @@ def choices(
     Engines are treated separately, because their counts are not comparable.
     """
     chosen = norm_of(case, norm)
-    engines = dict.fromkeys(point.cell.engine for curve in case.curves for point in curve.points)
-    known = {point.cell for point in known_well(point for curve in case.curves for point in curve.points)}
+    engines = dict.fromkeys(point.cell.engine for point in case.points)
+    known = {point.cell for point in known_well(case.points)}
     made: list[tuple[float, str, tuple[Curve, Point] | None]] = []
     for target in targets:
         for engine in engines:
@@ -212,15 +181,6 @@ def remarks(trade: Trade, norm: str | None = None) -> list[str]:
     return lines
 
 
-def machine_line(machine: dict[str, str]) -> str:
-    """Processor and system, then versions."""
-    rest = dict(machine)
-    place = [rest.pop(key) for key in ("processor", "system") if key in rest]
-    clock = [rest.pop("clock")] if "clock" in rest else []
-    versions = ", ".join(f"{name} {version}" for name, version in rest.items())
-    return "; ".join(filter(None, (", ".join(place), versions, *clock)))
-
-
 def case_remarks(case: CaseTrade, norm: str) -> list[str]:
     """Sentences about one case, for the norm that its table shows."""
     lines = [f"{case.kind}: {case.why}"]
@@ -245,8 +205,6 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
     off = [f"{curve.label} {order(curve, norm)}" for curve in case.curves if off_theory(curve, norm)]
     if off:
         lines.append(f"observed orders more than {ORDER_TOLERANCE:g} from the theory's: {', '.join(off)}")
-    if published(case.scene, norm):
-        lines.append(SOURCE)
     return lines
 
 
@@ -258,24 +216,5 @@ def reference_line(case: CaseTrade, norm: str) -> str:
 
 def untrusted(case: CaseTrade, norm: str) -> list[Point]:
     """The points whose error is too small for the reference."""
-    points = [point for curve in case.curves for point in curve.points if norm in point.errors]
+    points = [point for point in case.points if norm in point.errors]
     return [point for point in points if not case.reference.trusts(norm, point.errors[norm].mean)]
-
-
-def compact(value: float, digits: int = 3) -> str:
-    """A number with that many significant digits: 0.0123, 1,230, 1.23e-5, 4.56e7."""
-    if not math.isfinite(value):
-        return f"{value:g}"
-    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
-    power = int(exponent)
-    if value == 0:
-        return "0"
-    if power < -3 or power > 5:
-        return f"{mantissa}e{power}"
-    return f"{float(f'{mantissa}e{power}'):,.{max(digits - 1 - power, 0)}f}"
-
-
-def counted(value: float) -> str:
-    """A mean of counts, without decimals if it is whole."""
-    whole = abs(value) < 1e6 and math.isclose(value, round(value), rel_tol=1e-9)
-    return f"{value:,.0f}" if whole else compact(value)

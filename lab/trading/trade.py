@@ -6,7 +6,6 @@ import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +13,7 @@ from ..bench.results import machine
 from ..cases import grid as grids
 from ..cases.case import EFFORTS, Case, case_of, check_arguments
 from ..cases.subjects import subject_of
-from ..cli.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import (
     OUT_OF_TIME,
@@ -30,6 +29,7 @@ from ..jobs.workers import Pool
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
+from ..wording import counted
 from .answer import clearly_worse, front
 from .code_line import python_line
 from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
@@ -64,12 +64,6 @@ class Only:
 
     def of(self, case: Case) -> tuple[Cell, ...]:
         """The methods of the case; a named field is varied even without effect. Problem if there is none."""
-        if self.integrators:
-            with closing(case.subject.world(None)) as world:
-                known = world.registry.integrators
-            for name in self.integrators:
-                if name not in known:
-                    raise Problem(f"no integrator {name!r}{did_you_mean(name, known)}")
         found = grids.methods(case.survey)
         fields = {
             "integrator": self.integrators,
@@ -230,9 +224,10 @@ class Study:
                 self.show(self._known())
 
     def _time_needed(self, case: Case) -> float:
-        """About how long it takes to the first results against references, s, from the beginning."""
+        """About how long it takes to the first results against references, s, from the beginning; 0: not known."""
         tasks = [*reference_tasks(case.coarse_reference()), *run_tasks(case, grids.grid(self.curves, case.steps))]
-        return (time.monotonic() - self.began + self.runs.seconds_for(tasks)) / RUNNING
+        left = self.runs.seconds_for(tasks)
+        return (time.monotonic() - self.began + left) / RUNNING if left < math.inf else 0.0
 
     def _told_and_worse(self) -> tuple[set[Cell], set[Cell]]:
         """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""
@@ -335,7 +330,7 @@ def label_of(method: Cell, others: Iterable[Cell]) -> str:
         if differs(lambda cell: cell.collision):
             parts.append(method.collision)
     if differs(lambda cell: cell.substeps):
-        parts.append(f"{method.substeps} substep{'s' * (method.substeps > 1)}")
+        parts.append(counted(method.substeps, "substep"))
     if differs(lambda cell: cell.geometry):
         parts.append(method.geometry)
     return ", ".join(parts)

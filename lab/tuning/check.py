@@ -13,7 +13,6 @@ from ..cases.case import Case, case_of
 from ..jobs.result_store import Store
 from ..jobs.runs import Runs, points_of
 from ..jobs.workers import Pool
-from ..measure.norms import norm_of
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import Cell, Point, Reference
 from .search import Tuning, enough_repeats, exact_enough
@@ -87,9 +86,7 @@ def check(
     case = case.replace(survey=dataclasses.replace(case.survey, settings=settings))
     promise = tuning.target * tuning.scale if absolute else tuning.target
     case, reference = exact_enough(case, tuning.norm, promise, absolute, runs)
-    seen = case.reference
-    assert seen is not None
-    scale = norm_of(tuning.norm).scale(seen, seen)
+    scale = case.scale(tuning.norm)
     promise = promise / scale if absolute else promise
     case = enough_repeats(case, tuning.norm, reference.spread.get(tuning.norm, 0.0), promise)
     return Check(

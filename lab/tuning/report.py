@@ -7,14 +7,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..measure.effects import metres
-from ..reporting.run_report import number
 from ..reporting.text_tables import TextTable
 from ..trading.answer import cost_text, noticed_text
 from ..trading.code_line import settings_line
-from ..trading.records import Cell, ErrorBar, Point
-from ..trading.report import NOTHING, compact, target_text
+from ..trading.records import ErrorBar, Point
+from ..trading.report import failures, target_text, worst_heading
 from ..trading.trade import label_of
+from ..wording import NOTHING, compact, counted, metres, number
 from .check import TOLERATED, Check
 from .search import FAR_DEARER, Trial, Tuning
 
@@ -34,38 +33,32 @@ class TuneResult:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which cannot represent infinity: the error of a failed run is null."""
-        tuning = self.tuning
+        tuning, found = self.tuning, self.tuning.choice is not None
+        told = ("scene", "norm", "text", "target", "scale", "seconds", "repeats", "repeated", "methods")
+        checked = ("scene", "norm", "promise", "scale", "seconds", "tolerated", "refused")
         return {
             "command": self.command,
-            "scene": tuning.scene,
-            "norm": tuning.norm,
-            "text": tuning.text,
-            "target": tuning.target,
-            "scale": tuning.scale,
-            "seconds": tuning.seconds,
-            "repeats": tuning.repeats,
-            "repeated": tuning.repeated,
+            **{name: getattr(tuning, name) for name in told},
             "reference": dataclasses.asdict(tuning.reference),
-            "methods": tuning.methods,
-            "settings": None if tuning.choice is None else dataclasses.asdict(tuning.settings),
-            "line": None if tuning.choice is None else tuning.line,
-            "why_not": tuning.why_not if tuning.choice is None else "",
+            "settings": dataclasses.asdict(tuning.settings) if found else None,
+            "line": tuning.line if found else None,
+            "why_not": "" if found else tuning.why_not,
             "error": _finite(tuning.error),
-            "margin": _finite(tuning.margin) if tuning.choice is not None else None,
+            "margin": _finite(tuning.margin) if found else None,
             "choice": _plain(tuning.choice),
             "runner_up": _plain(tuning.runner_up),
             "balanced": _plain(self.balanced),
             "trials": [{**dataclasses.asdict(trial), "error": _finite(trial.error)} for trial in tuning.trials],
             "checks": [
                 {
-                    "scene": check.scene, "norm": check.norm, "promise": check.promise, "scale": check.scale,
-                    "seconds": check.seconds, "reference": dataclasses.asdict(check.reference),
-                    "point": _plain(check.point), "error": _finite(check.error), "times": _finite(check.times),
-                    "tolerated": check.tolerated, "refused": check.refused,
+                    **{name: getattr(check, name) for name in checked},
+                    "reference": dataclasses.asdict(check.reference),
+                    "point": _plain(check.point),
+                    **{name: _finite(getattr(check, name)) for name in ("error", "times")},
                 }
                 for check in self.checks
             ],
-        }  # fmt: skip
+        }
 
 
 def _finite(value: float) -> float | None:
@@ -107,7 +100,7 @@ def answer(tuning: Tuning) -> list[str]:
         ratio = compact(tuning.runner_up.work / choice.work, 2)
         lines.append(f"  else     {line}: {ratio} times the work, error {error}")
     repeats = f"{choice.repeats} {tuning.repeated if choice.repeats > 1 else tuning.repeated[:-1]}"
-    known = f"from {len(tuning.trials)} trials, {repeats} of {number(tuning.seconds)} s"
+    known = f"from {counted(len(tuning.trials), 'trial')}, {repeats} of {number(tuning.seconds)} s"
     return [*lines, f"  known    {'; '.join(filter(None, (known, rough, more)))}"]
 
 
@@ -115,7 +108,7 @@ def _in_unit(tuning: Tuning, error: float) -> str:
     """An error in metres if the norm is one of place, else as a share."""
     if tuning.norm in ("position", "apex"):
         return metres(error * tuning.scale)
-    return f"{100 * error:.2g} %"
+    return f"{compact(100 * error, 2)} %"
 
 
 # -- tables -----------------------------------------------------------------------------------------------------
@@ -163,21 +156,13 @@ def compared_table(result: TuneResult) -> TextTable:
         bar = None if point.failed else point.errors[tuning.norm]
         work = NOTHING if tuning.choice is None else compact(point.work / tuning.choice.work)
         rows.append((
-            name, label_of(point.cell.method, cells), number(point.cell.dt), _worst(bar), _part(bar, tuning.target),
-            compact(point.work), work,
+            name, label_of(point.cell.method, cells), number(point.cell.dt), failures(point) or _worst(bar),
+            _part(bar, tuning.target), compact(point.work), work,
         ))  # fmt: skip
-    headings = ("", "method", "step, s", worst_heading(tuning), "of target", "work", "of choice's")
+    worst = worst_heading(tuning.reference, tuning.norm)
+    headings = ("", "method", "step, s", worst, "of target", "work", "of choice's")
     title = f"{tuning.scene}: {tuning.norm}, and work per simulated second"
     return TextTable(title, headings, rows, words=2)
-
-
-def worst_heading(tuning: Tuning) -> str:
-    return "mean + 2 s.e." if is_statistic(tuning) else "worst"
-
-
-def is_statistic(tuning: Tuning) -> bool:
-    """True if single repeats are noise, so that the limit applies to the mean plus two standard errors."""
-    return tuning.norm in tuning.reference.spread
 
 
 def checks_table(result: TuneResult) -> TextTable:
@@ -191,7 +176,8 @@ def checks_table(result: TuneResult) -> TextTable:
         rows.append((
             check.scene, number(check.seconds), _worst(_bar(check)), compact(check.promise), times, _kept(check),
         ))  # fmt: skip
-    headings = ("scene", "over, s", worst_heading(result.tuning), "promise", "times the promise", "")
+    worst = worst_heading(result.tuning.reference, result.tuning.norm)
+    headings = ("scene", "over, s", worst, "promise", "times the promise", "")
     return TextTable("on scenes that it was not tuned on", headings, rows)
 
 
@@ -223,14 +209,13 @@ def _error(error: float) -> str:
 
 
 def sentences(result: TuneResult) -> list[str]:
-    """The choice and the reasons for it; or that there is none."""
+    """What was searched, against what, and how far the result goes; or that there is none."""
     tuning = result.tuning
     lines = [result.command, *_about(tuning)]
     if tuning.choice is None:
         return [*lines, f"{tuning.why_not}."]
-    lines += [_chosen(tuning, tuning.choice), _second(tuning, tuning.choice)]
-    if result.balanced is not None:
-        lines.append(_against_balanced(result.balanced, tuning, tuning.choice))
+    if tuning.runner_up is None:
+        lines.append(f"no other method holds within {FAR_DEARER:g} times the work")
     lines += [line for check in result.checks if (line := check_line(check))]
     return [*lines, _limits(tuning)]
 
@@ -246,42 +231,9 @@ def _about(tuning: Tuning) -> list[str]:
         f"{tuning.norm}: {tuning.text}",
         f"reference: {tuning.reference.text}{apart}",
         f"target: {target_text(tuning.target, tuning.norm)}{units}, over {number(tuning.seconds)} s{repeated}",
-        f"{tuning.methods} {_plural('method', tuning.methods)} to choose from,"
-        f" {len(tuning.trials)} {_plural('trial', len(tuning.trials))}; the cheapest first",
+        f"{counted(tuning.methods, 'method')} to choose from, {counted(len(tuning.trials), 'trial')};"
+        " the cheapest first",
     ]
-
-
-def _chosen(tuning: Tuning, choice: Point) -> str:
-    bar = choice.errors[tuning.norm]
-    if is_statistic(tuning):
-        error = f"{compact(bar.high)}, two standard errors beyond the mean of {tuning.repeats} {tuning.repeated}"
-    elif tuning.repeats > 1:
-        error = f"{compact(bar.high)} in the worst of {tuning.repeats} {tuning.repeated}"
-    else:
-        error = f"{compact(bar.high)} in the one run"
-    margin = "an exact result" if math.isinf(tuning.margin) else f"a margin of {compact(tuning.margin)}"
-    return f"choice: {_words(choice.cell, tuning)}: {tuning.norm} {error}: {margin}; work {compact(choice.work)}"
-
-
-def _second(tuning: Tuning, choice: Point) -> str:
-    second = tuning.runner_up
-    if second is None:
-        return f"runner-up: no other method holds within {FAR_DEARER:g} times the work"
-    error, work = compact(second.errors[tuning.norm].high), compact(second.work / choice.work)
-    return f"runner-up: {_words(second.cell, tuning)}: {tuning.norm} {error} with {work} times the work"
-
-
-def _against_balanced(point: Point, tuning: Tuning, choice: Point) -> str:
-    ratio = point.work / choice.work
-    work = (
-        f"{compact(ratio)} times the work of the choice" if ratio >= 1
-        else f"1/{compact(1 / ratio)} of the work of the choice"
-    )  # fmt: skip
-    if point.failed:
-        return f"Settings.balanced(): {work}, and it fails: {', '.join(point.failures)}"
-    error = point.errors[tuning.norm].high
-    kept = "keeps the target" if error <= tuning.target else f"misses the target {compact(error / tuning.target)} times"
-    return f"Settings.balanced(): {work}; it {kept}"
 
 
 def check_line(check: Check) -> str:
@@ -303,12 +255,3 @@ def _limits(tuning: Tuning) -> str:
         f"measured on {tuning.scene} over {number(tuning.seconds)} s and nowhere else: larger speeds, stronger forces, "
         "other sizes or longer runs change the error; --check SCENE measures it there"
     )
-
-
-def _words(cell: Cell, tuning: Tuning) -> str:
-    label = label_of(cell.method, {trial.cell.method for trial in tuning.trials} | {cell.method})
-    return f"{label}, {number(cell.dt)} s"
-
-
-def _plural(word: str, count: int) -> str:
-    return word + "s" * (count != 1)

@@ -32,6 +32,7 @@ from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.code_line import settings_line
 from ..trading.records import CHAOTIC, TRUSTED, Cell, Point, Reference
 from ..trading.trade import RUNNING, TRIAL, TURNS, Only
+from ..wording import counted
 
 BELOW = 16  # a method's step is at least the smallest step of the case over this
 MOST_REPEATS = 400  # of a noisy statistic
@@ -137,7 +138,7 @@ class Tuning:
         if best is None or not math.isfinite(best.error):
             return f"{text}: every run failed"
         line = settings_line(best.cell, self.base)
-        return f"{text}: the best of {len(self.trials)} trials has {best.error:.3g}, {line}"
+        return f"{text}: the best of {counted(len(self.trials), 'trial')} has {best.error:.3g}, {line}"
 
 
 def tune(build: Any, max_error: float = 1e-3, norm: str | None = None, **options: Any) -> Settings:
@@ -233,9 +234,7 @@ class _Search:
         self.norm = norm_of(case.norms[0])
         self.methods = only.of(case)
         self.case, self.reference = case, reference
-        seen = self.case.reference
-        assert seen is not None
-        self.scale = self.norm.scale(seen, seen)
+        self.scale = case.scale(self.norm.name)
         self.target = max_error / self.scale if absolute else max_error
         self.noise = self.reference.spread.get(self.norm.name, 0.0)
         self.case = enough_repeats(self.case, self.norm.name, self.noise, self.target)
@@ -390,9 +389,7 @@ def exact_enough(
     """The case with a reference accurate enough for the target; Problem if own runs cannot be made to agree so well."""
     def margin_of(known: Case, reference: Reference) -> float:
         """The target over the accuracy of the reference."""
-        seen = known.reference
-        assert seen is not None
-        target = max_error / norm_of(norm).scale(seen, seen) if absolute else max_error
+        target = max_error / known.scale(norm) if absolute else max_error
         if case.reference is None and target < SMALLEST:
             raise Problem(
                 f"{case.subject.name}: a {norm} error of {target:.3g} is below rounding, no own runs can tell it: take "

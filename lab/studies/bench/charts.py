@@ -10,6 +10,7 @@ from ...pictures import canvas
 from .scaling import Scaling
 
 
+@canvas.styled
 def draw_scaling(result: Scaling, folder: Path) -> Path:
     """Nanoseconds per body per step against the number of bodies, the spread as a band."""
     axes = new_axes("how the time per body grows (gas2d)", 4.5)
@@ -22,6 +23,6 @@ def draw_scaling(result: Scaling, folder: Path) -> Path:
         axes.annotate(f"{spread.median:.0f}", (n, spread.median), color=canvas.TEXT, **above)
     axes.set_xscale("log")
     axes.set_ylim(0, 1.2 * max(s.high for s in spreads))
-    axes.set_xlabel("bodies", color=canvas.MUTED)
-    axes.set_ylabel("ns per body per step", color=canvas.MUTED)
+    axes.set_xlabel("bodies")
+    axes.set_ylabel("ns per body per step")
     return saved(axes, folder / "scaling.png")

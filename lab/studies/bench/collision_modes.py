@@ -21,7 +21,7 @@ import numpy as np
 from .... import scenes
 from ....framework import Settings, World
 from ....framework.compilation import log
-from ...bench.report import NOTHING, digits, span
+from ...bench.report import digits, span
 from ...bench.results import machine
 from ...cli.usage_errors import Problem
 from ...measure.body_shapes import shapes_of
@@ -30,6 +30,7 @@ from ...measure.timing import Spread, no_garbage_collection, timed
 from ...plain import Plain
 from ...reporting.progress import NO_PROGRESS, Progress
 from ...reporting.text_tables import TextTable
+from ...wording import NOTHING
 
 STEPS = 60
 REPEATS = 5

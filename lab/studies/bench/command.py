@@ -8,9 +8,9 @@ import click
 from rich.console import Console
 
 from ...cli.loading import load
-from ...cli.options import listed, out_option, repeats_option, shown_options, whole_number
-from ...reporting.output import Output
+from ...cli.options import listed, out_option, repeats_option, whole_number
 from ...reporting.progress import Bar
+from ..page import PageOutput, shown_options
 from . import collision_modes as bench_modes
 from . import feature_ladder as bench_ladder
 from . import plugin_pairs as bench_pairs
@@ -25,7 +25,7 @@ RUNS = "Runs; the median counts."
 @shown_options
 def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time the narrow phase with a registered pair, with a built-in one, and with the same maths written by hand."""
-    output = Output.checked("studies plugin-pairs", as_json, as_markdown, into, None)
+    output = PageOutput.of("studies plugin-pairs", as_json, as_markdown, into, None)
     with Bar(Console(stderr=True)) as bar:
         result = bench_pairs.pair_costs(repeats, bar)
     output.show(result, [bench_pairs.table(result)], [])
@@ -37,7 +37,7 @@ def pairs_command(repeats: int, as_json: bool, as_markdown: bool, into: Path | N
 @shown_options
 def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time scenes that differ in one feature: nanoseconds per body per step beside the scene without it."""
-    output = Output.checked("studies ladder", as_json, as_markdown, into, None)
+    output = PageOutput.of("studies ladder", as_json, as_markdown, into, None)
     with Bar(Console(stderr=True)) as bar:
         result = bench_ladder.ladder(bodies, repeats, bar)
     output.show(result, [bench_ladder.table(result)], [])
@@ -52,7 +52,7 @@ def ladder_command(bodies: int, repeats: int, as_json: bool, as_markdown: bool, 
 @shown_options
 def modes_command(steps: int, repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time the same bodies with discrete, continuous and event-driven collisions."""
-    output = Output.checked("studies modes", as_json, as_markdown, into, None)
+    output = PageOutput.of("studies modes", as_json, as_markdown, into, None)
     with Bar(Console(stderr=True)) as bar:
         result = bench_modes.modes(steps, repeats, bar)
     output.show(result, bench_modes.tables(result), bench_modes.remarks(result))
@@ -78,7 +78,7 @@ def scaling_command(
 ) -> None:
     """Time the elastic gas from 1,000 to 100,000 bodies: nanoseconds per body per step."""
     asked = tuple(sorted(sizes)) if sizes else bench_scaling.SIZES
-    output = Output.checked("studies scaling", as_json, as_markdown, into, out, "studies.bench.charts")
+    output = PageOutput.of("studies scaling", as_json, as_markdown, into, out, "studies.bench.charts")
     with Bar(Console(stderr=True)) as bar:
         result = bench_scaling.scaling((*asked, *[bench_scaling.LARGEST] * million), repeats, bar)
     output.show(result, [bench_scaling.table(result)], [])
@@ -94,7 +94,7 @@ def scaling_command(
 @shown_options
 def startup_command(names: tuple[str, ...], repeats: int, as_json: bool, as_markdown: bool, into: Path | None) -> None:
     """Time new processes up to their first step: nothing compiled, kernels kept on disk, and kernels shipped."""
-    output = Output.checked("studies startup", as_json, as_markdown, into, None)
+    output = PageOutput.of("studies startup", as_json, as_markdown, into, None)
     wanted = [load(name).name for name in names]
     with Bar(Console(stderr=True)) as bar:
         result = bench_startup.startup(wanted, repeats, bar)

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import out_option, repeats_option, shown_options
-from ...reporting.output import Output
+from ...cli.options import out_option, repeats_option
 from ...reporting.progress import Bar
+from ..page import PageOutput, shown_options
 from . import report as geometry_report
 from .study import COUNT, REPEATS, geometry_study
 
@@ -28,7 +28,7 @@ def geometry_command(
 
     How many contacts are reported that are none, how many pairs are tested, and what that costs.
     """
-    output = Output.checked("studies geometry", as_json, as_markdown, into, out, "studies.geometry.picture")
+    output = PageOutput.of("studies geometry", as_json, as_markdown, into, out, "studies.geometry.picture")
     with Bar(Console(stderr=True)) as bar:
         result = geometry_study(count, repeats, progress=bar)
     output.show(result, geometry_report.tables(result), geometry_report.remarks(result))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from ...bench.report import NOTHING, digits
+from ...bench.report import digits
 from ...reporting.text_tables import TextTable
+from ...wording import NOTHING
 from .records import GeometryCost, GeometryStudy
 from .study import OPTIONS
 

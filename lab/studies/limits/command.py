@@ -10,17 +10,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import (
-    listed,
-    one_of,
-    out_option,
-    seed_number,
-    seed_option,
-    shown_options,
-)
+from ...cli.options import listed, one_of, out_option, seed_option, traceback_option
 from ...cli.usage_errors import Problem
-from ...reporting.output import Output
 from ...reporting.progress import Bar
+from ..page import PageOutput, shown_options
 from . import report as limits_report
 from .pairs import report as pairs_report
 from .pairs.axes import Draw
@@ -46,7 +39,7 @@ NAMES = tuple(axis.name for axis in AXES)
 @out_option("Draw a picture into this folder.")
 @shown_options
 @seed_option
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def limits_command(
     names: tuple[str, ...] | None,
     quick: bool,
@@ -59,15 +52,13 @@ def limits_command(
     as_markdown: bool,
     into: Path | None,
     out: Path | None,
-    seed: str,
-    traceback: bool,
+    seed: int,
 ) -> None:
     """Sweep one thing at a time until carom fails: the step, stiffness, speeds, ratios of masses and sizes, distance
     from the origin, towers, crowds, duration. Prints where the error passes 1 % and 10 %, and where it breaks.
 
     With --pairs: random scenes that cross these axes in pairs; prints what went wrong in each mode, and where.
     """
-    del traceback  # seen by Commands.main
     crossing = pairs or play is not None
     if not crossing:
         _refuse({"--scenes": scenes is not None, "--workers": workers is not None}, "needs --pairs")
@@ -78,19 +69,19 @@ def limits_command(
         _refuse(of_others, "does not go with --pairs or --play")
         if play is not None:
             _refuse({"--scenes": scenes is not None, "--into": into is not None}, "does not go with --play")
-            _play(seed_number(seed), play, as_json)
+            _play(seed, play, as_json)
             return
         if quick and scenes is not None:
             raise Problem("--quick and --scenes exclude each other")
         wanted = scenes or (QUICK_SCENES if quick else SCENES)
-        output = Output.checked(PAIRS_MARK, as_json, as_markdown, into, None)
-        _cross(wanted, seed_number(seed), workers, output)
+        output = PageOutput.of(PAIRS_MARK, as_json, as_markdown, into, None)
+        _cross(wanted, seed, workers, output)
         return
-    _refuse({"--seed": seed != "0"}, "needs --pairs")
-    _sweep(names, quick, long_runs, Output.checked(MARK, as_json, as_markdown, into, out))
+    _refuse({"--seed": seed != 0}, "needs --pairs")
+    _sweep(names, quick, long_runs, PageOutput.of(MARK, as_json, as_markdown, into, out))
 
 
-def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: Output) -> None:
+def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: PageOutput) -> None:
     if quick and long_runs:
         raise Problem("--quick and --long exclude each other")
     if output.charts is not None:
@@ -101,7 +92,7 @@ def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: 
     output.draw("draw_limits", result)
 
 
-def _cross(scenes: int, seed: int, workers: int | None, output: Output) -> None:
+def _cross(scenes: int, seed: int, workers: int | None, output: PageOutput) -> None:
     with Bar(Console(stderr=True)) as bar:
         result = pair_limits(scenes, seed, workers, bar)
     output.show(result, pairs_report.tables(result), pairs_report.remarks(result))

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import repeats_option, shown_options
+from ...cli.options import repeats_option, traceback_option
 from ...cli.usage_errors import Problem
-from ...reporting.output import Output
 from ...reporting.progress import Bar
+from ..page import PageOutput, shown_options
 from .games import games_study, of_names
 from .records import GamesStudy, SettingsStudy
 from .report import game_remarks, game_tables, remarks, tables
@@ -24,7 +24,7 @@ FIELDS_MARK, GAMES_MARK = "studies settings", "studies settings games"
 @click.option("--games", is_flag=True, help="Kinds of games instead of fields: the cheapest settings for each.")
 @repeats_option(REPEATS, "Timed runs; the median counts.")
 @shown_options
-@click.option("--traceback", is_flag=True, help="Show in full where an error came from.")
+@traceback_option
 def settings_command(
     names: tuple[str, ...],
     games: bool,
@@ -32,17 +32,15 @@ def settings_command(
     as_json: bool,
     as_markdown: bool,
     into: Path | None,
-    traceback: bool,
 ) -> None:
     """Vary each field of Settings alone, in scenes where it matters: cost and error of its values. About two minutes.
 
     With --games: tune a scene of each kind of game to what such a game needs. NAMES: only these fields, or games.
     """
-    del traceback  # seen by Commands.main
     if names and into is not None:
         raise Problem("--into fills the page with all of them: it takes no names")
     (of_names if games else of_fields)(names)  # raises for unknown names before anything runs
-    output = Output.checked(GAMES_MARK if games else FIELDS_MARK, as_json, as_markdown, into, None)
+    output = PageOutput.of(GAMES_MARK if games else FIELDS_MARK, as_json, as_markdown, into, None)
     found: GamesStudy | SettingsStudy
     with Bar(Console(stderr=True)) as bar:
         if games:

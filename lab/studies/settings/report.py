@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ...bench.report import NOTHING, digits
+from ...bench.report import digits
 from ...cli.choices import PRESETS
 from ...reporting.text_tables import TextTable
 from ...trading import code_line as settings_line
+from ...wording import NOTHING
 from .records import Choice, GameChoices, GamesStudy, SettingsStudy
 
 ROUNDING = 1e-6  # smaller errors are shown as this limit

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ....bench.report import NOTHING
 from ....reporting.text_tables import TextTable
+from ....wording import NOTHING
 from ..records import MODES
 from ..report import number
 from .axes import (

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..reporting.run_report import number
-from ..reporting.text_tables import TextTable
-from .records import CaseTrade, Curve, Point, Trade
-from .report import NOTHING, TARGETS, compact, failures, measured, norm_of, order, target_text
+from ...reporting.text_tables import TextTable
+from ...trading.records import CaseTrade, Curve, Point
+from ...trading.report import TARGETS, failures, order, target_text
+from ...wording import NOTHING, compact, number
 
 
-def summaries(trade: Trade, norm: str | None = None) -> list[TextTable]:
-    """One table for each measured case; ``norm`` as in :func:`carom.lab.trading.report.tables`."""
-    return [summary(case, norm_of(case, norm)) for case in measured(trade)]
-
-
-def summary(case: CaseTrade, norm: str, targets: Sequence[float] = TARGETS) -> TextTable:
+def summary(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
     """By method: the observed order of each norm with the theoretical one; for each target the largest step that meets
-    it in all repeats, with its work per simulated second; the best error of ``norm``; and the failures."""
+    it in all repeats, with its work per simulated second; the best error; and the failures."""
+    norm = case.norm
     trusted = [target for target in targets if case.reference.trusts(norm, target)]
     headings = ["method", *(f"{name}, order" for name in case.norms), *(target_text(t, norm) for t in trusted), "best"]
     failing = any(point.failed for curve in case.curves for point in curve.points)
