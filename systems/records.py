@@ -12,7 +12,7 @@ from typing import Any
 from ..components import Collider, RigidBody
 from ..framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, table, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
-from .broad_phase.records import GRID
+from .broad_phase.records import GRID, VIEWS
 
 
 def default_of(field: Any) -> Any:
@@ -518,4 +518,5 @@ STATE = Schema(
     contacts=CONTACTS,
     grid=GRID,  # of what moves
     static_grid=GRID,
+    views=VIEWS,
 )

@@ -67,6 +67,7 @@ class Boxes:
         """Take these corners (n, d)."""
         state, d = self.state, lower.shape[1]
         state.bodies.lower, state.bodies.upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        state.bodies.position = state.bodies.previous_position = np.zeros_like(lower)
         state.count, state.moving = len(lower), moving
         state.statics_version += statics_changed
         state.frame[LOWEST : LOWEST + 3], state.frame[HIGHEST : HIGHEST + 3] = np.inf, -np.inf

@@ -141,15 +141,9 @@ def test_only_the_worst_places_are_told():
 
 def test_a_mean_is_noticed_beyond_chance_and_beyond_what_games_differ_by():
     right = mean_of([seen({"kills": [kills]}) for kills in (90.0, 110.0, 100.0, 100.0)], ())
-    assert (
-        right.values == {"kills": [100.0]}
-    )
-    assert (
-        right.runs == 4
-    )
-    assert (
-        right.spread["kills"] == pytest.approx(8.165, 1e-3)
-    )
+    assert right.values == {"kills": [100.0]}
+    assert right.runs == 4
+    assert right.spread["kills"] == pytest.approx(8.165, 1e-3)
 
     def effects(mean, count):
         return at_worst([effects_of(seen({"kills": [mean]}), right, CHAOTIC)] * count)

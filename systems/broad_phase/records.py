@@ -33,6 +33,17 @@ GRID = Schema(
     outside=ints("int32"),
 )
 
+# What moving bodies remember of the static grid, see :mod:`.views`; one entry per moving body.
+VIEWS = Schema(
+    "Views",
+    version=integer(),  # ``state.version`` and ``state.statics_version`` that they hold for
+    statics_version=integer(),
+    lower=vectors(),
+    upper=vectors(),
+    count=ints("int32"),  # static bodies in the view; -1: not known
+    seen=table("int32", 8),  # their rows
+)
+
 # A loose quadtree or octree, see :mod:`.tree`. Columns named level_* have one row per level: level 0 is the finest, row
 # ``levels`` the top level, row ``levels + 1`` the boxes that are in no level because they are empty or nan.
 TREE = Schema(

@@ -18,6 +18,7 @@ from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_
 from .static_grid import NEVER_BUILT, OUTSIDE_MAX, reserve_static_grid
 from .tree.tree import SpatialTree
 from .uniform_grid import reserve_grid
+from .views import reserve_views
 
 
 class CandidateSearch:
@@ -62,8 +63,10 @@ class CandidateSearch:
             candidates = state.candidates
             candidates.reserve(state.needed, "first", "second", keep=candidates.count)
         elif code == NEED_CELLS:
-            static = state.count - state.moving
-            if state.pair_search == STATIC_GRID and len(state.static_grid.keys) < static:
+            static, searches_static = state.count - state.moving, state.pair_search == STATIC_GRID
+            if searches_static and len(state.views.count) < state.moving:
+                reserve_views(state.views, state.moving)
+            elif searches_static and len(state.static_grid.keys) < static:
                 reserve_static_grid(state.static_grid, static)
             else:
                 reserve_grid(state.grid, state.moving)

@@ -23,6 +23,7 @@ from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
 from .seekers import ALL
 from .static_grid import build_static_grid, follow_rows
 from .uniform_grid import FULL, build_grid, look_around, look_inside, test_notes
+from .views import follow_statics, look_at_statics
 
 # 8 million candidates: with everything that is kept of a pair about 4 gigabytes. A game has 1 to 50 per body.
 CANDIDATE_LIMIT = 1 << 23
@@ -83,6 +84,9 @@ def place_statics(state, dt):
     grid = state.static_grid
     if state.pair_search != STATIC_GRID:
         return OK
+    if len(state.views.count) < state.moving:
+        state.needed = state.moving
+        return NEED_CELLS
     if grid.version != state.statics_version:
         if len(grid.keys) < state.count - state.moving:
             state.needed = state.count - state.moving
@@ -99,7 +103,7 @@ def look_from_outside(state, found):
     static_grid, all_static = state.static_grid, state.pair_search == UNIFORM_GRID
     for k in range(state.count - state.moving if all_static else static_grid.outside_count):
         i = state.moving + k if all_static else static_grid.outside[k]
-        found = look_inside(state, state.grid, i, found)
+        found = look_inside(state, state.grid, i, state.bodies.lower[i], state.bodies.upper[i], found)
         if found == FULL:
             break
     return found
@@ -235,8 +239,9 @@ def search_static_grid(state, dt):
         return OK
     candidates, found = state.candidates, state.candidates.count
     every = candidates.seeker_count == ALL
+    follow_statics(state)
     for k in range(state.moving if every else candidates.seeker_count):
-        found = look_inside(state, state.static_grid, k if every else candidates.seekers[k], found)
+        found = look_at_statics(state, k if every else candidates.seekers[k], found)
         if found == FULL:
             return need_more_room(state)
     state.candidates.count = found

@@ -64,8 +64,8 @@ class BroadPhase(StagedSystem):
             ("candidates",), "sleeping", "few bodies are awake",
         ),
         Stage(
-            search_static_grid, "what moves looks into the grid of what does not", (*BOXES, "static_grid"),
-            ("candidates",), MANY, "more bodies are static than move",
+            search_static_grid, "what moves looks into the grid of what does not, unless it has seen what is there",
+            (*BOXES, "static_grid"), ("candidates", "views"), MANY, "more bodies are static than move",
         ),
         Stage(
             leave_out_still, "pairs of two bodies that are still", ("candidates", "still"), ("candidates",), "sleeping",

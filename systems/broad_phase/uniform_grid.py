@@ -243,12 +243,13 @@ def outline(grid, low, high):
 
 
 @part
-def look_inside(state, grid, i, found):
-    """Pairs of body i, which is not in the grid and of any size, with what is in it; returns as ``test_notes``."""
+def look_inside(state, grid, i, low, high, found):
+    """Pairs of body i, which is not in the grid, with what of it overlaps this box of any size; returns as
+    ``test_notes``."""
     bodies, candidates, frame, inverse = state.bodies, state.candidates, grid.frame, grid.inverse_cell
     lower, upper, order, directory, codes = bodies.lower, bodies.upper, grid.order, grid.directory, grid.codes
     first, second, room = candidates.first, candidates.second, len(candidates.first)
-    low, high, begin, last = lower[i], upper[i], lower[i], upper[i]
+    begin, last = low, high
     for q in range(len(low)):
         if not item(low, q) <= item(high, q):
             return found

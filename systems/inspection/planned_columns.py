@@ -53,6 +53,7 @@ RECORDS = (
     ("contacts", "contact", "contacts", "bodies have touched"), ("impacts", "impact", "impacts", "bodies have bounced"),
     ("grid", "body", "broad phase, grid", "more bodies than are tested pair by pair"),
     ("static_grid", "body", "broad phase, static grid", "more static bodies than are tested pair by pair"),
+    ("views", "body", "broad phase, static grid", "what a moving body has seen in the grid"),
 )  # fmt: skip
 
 # Columns of these records whose rows are something else.
