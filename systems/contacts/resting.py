@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, sub
@@ -18,6 +20,7 @@ OWN_SAG = 0.0003  # of the extent: a contact that would sag more under one body 
 CONCAVE_SAG = 0.001  # one of concave shapes, which stands for all sides where they touch, by turns
 APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
 BESIDE, EVEN = 1e-6, 1e-9  # of the extent: so near the normal is another one, by this much of its cosine
+LOOK, RESTS, IS_APART = range(3)
 STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of the step
 SAME_PLACE = 1e-9  # of the extent: a gap of rounding errors is none
 
@@ -92,27 +95,33 @@ def still_bounces(state, dt, c, depth, normal):
 
 
 @part
-def surely_rests(state, dt, c, d, margin):
-    """Whether a pair that has had no impact rests by what the narrow phase has found at the end of the free flight.
+def known_by_flight(state, dt, c, d, margin):
+    """RESTS or IS_APART if that is sure of a pair that has had no impact, by what the narrow phase has found at the end
+    of the free flight; else LOOK.
 
     d: from the centre of a's shape to that of b's. The resting prediction cannot change the depth by more than it
-    moves the two to each other. Pairs that may bounce, or go far, are to be looked at.
+    moves the two to each other. Pairs that go far are to be looked at, and those that may bounce unless they are apart.
     """
     pairs, bodies, colliders = state.pairs, state.bodies, state.colliders
     a, b, slot = pairs.a[c], pairs.b[c], bodies.collider_slot
-    if not pairs.near_contact[c]:
-        return False
-    restitution = colliders.restitution
-    if mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b]) > 0.0:
-        return False
     least, edge = pairs.depth[c] + margin, FAST * smaller_extent(bodies, a, b)
     moved, travel = zero_of(state), sub(d, between_at_start(bodies, a, b))
     if bodies.supported[a]:
         moved = add_scaled(moved, bodies.support_change[a], state.force_travels * dt)
     if bodies.supported[b]:
         moved = add_scaled(moved, bodies.support_change[b], -state.force_travels * dt)
+    room, flown = least * least, add(travel, moved)
+    if not (dot(moved, moved) <= room and dot(travel, travel) <= edge * edge):
+        return LOOK
+    if least < 0.0:  # a depth of -inf only says that they do not touch there
+        return IS_APART if dot(moved, moved) < room < math.inf and dot(flown, flown) <= edge * edge else LOOK
+    restitution = colliders.restitution
+    if not pairs.near_contact[c]:
+        return LOOK
+    if mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b]) > 0.0:
+        return LOOK
     pairs.parting[c] = STAYS
-    return least >= 0.0 and dot(moved, moved) <= least * least and dot(travel, travel) <= edge * edge
+    return RESTS
 
 
 @part
@@ -134,8 +143,9 @@ def is_resting(state, dt, c):
     if not near and not hit and not carried:
         return False
     d = between(bodies, a, b)
-    if not hit and surely_rests(state, dt, c, d, margin):
-        return not meets_at_corner(state, a, b, d, slop_of(state, a, b))
+    known = LOOK if hit else known_by_flight(state, dt, c, d, margin)
+    if known != LOOK:
+        return known == RESTS and not meets_at_corner(state, a, b, d, slop_of(state, a, b))
     pairs.looked += 1
     depth, normal, far = deepest(state, dt, a, b, d)
     if depth < -margin:
