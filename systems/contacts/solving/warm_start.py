@@ -75,16 +75,18 @@ def match_warm_start(state, dt):
         find_rows(state)
     r = 0
     for m in range(memory.counts[now]):
-        one, other = memory.entity_a[now, m], memory.entity_b[now, m]
+        first, second, same = memory.first[now, m], memory.second[now, m], False
         while r < solver.contacts:
             c = pairs.resting[r]
-            a, b = entity[pairs.a[c]], entity[pairs.b[c]]
-            if a > one or (a == one and b >= other):
+            same = pairs.a[c] == first and pairs.b[c] == second
+            if same or entity[pairs.a[c]] > memory.entity_a[now, m]:
+                break
+            if entity[pairs.a[c]] == memory.entity_a[now, m] and entity[pairs.b[c]] > memory.entity_b[now, m]:
                 break
             r += 1
-        c = pairs.resting[r] if r < solver.contacts else 0
-        if r < solver.contacts and entity[pairs.a[c]] == one and entity[pairs.b[c]] == other:
+        if same:
             k = solver.slot[r]
+            r += 1
             n = solver.normal[k]
             if dot(memory.normal[now, m], n) > TURNED:
                 pull = memory.tangent[now, m]
@@ -92,7 +94,7 @@ def match_warm_start(state, dt):
                 solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
                 continue
         for side in range(2):
-            i = memory.first[now, m] if side == 0 else memory.second[now, m]
+            i = first if side == 0 else second
             if i >= 0 and bodies.place[i] >= 0:
                 solver.unsettled[bodies.place[i]] = True
                 solver.any_unsettled = True
