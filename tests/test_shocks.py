@@ -61,8 +61,6 @@ def test_a_pile_at_rest_has_no_shocks():
     with scenes.pile2d.build(n=100) as world:
         for _ in range(500):
             world.step()
-        pairs = world.physics.state.pairs
-        assert pairs.looked < pairs.count - pairs.resting_count + 10  # those that rest need no second look
         assert [visits_in_the_step(world) for _ in range(20)] == [0] * 20
         assert world.physics.state.solver.visits <= (PASSES + 4) * world.physics.state.solver.contacts
 

@@ -35,6 +35,19 @@ def test_looks_of_a_slow_gas():
         assert state.looks_counted < 4 * state.impacts_counted
 
 
+@pytest.mark.parametrize("scene", ["pile2d", "pile3d"])
+def test_a_pile_at_rest_is_known_by_its_flight(scene):
+    """Neither pairs that rest nor those that stay apart are evaluated once more where the resting prediction leads."""
+    with scenes.get(scene).build(n=200) as world:
+        for _ in range(200):
+            world.step()
+        pairs = world.physics.state.pairs
+        apart = pairs.count - pairs.resting_count
+        assert pairs.resting_count > 400
+        assert apart > (10 if scene == "pile2d" else 300)
+        assert pairs.looked < 10
+
+
 def columns_of(*records):
     """Where the columns of some records stand in memory."""
     return {
