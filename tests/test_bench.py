@@ -201,6 +201,9 @@ def test_scaling_grows_from_the_first_size():
     assert series.points[0].growth == 1.0
     assert series.points[1].growth == pytest.approx(series.grown(10, 40))
     assert series.grown(10, 50) is None
+    for point in series.points:
+        assert 0.0 < point.set_up.low <= point.set_up.high
+        assert point.memory > 100.0  # position, velocity, mass, radius and where it was are that much alone
     assert bench_scaling.Scaling.from_dict(json.loads(json.dumps(series.as_dict()))) == series
     assert len(bench_scaling.table(series).rows) == 2
 
