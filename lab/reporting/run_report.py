@@ -42,8 +42,8 @@ def fault_lines(faults: list[str]) -> list[str]:
     lines = []
     for what, entities in list(kinds.items())[:FAULTS_SHOWN]:
         more = f" and {len(entities) - FAULTS_SHOWN:,} more" * (len(entities) > FAULTS_SHOWN)
-        word = "entity" if len(entities) == 1 else "entities"
-        lines.append(f"{word} {', '.join(entities[:FAULTS_SHOWN])}{more}: {what}" if entities else what)
+        word, each = ("entity", "") if len(entities) == 1 else ("entities", ", each")
+        lines.append(f"{word} {', '.join(entities[:FAULTS_SHOWN])}{more}{each}: {what}" if entities else what)
     others = len(kinds) - len(lines)
     return [*lines, f"and {counted(others, 'other fault')}"] if others else lines
 
