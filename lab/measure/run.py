@@ -18,6 +18,7 @@ from ...components import AABBCollider, SphereCollider
 from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
+from ..plain import jsonable
 from .body_shapes import dimensions_of, sensor_entities
 from .escape import Enclosure
 from .impacts import PathImpact, path_impacts, with_corners
@@ -80,7 +81,7 @@ class RunReport:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dicts, lists and numbers for json.dumps; non-finite numbers become None."""
-        return _jsonable(dataclasses.asdict(self))
+        return jsonable(self)
 
 
 @dataclass
@@ -394,12 +395,3 @@ def _restitutions(bodies: Any) -> NDArray[np.float64]:
 
 def _kernels() -> tuple[int, int]:
     return len(log.compiled), log.loaded
-
-
-def _jsonable(value: Any) -> Any:
-    """None instead of numbers that JSON cannot represent: infinity and NaN."""
-    if isinstance(value, dict):
-        return {key: _jsonable(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_jsonable(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
