@@ -193,23 +193,27 @@ def timing() -> bool:
     return _timing is not None
 
 
-def announce(dispatcher: Any) -> None:
-    """Say that a kernel is about to compile."""
+def announcement() -> str:
+    """What is said once of a process that compiles: where the kernels are kept."""
     from .jit.cache import CACHE_FOLDER_VARIABLE, cache_folder
 
+    log.announced = True
+    folder = cache_folder()
+    if folder is not None:
+        return (
+            f"carom: compiling kernels that are not in {folder} yet; this takes some seconds, once: later runs load "
+            "them (carom warm-up compiles ahead)"
+        )
+    return (
+        "carom: compiling kernels, which takes some seconds in every run: there is no folder that can be written to "
+        f"keep them ({CACHE_FOLDER_VARIABLE} names one)"
+    )
+
+
+def announce(dispatcher: Any) -> None:
+    """Say that a kernel is about to compile."""
     for listener in log.listeners:
         listener(dispatcher.py_func.__qualname__)
     if not log.announced and not log.listeners:
-        log.announced = True
-        folder = cache_folder()
-        if folder is not None:
-            logger.warning(
-                "carom: compiling kernels that are not in %s yet; this takes some seconds, once: later runs load them "
-                "(carom warm-up compiles ahead)", folder
-            )  # fmt: skip
-        else:
-            logger.warning(
-                "carom: compiling kernels, which takes some seconds in every run: there is no folder that can be "
-                "written to keep them (%s names one)", CACHE_FOLDER_VARIABLE
-            )  # fmt: skip
+        logger.warning(announcement())
     logger.info("compiling %s (%d so far, %.1f s)", dispatcher.py_func.__name__, len(log.compiled), log.seconds)

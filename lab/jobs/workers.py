@@ -24,9 +24,11 @@ from concurrent.futures import (
 )
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.synchronize import Semaphore
 from types import ModuleType
 from typing import Any, TypeVar
 
+from ...framework.compilation import log
 from ..cli.usage_errors import Problem, one_line
 
 Task = TypeVar("Task")
@@ -61,9 +63,11 @@ def available_cores() -> int:
 
 
 def process_pool(workers: int) -> Executor:
-    """Processes that import what they need, say nothing on stdout and end with this one."""
+    """Processes that import what they need, say nothing on stdout and end with this one. Of all that compile only the
+    first says so."""
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin)
+    announcing = context.Semaphore(0 if log.announced else 1)
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(announcing,))
 
 
 class Pool:
@@ -213,8 +217,9 @@ def run_message(message: bytes, folder: str | None = None) -> Any:
     return function(task)
 
 
-def _begin() -> None:
+def _begin(announcing: Semaphore) -> None:
     """In a worker, before its first task."""
+    log.announced = not announcing.acquire(block=False)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     os.dup2(2, 1)

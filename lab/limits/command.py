@@ -18,6 +18,7 @@ from ..cases.subjects import load_once
 from ..cli.loading import Loaded, stdout_kept_clean
 from ..cli.options import above_zero, budget_option, traceback_option, world_options
 from ..cli.usage_errors import Problem
+from ..plain import jsonable
 from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
 from ..wording import number
@@ -126,10 +127,10 @@ def _show(name: str, found: list[tuple[float, StepLimits]], outcome: StepOutcome
     if as_json:
         shortest: dict[str, Any] = {"time": at, **tightest.as_dict()}
         plain = {
-            "scene": name, "suggested": dt if math.isfinite(dt) else None, "outcome": outcome.as_dict(),
+            "scene": name, "suggested": dt, "outcome": outcome.as_dict(),
             "start": start.as_dict(), "tightest": shortest,
         }  # fmt: skip
-        click.echo(json.dumps(plain, indent=2))
+        click.echo(json.dumps(jsonable(plain), indent=2))
         return
     for line in [f"{name}: {_suggestion(dt, start.dt, tightest, outcome)}", *outcome.sentences()]:
         click.echo(line)

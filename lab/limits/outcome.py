@@ -11,7 +11,7 @@ from ..cases.case import case_of
 from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
 from ..measure.effects import SHARE, in_words, names_told, noticed
-from ..plain import Plain
+from ..plain import Plain, jsonable
 from ..reporting.progress import Progress
 from ..trading.answer import more_budget, rough_text
 from ..trading.records import CaseTrade, Point, known_well
@@ -57,7 +57,7 @@ class StepOutcome(Plain):
 
     def as_dict(self) -> dict[str, object]:
         """For JSON, which has no infinity."""
-        return {name: None if value == math.inf else value for name, value in super().as_dict().items()}
+        return jsonable(super().as_dict())
 
     def sentences(self) -> list[str]:
         """For a person."""

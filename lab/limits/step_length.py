@@ -7,7 +7,7 @@ world.settings = world.settings.replace(dt=min(1 / 60, suggest_dt(world)))
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from ...components import Collider
 from ...framework import CaromError, NoPhysicsError, World
 from ...systems import Integrator
+from ..plain import jsonable
 from .stability import growth_of_system, stability_limits
 from .stiffness import Modes, modes_of, unmeasured
 
@@ -137,7 +138,7 @@ class StepLimits:
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which has no infinity: None means no limit."""
         numbers = {name: getattr(self, name) for name in ("stability", "tunnelling", "suggested")}
-        return {**asdict(self), **{name: None if v == math.inf else v for name, v in numbers.items()}}
+        return jsonable({**vars(self), **numbers})
 
 
 def suggest_dt(world: World) -> float:

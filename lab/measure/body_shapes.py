@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...components import AABBCollider, RigidBody, SphereCollider, Transform
 from ...framework import World
+from ...systems.shapes.rotation import axes_of
 
 Floats = NDArray[np.float64]
 
@@ -111,32 +112,15 @@ def sensor_entities(world: World) -> NDArray[np.int64]:
     return np.asarray(bodies.entity)[found]
 
 
-def rotation_matrix(rotation: object, dimensions: int) -> Floats:
-    """(d, d): from an angle in 2D, from a unit quaternion (w, x, y, z) in 3D."""
-    if dimensions == 2:
-        angle = float(np.asarray(rotation).reshape(-1)[0])
-        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    w, x, y, z = np.asarray(rotation, float)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def _is_unrotated(rotation: object) -> bool:
-    values = np.asarray(rotation, float).reshape(-1)
-    return not values.any() if len(values) == 1 else not values[1:].any()
-
-
 def _turned(rotation: object, offset: object, dimensions: int) -> Floats:
     vector = np.broadcast_to(np.asarray(offset, float), (dimensions,))
-    return vector if not vector.any() or _is_unrotated(rotation) else rotation_matrix(rotation, dimensions) @ vector
+    return _axes(rotation, dimensions) @ vector if vector.any() else vector
 
 
 def _stretched(rotation: object, half_extents: object, dimensions: int) -> Floats:
     """The half extents of the axis-aligned box that encloses the turned box."""
-    half = np.broadcast_to(np.asarray(half_extents, float), (dimensions,))
-    return half if _is_unrotated(rotation) else np.abs(rotation_matrix(rotation, dimensions)) @ half
+    return np.abs(_axes(rotation, dimensions)) @ np.broadcast_to(np.asarray(half_extents, float), (dimensions,))
+
+
+def _axes(rotation: object, dimensions: int) -> Floats:
+    return axes_of(np.asarray(rotation, float).reshape((1,) if dimensions == 2 else (1, 4)), dimensions)[0]

@@ -18,7 +18,7 @@ from ...components import AABBCollider, SphereCollider
 from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
-from ..reporting.profile import profile_of
+from ..plain import jsonable
 from .body_shapes import dimensions_of, sensor_entities
 from .escape import Enclosure
 from .impacts import PathImpact, path_impacts, with_corners
@@ -65,7 +65,7 @@ class RunReport:
     step_milliseconds: float = math.nan  # median of the steps that compiled nothing; NaN if there were none
     step_milliseconds_mean: float = math.nan
     system_milliseconds: dict[str, float] = field(default_factory=dict)  # mean per step, without compilation
-    profile: dict[str, Any] | None = None  # see profile_of; None unless requested
+    profile: dict[str, Any] | None = None  # by system and kernel; None unless requested
     energy: Drift | None = None
     energy_changes: list[str] = field(default_factory=list)  # what has changed it, besides the integrator
     momentum: Drift | None = None
@@ -81,7 +81,7 @@ class RunReport:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain dicts, lists and numbers for json.dumps; non-finite numbers become None."""
-        return _jsonable(dataclasses.asdict(self))
+        return jsonable(self)
 
 
 @dataclass
@@ -166,11 +166,12 @@ class Recorder:
 
 @dataclass
 class Run:
-    """A finished run: the report, the paths, and the world in its final state."""
+    """A finished run: the report, the paths, the world in its final state, and the profile if one was requested."""
 
     report: RunReport
     traces: Traces
     world: World
+    profile: Stats | None = None
 
 
 class Meter:
@@ -364,9 +365,15 @@ def run(
     report.wall_seconds = time.perf_counter() - started
     report.kernels_compiled, report.kernels_loaded = _kernels()[0] - compiled, _kernels()[1] - loaded
     meter.fill(report)
-    if profile:
-        report.profile = profile_of(meter.stats(), report.step_milliseconds_mean, meter.compile_seconds)
-    return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world)
+    stats = meter.stats() if profile else None
+    report.profile = None if stats is None else _plain_profile(stats)
+    return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world, stats)
+
+
+def _plain_profile(stats: Stats) -> dict[str, Any]:
+    """What ``stats`` knows of systems and kernels, as values of JSON."""
+    kernels = [dataclasses.asdict(row) for row in stats.kernels]
+    return {"steps": stats.steps, "nanoseconds": stats.nanoseconds, "kernels": kernels}
 
 
 def plain_settings(world: World) -> dict[str, Any]:
@@ -388,12 +395,3 @@ def _restitutions(bodies: Any) -> NDArray[np.float64]:
 
 def _kernels() -> tuple[int, int]:
     return len(log.compiled), log.loaded
-
-
-def _jsonable(value: Any) -> Any:
-    """None instead of numbers that JSON cannot represent: infinity and NaN."""
-    if isinstance(value, dict):
-        return {key: _jsonable(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_jsonable(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -69,8 +69,7 @@ def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str],
 
 def _attempt(subject: Subject, progress: Callable[[str], None], check: Callable[[Subject], None]) -> None:
     """Run a check; convert any exception of plugin code to a finding."""
-    where = f"{subject.kind} {subject.name}{f', {subject.dimensions}D' if subject.dimensions else ''}"
-    progress(where)
+    progress(subject.place)
     try:
         check(subject)
     except errors.NumbaError as error:

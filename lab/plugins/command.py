@@ -13,6 +13,7 @@ from ..cli.group import Commands
 from ..cli.loading import stdout_kept_clean
 from ..cli.options import traceback_option
 from ..reporting.progress import Bar
+from ..wording import counted
 from .check import check_plugin
 from .findings import Report, Subject
 from .installed import needed_by, plugins_of
@@ -89,16 +90,14 @@ def _print(report: Report, console: Console) -> None:
         for finding in subject.findings:
             number += 1
             share = f" ({finding.share})" if finding.share else ""
-            place = f"{subject.kind} {subject.name}{f', {subject.dimensions}D' if subject.dimensions else ''}"
-            title = f"{number}. {place}{share}: {finding.what}"
+            title = f"{number}. {subject.place}{share}: {finding.what}"
             for line in (title, f"   for {finding.example}", f"   cure: {finding.cure}"):
                 console.print(line, markup=False, highlight=False, soft_wrap=True)
-    count = report.findings
-    said = "nothing found" if not count else f"{count} finding{'s' if count > 1 else ''}"
+    said = counted(report.findings, "finding") if report.findings else "nothing found"
     console.print(f"plugin {report.plugin}: {said}", markup=False, highlight=False)
 
 
 def _result(subject: Subject) -> str:
-    count = len(subject.findings)
-    result = f"{count} finding{'s' if count > 1 else ''}" if count else "ok" if subject.inputs else ""
+    found = subject.findings
+    result = counted(len(found), "finding") if found else "ok" if subject.inputs else ""
     return "; ".join(part for part in (result, subject.note) if part)

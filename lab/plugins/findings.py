@@ -32,6 +32,10 @@ class Subject:
     findings: list[Finding] = field(default_factory=list)
     note: str = ""
 
+    @property
+    def place(self) -> str:
+        return f"{self.kind} {self.name}" + (f", {self.dimensions}D" if self.dimensions else "")
+
     def found(self, bad: np.ndarray, what: Any, example: Any, cure: str) -> bool:
         """Record a finding where ``bad`` (n,) is true; ``what`` and ``example`` describe the first such row."""
         at = np.flatnonzero(bad)

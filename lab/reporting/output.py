@@ -20,12 +20,10 @@ from .text_tables import TextTable
 
 @dataclass(frozen=True)
 class Output:
-    """``charts``: the module that draws, or None."""
+    """What a command prints, and for whom."""
 
     as_json: bool
     as_markdown: bool
-    out: Path | None
-    charts: Any
 
     @property
     def plain(self) -> bool:
@@ -33,15 +31,11 @@ class Output:
         return not self.as_json and not self.as_markdown
 
     @staticmethod
-    def checked(as_json: bool, as_markdown: bool, out: Path | None = None, charts: str = "bench.charts") -> Output:
-        """Problem for impossible options, raised before the long run. charts: the lab's module that draws."""
+    def checked(as_json: bool, as_markdown: bool) -> Output:
+        """Problem for options that exclude each other, raised before the long run."""
         if as_json and as_markdown:
             raise Problem("--json and --markdown exclude each other")
-        if out is None:
-            return Output(as_json, as_markdown, out, None)
-        module = drawing_module(charts, "--out:", "bench")
-        writable_folder(out)
-        return Output(as_json, as_markdown, out, module)
+        return Output(as_json, as_markdown)
 
     def as_it_comes(self, answer: Callable[[Any], list[str]]) -> Callable[[Any], None]:
         """Prints what is known so far, with the seconds that it took, for a person; nothing for others."""
@@ -67,17 +61,20 @@ class Output:
             for remark in remarks:
                 console.print(remark, style="dim", highlight=False)
 
-    def draw(self, function: str, result: Any) -> None:
-        """Draw the chart if requested, and print its path."""
-        if self.charts is None:
-            return
-        picture = getattr(self.charts, function)(result, self.out)
-        click.echo(f"chart: {picture}" if picture is not None else "no chart: nothing is compared", err=True)
-
 
 def as_markdown(tables: list[TextTable], remarks: list[str]) -> str:
     """The tables, then the remarks, as Markdown."""
     return "\n\n".join([*(table.markdown() for table in tables), *remarks])
+
+
+def drawing_into(out: Path | None, charts: str) -> Any:
+    """The lab's module that draws charts into that folder, None for no folder; Problem, before the long run, if that
+    cannot be."""
+    if out is None:
+        return None
+    module = drawing_module(charts, "--out:", "bench")
+    writable_folder(out)
+    return module
 
 
 def drawing_module(name: str, what: str, extra: str = "plot") -> Any:

@@ -9,8 +9,7 @@ from typing import Self
 import rich.progress
 from rich.console import Console
 
-from ...framework.compilation import log
-from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_folder
+from ...framework.compilation import announcement, log
 
 REFRESH = 0.1  # s between two drawings of the bar
 LINES = 5.0  # s between two lines where there is no terminal
@@ -62,7 +61,6 @@ class Bar(Progress):
         self._total: float | None = None
         self._what = ""
         self._shown = time.monotonic()
-        self._told_of_cache = False
 
     def __enter__(self) -> Self:
         log.listeners.append(self._compiles)
@@ -115,13 +113,8 @@ class Bar(Progress):
         self._console.print(text, style="dim", highlight=False, markup=False, soft_wrap=True)
 
     def _compiles(self, kernel: str) -> None:
-        if not self._told_of_cache:
-            self._told_of_cache = True
-            folder = cache_folder()
-            place = f"kept in {folder} for next time"
-            if folder is None:
-                place = f"not kept: there is no folder that can be written ({CACHE_FOLDER_VARIABLE} names one)"
-            self._line(f"first use: kernels are compiled, and {place}")
+        if not log.announced:
+            self._line(announcement())
         left = f" ({log.left} left)" if log.left else ""
         text = f"{self._what}: compiling {kernel.rpartition('.')[2]}{left} ..."
         self._bar.update(self._task, description=text)

@@ -10,23 +10,22 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ...framework.schedule.profile_report import Stats
 from ..measure.run import Drift, RunReport
 from ..wording import counted, number
-from .profile import milliseconds, profile_table
 
 GOOD, WARNING = "green", "bold yellow"
 FAULTS_SHOWN = 3
 AT_REST = 1e-2  # of the energy: a smaller kinetic energy is no scale for a drift
 
 
-def print_report(report: RunReport, console: Console) -> None:
-    """Print the tables: settings, cost by system, and accuracy."""
+def print_report(report: RunReport, console: Console, profile: Stats | None = None) -> None:
+    """Print the tables: settings, cost by system, the profile by kernel if there is one, and accuracy."""
     console.print()
     console.print(summary(report))
-    if report.profile is None:
-        console.print(cost(report))
-    else:
-        console.print(profile_table(report.profile, report.step_milliseconds_mean))
+    console.print(cost(report))
+    if profile is not None:
+        console.print(f"{profile}\n", highlight=False, markup=False, soft_wrap=True)
         console.print(f"not in it: {report.compile_seconds:.3g} s for the steps that compiled or loaded kernels\n")
     console.print(quality(report))
     for line in fault_lines(report.faults):
@@ -42,8 +41,8 @@ def fault_lines(faults: list[str]) -> list[str]:
     lines = []
     for what, entities in list(kinds.items())[:FAULTS_SHOWN]:
         more = f" and {len(entities) - FAULTS_SHOWN:,} more" * (len(entities) > FAULTS_SHOWN)
-        word = "entity" if len(entities) == 1 else "entities"
-        lines.append(f"{word} {', '.join(entities[:FAULTS_SHOWN])}{more}: {what}" if entities else what)
+        word, each = ("entity", "") if len(entities) == 1 else ("entities", ", each")
+        lines.append(f"{word} {', '.join(entities[:FAULTS_SHOWN])}{more}{each}: {what}" if entities else what)
     others = len(kinds) - len(lines)
     return [*lines, f"and {counted(others, 'other fault')}"] if others else lines
 
@@ -64,6 +63,11 @@ def summary(report: RunReport) -> Text:
         text.append(f" ({report.compile_seconds:.3g} s of it loading {counted(report.kernels_loaded, 'kernel')})")
     text.append(f"\n{', '.join(f'{name} {value}' for name, value in choice.items())}, seed {report.seed}\n")
     return text
+
+
+def milliseconds(value: float) -> str:
+    """A dash for a value that was not measured, because every step compiled or loaded kernels."""
+    return f"{max(value, 0.0):.4f}" if math.isfinite(value) else "-"
 
 
 def cost(report: RunReport) -> Table:

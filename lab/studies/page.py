@@ -11,10 +11,10 @@ from typing import Any, Self
 
 import click
 
+from ..cli.options import Option, together
 from ..cli.options import shown_options as printed_options
-from ..cli.options import together
 from ..cli.usage_errors import Problem
-from ..reporting.output import Output, as_markdown
+from ..reporting.output import Output, as_markdown, drawing_into
 from ..reporting.text_tables import TextTable
 
 shown_options = together(
@@ -26,22 +26,36 @@ shown_options = together(
 )  # fmt: skip
 
 
+def repeats_option(default: int, help_text: str) -> Option:
+    """``--repeats N``, from 1."""
+    return click.option(
+        "--repeats", type=click.IntRange(min=1), metavar="N", default=default, show_default=True, help=help_text
+    )
+
+
 @dataclass(frozen=True)
 class PageOutput(Output):
-    """Output that also goes into a page, between the marks of that name."""
+    """Output that also goes into a page, between the marks of that name, and into a chart.
+
+    charts
+        the module that draws into the folder ``out``, or None
+    """
 
     mark: str = ""
     into: Path | None = None
+    out: Path | None = None
+    charts: Any = None
 
     @classmethod
     def of(
         cls, mark: str, as_json: bool, as_markdown: bool, into: Path | None, out: Path | None = None,
-        charts: str = "bench.charts",
+        charts: str = "",
     ) -> Self:  # fmt: skip
         """Problem for impossible options and a page without the marks, raised before the long run."""
         if into is not None:
             between_marks(into, mark)
-        return cls(**vars(Output.checked(as_json, as_markdown, out, charts)), mark=mark, into=into)
+        checked = Output.checked(as_json, as_markdown)
+        return cls(**vars(checked), mark=mark, into=into, out=out, charts=drawing_into(out, charts))
 
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
         """Print the result, and write the tables into the page."""
@@ -49,6 +63,11 @@ class PageOutput(Output):
         if self.into is not None:
             replace_between_marks(self.into, self.mark, as_markdown(tables, remarks))
             click.echo(f"tables: {self.into}", err=True)
+
+    def draw(self, function: str, result: Any) -> None:
+        """Draw the chart if requested, and print its path."""
+        if self.charts is not None:
+            click.echo(f"chart: {getattr(self.charts, function)(result, self.out)}", err=True)
 
 
 @click.command("page", context_settings={"ignore_unknown_options": True})

@@ -13,6 +13,7 @@ from .report import failures
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
 CLEARLY = 4.0  # times; start phases differ by less
+CHEAPER = 0.9  # of the cost: less is saved by nothing that is told of
 MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
 
@@ -35,7 +36,7 @@ def answer(case: CaseTrade) -> list[str]:
     lines.append(f"  error    {_error(case, chosen)}")
     lines.append(f"  noticed  {noticed_text(chosen)}")
     best = front(usable)
-    cheaper = [point for point in best if point is not now and price(point) < 0.9 * price(chosen)]
+    cheaper = [point for point in best if point is not now and price(point) < CHEAPER * price(chosen)]
     better = [
         point for point in best
         if point is not now and price(point) > price(chosen)
@@ -84,15 +85,15 @@ def price(point: Point) -> float:
 
 
 def clearly_worse(points: Sequence[Point]) -> set[Cell]:
-    """The settings of which something is noticed CLEARLY more than of others that cost no more: more runs of them would
-    change no answer."""
+    """The settings of which something is noticed CLEARLY more than of others that cost hardly more: more runs of them
+    would change no answer."""
 
     def harm(point: Point) -> float:
         return math.inf if point.failed else severity(point.effects)
 
     return {
         point.cell for point in points if harm(point) > 1.0 and any(
-            price(other) <= price(point) and CLEARLY * harm(other) <= harm(point)
+            CHEAPER * price(other) <= price(point) and CLEARLY * harm(other) <= harm(point)
             for other in points if not other.failed
         )
     }  # fmt: skip

@@ -233,7 +233,8 @@ class Study:
         """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""
         points = known_points(self.case.replace(repeats=1), self.cells, self.runs)
         best = front([point for point in points if not point.failed])
-        return {self.own, *(point.cell for point in best)}, clearly_worse(points) - {self.own}
+        worse = clearly_worse(points) - {self.own}
+        return {self.own, *(point.cell for point in best)} - worse, worse
 
     def _nearest(self) -> tuple[Cell, ...]:
         """The scene's own settings, and with twice and half the step: known before there is a reference."""

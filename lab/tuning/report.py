@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..plain import jsonable
 from ..reporting.text_tables import TextTable
 from ..trading.answer import cost_text, noticed_text
 from ..trading.code_line import settings_line
@@ -34,39 +34,24 @@ class TuneResult:
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which cannot represent infinity: the error of a failed run is null."""
         tuning, found = self.tuning, self.tuning.choice is not None
-        told = ("scene", "norm", "text", "target", "scale", "seconds", "repeats", "repeated", "methods")
-        checked = ("scene", "norm", "promise", "scale", "seconds", "tolerated", "refused")
-        return {
+        told = (
+            "scene", "norm", "text", "target", "scale", "seconds", "repeats", "repeated", "methods", "reference",
+            "error", "choice", "runner_up", "trials",
+        )  # fmt: skip
+        checked = (
+            "scene", "norm", "promise", "scale", "seconds", "tolerated", "refused", "reference", "point", "error",
+            "times",
+        )  # fmt: skip
+        return jsonable({
             "command": self.command,
             **{name: getattr(tuning, name) for name in told},
-            "reference": dataclasses.asdict(tuning.reference),
-            "settings": dataclasses.asdict(tuning.settings) if found else None,
+            "settings": tuning.settings if found else None,
             "line": tuning.line if found else None,
             "why_not": "" if found else tuning.why_not,
-            "error": _finite(tuning.error),
-            "margin": _finite(tuning.margin) if found else None,
-            "choice": _plain(tuning.choice),
-            "runner_up": _plain(tuning.runner_up),
-            "balanced": _plain(self.balanced),
-            "trials": [{**dataclasses.asdict(trial), "error": _finite(trial.error)} for trial in tuning.trials],
-            "checks": [
-                {
-                    **{name: getattr(check, name) for name in checked},
-                    "reference": dataclasses.asdict(check.reference),
-                    "point": _plain(check.point),
-                    **{name: _finite(getattr(check, name)) for name in ("error", "times")},
-                }
-                for check in self.checks
-            ],
-        }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _plain(point: Point | None) -> dict[str, Any] | None:
-    return None if point is None else dataclasses.asdict(point)
+            "margin": tuning.margin if found else None,
+            "balanced": self.balanced,
+            "checks": [{name: getattr(check, name) for name in checked} for check in self.checks],
+        })  # fmt: skip
 
 
 # -- the answer ---------------------------------------------------------------------------------------------------

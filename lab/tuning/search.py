@@ -42,6 +42,7 @@ FINE = (1.5, 1.25, 1.75)  # factors of the step that holds: the first, then the 
 ROUNDING = 1e-9  # of a step
 SMALLEST = 1e-13  # of the scale: accuracy limit of own runs, ten times the rounding of some hundred steps
 FAR_DEARER = 4.0  # times the choice's work: limit of the search for a runner-up
+PARTS = (1 / 64, 1 / 8, 1)  # of all repeats, one after the other: what has missed the target in one runs no further
 STUCK = 3  # smaller steps in a row without improvement: the error does not depend on the step
 
 
@@ -326,14 +327,26 @@ class _Search:
         return self.looks[cell]
 
     def _hold(self, cell: Cell) -> Point | None:
-        """The point over all repeats if it meets the target, including the reference's own error."""
-        (point,) = points_of(self.case, [cell], self.runs, f"{_words(self.case, cell)}, all repeats")
-        self.whole[cell] = point
+        """The point over all repeats if it meets the target, including the reference's own error; the repeats go on
+        only while it can."""
+        for part in PARTS:
+            case = self.case.replace(repeats=math.ceil(self.case.repeats * part))
+            (point,) = points_of(case, [cell], self.runs, f"{_words(case, cell)}, {case.repeats_text}")
+            self.whole[cell] = point
+            if self._cannot_hold(point):
+                break
         error = self._worst(cell)
         met = error <= self.target
-        if self.case.repeats > 1 or cell not in self.looks:  # otherwise the single run is already recorded
+        if point.repeats > 1 or cell not in self.looks:  # otherwise the single run is already recorded
             self.trials.append(Trial(cell, error, point.work, point.repeats, met, ", ".join(point.failures)))
         return point if met else None
+
+    def _cannot_hold(self, point: Point) -> bool:
+        """True if more repeats cannot make it hold: one has missed the target, or of a statistic the mean of all, by
+        more than chance."""
+        if point.failed or not self.noise:
+            return self._worst(point.cell) > self.target
+        return point.errors[self.norm.name].mean > self.target + 3 * self.noise / math.sqrt(point.repeats)
 
     def _worst(self, cell: Cell) -> float:
         point = self.whole[cell]

@@ -8,9 +8,9 @@ import click
 from rich.console import Console
 
 from ...cli.loading import load
-from ...cli.options import listed, out_option, repeats_option, whole_number
+from ...cli.options import listed, out_option, whole_number
 from ...reporting.progress import Bar
-from ..page import PageOutput, shown_options
+from ..page import PageOutput, repeats_option, shown_options
 from . import collision_modes as bench_modes
 from . import feature_ladder as bench_ladder
 from . import plugin_pairs as bench_pairs

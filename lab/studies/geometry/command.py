@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import out_option, repeats_option
+from ...cli.options import out_option
 from ...reporting.progress import Bar
-from ..page import PageOutput, shown_options
+from ..page import PageOutput, repeats_option, shown_options
 from . import report as geometry_report
 from .study import COUNT, REPEATS, geometry_study
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import json
 from pathlib import Path
 
@@ -78,14 +77,13 @@ def limits_command(
         _cross(wanted, seed, workers, output)
         return
     _refuse({"--seed": seed != 0}, "needs --pairs")
-    _sweep(names, quick, long_runs, PageOutput.of(MARK, as_json, as_markdown, into, out))
+    output = PageOutput.of(MARK, as_json, as_markdown, into, out, "studies.limits.chart")
+    _sweep(names, quick, long_runs, output)
 
 
 def _sweep(names: tuple[str, ...] | None, quick: bool, long_runs: bool, output: PageOutput) -> None:
     if quick and long_runs:
         raise Problem("--quick and --long exclude each other")
-    if output.charts is not None:
-        output = dataclasses.replace(output, charts=importlib.import_module(".chart", __package__))
     with Bar(Console(stderr=True)) as bar:
         result = limits(names, progress=bar, quick=quick, long=long_runs)
     output.show(result, limits_report.tables(result), limits_report.remarks(result))

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from ...cli.options import repeats_option, traceback_option
+from ...cli.options import traceback_option
 from ...cli.usage_errors import Problem
 from ...reporting.progress import Bar
-from ..page import PageOutput, shown_options
+from ..page import PageOutput, repeats_option, shown_options
 from .games import games_study, of_names
 from .records import GamesStudy, SettingsStudy
 from .report import game_remarks, game_tables, remarks, tables

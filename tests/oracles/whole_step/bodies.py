@@ -9,7 +9,9 @@ import numpy as np
 
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.lab.measure.body_shapes import Floats, rotation_matrix
+from carom.lab.measure.body_shapes import Floats
+
+from ..narrow_naive import rotation_matrix
 
 FLAT = 0.005  # default slop, as a fraction of the smaller body's size
 NEIGHBOURS = 0.1  # of the smallest half extent: enlargement of the boxes around the motion
