@@ -98,7 +98,7 @@ def test_lengths():
 def test_what_is_clearly_worse_at_hardly_less_cost_is_not_run_again():
     points = [
         point(1 / 30, 10.0, place=0.005), point(1 / 60, 20.0, place=0.04), point(1 / 90, 20.0, place=0.06),
-        point(1 / 20, 8.5, place=5.0), point(1 / 25, 9.5, place=5.0),
+        point(1 / 20, 7.5, place=5.0), point(1 / 25, 9.5, place=5.0),
         dataclasses.replace(point(1 / 120, 30.0), failures={"tunnelled": 1}),
         dataclasses.replace(point(1 / 15, 4.0), failures={"tunnelled": 1}),
     ]  # fmt: skip

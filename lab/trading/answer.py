@@ -13,9 +13,9 @@ from .report import failures
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
 CLEARLY = 4.0  # times; start phases differ by less
-CHEAPER = 0.9  # of the cost: less is saved by nothing that is told of
 MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: no reason to change settings
+CHEAPER = 1 / HARDLY
 
 
 def answer(case: CaseTrade) -> list[str]:
