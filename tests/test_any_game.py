@@ -442,8 +442,8 @@ def play_for(steps):
 
 
 @pytest.mark.slow
-def test_games_of_ten_thousand_steps():
-    play_for(10_000)
+def test_games_of_some_thousand_steps():
+    play_for(6_000)
 
 
 @pytest.mark.long

@@ -83,14 +83,14 @@ def test_nothing_is_performed_twice_when_it_goes_on(ball, whole, performed, tmp_
 
 def test_what_is_clearly_worse_in_its_first_run_is_not_repeated():
     """Explicit Euler with 1/60 s costs more than velocity Verlet with 1/30 s; with 1/30 s it is the cheapest of all."""
-    plan = {"only": Only(("explicit_euler", "velocity_verlet"), ("continuous",)), "repeats": 8}
+    plan = {"only": Only(("explicit_euler", "velocity_verlet"), ("continuous",)), "repeats": 4}
 
     def repeats(**budget):
         (case,) = measured("spring", **plan, **budget).cases
         return {(point.cell.integrator, round(1 / point.cell.dt)): point.repeats for point in case.points}
 
     cut = {("explicit_euler", 60): 1}
-    every = {(name, steps): 8 for name in ("explicit_euler", "velocity_verlet") for steps in (30, 60)}
+    every = {(name, steps): 4 for name in ("explicit_euler", "velocity_verlet") for steps in (30, 60)}
     assert repeats(budget=600.0) == every | cut
     assert repeats() == every
 

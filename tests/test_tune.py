@@ -83,11 +83,11 @@ def test_what_misses_in_one_run_is_run_no_further(monkeypatch):
     """Only what holds has all repeats; the finer step that fails after it has been looked at once, too."""
     done = []
     monkeypatch.setattr(runs, "perform", lambda task: done.append(task) or perform(task))
-    found = search("spring", 1e-2, workers=1, steps=(1 / 15, 1 / 30), repeats=64)
+    found = search("spring", 1e-2, workers=1, steps=(1 / 15, 1 / 30), repeats=16)
     assert found.choice is not None
     ran = Counter(task.cell for task in done if not task.reference)
     assert ran == {trial.cell: trial.repeats for trial in sorted(found.trials, key=lambda trial: trial.repeats)}
-    assert {trial.repeats for trial in found.trials if trial.met and trial.repeats > 1} == {64}
+    assert {trial.repeats for trial in found.trials if trial.met and trial.repeats > 1} == {16}
     assert {trial.repeats for trial in found.trials if not trial.met} == {1}
 
 
