@@ -33,6 +33,8 @@ GRID = Schema(
     outside=ints("int32"),
 )
 
+MOST_SEEN = 8  # static bodies that a view remembers; what sees more looks into the grid in every step
+
 # What moving bodies remember of the static grid, see :mod:`.views`; one entry per moving body.
 VIEWS = Schema(
     "Views",
@@ -41,7 +43,7 @@ VIEWS = Schema(
     lower=vectors(),
     upper=vectors(),
     count=ints("int32"),  # static bodies in the view; -1: not known
-    seen=table("int32", 8),  # their rows
+    seen=table("int32", MOST_SEEN),  # their rows
 )
 
 # A loose quadtree or octree, see :mod:`.tree`. Columns named level_* have one row per level: level 0 is the finest, row

@@ -10,9 +10,9 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.vectors import item, replace, sub
 from .brute_force import boxes_overlap
+from .records import MOST_SEEN
 from .uniform_grid import FULL, look_inside
 
-MOST_SEEN = 8  # static bodies that a view remembers; what sees more looks into the grid in every step
 AHEAD = 8.0  # motions of this step by which a view reaches ahead, but no more than the length of the box
 AROUND = 0.125  # lengths of the box by which it does on all sides: what is turned aside, or hardly moves, stays inside
 
