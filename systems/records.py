@@ -83,6 +83,7 @@ BODIES = Schema(
     cluster_next=ints("int32"),
     cluster_tail=ints("int32"),
     cluster_inverse_mass=floats(),
+    cluster_holder=ints("int32"),  # row of the unmovable body that holds it; -1: none
     supported=flags(default=False),  # the resting prediction has changed its velocity
     support_change=vectors(),
     held=flags(default=False),  # a contact at rest has pushed it
@@ -255,6 +256,9 @@ IMPACTS = Schema(
     # what has happened in this step
     logged=integer(),
     capped=integer(),
+    rounds=integer(),  # of pairs for what is left of the step
+    halted=integer(),  # bodies that were stopped because these were too many,
+    halted_row=integer(),  # and the first of them
     crossings=integer(),
     log_pair=ints("int32"),
     log_time=floats(),

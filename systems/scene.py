@@ -40,7 +40,7 @@ COLLISIONS = (
 CURVES = ("path_second", "path_third")
 SWEEPS = (
     "search_margin", "search_lower", "search_upper", "caught", "last_impact", "cluster_root", "cluster_next",
-    "cluster_tail", "cluster_inverse_mass",
+    "cluster_tail", "cluster_inverse_mass", "cluster_holder",
 )  # fmt: skip
 HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems

@@ -87,6 +87,6 @@ def compare_contacts(state, dt):
             j += 1
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
-    faults = state.impacts.capped + state.solver.squeezed + state.hasty
+    faults = state.impacts.capped + state.impacts.halted + state.solver.squeezed + state.hasty
     state.news = ends + begins + state.impacts.logged + faults + (stays + contacts.stored if state.stay_wanted else 0)
     return OK

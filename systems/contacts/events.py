@@ -237,6 +237,13 @@ class ContactEvents(StagedSystem):
                 f"{entity}: stop earlier what squeezes them, or use masses that differ less",
                 kind="squeezed", entity=entity,
             )  # fmt: skip
+        if self._impacts.halted:
+            entity = int(bodies.entity[self._impacts.halted_row])
+            self.world.report_fault(
+                f"entity {entity}: so many impacts that the step would not end: {self._impacts.halted} bodies stood still "
+                f"for what was left of it; use smaller steps",
+                kind="halted", entity=entity,
+            )  # fmt: skip
         if self._impacts.capped:
             self.world.report_fault(
                 f"step {self.world.step_count}: {self._impacts.capped} impacts beyond {self._settings().impact_cap} "

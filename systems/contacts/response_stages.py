@@ -13,7 +13,7 @@ def begin_response(state, dt):
     near = pairs.found if state.moved else pairs.count  # in a step, what is near at its end is among those found
     unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
     state.response_idle = near == 0 and not unknown and memory.counts[memory.now] == 0
-    state.impacts_recorded, state.solver.squeezed = False, 0
+    state.impacts_recorded, state.solver.squeezed, state.impacts.halted = False, 0, 0
     if state.response_idle:
         return OK
     for c in range(pairs.count):

@@ -25,6 +25,7 @@ PASSES, LEAST_PASSES = 1000, 8  # over the impacts of a group
 WORK = 1 << 16  # impacts in all passes of a step: a heap of bodies that overlap is not worth more
 AGREED = 8e-16  # of the largest speed
 SAME = 2e-15  # of a sum of energies
+CANCELLED = 1e-6  # of what impulses would do if none worked against another: less is none
 ORTHOGONAL = 1e-12  # cosine of the angle between normals that have nothing to do with each other
 SHOT = 2.0  # times the fastest change of speed that its impacts ask for: a body that gains more is shot out
 
@@ -87,7 +88,7 @@ def is_affordable(impacts, count):
 
 @part
 def solve_group(state, count):
-    """Find the impulses of a group's impacts, into ``ahead``."""
+    """Find the impulses of a group's impacts, into ``ahead``; returns whether there are such."""
     impacts, pairs, inverse_mass = state.impacts, state.pairs, state.bodies.inverse_mass
     for g in range(count):
         m = impacts.group[g]
@@ -115,7 +116,7 @@ def solve_group(state, count):
         inertia = following
     for g in range(count):
         impacts.ahead[impacts.group[g]] = impacts.share[impacts.group[g]]
-    keep_energy(state, count)
+    return keep_energy(state, count)
 
 
 @part
@@ -136,9 +137,13 @@ def improve(state, count):
 @part
 def keep_energy(state, count):
     """Scale the impulses so that the group as a whole obeys its law, which they do but for rounding where the passes
-    were enough: then energy is right in any case."""
-    impacts, terms = state.impacts, state.impacts.terms
+    were enough: then energy is right in any case. False if no impulses can: those of what is squeezed between two that
+    cannot be moved cancel each other, however high they are."""
+    impacts, terms, size = state.impacts, state.impacts.terms, 0.0
     push_bodies(state, count, False)
+    for g in range(count):
+        m = impacts.group[g]
+        size += impacts.ahead[m] * impacts.ahead[m] / impacts.weight[m]
     for g in range(count):
         m = impacts.group[g]
         terms[g] = impacts.ahead[m] * impacts.event_change[impacts.member[m]]
@@ -146,10 +151,13 @@ def keep_energy(state, count):
     for g in range(count):
         terms[g] = impacts.ahead[impacts.group[g]] * gained_along(state, impacts.group[g])
     given = exact_sum(terms, count)
+    if not given > CANCELLED * size and size > 0.0:
+        return False
     if abs(wanted - given) > SAME * wanted:
         for g in range(count):
             impacts.ahead[impacts.group[g]] *= wanted / given
         push_bodies(state, count, False)
+    return True
 
 
 @part

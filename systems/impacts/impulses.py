@@ -87,8 +87,12 @@ def bounce(state, event, dt):
 
 @part
 def mean_rate(state, root, now):
-    """The velocity of a cluster's centre of mass, of its bodies that can be moved."""
+    """The velocity of a cluster's centre of mass, of its bodies that can be moved; one that is held moves as what holds
+    it: what strikes it must not gain from how fast it slides along that, as if it had no end of mass."""
     bodies, i, mass, total = state.bodies, root, 0.0, zero_of(state)
+    if bodies.inverse_mass[root] > 0.0 and bodies.cluster_inverse_mass[root] == 0.0:
+        holder = bodies.cluster_holder[root]
+        return rate_along(path_of(state, holder), now) if holder >= 0 else total
     rate = rate_along(path_of(state, root), now)
     while i >= 0:
         if bodies.inverse_mass[i] > 0.0:
@@ -134,7 +138,7 @@ def stick(state, event, dt):
     one_fixed, other_fixed = inverse_mass[pairs.a[c]] == 0.0, inverse_mass[pairs.b[c]] == 0.0
     if one_fixed or other_fixed:  # that is in no cluster: others touch it too
         held = b if one_fixed else a
-        lightness[held] = 0.0
+        lightness[held], bodies.cluster_holder[held] = 0.0, pairs.a[c] if one_fixed else pairs.b[c]
         return held
     join_clusters(bodies, a, b)
     return a
@@ -145,6 +149,8 @@ def join_clusters(bodies, a, b):
     """The cluster with root b becomes part of the one with root a."""
     lightness, following = bodies.cluster_inverse_mass, bodies.cluster_next
     heavy = lightness[a] == 0.0 or lightness[b] == 0.0
+    if lightness[a] > 0.0:
+        bodies.cluster_holder[a] = bodies.cluster_holder[b]
     lightness[a] = 0.0 if heavy else 1.0 / (1.0 / lightness[a] + 1.0 / lightness[b])
     following[bodies.cluster_tail[a]] = b
     bodies.cluster_tail[a] = bodies.cluster_tail[b]

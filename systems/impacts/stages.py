@@ -20,6 +20,8 @@ BLOCK = 256  # bodies that are looked at before one that bounces is enough
 FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
 AHEAD = 4  # looks between the request of a body's rows and their use
 
+MOST_ROUNDS = 1000  # of pairs for the rest of a step
+
 
 @part
 def any_restitution(state):
@@ -46,6 +48,7 @@ def begin_impacts(state, dt):
     """No impact has happened yet; the first search is among what may have met."""
     impacts, bodies, pairs = state.impacts, state.bodies, state.pairs
     impacts.logged = impacts.capped = impacts.crossings = impacts.group_visits = 0
+    impacts.rounds = impacts.halted = 0
     impacts.active = False
     if state.response_idle:
         return OK
@@ -72,6 +75,7 @@ def begin_clusters(state):
         bodies.caught[i] = 0
         bodies.last_impact[i], bodies.cluster_inverse_mass[i] = -1.0, bodies.inverse_mass[i]
         bodies.cluster_root[i], bodies.cluster_next[i], bodies.cluster_tail[i] = i, -1, i
+        bodies.cluster_holder[i] = -1
     impacts.clusters_version = state.version
 
 
@@ -210,6 +214,19 @@ def request_bodies(state, c):
         request(bodies.counted_impacts, i)
 
 
+@part
+def halt(state):
+    """Too many rounds: what impacts have sent elsewhere stays where it is until the step ends."""
+    impacts, bodies = state.impacts, state.bodies
+    for i in range(state.dynamic):
+        if bodies.inverse_mass[i] > 0.0 and 0 < bodies.impact_count[i] < STOPPED:
+            if impacts.halted == 0:
+                impacts.halted_row = i
+            impacts.halted += 1
+            stop(state, i, impacts.until)
+    impacts.until = math.inf
+
+
 def resolve_impacts(state, dt):
     """Bounce every pair that touches in its motion and approaches faster than the threshold."""
     impacts, pairs, far = state.impacts, state.pairs, state.count >= FAR
@@ -240,7 +257,10 @@ def resolve_impacts(state, dt):
             if code != OK:
                 return code
         elif impacts.sweeps and impacts.until < dt:
-            return REFRESH_PAIRS
+            impacts.rounds += 1
+            if impacts.rounds <= MOST_ROUNDS:
+                return REFRESH_PAIRS
+            halt(state)
         else:
             break
     state.impacts_counted += impacts.logged

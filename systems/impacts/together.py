@@ -190,7 +190,7 @@ def take_group(state, m, dt):
     count = find_group(state, m)
     solves = count > 1 and is_affordable(impacts, count)
     if solves:
-        solve_group(state, count)
+        solves = solve_group(state, count)
     elif count > 1:
         impacts.group_visits = WORK
     if solves and not (shoots(state, count) and not impacts.sweeps):
