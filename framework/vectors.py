@@ -264,10 +264,12 @@ def axes_at(axes, index, like):
 
 @inlined
 def length(a):
-    """Euclidean length; neither overflows above 1e154 nor loses digits below 1e-154."""
+    """Euclidean length; neither overflows above 1e154 nor loses digits below 1e-154; nan of nan."""
     square = dot(a, a)
     if 1e-280 < square < 1e280:
         return math.sqrt(square)
+    if math.isnan(square):  # which max passes over
+        return square
     largest = 0.0
     for k in range(len(a)):
         largest = max(largest, abs(item(a, k)))

@@ -83,7 +83,7 @@ BODIES = Schema(
     cluster_next=ints("int32"),
     cluster_tail=ints("int32"),
     cluster_inverse_mass=floats(),
-    cluster_holder=ints("int32"),  # row of the unmovable body that holds it; -1: none
+    cluster_holder=ints("int32"),  # what cannot be moved and holds it, or -1
     supported=flags(default=False),  # the resting prediction has changed its velocity
     support_change=vectors(),
     held=flags(default=False),  # a contact at rest has pushed it
@@ -188,16 +188,20 @@ PAIRS = Schema(
     hit=flags(),
     near_contact=flags(),  # the response may concern them
     crossed=flags(),
-    depth=floats(),
     impulse=floats(),
+    struck=floats(),  # s, time of its last impact in this step, where there is an impulse
     parting=ints("uint8"),
+    # the manifold, made once in a step: what the pair's function says of
+    at=vectors(),  # this way from the centre of a's shape to that of b's; nan: of none
+    depth=floats(),
     normal=vectors(),
-    point=vectors(),
+    point=vectors(),  # relative to the centre of a's shape
+    early=flags(),  # it was made where the step starts, as the two rested in the step before
     found=integer(),  # contacts of the narrow phase: hits
     hits=ints("int32"),
     disabled_count=integer(),
     disabled=ints("int32"),
-    looked=integer(),  # pairs that were evaluated once more to tell whether they rest
+    rests=flags(),
     resting_count=integer(),
     resting=ints("int32"),
     touching_count=integer(),
@@ -256,6 +260,7 @@ IMPACTS = Schema(
     # what has happened in this step
     logged=integer(),
     capped=integer(),
+    looked=integer(),  # pairs searched for their next impact in this step
     rounds=integer(),  # of pairs for what is left of the step
     halted=integer(),  # bodies that were stopped because these were too many,
     halted_row=integer(),  # and the first of them
@@ -279,6 +284,7 @@ CONTACTS = Schema(
     depth=floats(stacked=True),
     impulse=floats(stacked=True),
     enabled=flags(stacked=True),
+    rested=flags(stacked=True),
     ends=integer(),
     begins=integer(),
     before=integer(),  # ``now`` at the start of the step
@@ -384,8 +390,14 @@ STATE = Schema(
     force_evaluations=integer(),
     candidates_counted=integer(),
     pairs_counted=integer(),
+    evaluations_counted=integer(),  # calls of pairs' functions
     contacts_counted=integer(),
     resting_counted=integer(),
+    islands_counted=integer(),
+    refined_counted=integer(),  # islands with more substeps than usual
+    solved_counted=integer(),  # rows in all passes
+    restrained_counted=integer(),  # islands that the guard has taken energy from,
+    restrained_energy=number(),  # and how much, J
     impacts_counted=integer(),
     capped_counted=integer(),
     refreshes_counted=integer(),
@@ -403,7 +415,8 @@ STATE = Schema(
     started=flag(),  # keep_start has run
     step_force_kept=flag(),
     impacts_recorded=flag(),  # in the history of world.contacts
-    found_current=flag(),  # the contacts are those of the narrow phase
+    found_current=flag(),  # the contacts are those of the narrow phase,
+    found_at_end=flag(),  # where free flight leads, of all pairs
     candidates_ready=flag(),
     contacts_ready=flag(),
     # records

@@ -34,24 +34,24 @@ from .records import IMPACTS
 from .scene import Scene
 
 COLOURS = 64
-CONTACTS_IN_WORD = 64  # see contacts.solving.shocks
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
 EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
 MEMBERS = ("member", "group", "is_left", "share", "before", "ahead", "weight", "terms", "rub")
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = (
-    "body_row", "used", "last", "velocity", "shift", "acceleration", "inverse_mass", "unsettled", "contacts_until",
-    "reach", "velocity_before", "velocity_way", "heaviest", "fastest", "island", "size", "open", "going", "across",
-    "along", "far", "worst", "stopper",
+    "body_row", "used", "number", "island", "velocity", "velocity_before", "shift", "acceleration", "inverse_mass",
+    "heft", "mover", "shared", "way", "held", "size_of", "mass_of", "force_of", "lightest", "most_change", "stiff",
+    "own", "strike", "substeps_of", "hard_of", "passes", "bears", "range_of", "slope", "curvature", "energy",
+    "momentum", "allowed", "share", "taken", "struck", "unsolved", "leader", "remembered",
+    "special", "row_ends", "body_ends",
 )  # fmt: skip
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {
-    "sum_forces": ("force",), "end_flight": ("kept_step_force",), "predict_rest": ("supported", "support_change"),
-    "gather": ("held", "place"),
+    "sum_forces": ("force",), "end_flight": ("kept_step_force",),
+    "predict_rest": ("supported", "support_change", "place"), "gather": ("held", "place"),
 }  # fmt: skip
-SOLVER_BATCH = ("batch", "change", "speed")
-SOLVER_OTHERS = ("starts", *SOLVER_BATCH, *SOLVER_BODIES)
+SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
 
 
 class Room:
@@ -62,10 +62,9 @@ class Room:
         for record in (state.warm_start, state.contacts):
             record.counts = np.zeros(2, np.int64)
         state.warm_start.rows_version = np.full(2, -1, np.int64)
-        state.warm_start.step, state.warm_start.substep = np.ones(2), np.ones(2)
+        state.warm_start.step = np.ones(2)
         state.contacts.stays, state.contacts.steps = np.zeros(2, np.int64), np.zeros(2, np.int64)
         state.solver.starts = np.zeros(COLOURS, np.int64)
-        state.solver.reserve(CONTACTS_IN_WORD, *SOLVER_BATCH)
         state.frame = np.zeros(7)
         _grow_stacked(state.warm_start, 0)
         _grow_stacked(state.contacts, 0)
@@ -166,9 +165,9 @@ class Room:
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""
         memory = self._state.warm_start
-        if rows > len(memory.work):
+        if rows > len(memory.share):
             _grow_stacked(memory, max(_with_spare(rows), memory.entity_a.shape[1]))
-            memory.reserve(memory.entity_a.shape[1], "work")
+            memory.reserve(memory.entity_a.shape[1], "share", "off", "going", "slope", "curvature")
 
     def reserve_contacts(self, rows: int) -> None:
         """Room for so many contacts, if there is less."""

@@ -78,6 +78,7 @@ class Simulation(PhysicsServices):
         }  # fmt: skip
         self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
         self.sleepers = Sleepers(self.state, self.table, self.scene, self.program, self._room)
+        source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
         source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
         self._attribution = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()

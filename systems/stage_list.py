@@ -26,6 +26,7 @@ from .linking.parts import (
     TAKE_TOGETHER,
     WATCH_BOUNDS,
 )
+from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
 from .opening import check_finite, keep_state, read_bodies
 from .quarantine.columns import check_columns
@@ -65,6 +66,9 @@ ON_DEMAND = (
         ("pairs", "candidates"),
         ("merged", "impacts"),
         "swept bodies",
+    ),
+    Stage(
+        finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",), "colliders"
     ),
     Stage(take_prints, "what bodies are like, to tell when they change", ("watching",), ("prints",), "sleeping"),
     *Integration.ON_DEMAND,
@@ -111,6 +115,6 @@ SYSTEM_OF_STAGE = (
     *("" for _ in OPENING),
     *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
     *("" for _ in CLOSING),
-    *(BroadPhase.__name__, NarrowPhase.__name__, ""),
+    *(BroadPhase.__name__, NarrowPhase.__name__, NarrowPhase.__name__, ""),
     *(Integration.__name__ for _ in Integration.ON_DEMAND),
 )

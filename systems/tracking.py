@@ -12,7 +12,7 @@ import numpy as np
 from ..framework.jit.records.record import Record
 from ..framework.jit.records.schema import Column
 
-WARM_START = ("step", "substep")  # numbers of which there are two, beside the counts
+WARM_START = ("step",)  # numbers of which there are two, beside the counts
 CONTACTS = ("steps", "stays")
 
 

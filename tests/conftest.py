@@ -22,8 +22,8 @@ os.environ.update({"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
 
 # Files that take long begin first, so that no worker is left with one at the end.
 LONG = (
-    "test_nobody_leaves", "test_tune_grid", "test_checked_build", "test_wheel", "test_trade",
-    "test_quarantine_everywhere", "test_extremes_duration", "test_oracle_modes", "test_tune", "test_piles",
+    "test_tune_grid", "test_checked_build", "test_wheel", "test_trade",
+    "test_quarantine_everywhere", "test_extremes_duration", "test_impact_oracle", "test_tune", "test_piles",
     "test_plugin_package", "test_docs", "test_settings_study", "test_gas_modes", "test_trade_resume",
     "test_trade_command", "test_limits", "test_orbits",
 )  # fmt: skip

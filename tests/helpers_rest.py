@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from worlds import box
 
@@ -42,13 +40,3 @@ def energy(world):
 
 def depths(world):
     return np.maximum(np.asarray(world.contacts.depth), 0.0)
-
-
-def soft_overlap(load, effective_mass, settings, g=G):
-    """Overlap of a contact at rest under a load, metres: load g / (effective_mass w^2).
-
-    w, the frequency of the soft contact, is a quarter of the substeps' rate; effective_mass: of the two bodies, 1 /
-    (1/m_a + 1/m_b).
-    """
-    frequency = 2 * math.pi * 0.25 * settings.substeps / settings.dt
-    return np.asarray(load) * g / (np.asarray(effective_mass) * frequency**2)

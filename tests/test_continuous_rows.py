@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import MODES, bullet, each_mode, each_sweep, mode_world, positions, velocities
+from helpers_modes import MODES, SWEPT, bullet, each_mode, each_sweep, mode_world, positions, velocities
+from helpers_pairwise import pairwise
 from worlds import Conserved, box, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -21,13 +22,11 @@ G = 10.0
 # -- rows without restitution --------------------------------------------------------------------
 
 
-@each_sweep
-@pytest.mark.parametrize("gap", [0.0, 0.01, 0.5])
-@pytest.mark.parametrize("speed", [10.0, 30.0, 300.0])
+@pytest.mark.parametrize(("mode", "gap", "speed"), pairwise(SWEPT, (0.0, 0.01, 0.5), (10.0, 30.0, 300.0)))
 def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
-    """Five plastic balls are pushed along: none ends up behind it, their order is kept, each is as fast as the ram, or
-    a little faster where the solver for contacts at rest takes the impact (up to a quarter in rows,
-    docs/limitations.md)."""
+    """Five plastic balls are pushed along: none ends up behind it, their order is kept, each is as fast as the ram; or
+    faster where the solver for contacts at rest takes the impact (up to a quarter in rows, docs/limitations.md), or a
+    little slower while it closes a gap of less than the margin of contacts, a hundredth of it in each step."""
     world = mode_world(mode, max_impacts_per_step=64)
     row = [bullet(world, k * (0.2 + gap), 0.0, radius=0.1) for k in range(5)]
     ram = bullet(world, -0.5, speed, half=(0.02, 1.0), kind="kinematic")
@@ -35,7 +34,7 @@ def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
     x = positions(world, [ram, *row])[:, 0]
     assert (np.diff(x) > 0.1).all()
     fast = velocities(world, row)[:, 0] / speed
-    assert (fast > 1 - 1e-9).all()
+    assert (fast > 0.999).all()
     assert (fast < 1.25).all()
 
 

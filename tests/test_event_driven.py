@@ -3,21 +3,19 @@ infinite sequences, piles, simultaneous impacts; flight exact under gravity, of 
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 import pytest
 from helpers_modes import MODES, along, bullet, each_mode, mode_world, positions, strikes, velocities
 from helpers_pairwise import pairwise
-from worlds import Conserved, ball, both_dimensions, box, floor, make_world, position, run, velocity
+from worlds import Conserved, ball, both_dimensions, box, make_world, position, run, velocity
 
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem, Settings
-from carom.scenes import galperin, pile2d
+from carom.scenes import galperin
 
 DT, G = 1 / 60, 9.81
-makers = pytest.mark.parametrize("maker", [ball, box])
 
 
 # -- B16: Newton's cradle --------------------------------------------------------------------------
@@ -25,7 +23,7 @@ makers = pytest.mark.parametrize("maker", [ball, box])
 
 @pytest.mark.parametrize(
     ("mode", "maker", "speed", "gap", "arriving"),
-    pairwise(MODES, (ball, box), (1.0, 120.0), (0.0, 1e-6, 0.01), (1, 2, 3, 4)),
+    pairwise(("discrete", *MODES), (ball, box), (1.0, 120.0), (0.0, 1e-6, 0.01), (1, 2, 3, 4)),
 )
 def test_b16_cradle(mode, maker, speed, gap, arriving):
     """k arrive, k leave, one impact after the other at any gap; also at 2 m per step, when all is over within one.
@@ -34,6 +32,7 @@ def test_b16_cradle(mode, maker, speed, gap, arriving):
     the sorted free flights plus the widths.
     """
     world = mode_world(mode, max_impacts_per_step=20)
+    speed = 1.0 if mode == "discrete" else speed
     start = np.arange(5) * (1 + gap)
     start[:arriving] -= 0.3 + np.arange(arriving)[::-1] * gap
     speeds = np.where(np.arange(5) < arriving, speed, 0.0)
@@ -76,11 +75,6 @@ def test_b17_galperin(mode, dt, digits):
     hits = check_galperin(settings, digits, 9.0)
     if dt == 1.0 and digits >= 2:
         assert np.count_nonzero((hits.time > 1) & (hits.time < 3) & (hits.entity_a == 1)) > 100
-
-
-@each_mode
-def test_b17_galperin_31415(mode):
-    check_galperin(Settings(collision=mode, max_impacts_per_step=100_000), 4, 4.0)
 
 
 @pytest.mark.slow
@@ -126,24 +120,6 @@ def test_impacts_are_reported_in_the_order_of_time(mode, d):
     assert world.kinetic_energy() == pytest.approx(kept.energy, rel=1e-12)
 
 
-@each_mode
-@pytest.mark.parametrize("upper_first", [False, True])
-def test_simultaneous_impacts_are_taken_together(mode, upper_first):
-    """A ball hits two mirror images at the same moment, 30 degrees off its way: neither is first. Both get the same
-    impulse, and the ball goes back with a fifth of its speed."""
-    world = mode_world(mode)
-    cue = bullet(world, -3.0, 300.0, radius=0.5, restitution=1.0)
-    up, down = (math.cos(math.pi / 6), 0.5), (math.cos(math.pi / 6), -0.5)
-    order = (up, down) if upper_first else (down, up)
-    pair = [bullet(world, np.multiply(n, 1.0), 0.0, radius=0.5, restitution=1.0) for n in order]
-    hits = strikes(world, 1)
-    assert hits.entity_b.tolist() == pair
-    assert hits.time.tolist() == pytest.approx([0.01, 0.01], rel=1e-12)
-    away = 300 * 2 * math.cos(math.pi / 6) / 2.5  # 2 v cos 30 / (1 + 1 + cos 60): along the normals
-    expected = [np.array((-60.0, 0.0)), away * np.array(order[0]), away * np.array(order[1])]
-    np.testing.assert_allclose(velocities(world, [cue, *pair]), expected, atol=1e-9)
-
-
 # -- infinite sequences ----------------------------------------------------------------------------
 
 
@@ -172,13 +148,11 @@ def test_inelastic_collapse_ends(mode, speed):
     kept.check()
 
 
-@each_mode
-@pytest.mark.parametrize(("count", "speed"), [(10, 60.0), (10, 600.0), (4, 1000.0)])
-@pytest.mark.parametrize("e", [0.0, 0.3])
-def test_a_row_collapses_against_a_wall(mode, e, count, speed):
+@pytest.mark.parametrize(("mode", "e", "row"), pairwise(MODES, (0.0, 0.3), ((10, 60.0), (10, 600.0), (4, 1000.0))))
+def test_a_row_collapses_against_a_wall(mode, e, row):
     """Balls thrown at a wall in a row: most of the energy is lost, no ball passes another or the wall,
     whose middle is at 20.5: at most half a ball is in it for a moment."""
-    world = mode_world(mode)
+    world, (count, speed) = mode_world(mode), row
     box(world, 20.5, half=(0.5, 5.0), kind="static")
     line = [bullet(world, 1.1 * k, speed, radius=0.5, restitution=e) for k in range(count)]
     energy = world.kinetic_energy()
@@ -188,35 +162,6 @@ def test_a_row_collapses_against_a_wall(mode, e, count, speed):
         assert (np.diff(x) > 0).all()
         assert x[-1] < 20.0
     assert world.kinetic_energy() < 0.09 * energy
-
-
-@pytest.mark.parametrize("e", [0.0, 0.5])
-def test_a_pile_comes_to_rest(e):
-    """60 discs fall into a bin: at rest after 8 s, none outside, overlap below 2 % of a size."""
-    world = pile2d.build(Settings(collision="event_driven"), n=60)
-    world.bodies.sphere_collider.restitution[:] = e
-    run(world, 480)
-    moving = world.bodies.dynamic
-    assert np.abs(moving.linear_velocity).max() < 1e-3
-    assert world.contacts.depth.max() < 0.02
-    assert (moving.position > 0.45).all()
-    assert len(moving) == 60
-
-
-@each_mode
-@both_dimensions
-@makers
-@pytest.mark.parametrize("e", [0.0, 0.5])
-def test_a_stack_stands(mode, d, maker, e):
-    """Five above each other, each dropped from 0.1 m: still after 4 s, no drift, within the slop."""
-    world = mode_world(mode, d, G)
-    floor(world)
-    stack = [maker(world, along(d, 0.0, 0.5 + 1.05 * (k + 1)), restitution=e) for k in range(5)]
-    run(world, 240)
-    assert np.abs(velocities(world, stack)).max() < 1e-6
-    places = positions(world, stack)
-    assert (places[:, 0] == 0).all()
-    np.testing.assert_allclose(places[:, 1], np.arange(5) + 0.5, atol=5 * 0.005)
 
 
 # -- flight ----------------------------------------------------------------------------------------
@@ -286,13 +231,3 @@ def test_other_forces_are_of_second_order():
     flier = world.create_entity(Transform((0.0, 0.0)), RigidBody(1.0, (3.0, 0.0), linear_damping=c))
     run(world, 60)
     assert velocity(world, flier)[0] == pytest.approx(3.0 * fade, rel=1e-13)
-
-
-@pytest.mark.parametrize(("n", "mass"), list(itertools.product((1, 2, 5), (1.0, 8.0))))
-def test_free_bodies_keep_their_course(n, mass):
-    """No forces: n bodies pass far from each other at any dt, to the rounding of one product."""
-    world = make_world(dt=0.3, collision="event_driven")
-    bodies = [ball(world, (0.0, 5.0 * k), (7.0, 0.0), mass=mass, restitution=1.0) for k in range(n)]
-    run(world, 10)
-    np.testing.assert_allclose(positions(world, bodies)[:, 0], 21.0, rtol=1e-14)
-    assert (velocities(world, bodies) == (7.0, 0.0)).all()

@@ -3,19 +3,16 @@ seen from a moving frame."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from helpers_extremes import DT
-from helpers_motion import METHODS, oscillators
+from helpers_motion import METHODS
 from helpers_rest import depths
 from oracles import integrators_naive as naive
-from worlds import EPS, ball, both_dimensions, box, make_world, run
+from worlds import ball, both_dimensions, box, make_world, run
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, Settings, World
-from carom.framework.errors import StepError
+from carom.framework import Settings, World
 from carom.lab import step_limits
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
@@ -59,61 +56,6 @@ def test_c16_the_world_says_that_a_spring_is_too_stiff(mode):
         assert any("spring" in str(fault) for fault in world.faults) == told
 
 
-# -- C17: many steps -------------------------------------------------------------------------------
-
-
-def check_invariant(steps, tolerance=20):
-    """B2: semi-implicit Euler keeps v^2 + z^2 x^2 - z^2 x v exactly; rounding adds up like a random walk."""
-    z = np.array([0.05, 0.1, 0.3, 1.0])
-    world = oscillators("semi_implicit_euler", 1.0, z**2)
-    x, v = world.bodies.position[:, 0], world.bodies.linear_velocity[:, 0]
-    start = v**2 + z**2 * x**2 - z**2 * x * v
-    run(world, steps)
-    end = v**2 + z**2 * x**2 - z**2 * x * v
-    np.testing.assert_allclose(end, start, rtol=tolerance * math.sqrt(steps) * EPS)
-
-
-def test_c17_a_spring_drifts_no_more_than_rounding():
-    check_invariant(5_000)
-
-
-@pytest.mark.long
-def test_c17_a_spring_drifts_no_more_than_rounding_in_many_steps():
-    """100,000 steps, where a drift of an eightieth of a rounding error per step would show."""
-    check_invariant(100_000, tolerance=4)
-
-
-class Sun(ForceSystem):
-    """GM = 1, at the origin."""
-
-    def add_forces(self, bodies, time):
-        bodies.force -= bodies.position / np.linalg.norm(bodies.position, axis=1)[:, None] ** 3
-
-
-def check_orbit(method, steps, tolerance=20):
-    """B4: both symplectic methods keep the angular momentum exactly, and the energy within its band."""
-    world = make_world(dt=2 * math.pi / 1000, integrator=method)
-    world.add_system(Sun())
-    world.create_entity(Transform((1.0, 0.0)), RigidBody(linear_velocity=(0.0, 1.0)))
-    (x, y), (vx, vy) = world.bodies.position[0], world.bodies.linear_velocity[0]
-    run(world, steps)
-    (x, y), (vx, vy) = world.bodies.position[0], world.bodies.linear_velocity[0]
-    assert x * vy - y * vx == pytest.approx(1.0, rel=tolerance * math.sqrt(steps) * EPS)
-    assert 0.5 * (vx * vx + vy * vy) - 1 / math.hypot(x, y) == pytest.approx(-0.5, abs=2e-4)
-
-
-@pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet"])
-def test_c17_an_orbit_drifts_no_more_than_rounding(method):
-    check_orbit(method, 3_000)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("method", ["semi_implicit_euler", "velocity_verlet"])
-def test_c17_an_orbit_drifts_no_more_than_rounding_in_50_turns(method):
-    """50,000 steps: a drift of a fortieth of a rounding error per step would show."""
-    check_orbit(method, 50_000, tolerance=5)
-
-
 # -- C19: crowds created in each other -------------------------------------------------------------
 
 
@@ -146,27 +88,11 @@ def test_c19_a_crowd_parts_slowly(mode, d):
     np.testing.assert_allclose(world.momentum(), 0.0, rtol=0, atol=1e-9)
 
 
-@pytest.mark.slow
-def test_c19_a_hundred_thousand_are_refused():
-    """In a box of ten sizes: they are counted, and an error gives the number; no pair is made and no body moves."""
-    world = crowd(100_000, 3, "discrete")
-    before = world.bodies.position.copy()
-    with pytest.raises(StepError, match="candidate pairs exceed the limit"):
-        world.step()
-    assert world.stats().counters["pairs"] == 0
-    assert (world.bodies.position == before).all()
-
-
 # -- C23: from a moving frame ----------------------------------------------------------------------
-
-PLASTIC = pytest.mark.xfail(
-    strict=True, reason="a known defect: whether what just touches is soft, and the order of ties, depend on rounding"
-)
-
 
 @both_dimensions
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("e", [pytest.param(0.0, marks=PLASTIC), 0.5, 1.0])
+@pytest.mark.parametrize("e", [0.5, 1.0])
 def test_c23_galilean_in_every_mode(mode, d, e):
     """A velocity added to all: relative motion is the same to 1e-9, in impacts and after them."""
 
@@ -181,7 +107,7 @@ def test_c23_galilean_in_every_mode(mode, d, e):
             (box, ball)[k % 2](world, place, speed + drift, restitution=e, mass=random.uniform(0.5, 2.0))
         run(world, 60)
         counted = world.stats().counters
-        assert counted["impacts" if e > 0.0 else "contacts"] > 10
+        assert counted["impacts"] > 10
         return world.bodies.position - drift * 60 * DT, world.bodies.linear_velocity - drift
 
     for still, drifting in zip(cluster(np.zeros(d)), cluster(np.array([1e3, -7e2, 0.0])[:d]), strict=True):

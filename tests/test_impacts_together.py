@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 import pytest
-from oracles.whole_step import Oracle, assert_agrees
 from worlds import both_dimensions
 
 from carom.lab import testing as kit
@@ -183,17 +182,6 @@ def test_groups_take_no_more_work_than_a_step_has():
 
 
 @each_collision
-def test_a_cradle_is_no_group(mode):
-    """Balls in a row that touch are struck one after the other: as many leave as arrive."""
-    for arriving in (1, 2):
-        places = [-4.0 + k for k in range(arriving)] + [float(k) for k in range(5)]
-        speeds = [6.0] * arriving + [0.0] * 5
-        balls = line_up(*(((x, 0.0), (v, 0.0)) for x, v in zip(places, speeds, strict=True)), restitution=1.0)
-        states = play(balls, mode, 90)
-        assert states[-1, :, 1, 0].tolist() == [0.0] * 5 + [6.0] * arriving
-
-
-@each_collision
 def test_into_a_corner_and_onto_a_seam(mode):
     """Two walls at once: each takes its part; two flush boxes share what one would take."""
     walls = [((3.0, 0.0), (1.0, 9.0)), ((0.0, 3.0), (9.0, 1.0))]
@@ -224,31 +212,6 @@ def test_friction_of_several_takes_no_more_than_there_is(mode):
     velocity = kit.velocity(world, box)
     assert abs(velocity[0]) <= 1e-15
     assert velocity[1] == 1.0
-
-
-@pytest.mark.slow
-@both_dimensions
-@each_collision
-def test_the_oracle_agrees(mode, d):
-    """Several at once onto one, of any mass and material."""
-    rng = np.random.default_rng(5)
-    together = 0
-    for _ in range(8):
-        world = kit.make_world(d, collision=mode)
-        kit.ball(world, np.zeros(d), 0.0, radius=0.5, restitution=0.8, friction=0.3)
-        for axis, sign in itertools.product(range(d), (-1.0, 1.0)):
-            way = sign * np.eye(d)[axis] + rng.normal(size=d) * 0.2
-            way /= np.linalg.norm(way)
-            kit.ball(world, way * 1.0625, -way * 8.0, radius=0.5, mass=float(rng.uniform(0.5, 2)), friction=0.4,
-                     restitution=float(rng.choice([0.5, 1.0])))  # fmt: skip
-        oracle = Oracle(world)
-        for _ in range(3):
-            world.step()
-            oracle.step()
-            assert_agrees(world, oracle)
-            together += len(world.contacts.impacts) > 2
-        world.close()
-    assert together > 4
 
 
 def test_exact_sums():

@@ -204,13 +204,9 @@ def test_ratios_of_sizes_and_masses(method):
 
 
 def test_loads():
-    """B19: on a single box any ratio is stable; on three the discrete solver yields, with 32 substeps ten times
-    later."""
-    assert max(sample.error for sample in line_of("load", "discrete", (1.0, 100.0, 1e12)).samples) < 0.01
-    values = (1.0, 100.0, 1e4)
-    plain, fine = (line_of("load-on-three", m, values).edge("1 %") for m in ("discrete", "discrete with 32 substeps"))
-    assert plain.value <= 100
-    assert fine.value > 10 * plain.value
+    """B19: on one box and on three any ratio of masses stands, with less than 1 % of overlap."""
+    for name in ("load", "load-on-three"):
+        assert max(sample.error for sample in line_of(name, "discrete", (1.0, 100.0, 1e12)).samples) < 0.01
 
 
 def test_towers_sink():

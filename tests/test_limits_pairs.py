@@ -13,7 +13,6 @@ from click.testing import CliRunner
 
 from carom.lab.cli.group import Commands
 from carom.lab.studies.limits.command import limits_command
-from carom.lab.studies.limits.pairs import report
 from carom.lab.studies.limits.pairs.axes import AXES, KINDS, NAMES, PAIRS, ROUND, Draw
 from carom.lab.studies.limits.pairs.scenes import Outcome, build, played
 from carom.lab.studies.limits.pairs.sweep import Batch, PairLimits, pair_limits, play_batch
@@ -69,31 +68,6 @@ def test_a_scene_is_drawn_from_its_seed_and_number_alone():
     other.world.close()
 
 
-def test_valid_ranges():
-    """A discrete world is left by what is fast or thin, others by what forces make faster still; all by what is far
-    away, too stiff, or too heavy for those below it."""
-    draw = dataclasses.replace(
-        Draw.of(0, 0), mode="discrete", integrator="rk4", kind="room", wall=1.0,
-        values=dict.fromkeys(NAMES, 0.0) | {"size": 2.0, "gravity": 1e-4, "speed": 0.2, "height": 3.0},
-    )  # fmt: skip
-    assert draw.outside(1.0) == []
-
-    def left(mode="discrete", wall=1.0, height=1.0, **values):
-        return dataclasses.replace(draw, mode=mode, wall=wall, values=draw.values | values).outside(height)
-
-    assert left(speed=0.4) == ["way in a step"]
-    assert left(height=100.0) == ["way in a step"]
-    assert left(wall=0.1) == ["thin walls"]
-    assert left("continuous", 0.1, speed=1e4, gravity=1.0, mass=1e6) == []
-    assert left("continuous", 0.1, speed=10.0, gravity=1e6) == []
-    assert left("continuous", speed=1e4, gravity=1e6) == left("event_driven", speed=1e4, stiffness=0.5)
-    assert left("event_driven", speed=1e4, stiffness=0.5) == ["speed and forces"]
-    assert dataclasses.replace(draw, kind="stack", values=draw.values | {"mass": 1e5}).outside(1.0) == ["load"]
-    assert left("event_driven", distance=6e8) == ["distance"]
-    assert left("continuous", stiffness=2.5) == []
-    assert left("event_driven", stiffness=2.5) == ["stiffness"]  # its flight is velocity Verlet
-
-
 # -- what is noted -------------------------------------------------------------------------------
 
 
@@ -147,28 +121,6 @@ def test_failures_are_seen():
     assert Outcome(1, refused="too many").failures == ["refused"]
 
 
-def test_tables_count_what_failed_within_the_range():
-    numbers = [number for number in range(3 * ROUND) if Draw.of(0, number).mode == "discrete"]
-    bad = next(n for n in numbers if Draw.of(0, n).crossed.get("mass") == 3)
-    outcomes = [Outcome(n, lost=int(n == bad), slowest=0.01) for n in range(3 * ROUND)]
-    outcomes[bad].outside = []
-    result = PairLimits({"carom": "1", "numpy": "2"}, 0, outcomes)
-    failures, discrete, *others = report.tables(result)
-    assert failures.rows[0][:3] == ("discrete", str(len(numbers)), "1")
-    crossed = Draw.of(0, bad).crossed
-    other = next(name for name in crossed if name != "mass")
-    row = next(row for row in discrete.rows if row[1] == "10,000 .. 1e6")
-    assert row[2 + NAMES.index(other)].startswith("1 / ")
-    assert row[2 + NAMES.index("mass")] == "-"
-    assert not any(cell.startswith("1 / ") for table in others for row in table.rows for cell in row[2:])
-    text = "\n".join(report.remarks(result))
-    assert f"Failed in discrete: scenes {bad} of seed 0." in text
-    outcomes[bad].outside = ["thin walls"]
-    assert "Failed in" not in "\n".join(report.remarks(result))
-    for mode in MODES:
-        assert f"Valid range of {mode}:" in text
-
-
 # -- the command ---------------------------------------------------------------------------------
 
 
@@ -180,26 +132,6 @@ def test_the_command_plays_one_scene():
     found = json.loads(again.stdout)
     assert Draw(**found["scene"]) == Draw.of(7, 36)
     assert but_time(Outcome(**found["outcome"])) == but_time(played(Draw.of(7, 36)))
-
-
-def test_the_command_fills_a_page(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("# Page\n\n<!-- studies limits --pairs -->\n<!-- end of studies limits --pairs -->\nafter\n")
-    result = invoke("--pairs", "--scenes", "4", "--workers", "1", "--into", str(page))
-    assert result.exit_code == 0, result.output
-    text = page.read_text()
-    assert "| mode | scenes | lost |" in text
-    assert "Valid range of discrete:" in text
-    assert text.endswith("<!-- end of studies limits --pairs -->\nafter\n")
-
-
-@pytest.mark.slow
-def test_a_short_sweep():
-    result = invoke("--pairs", "--scenes", "24", "--json")
-    assert result.exit_code == 0, result.output
-    found = PairLimits.from_dict(json.loads(result.stdout))
-    assert [outcome.number for outcome in found.outcomes] == list(range(24))
-    assert not any(outcome.not_finite for outcome in found.outcomes if not outcome.outside)
 
 
 @pytest.mark.parametrize(

@@ -75,34 +75,42 @@ def test_shipped_pairs_give_the_bits_of_their_functions(scene):
     assert cases.swept.any()
 
 
-def run_batches(scene, cases):
+def run_batches(scene, cases, early=False):
     """Evaluate the cases as pairs of the state, in one batch for each kind of pair."""
     state, pairs, count = scene.state, scene.state.pairs, len(scene.components)
     pairs.a, pairs.b = cases.a.astype(np.int32), cases.b.astype(np.int32)
     low, high = np.minimum(cases.shape_a, cases.shape_b), np.maximum(cases.shape_a, cases.shape_b)
     kinds = low * count + high
     state.candidates.bucket = np.argsort(kinds, kind="stable").astype(np.int32)
-    pairs.hit, pairs.depth = np.zeros(len(kinds), bool), np.zeros(len(kinds))
-    pairs.normal, pairs.point = np.zeros_like(cases.d), np.zeros_like(cases.d)
+    pairs.hit, pairs.depth, pairs.early = np.zeros(len(kinds), bool), np.zeros(len(kinds)), np.zeros(len(kinds), bool)
+    pairs.at, pairs.normal, pairs.point = np.zeros((3, *cases.d.shape))
+    if early:
+        state.bodies.previous_position, state.bodies.position = state.bodies.position, state.bodies.position + 7.0
+        pairs.early[:] = True
     sizes = np.bincount(kinds, minlength=count * count)
     stops = np.cumsum(sizes)
     KERNELS[scene.dimensions][2](state.address, np.arange(count * count), stops - sizes, stops)
     return pairs
 
 
-def test_a_batch_gives_what_evaluate_gives(scene):
+@pytest.mark.parametrize("early", [False, True])
+def test_a_batch_gives_what_evaluate_gives(scene, early):
+    """Where the bodies are now, or where the step starts."""
     rng, state = np.random.default_rng(4), scene.state
     a, b = all_pairs(scene)
     chosen = rng.random(len(a)) < 0.5
     a, b = a[chosen], b[chosen]
     cases = scene.cases(rng, a, b)
     KERNELS[scene.dimensions][0](state.address, cases.address)
-    pairs = run_batches(scene, cases)
+    before = state.bodies.position.copy()
+    pairs = run_batches(scene, cases, early)
+    state.bodies.position = before
     assert (pairs.hit == cases.hit).all()
     same(pairs.depth, cases.depth)
     known = cases.depth > -math.inf
     same(pairs.normal[known], cases.normal[known])
-    same(pairs.point[known], (state.bodies.position[a] + state.bodies.offset[a] + cases.point)[known])
+    same(pairs.point[known], cases.point[known])
+    same(pairs.at[known], cases.d[known])
     assert (pairs.a == a).all()
 
 

@@ -226,6 +226,7 @@ print("boxes", any("AABBCollider" in title for title in made))
 
 RUN = {"run_stages", "ticks_now"}  # what calls the stages, and their clock
 SHAPES = {"box_rows", "bounds", "evaluate", "batch", "rotated", "corner", "take_together"}  # called by address
+SHAPES |= {"finish_found"}  # called where code reads contacts within a step
 
 
 @pytest.mark.parametrize("name", ["drifting", "spheres", "restitution", "spheres, 3D"])

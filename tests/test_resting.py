@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_rest import G, heights, overlaps, soft_overlap, speed, tower
+from helpers_rest import SLOP, G, heights, overlaps, speed, tower
 from worlds import ball, box, floor, make_world, run
 
 from carom.framework import Phase, System
@@ -72,9 +72,9 @@ def test_a_step_that_fails_leaves_no_trace_in_the_impulses():
 
 @pytest.mark.parametrize("change", [{"dt": 1 / 120}, {"dt": 1 / 30}, {"substeps": 8}, {"substeps": 2}])
 def test_another_step_in_mid_run_makes_no_body_jump(change):
-    """The stored impulses are those of the old step; they are rescaled. The overlap changes to that of the new springs.
+    """The stored impulses are those of the old step; they are rescaled.
 
-    Impulses of another step would accelerate them to 0.03 to 0.05 m/s; the springs' own change of length makes 0.014.
+    Impulses of another step would accelerate them to 0.03 to 0.05 m/s; the contacts' own change of length makes 0.014.
     """
     world = make_world(gravity=G)
     floor(world)
@@ -82,14 +82,12 @@ def test_another_step_in_mid_run_makes_no_body_jump(change):
     run(world, 300)
     before = heights(world, ids)
     world.settings = world.settings.replace(**change)
-    load, mass = [5, 4, 3, 2, 1], [1.0, 0.5, 0.5, 0.5, 0.5]
-    expected = soft_overlap(load, mass, world.settings)
     fastest = 0.0
     for _ in range(600):
         world.step()
         fastest = max(fastest, speed(world))
     assert fastest < 0.02
-    np.testing.assert_allclose(overlaps(world, ids), expected, rtol=0.01, atol=1e-7)
+    assert overlaps(world, ids).max() < SLOP
     assert np.abs(heights(world, ids) - before).max() < 0.02
 
 
@@ -100,24 +98,6 @@ def test_what_rests_stays_at_rest_for_a_minute():
     run(world, 3600)
     assert np.abs(world.bodies.dynamic.position - before).max() < 0.005
     assert speed(world) < 0.01
-
-
-def test_slop_and_threshold_are_relative_to_size():
-    """The same heap in millimetres: lengths, so also g, by 2^-10: every length is 2^-10 of it, bit for bit."""
-    answers = []
-    for scale in (1.0, 2.0**-10):
-        world = make_world(gravity=G * scale)
-        floor_half = 0.5 * scale
-        box(world, (0, -floor_half), half=(50 * scale, floor_half), kind="static", friction=0.4)
-        for k in range(18):
-            place = (1.05 * (k % 3) * scale, (0.6 + 1.1 * (k // 3)) * scale)
-            if k % 2:
-                ball(world, place, radius=0.5 * scale, friction=0.4, restitution=0.3)
-            else:
-                box(world, place, half=0.5 * scale, friction=0.4)
-        run(world, 200)
-        answers.append(world.bodies.dynamic.position / scale)
-    np.testing.assert_array_equal(answers[0], answers[1])
 
 
 def test_a_slop_of_ones_own_reaches_the_contacts():

@@ -37,7 +37,7 @@ from carom.lab.studies.settings.clock import costs
 from carom.lab.studies.settings.records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
 from carom.lab.studies.settings.study import VARIED, measured
 from carom.scenes import drops, jump, stack
-from carom.systems.contacts.resting import OWN_SAG
+from carom.systems.contacts.constants import OWN_SAG
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
@@ -110,14 +110,14 @@ def test_twice_the_steps_are_twice_the_work():
 @pytest.mark.parametrize("field", ["dt", "substeps"])
 def test_a_tower_gives_way_with_the_square_of_the_substep(field):
     """load |a| / (m w^2), w = 2 pi substeps / 4 dt: largest between the lowest two, under nine boxes, m = 1/2; where
-    one box alone would sink in by 0.03 % of its size, contacts are rigid."""
+    one box would sink into its like by 0.2 % of its size under itself, contacts are hard."""
     varied = EVERY[field, "stack of 10"]
     for value, found in zip(varied.values, errors(field, "stack of 10"), strict=True):
         settings = varied.base.replace(**{field: value})
         w = math.pi / 2 * settings.substeps / settings.dt
         sag = stack.GRAVITY / (w * w)
-        soft = 100 * (stack.BODIES - 1) * 2 * sag if sag <= OWN_SAG else 0.0
-        assert found["overlap"] == pytest.approx(soft, rel=1e-3, abs=1e-6)
+        soft = 100 * (stack.BODIES - 1) * 2 * sag if 2 * sag <= OWN_SAG else 0.0
+        assert found["overlap"] == pytest.approx(soft, rel=1e-3, abs=1e-4)  # %
         assert found["speed"] < 1.0  # mm/s
 
 
@@ -204,7 +204,9 @@ def test_impacts_beyond_the_cap():
     found = dict(zip((None, 1, 4, 64, 1000), errors("max_impacts_per_step", "galperin"), strict=True))
     assert [found[cap]["missing"] for cap in (64, 1000)] == [0, 0]
     assert max(found[cap]["energy"] for cap in (64, 1000)) < 1e-6
-    assert found[1]["missing"] > found[4]["missing"] > found[None]["missing"] > 0
+    for cap in (None, 1, 4):  # contacts at rest beyond it take the energy
+        assert found[cap]["missing"] != 0
+        assert found[cap]["energy"] > 99
 
 
 @pytest.mark.parametrize("key", [("restitution_mixing", "two balls"), ("friction_mixing", "sliding box")])

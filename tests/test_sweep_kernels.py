@@ -25,6 +25,7 @@ from carom.systems.integration.stages import first_half_kick, second_half_kick
 from carom.systems.records import STATE
 
 DT = 1 / 60
+MANIFOLD = ("at", "hit", "depth", "normal", "point", "early")
 
 numbers = st.floats(-10, 10).map(lambda x: round(x, 3))
 
@@ -93,7 +94,9 @@ def test_merged_pairs_against_sets(seed, n):
         solid, near = rng.random((2, rows)) < 0.5
         impulse, crossed = np.where(rng.random(rows) < 0.3, rng.random(rows), 0.0), rng.random(rows) < 0.2
         fill(pairs, is_solid=solid, near_contact=near, crossed=crossed, impulse=impulse, depth=rng.random(rows))
-        fill(pairs, normal=rng.random((rows, 2)), point=rng.random((rows, 2)), parting=rng.integers(0, 3, rows))
+        fill(pairs, struck=rng.random(rows))
+        (at, normal, point), (hit, early) = rng.random((3, rows, 2)), rng.random((2, rows)) < 0.5
+        fill(pairs, at=at, hit=hit, early=early, normal=normal, point=point, parting=rng.integers(0, 3, rows))
     hits = np.flatnonzero(rng.random(m) < 0.3)
     disabled, log = hits[::2], hits[::-1]
     fill(before, a=[a for a, _ in old], b=[b for _, b in old], count=m, place=np.zeros(m))
@@ -130,12 +133,14 @@ def test_merged_pairs_against_sets(seed, n):
         assert [pairs[c] for c in now[: len(then)]] == [old[c] for c in then]
     for place, (a, b) in enumerate(pairs):
         if (a, b) in kept:
-            for name in ("is_solid", "near_contact", "crossed", "depth", "impulse", "parting", "normal", "point"):
+            for name in ("is_solid", "near_contact", "crossed", "impulse", "struck", "parting", *MANIFOLD):
                 np.testing.assert_array_equal(getattr(merged, name)[place], getattr(before, name)[old.index((a, b))])
         else:
             assert not merged.crossed[place]
             assert merged.is_solid[place] == (not (sensors[a] or sensors[b]) and masses[a] + masses[b] > 0.0)
             assert merged.impulse[place] == 0.0
+            assert np.isnan(merged.at[place]).all()
+            assert not merged.early[place]
 
 
 @both_dimensions

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles.whole_step import Oracle, assert_agrees
 from worlds import both_dimensions
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -114,15 +113,3 @@ def test_rest_is_looked_at_while_bodies_come_and_go():
     late = kit.box(world, (-20.0, 0.51))
     with pytest.raises(AssertionError, match=rf"entity {late}, step \d+: (moves at|has drifted by)"):
         kit.assert_at_rest(world, steps=60)
-
-
-def test_an_oracle_says_that_it_has_other_bodies():
-    world = kit.make_world(2)
-    kit.ball(world, (0, 0), (1, 0))
-    oracle = Oracle(world)
-    kit.ball(world, (9, 0))
-    world.step()
-    oracle.step()
-    with pytest.raises(AssertionError, match=r"the world has other bodies than its oracle: take a new Oracle"):
-        assert_agrees(world, oracle)
-    assert_agrees(world, Oracle(world))

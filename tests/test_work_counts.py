@@ -9,7 +9,9 @@ from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import PhysicsWarning, Settings, StepError, World
 from carom.framework.jit.records.schema import Column
-from carom.plugins import Physics
+from carom.plugins import Physics, convex_polygon, half_space
+from carom.plugins.convex_polygon import ConvexPolygonCollider
+from carom.plugins.half_space import HalfSpaceCollider
 from carom.systems.codes import CHECK_FLIGHT
 
 
@@ -35,17 +37,51 @@ def test_looks_of_a_slow_gas():
         assert state.looks_counted < 4 * state.impacts_counted
 
 
-@pytest.mark.parametrize("scene", ["pile2d", "pile3d"])
-def test_a_pile_at_rest_is_known_by_its_flight(scene):
-    """Neither pairs that rest nor those that stay apart are evaluated once more where the resting prediction leads."""
-    with scenes.get(scene).build(n=200) as world:
-        for _ in range(200):
-            world.step()
+def evaluations_of_a_step(world: World) -> int:
+    """How often functions of pairs are called in a step."""
+    before = world.physics.state.evaluations_counted
+    world.step()
+    return world.physics.state.evaluations_counted - before
+
+
+def settled(scene: str, steps: int, **options) -> World:
+    world = scenes.get(scene).build(**options)
+    for _ in range(steps):
+        world.step()
+    return world
+
+
+@pytest.mark.parametrize(("scene", "steps", "options"), [("pyramid", 500, {}), ("pile2d", 900, {"n": 200})])
+def test_a_pair_at_rest_is_evaluated_once_a_step(scene, steps, options):
+    """Where the step starts; all that follows reads this manifold. Those that are near but do not touch: twice more."""
+    with settled(scene, steps, **options) as world:
         pairs = world.physics.state.pairs
-        apart = pairs.count - pairs.resting_count
-        assert pairs.resting_count > 400
-        assert apart > (10 if scene == "pile2d" else 300)
-        assert pairs.looked < 10
+        evaluations = evaluations_of_a_step(world)
+        assert pairs.touching_count > 0.9 * pairs.count
+        assert pairs.count <= evaluations <= pairs.count + 2 * (pairs.resting_count - pairs.touching_count)
+
+
+def test_a_pair_at_rest_that_is_a_plugins_is_evaluated_once_a_step():
+    """Also on a slope, and if it may bounce."""
+    world = World(Physics(dimensions=2, gravity=(0.0, -10.0)), half_space.plugin, convex_polygon.plugin)
+    world.create_entity(Transform((0.0, 0.0)), HalfSpaceCollider((-0.1, 1.0), friction=1.0))
+    world.create_entity(
+        Transform((0.0, 0.5)), RigidBody(mass=1.0),
+        ConvexPolygonCollider([(-0.5, -0.45), (0.5, -0.55), (0.4, 0.5)], restitution=0.2, friction=1.0),
+    )  # fmt: skip
+    with world:
+        for _ in range(300):
+            world.step()
+        assert world.physics.state.pairs.resting_count == 1
+        assert evaluations_of_a_step(world) == 1
+
+
+def test_a_pile_that_settles_is_evaluated_at_most_twice_a_step():
+    """Where the step starts and where it ends; and pairs near each other where free flight leads."""
+    with settled("pile2d", 120, n=200) as world:
+        pairs = world.physics.state.pairs
+        total = sum(evaluations_of_a_step(world) for _ in range(10))
+        assert total < 10 * 2.3 * pairs.count
 
 
 def columns_of(*records):

@@ -21,7 +21,7 @@ class Faults:
     """The faults of one world.
 
     texts
-        the last 100 that differ
+        the last 100 that differ; one for each kind and body, the newest, with how often it was reported
     pending
         those that the step has found and that are to be told at its end
     """
@@ -31,18 +31,31 @@ class Faults:
         self.pending: list[str] = []
         self._settings = settings
         self._told: set[tuple[str, int | None]] = set()  # kinds and bodies
+        self._lines: dict[tuple[str, int | None], tuple[str, int]] = {}  # newest text, count
 
     def report(self, text: str, kind: str | None, entity: int | None) -> None:
         """Note a fault; ``kind`` and ``entity`` say which others it is like (None: only those with the same text)."""
-        if text not in self.texts:
-            self.texts.append(text)
-        del self.texts[:-KEPT]
         how, key = self._settings().on_fault, (text if kind is None else kind, entity)
+        self._add_line(text, key, kind is not None)
         if how == "raise" or (how == "warn" and key not in self._told):
             if len(self._told) >= REMEMBERED:
                 self._told.clear()
             self._told.add(key)
             self.pending.append(text)
+
+    def _add_line(self, text: str, key: tuple[str, int | None], counts: bool) -> None:
+        """The text, in place of what was reported of its kind and body until now."""
+        old, count = self._lines.get(key, ("", 0)) if counts else ("", 0)
+        if old in self.texts:
+            self.texts.remove(old)
+        line = text if count == 0 else f"{text} ({count + 1} times)"
+        if line not in self.texts:
+            self.texts.append(line)
+        del self.texts[:-KEPT]
+        if counts:
+            if len(self._lines) >= REMEMBERED:
+                self._lines.clear()
+            self._lines[key] = line, count + 1
 
     @property
     def stopping(self) -> bool:

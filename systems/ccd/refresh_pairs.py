@@ -10,8 +10,10 @@ What the queue holds of pairs that are candidates again stays: their paths are t
 from __future__ import annotations
 
 from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
 from ..codes import NEED_MERGED, OK
 from ..impacts.heap import heap_push
+from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
 
 KEPT, GONE, NEW = -1, -2, -3  # in ``pairs.place``; from 0 on it is the place in the other list
@@ -35,8 +37,9 @@ def keep_pair(state, j, found):
     new.a[found], new.b[found] = old.a[j], old.b[j]
     new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
     new.crossed[found] = old.crossed[j]
-    new.depth[found], new.impulse[found], new.parting[found] = old.depth[j], old.impulse[j], old.parting[j]
-    new.normal[found], new.point[found] = old.normal[j], old.point[j]
+    new.impulse[found], new.struck[found], new.parting[found] = old.impulse[j], old.struck[j], old.parting[j]
+    new.hit[found], new.early[found], new.at[found] = old.hit[j], old.early[j], old.at[j]
+    new.depth[found], new.normal[found], new.point[found] = old.depth[j], old.normal[j], old.point[j]
 
 
 @part
@@ -47,7 +50,9 @@ def add_pair(state, a, b, found):
     new.a[found], new.b[found] = a, b
     new.is_solid[found] = is_solid_pair(state, a, b)
     new.near_contact[found], new.crossed[found] = True, False
-    new.depth[found], new.impulse[found] = 0.0, 0.0
+    new.early[found], new.impulse[found] = False, 0.0
+    new.normal[found] = zero_of(state)
+    forget_manifold(new, found)
 
 
 @part

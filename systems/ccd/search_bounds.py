@@ -12,7 +12,7 @@ import math
 
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, item, length, replace
+from ...framework.vectors import add, add_scaled, item, length, replace, sub
 from ..codes import OK
 from ..integration.trajectory import (
     along,
@@ -203,14 +203,14 @@ def sweep_pairs(state, dt):
             small = FAST * smaller_extent(bodies, a, b)
             limits = min(contact_margin(state, dt, a, b), small), small / travel * dt, 0.0
             straight = is_straight(state, a, b, path, dt)
-            touch, t, normal, point, _ = call_first_touch(
+            touch, t, normal, point, at = call_first_touch(
                 state.links[FIRST_TOUCH], state, a, b, path, straight, 0.0, dt, limits
             )
             if touch == APART:
                 continue
-            pairs.normal[c] = normal
-            pairs.point[c] = add(centre_at(state, a, t), point)
-            pairs.depth[c], pairs.near_contact[c] = 0.0, True
+            end = add(bodies.position[a], bodies.offset[a])
+            pairs.normal[c], pairs.point[c] = normal, add(sub(centre_at(state, a, t), end), point)
+            pairs.at[c], pairs.depth[c], pairs.near_contact[c] = at, 0.0, True
         pairs.hits[found] = c
         found += 1
     pairs.found = found

@@ -1,37 +1,17 @@
-"""Where two bodies are to each other at the start and the end of a step, and where they first touch in between."""
+"""Where two bodies first touch on their way, and what counts as no touch."""
 
 from __future__ import annotations
 
-from ...framework.compilation import inlined, part
+from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, length, sub
+from ...framework.vectors import add_scaled, dot, length, sub
 from ..integration.trajectory import ROUNDING, along, relative_path
-from ..shapes.dispatch import both_convex, both_sharp, evaluate, has_corner_rule, is_corner_touch
+from ..narrow_phase.manifolds import between, between_at_start, meet
+from ..shapes.dispatch import both_convex, both_sharp, has_corner_rule, is_corner_touch
 from ..shapes.tolerances import slop_of
 
 LOOKS = 24
 STAYS_SLOPS = 1e-3  # slops: two bodies that go less far past each other in a step stay where they are
-
-
-@inlined
-def between(bodies, a, b):
-    """From the centre of a's shape to that of b's, where they are now."""
-    position, offset = bodies.position, bodies.offset
-    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
-
-
-@inlined
-def between_at_start(bodies, a, b):
-    """The same where the step starts."""
-    position, offset = bodies.previous_position, bodies.offset
-    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
-
-
-@part
-def meet(state, a, b, d):
-    """The answer of the pair's function: (hit, depth, normal, point)."""
-    shape = state.bodies.shape
-    return evaluate(state, shape[a], a, shape[b], b, d)
 
 
 @part
@@ -61,14 +41,14 @@ def leg_start(state, a, b):
 
 @part
 def touch_on_way(state, a, b, d, travel, edge):
-    """(whether they touch on the way from d to d + travel and get deeper than ``edge``; gap at d, normal and point of
-    that), by conservative advancement; of concave shapes by their distance, as what comes next may have another normal.
+    """(whether they touch on the way from d to d + travel and get deeper than ``edge``; gap at d and normal of that),
+    by conservative advancement; of concave shapes by their distance, as what comes next may have another normal.
     A touch of corners is none, nor one that only is the edge of the next thing in a row that one of them slides along.
     """
     shape, t, nothing = state.bodies.shape, 0.0, zero_of(state)
     way, slop = length(travel), slop_of(state, a, b)
     convex = both_convex(state, shape[a], shape[b])
-    _, depth, normal, point = meet(state, a, b, d)
+    _, depth, normal, _ = meet(state, a, b, d)
     for _ in range(LOOKS):
         rate = dot(travel, normal)
         if convex and not rate < 0.0:
@@ -79,11 +59,11 @@ def touch_on_way(state, a, b, d, travel, edge):
             if rate < 0.0 and not meets_at_corner(state, a, b, at, slop):
                 ahead = t - 2.0 * edge / rate
                 if ahead < 1.0 and meet(state, a, b, add_scaled(d, travel, ahead))[1] > edge:
-                    return True, -depth - t * rate, normal, point
+                    return True, -depth - t * rate, normal
                 if convex:
                     break
         if not further < 1.0:
             break
         t = further
-        _, depth, normal, point = meet(state, a, b, add_scaled(d, travel, t))
-    return False, 0.0, nothing, nothing
+        _, depth, normal, _ = meet(state, a, b, add_scaled(d, travel, t))
+    return False, 0.0, nothing

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, length, scale, sub
+from ...framework.vectors import add, add_scaled, dot, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
-from .colours import colour_contacts
-from .resting_prediction import drop_support
-
-MOST_THROW = 2.0  # times the speed around it: what the solver may give a body in a discrete world
+from .solving.islands import order_rows
+from .solving.prediction import drop_support
 
 
 @part
@@ -46,19 +44,23 @@ def gather(state, dt):
     if solver.contacts > len(solver.first) or min(2 * solver.contacts, state.count) > len(solver.body_row):
         state.needed = solver.contacts
         return NEED_SOLVER
-    colour_contacts(state)
+    order_rows(state, dt)
     for r in range(solver.contacts):
-        c, k = pairs.resting[r], solver.starts[solver.colour[r]]
-        solver.starts[solver.colour[r]] += 1
-        solver.slot[r], solver.pair[k] = k, c
+        c, k = pairs.resting[r], solver.slot[r]
+        solver.pair[k] = c
         solver.first[k], solver.second[k] = bodies.place[pairs.a[c]], bodies.place[pairs.b[c]]
     inverse_mass, nothing = bodies.inverse_mass, zero_of(state)
+    solver.movers = 0
     for q in range(solver.bodies):
         i = solver.body_row[q]
-        solver.inverse_mass[q] = inverse_mass[i]
+        w = inverse_mass[i]
+        solver.inverse_mass[q], solver.heft[q] = w, 1.0 / w if w > 0.0 else 0.0
         v, x, a = nothing, nothing, nothing
         if i < state.moving:
             v = bodies.start_velocity[i]
+            if inverse_mass[i] == 0.0 and dot(v, v) > 0.0:
+                solver.mover[solver.movers] = q
+                solver.movers += 1
             if inverse_mass[i] > 0.0:
                 x = sub(bodies.origin[i], bodies.previous_position[i])
                 a = sub(bodies.linear_velocity[i], v)
@@ -71,42 +73,12 @@ def gather(state, dt):
     return OK
 
 
-@part
-def bound_throws(state, dt):
-    """Heavy bodies may squeeze a light one out between them at many times their speed, and in a discrete world what is
-    that fast passes through walls. So the solver makes no body go farther in a step than its own extent, or than
-    MOST_THROW times as far as it and those that it touches went."""
-    solver, bodies, any_far = state.solver, state.bodies, False
-    speed, fastest = solver.worst, solver.far
-    for q in range(solver.bodies):
-        far = max(length(solver.shift[q]), length(solver.velocity[q]) * dt)
-        any_far |= solver.inverse_mass[q] > 0.0 and far > bodies.min_extent[solver.body_row[q]]
-    if not any_far:
-        return
-    for q in range(solver.bodies):
-        i = solver.body_row[q]
-        before = length(bodies.start_velocity[i]) if i < state.moving else 0.0
-        speed[q] = fastest[q] = before + length(solver.acceleration[q]) * dt
-    for k in range(solver.contacts):
-        a, b = solver.first[k], solver.second[k]
-        fastest[a], fastest[b] = max(fastest[a], speed[b]), max(fastest[b], speed[a])
-    for q in range(solver.bodies):
-        i, way, rate = solver.body_row[q], length(solver.shift[q]), length(solver.velocity[q]) * dt
-        most = max(bodies.min_extent[i], MOST_THROW * fastest[q] * dt)
-        if solver.inverse_mass[q] > 0.0 and max(way, rate) > most:
-            solver.shift[q] = scale(solver.shift[q], min(1.0, most / way) if way > 0.0 else 1.0)
-            solver.velocity[q] = scale(solver.velocity[q], min(1.0, most / rate) if rate > 0.0 else 1.0)
-            note_squeezed(solver, i)
-
-
 def put_back(state, dt):
     """Bodies that some contact pushed take what the solver says; without the predicted support they fly free."""
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
-    if solver.contacts > 0 and not state.sweeping:
-        bound_throws(state, dt)
     for r in range(solver.contacts):
         k = solver.slot[r]
-        pairs.impulse[pairs.resting[r]] += solver.total[k] + solver.shock[k]
+        pairs.impulse[pairs.resting[r]] += solver.total[k]
         if solver.worked[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True

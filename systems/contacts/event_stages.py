@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from ...framework.compilation import part
+from ...framework.vectors import add
 from ..codes import NEED_CONTACTS, OK
+from ..narrow_phase.manifolds import move_to_end
 
 
 @part
 def write_contacts(state):
     """The touching pairs as the contacts of the step, in canonical order; disabled pairs count as not touching."""
-    pairs, contacts, entity = state.pairs, state.contacts, state.bodies.entity
+    pairs, contacts, bodies, entity = state.pairs, state.contacts, state.bodies, state.bodies.entity
     if pairs.touching_count > len(contacts.began):
         state.needed = pairs.touching_count
         return NEED_CONTACTS
@@ -20,9 +22,10 @@ def write_contacts(state):
             next_disabled += 1
         enabled = not (next_disabled < pairs.disabled_count and pairs.disabled[next_disabled] == c)
         contacts.entity_a[new, count], contacts.entity_b[new, count] = entity[pairs.a[c]], entity[pairs.b[c]]
-        contacts.point[new, count], contacts.normal[new, count] = pairs.point[c], pairs.normal[c]
+        centre = add(bodies.position[pairs.a[c]], bodies.offset[pairs.a[c]])
+        contacts.point[new, count], contacts.normal[new, count] = add(centre, pairs.point[c]), pairs.normal[c]
         contacts.depth[new, count], contacts.impulse[new, count] = pairs.depth[c], pairs.impulse[c]
-        contacts.enabled[new, count] = enabled
+        contacts.enabled[new, count], contacts.rested[new, count] = enabled, pairs.rests[c]
         count += 1
     contacts.counts[new], contacts.steps[new], contacts.stays[new] = count, state.step_number, 0
     contacts.now = new
@@ -38,13 +41,14 @@ def publish_contacts(state, dt):
 
 
 @part
-def publish_found(state):
+def publish_found(state, dt):
     """What overlaps where free flight leads, as the contacts of a step in which no response has looked at its end."""
     pairs, count = state.pairs, 0
+    move_to_end(state, dt)
     for h in range(pairs.found):
         c = pairs.hits[h]
         if pairs.hit[c]:
-            pairs.impulse[c], pairs.touching[count] = 0.0, c
+            pairs.impulse[c], pairs.rests[c], pairs.touching[count] = 0.0, False, c
             count += 1
     pairs.touching_count = count
     code = write_contacts(state)
@@ -56,7 +60,7 @@ def publish_found(state):
 def compare_contacts(state, dt):
     """Rows of the contacts that ceased, began and stayed; both lists are in canonical order."""
     if state.found_current:
-        code = publish_found(state)
+        code = publish_found(state, dt)
         if code != OK:
             return code
     contacts = state.contacts
@@ -87,6 +91,8 @@ def compare_contacts(state, dt):
             j += 1
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
-    faults = state.impacts.capped + state.impacts.halted + state.solver.squeezed + state.hasty
+    solver = state.solver
+    faults = state.impacts.capped + state.impacts.halted + state.hasty
+    faults += solver.squeezed + solver.overloaded + solver.restrained
     state.news = ends + begins + state.impacts.logged + faults + (stays + contacts.stored if state.stay_wanted else 0)
     return OK

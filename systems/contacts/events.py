@@ -27,6 +27,7 @@ class RecordedContacts(ContactSource):
         self._state, self._touching, self._impacts = state, state.contacts, state.impacts
         self.record: Callable[[str, Columns], None] = lambda history, columns: None
         self.stored: Any = ()  # those of what sleeps, which the records do not hold
+        self.finish_found: Callable[[], None] = lambda: None  # looks where free flight leads
         self.disturb: Callable[[np.ndarray], None] = lambda entities: None  # wakes these
         self._asleep: Any = None, None, None, None  # (columns, those of what sleeps, mask of these in them, enabled)
 
@@ -80,7 +81,7 @@ class RecordedContacts(ContactSource):
 
     def _stored_rows(self) -> Columns:
         """Copies of the contacts of what sleeps; they last."""
-        columns = {name: column.copy() for name, column in self.stored.columns.items()}
+        columns = {name: column.copy() for name, column in self.stored.columns.items() if name != "rested"}
         columns["normal_impulse"] = columns.pop("impulse")
         return {**columns, "step": _repeated(self._state.step_number, len(self.stored))}
 
@@ -131,12 +132,14 @@ class RecordedContacts(ContactSource):
         }
 
     def _found(self) -> Columns:
-        state, pairs = self._state, self._state.pairs
-        hits, entity = pairs.hits[: pairs.found], state.bodies.entity
+        self.finish_found()
+        state, pairs, bodies = self._state, self._state.pairs, self._state.bodies
+        hits, entity = pairs.hits[: pairs.found], bodies.entity
+        a = pairs.a[hits]
         return {
-            "entity_a": entity[pairs.a[hits]],
+            "entity_a": entity[a],
             "entity_b": entity[pairs.b[hits]],
-            "point": pairs.point[hits],
+            "point": bodies.position[a] + bodies.offset[a] + pairs.point[hits],
             "normal": pairs.normal[hits],
             "depth": pairs.depth[hits],
             "normal_impulse": np.zeros(len(hits)),
@@ -222,35 +225,48 @@ class ContactEvents(StagedSystem):
         self._contacts.defer(self._record)
 
     def _report_faults(self) -> None:
-        state, solver, bodies = self._state, self._state.solver, self._state.bodies
+        state, impacts, solver = self._state, self._impacts, self._state.solver
+        entity = state.bodies.entity
         if state.hasty:
-            entity = int(bodies.entity[state.hasty_row])
+            hasty = int(entity[state.hasty_row])
             self.world.report_fault(
-                f"entity {entity}: so fast that discrete collisions may miss what it passes: set its ccd, or "
+                f"entity {hasty}: so fast that discrete collisions may miss what it passes: set its ccd, or "
                 f"Settings.collision = 'continuous', or use smaller steps",
-                kind="hasty", entity=entity,
+                kind="hasty", entity=hasty,
             )  # fmt: skip
         if solver.squeezed:
-            entity = int(bodies.entity[solver.squeezed_row])
             self.world.report_fault(
                 f"step {self.world.step_count}: no room for {solver.squeezed} squeezed bodies, the first is entity "
-                f"{entity}: stop earlier what squeezes them, or use masses that differ less",
-                kind="squeezed", entity=entity,
-            )  # fmt: skip
-        if self._impacts.halted:
-            entity = int(bodies.entity[self._impacts.halted_row])
+                f"{entity[solver.squeezed_row]}: stop earlier what squeezes them, or use masses that differ less",
+                kind="squeezed",
+            )
+        if solver.overloaded:
             self.world.report_fault(
-                f"entity {entity}: so many impacts that the step would not end: {self._impacts.halted} bodies stood still "
-                f"for what was left of it; use smaller steps",
-                kind="halted", entity=entity,
-            )  # fmt: skip
-        if self._impacts.capped:
+                f"step {self.world.step_count}: {solver.overloaded} bodies are too heavy for what they lie on, the "
+                f"first is entity {entity[solver.overloaded_row]}: their contacts take them as lighter; use masses "
+                f"that differ less, or smaller steps",
+                kind="overloaded",
+            )
+        if solver.restrained:
             self.world.report_fault(
-                f"step {self.world.step_count}: {self._impacts.capped} impacts beyond {self._settings().impact_cap} "
+                f"step {self.world.step_count}: contacts of {solver.restrained} islands would have given them much "
+                f"energy, and were held back, the first with entity {entity[solver.restrained_row]}: use smaller "
+                f"steps, more substeps, or masses that differ less",
+                kind="restrained",
+            )
+        if impacts.halted:
+            self.world.report_fault(
+                f"step {self.world.step_count}: too many impacts for a step: {impacts.halted} bodies stood still for "
+                f"the rest of it, the first is entity {entity[impacts.halted_row]}: use smaller steps",
+                kind="halted",
+            )
+        if impacts.capped:
+            self.world.report_fault(
+                f"step {self.world.step_count}: {impacts.capped} impacts beyond {self._settings().impact_cap} "
                 f"of a body in one step: raise Settings.max_impacts_per_step or use smaller steps; the rest was solved "
                 f"as contact at rest",
                 kind="impacts",
-            )  # fmt: skip
+            )
 
     def _record(self) -> None:
         """Record what has begun, ended and bounced."""

@@ -14,45 +14,43 @@ from ..ccd.search_bounds import FAST
 from ..codes import OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
+from ..narrow_phase.manifolds import between, deepest_possible, meet
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..shapes.tolerances import smaller_extent
-from .approach import between, leg_start, meet, touch_on_way
+from .approach import leg_start, touch_on_way
 from .bodies import note_squeezed
 
 ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
+NO_PAIR = -1
 ROUNDS = 4  # over what a body in a corner touches; the last one is for what stands still alone
 KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours of a body are known
 
 
 @part
-def how_deep(state, a, b):
-    """(by how much they overlap more than they may, normal) at the end of the step."""
+def how_deep(state, c, a, b):
+    """(by how much they overlap more than they may, normal) at the end of the step; c: the pair, or NO_PAIR."""
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
     d, start = between(bodies, a, b), leg_start(state, a, b)
     travel = sub(d, start)
     way, allowed = length(travel), ALLOWED * extent
-    if way <= FAST * extent:  # usual: one look is enough
-        _, depth, normal, _ = meet(state, a, b, d)
-        if depth <= allowed:
-            return 0.0, normal
-    _, deep, normal, _ = meet(state, a, b, start)
-    if -deep > way:  # it does not get there
-        return 0.0, normal
-    found = False
+    found, depth, normal = False, 0.0, travel
     if way > FAST * extent:
-        found, gap, normal, _ = touch_on_way(state, a, b, start, travel, FAST * extent)
+        found, gap, normal = touch_on_way(state, a, b, start, travel, FAST * extent)
         depth = -gap - dot(travel, normal)
+    elif c != NO_PAIR and deepest_possible(state.pairs, c, d) <= allowed:  # usual
+        return 0.0, normal
     if not found:
         _, depth, normal, _ = meet(state, a, b, d)
+    deep = meet(state, a, b, start)[1] if depth > allowed else 0.0
     return depth - max(deep, allowed), normal
 
 
 @part
-def keep_out(state, a, b):
+def keep_out(state, c, a, b):
     """Move the one of a and b that can be moved out of the other, where it is deeper than it may, and take the speed
     that leads there; returns whether it was."""
     bodies = state.bodies
-    far, normal = how_deep(state, a, b)
+    far, normal = how_deep(state, c, a, b)
     if not far > 0.0:
         return False
     i, fixed, sign = (b, a, 1.0) if bodies.inverse_mass[b] > 0.0 else (a, b, -1.0)
@@ -95,7 +93,7 @@ def keep_out_of_all(state, i):
     bodies, moved = state.bodies, False
     for k in range(state.dynamic, state.count):
         if bodies.shape[k] >= 0 and layers_meet(state, i, k) and is_solid_pair(state, i, k):
-            moved |= keep_out(state, i, k)
+            moved |= keep_out(state, NO_PAIR, i, k)
     return moved
 
 
@@ -111,7 +109,7 @@ def obey_statics(state, dt):
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
             if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i)):
                 continue
-            if keep_out(state, a, b):
+            if keep_out(state, c, a, b):
                 moved = True
                 if turn == ROUNDS - 1:
                     note_squeezed(state.solver, i)

@@ -19,8 +19,7 @@ from .events import disabled_pairs
 from .last_word import obey_statics
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
-from .resting_prediction import predict_rest
-from .solving.heavy_light_blocks import find_blocks
+from .solving.prediction import predict_rest
 from .solving.solver import solve_contacts
 from .solving.warm_start import match_warm_start, store_warm_start
 
@@ -40,8 +39,8 @@ class Response(StagedSystem):
     STAGES = (
         Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), "colliders"),
         Stage(
-            predict_rest, "what carried a body carries it in the prediction too", ("warm_start",), MOTION, "colliders",
-            RESTED,
+            predict_rest, "the impulses of the last step act on the prediction, as far as they take energy",
+            ("warm_start",), MOTION, "colliders", RESTED,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),
         Stage(
@@ -51,14 +50,19 @@ class Response(StagedSystem):
         Stage(
             find_resting, "which pairs neither bounce nor are apart", ("pairs", *MOTION), ("pairs",), "colliders", NEAR
         ),
-        Stage(gather, "the resting bodies and their contacts, by colour", MOTION, ("solver",), "colliders", REST),
+        Stage(
+            gather, "the resting bodies and their contacts, by island and colour; substeps of each island", MOTION,
+            ("solver",), "colliders", REST,
+        ),
         Stage(linearise, "normal and gap of each contact at rest", MOTION, ("solver", "pairs"), "colliders", REST),
         Stage(
             match_warm_start, "the impulses of the step before, to start with", ("warm_start",), ("solver",),
             "colliders", REST,
         ),
-        Stage(find_blocks, "light bodies between heavy ones", ("solver",), ("solver",), "colliders", REST),
-        Stage(solve_contacts, "substeps under forces and contacts", ("solver",), ("solver",), "colliders", REST),
+        Stage(
+            solve_contacts, "substeps: forces, warm start, push, move, relax, guard", ("solver",), ("solver",),
+            "colliders", REST,
+        ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, "colliders", REST),
         Stage(
             obey_statics, "what the solver has pushed into or through what cannot be moved is put back", ("pairs",),
@@ -88,16 +92,32 @@ class Response(StagedSystem):
             return "no colliders: nothing to do"
         mode = self._settings().collision
         if mode == "event_driven":
-            return "all impacts at their true time, in order, then contacts at rest"
-        if mode == "continuous":
-            return "impacts at their time on the path, what is fast where it first touches, then contacts at rest"
-        if self._state.sweeping:
-            return "impacts at their time on the path, bodies with ccd where they first touch, then contacts at rest"
-        if not self.may_bounce():
-            return "contacts at rest; nothing bounces: every restitution is 0"
-        return "impacts at their time on the path, then contacts at rest"
+            what = "all impacts at their true time, in order, then contacts at rest"
+        elif mode == "continuous":
+            what = "impacts at their time on the path, what is fast where it first touches, then contacts at rest"
+        elif self._state.sweeping:
+            what = "impacts at their time on the path, bodies with ccd where they first touch, then contacts at rest"
+        elif not self.may_bounce():
+            what = "contacts at rest; nothing bounces: every restitution is 0"
+        else:
+            what = "impacts at their time on the path, then contacts at rest"
+        return what + self._islands()
+
+    def _islands(self) -> str:
+        """The islands of the last step and their substeps."""
+        solver, usual = self._state.solver, self._state.substeps
+        if not solver.islands:
+            return ""
+        substeps = solver.substeps_of[: solver.islands]
+        refined = int(np.count_nonzero(substeps > usual))
+        more = f", {refined} of them with up to {substeps.max()}" if refined else ""
+        return f"; {_count(solver.contacts, 'row')}, {_count(solver.islands, 'island')} with {usual} substeps{more}"
 
     def may_bounce(self) -> bool:
         """Whether some collider has a restitution."""
         restitution = self._state.colliders.restitution[:, : self._state.count]
         return bool(np.any(restitution != 0.0))
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}" + "s" * (number != 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..codes import OK, RUN_NARROW
+from ..narrow_phase.manifolds import move_to_start
 
 
 def begin_response(state, dt):
@@ -13,9 +14,12 @@ def begin_response(state, dt):
     near = pairs.found if state.moved else pairs.count  # in a step, what is near at its end is among those found
     unknown = state.sweeping and state.moved and state.neighbours_known_until < dt
     state.response_idle = near == 0 and not unknown and memory.counts[memory.now] == 0
-    state.impacts_recorded, state.solver.squeezed, state.impacts.halted = False, 0, 0
+    solver = state.solver
+    solver.islands = solver.squeezed = solver.overloaded = solver.restrained = state.impacts.halted = 0
+    state.impacts_recorded = False
     if state.response_idle:
         return OK
+    move_to_start(state)
     for c in range(pairs.count):
         pairs.impulse[c] = 0.0
     if not state.moved:  # the phase is run alone: the bodies stand where they overlap

@@ -28,6 +28,7 @@ from ..linking.parts import (
     call_held_by_edge,
     call_kind_beyond_cap,
 )
+from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
@@ -36,7 +37,7 @@ from .impulses import BOUNCE, CROSS, FREE, LAND, SLIDE, STICK, STOP, STOPPED, is
 
 TIME_ITERATIONS = 80
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
-MOST_IMPACTS = 10_000_000  # of a body in a step, elastic ones included: some seconds, and then it is stopped
+MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
 
 NO_TOUCH, OVERLAPS_AT_END, SWEPT = range(3)
 NONE, LANDING, IMPACT = range(3)  # a landing is too slow to bounce
@@ -92,14 +93,12 @@ def rest_edge(state, a, b, dt):
 def leaves_touch_at(state, c, path, since, t):
     """When pair c, that touches at t on the side opposite to its last impact, is clear of the place of that: ``since``,
     unless it is there still. Things without thickness touch on either side, by rounding, after they have bounced."""
-    impacts, pairs, k = state.impacts, state.pairs, state.impacts.logged - 1
-    while k >= 0 and impacts.log_time[k] >= since:
-        if impacts.log_pair[k] == c:
-            a, b, rate = pairs.a[c], pairs.b[c], dot(rate_along(path, since), pairs.normal[c])
-            clear = since + clear_of_rounding(state, a, b, path, since) / abs(rate)
-            return clear if t < clear and both_convex(state, state.bodies.shape[a], state.bodies.shape[b]) else since
-        k -= 1
-    return since
+    pairs = state.pairs
+    if not pairs.struck[c] >= since:
+        return since
+    a, b, rate = pairs.a[c], pairs.b[c], dot(rate_along(path, since), pairs.normal[c])
+    clear = since + clear_of_rounding(state, a, b, path, since) / abs(rate)
+    return clear if t < clear and both_convex(state, state.bodies.shape[a], state.bodies.shape[b]) else since
 
 
 @part
@@ -219,6 +218,7 @@ def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
         return SLIDE
     one, two = bodies.cluster_root[a], bodies.cluster_root[b]
     movable = one != two and bodies.cluster_inverse_mass[one] + bodies.cluster_inverse_mass[two] > 0.0
+    movable = movable and max(count[a], count[b]) < STOPPED  # what meets something stopped keeps its momentum, as that
     since_last = t - max(bodies.last_impact[a], bodies.last_impact[b])
     collapse = restitution <= 0.0 or (restitution < 1.0 and since_last <= QUICK * dt)
     if movable and (collapse or (state.mode == EVENT_DRIVEN and since_last <= 0.0)):
@@ -241,10 +241,10 @@ def counts_for_cap(state, a, b, t, restitution):
 @part
 def is_beyond_cap(state, a, b):
     """Whether one of the two has had all the impacts it may have in a step."""
-    counted, count, cap = state.bodies.counted_impacts, state.bodies.impact_count, state.max_impacts
+    counted, cap = state.bodies.counted_impacts, state.max_impacts
     if state.impacts.sweeps and is_caught(state, a, b):
         return True
-    return counted[a] >= cap or counted[b] >= cap or count[a] >= MOST_IMPACTS or count[b] >= MOST_IMPACTS
+    return counted[a] >= cap or counted[b] >= cap or state.impacts.looked >= MOST_LOOKS
 
 
 @part
@@ -286,6 +286,9 @@ def consider(state, c, dt):
         return
     slot, restitutions = bodies.collider_slot, state.colliders.restitution
     e = mix(state, state.restitution_rule, restitutions[slot[a], a], restitutions[slot[b], b])
+    rested = pairs.early[c] and not passive and e < 1.0
+    if rested and is_at_manifold(pairs, c, along(path, dt), smaller_extent(bodies, a, b)):  # it stays there
+        return
     kind, touch, end_normal = find_touch(state, c, a, b, path, e, dt)
     if kind == NO_TOUCH:
         return

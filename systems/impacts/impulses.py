@@ -14,6 +14,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
+from ..narrow_phase.manifolds import forget_manifold
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
@@ -29,9 +30,12 @@ def deflect(state, i, dv, now, dt):
     """Give a body its change of velocity, and the rest of the step with it.
 
     In an event-driven world damping acts at the end of the step, for half of it. Else it acts all the time, and the
-    velocity of a straight path is that of the end already.
+    velocity of a straight path is that of the end already. What has been stopped stays where it is.
     """
     bodies = state.bodies
+    if bodies.impact_count[i] >= STOPPED:
+        bodies.linear_velocity[i] = add(bodies.linear_velocity[i], dv)
+        return
     bodies.start_velocity[i] = add(bodies.start_velocity[i], dv)
     bodies.origin[i] = add_scaled(bodies.origin[i], dv, -now)
     bodies.path_velocity[i] = add(bodies.path_velocity[i], dv)
@@ -49,9 +53,10 @@ def log_impact(state, event, impulse):
     """Note its pair, time, impulse, normal and point; also with the pair."""
     impacts, pairs = state.impacts, state.pairs
     logged, c = impacts.logged, impacts.event_pair[event]
-    pairs.normal[c], pairs.point[c] = impacts.event_normal[event], impacts.event_point[event]
+    pairs.normal[c] = impacts.event_normal[event]
     pairs.impulse[c] += impulse
-    pairs.depth[c] = 0.0
+    pairs.struck[c] = impacts.event_time[event]
+    forget_manifold(pairs, c)
     impacts.log_pair[logged], impacts.log_time[logged] = c, impacts.event_time[event]
     impacts.log_impulse[logged] = impulse
     impacts.log_normal[logged], impacts.log_point[logged] = impacts.event_normal[event], impacts.event_point[event]
@@ -86,6 +91,13 @@ def bounce(state, event, dt):
 
 
 @part
+def rate_of(state, i, now):
+    """The velocity of body i, also of one that has been stopped until the step ends."""
+    bodies = state.bodies
+    return bodies.linear_velocity[i] if bodies.impact_count[i] >= STOPPED else rate_along(path_of(state, i), now)
+
+
+@part
 def mean_rate(state, root, now):
     """The velocity of a cluster's centre of mass, of its bodies that can be moved; one that is held moves as what holds
     it: what strikes it must not gain from how fast it slides along that, as if it had no end of mass."""
@@ -97,7 +109,7 @@ def mean_rate(state, root, now):
     while i >= 0:
         if bodies.inverse_mass[i] > 0.0:
             weight = 1.0 / bodies.inverse_mass[i]
-            total, mass = add_scaled(total, rate_along(path_of(state, i), now), weight), mass + weight
+            total, mass = add_scaled(total, rate_of(state, i, now), weight), mass + weight
         i = bodies.cluster_next[i]
     return scale(total, 1.0 / mass) if mass > 0.0 else rate
 

@@ -9,6 +9,7 @@ from ...framework.jit.records.record_type import request
 from ..ccd.search_bounds import FAST
 from ..codes import NEED_EVENTS, NEED_TOGETHER, OK, REFRESH_PAIRS
 from ..linking.parts import TAKE_SWEPT, TAKE_TOGETHER, call_take_swept, call_take_together
+from ..narrow_phase.manifolds import forget_manifold
 from .find import consider
 from .heap import heap_pop
 from .impulses import CROSS, LAND, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
@@ -48,7 +49,7 @@ def begin_impacts(state, dt):
     """No impact has happened yet; the first search is among what may have met."""
     impacts, bodies, pairs = state.impacts, state.bodies, state.pairs
     impacts.logged = impacts.capped = impacts.crossings = impacts.group_visits = 0
-    impacts.rounds = impacts.halted = 0
+    impacts.rounds = impacts.halted = impacts.looked = 0
     impacts.active = False
     if state.response_idle:
         return OK
@@ -128,12 +129,12 @@ def take_swept_event(state, event, dt):
             slide(state, a if bodies.inverse_mass[a] > 0.0 else b, impacts.event_normal[event], impacts.now, dt)
     else:
         impacts.capped += 1
-        pairs.depth[c], pairs.crossed[c] = 0.0, True
+        pairs.crossed[c] = True
+        forget_manifold(pairs, c)
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
             if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
                 stop(state, i, impacts.now)
-                bodies.cluster_inverse_mass[bodies.cluster_root[i]] = 0.0  # what sticks to it later does not push it on
     return 0
 
 
@@ -240,7 +241,7 @@ def resolve_impacts(state, dt):
         if impacts.waiting + wanted > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
             state.needed = impacts.waiting + wanted
             return NEED_EVENTS
-        state.looks_counted += wanted
+        impacts.looked += wanted
         for q in range(min(AHEAD, wanted) if far else 0):
             request_bodies(state, impacts.looks[q])
         for q in range(wanted):
@@ -264,5 +265,6 @@ def resolve_impacts(state, dt):
         else:
             break
     state.impacts_counted += impacts.logged
+    state.looks_counted += impacts.looked
     state.capped_counted += impacts.capped
     return OK

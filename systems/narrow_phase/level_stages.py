@@ -8,6 +8,7 @@ from ...framework.vectors import add, sub
 from ..codes import OK
 from ..shapes.dispatch import evaluate
 from ..shapes.tolerances import contact_margin
+from .manifolds import between
 
 
 @part
@@ -23,10 +24,8 @@ def evaluate_levels_of(state, a, b, margin):
     last = state.level_count - 1
     for level in range(last + 1):
         shape_a, shape_b = levels[level, a], levels[level, b]
-        centre = add(position[a], offsets[level, a])
-        d = sub(add(position[b], offsets[level, b]), centre)
+        d = sub(add(position[b], offsets[level, b]), add(position[a], offsets[level, a]))
         hit, depth, normal, point = evaluate(state, shape_a, a, shape_b, b, d)
-        point = add(centre, point)
         if level == last or (shape_a == levels[last, a] and shape_b == levels[last, b]):
             break
         if level == 0:
@@ -56,7 +55,8 @@ def evaluate_levels(state, dt):
         dropped, hit, depth, normal, point = evaluate_levels_of(state, a, b, margin)
         pairs.a[kept], pairs.b[kept], pairs.is_solid[kept] = a, b, solid
         pairs.hit[kept], pairs.depth[kept] = hit, depth
-        pairs.normal[kept], pairs.point[kept] = normal, point
+        pairs.at[kept], pairs.normal[kept], pairs.point[kept] = between(state.bodies, a, b), normal, point
+        pairs.early[kept] = False
         kept += 0 if dropped else 1
     pairs.count = kept
     return OK

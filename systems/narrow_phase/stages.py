@@ -6,7 +6,7 @@ from ...framework.compilation import inlined, part
 from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
 from ..shapes.dispatch import evaluate_batch
-from ..shapes.tolerances import contact_margin
+from .manifolds import is_near, mark_early
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
 BODIES_PER_CANDIDATE = 64
@@ -175,7 +175,7 @@ def select_pairs(state, dt):
         a, b = candidates.sorted_a[c], candidates.sorted_b[c]
         if all_meet or layers_meet(state, a, b):
             pairs.a[kept], pairs.b[kept] = a, b
-            pairs.is_solid[kept] = is_solid_pair(state, a, b)
+            pairs.is_solid[kept], pairs.early[kept] = is_solid_pair(state, a, b), False
             if several:
                 one, other = min(shape[a], shape[b]), max(shape[a], shape[b])
                 kind[kept] = one * shapes.count + other
@@ -183,7 +183,7 @@ def select_pairs(state, dt):
             kept += 1
     if not several:
         starts[2] = kept
-    pairs.count, pairs.found = kept, 0
+    pairs.count, pairs.found, state.found_at_end = kept, 0, False
     pairs.resting_count, pairs.disabled_count = 0, 0
     return OK
 
@@ -193,6 +193,7 @@ def evaluate_pairs(state, dt):
     candidates, count, shapes = state.candidates, state.pairs.count, state.shapes.count
     if state.several_levels or count == 0:
         return OK
+    mark_early(state)
     starts, bucket, kind = candidates.bucket_starts, candidates.bucket, candidates.kind
     only = kind[0] if shapes > 1 else 0
     if starts[only + 2] == count:  # they need no sorting
@@ -214,14 +215,12 @@ def evaluate_pairs(state, dt):
 
 
 def collect_contacts(state, dt):
-    """The pairs that touch at the end of their motion, or nearly do."""
+    """The pairs that touch at the end of their motion, or nearly do, or rested in the step before."""
     pairs = state.pairs
     span, found = dt if state.moved else 0.0, 0
     for c in range(pairs.count):
         hit = pairs.hit[c]
-        near = hit or (
-            pairs.is_solid[c] and pairs.depth[c] >= -contact_margin(state, span, pairs.a[c], pairs.b[c])
-        )
+        near = hit or pairs.early[c] or is_near(state, span, c)
         pairs.near_contact[c] = near
         if hit or (near and span > 0.0):
             pairs.hits[found] = c

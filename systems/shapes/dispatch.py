@@ -36,6 +36,7 @@ def evaluate(state, shape_a, a, shape_b, b, d):
     address, flipped, swapped = shapes.evaluate[kind], shapes.flipped[kind], shape_a > shape_b
     if address == 0:
         return False, -math.inf, d, d
+    state.evaluations_counted += 1
     pa, pb = shapes.parameters[shape_a], shapes.parameters[shape_b]
     if swapped != flipped:
         pa, a, pb, b, d = pb, b, pa, a, negative(d)
@@ -44,9 +45,10 @@ def evaluate(state, shape_a, a, shape_b, b, d):
 
 @inlined
 def evaluate_batch(state, kind, start, stop):
-    """Write hit, depth, normal and point of the pairs ``bucket[start:stop]``, which are of that ``kind``."""
+    """Write the manifolds of the pairs ``bucket[start:stop]``, which are of that ``kind``."""
     address = state.shapes.batch[kind]
     if address != 0:
+        state.evaluations_counted += stop - start
         if call_batch(address, state, start, stop) != SOUND:
             repeat_batch(state, start, stop)
     else:

@@ -6,6 +6,10 @@ from ...framework.compilation import inlined
 
 SLOP = 0.005  # of the extent of the smaller body
 MARGIN_STEPS = 2.0
+# Where a manifold stands for the answer of the pair's function:
+SAME_PLACE = 1e-9  # of the extent: within that all of it does; and a gap that is smaller is one of rounding errors
+PLANE_SIZES = 0.2  # of the extent: within that its plane may tell the depth,
+FLAT_SLOPS = 0.02  # slops: if it is off the surfaces by less, which decides nothing
 
 
 @inlined

@@ -45,7 +45,7 @@ class Sleepers:
         self._watching = Watching(state, table, scene)
         self.contacts = Stored(state.contacts, CONTACTS, room.reserve_contacts)
         self.impulses = Stored(state.warm_start, IMPULSES, room.reserve_warm_start)
-        self._lengths = 1.0, 1.0  # of the step and the substep that the impulses are of
+        self._dt = 1.0  # s, of the step that the impulses are of
         self.links = self.sizes = np.empty((0, 2), np.int64)
         self._followed: Any = None  # the structure that all this is of
         self._seen = -1
@@ -235,13 +235,13 @@ class Sleepers:
             still[still > AWAKE] = AWAKE
             state.fresh_statics = 0
         now = memory.now
-        lengths = float(memory.step[now]), float(memory.substep[now])
+        dt = float(memory.step[now])
         if not len(self.impulses):
-            self._lengths = lengths
+            self._dt = dt
         elif not memory.counts[now]:
-            memory.step[now], memory.substep[now] = self._lengths
-        elif lengths != self._lengths:
-            self._scale(lengths)
+            memory.step[now] = self._dt
+        elif dt != self._dt:
+            self._scale(dt)
         self.impulses.exchange(self._both_still)
         memory.rows_version[now] = -1
         self.contacts.exchange(self._both_still)
@@ -249,14 +249,11 @@ class Sleepers:
         ids, sizes = np.unique(self._islands(), return_counts=True)
         self.sizes = np.stack((ids, sizes), axis=1)
 
-    def _scale(self, lengths: tuple[float, float]) -> None:
-        """The impulses that belong to steps and substeps of that length."""
-        by_step, by_substep = (new / old for new, old in zip(lengths, self._lengths, strict=True))
-        columns, self._lengths = self.impulses.columns, lengths
-        self.impulses.columns = {
-            **columns, "total": columns["total"] * by_step, "impulse": columns["impulse"] * by_substep,
-            "tangent": columns["tangent"] * by_substep,
-        }  # fmt: skip
+    def _scale(self, dt: float) -> None:
+        """The impulses that belong to steps of that length."""
+        columns, by = self.impulses.columns, dt / self._dt
+        self._dt = dt
+        self.impulses.columns = {**columns, **{name: columns[name] * by for name in ("impulse", "tangent", "push")}}
 
     def _both_still(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         still, table = self._still(), self._table
@@ -302,7 +299,7 @@ class Sleepers:
         state = self._state
         return {
             "contacts": self.contacts.saved(), "impulses": self.impulses.saved(), "links": self.links,
-            "sizes": self.sizes, "lengths": list(self._lengths),
+            "sizes": self.sizes, "dt": self._dt,
             "numbers": [state.asleep, state.due, state.fresh_statics, state.contacts.stored],
         }  # fmt: skip
 
@@ -311,7 +308,7 @@ class Sleepers:
         self.contacts.take_back(parts["contacts"])
         self.impulses.take_back(parts["impulses"])
         self.links, self.sizes = (np.array(parts[name], np.int64).reshape(-1, 2) for name in ("links", "sizes"))
-        self._lengths = parts["lengths"][0], parts["lengths"][1]
+        self._dt = parts["dt"]
         state.asleep, state.due, state.fresh_statics, state.contacts.stored = parts["numbers"]
 
     def saved(self) -> dict[str, Any] | None:

@@ -15,8 +15,8 @@ from ...framework.jit.records.record import Record
 
 Columns = dict[str, np.ndarray]
 
-CONTACTS = ("entity_a", "entity_b", "point", "normal", "depth", "impulse", "enabled")
-IMPULSES = ("entity_a", "entity_b", "normal", "impulse", "total", "tangent")
+CONTACTS = ("entity_a", "entity_b", "point", "normal", "depth", "impulse", "enabled", "rested")
+IMPULSES = ("entity_a", "entity_b", "normal", "impulse", "tangent", "push", "island")
 
 
 def merged(one: Columns, other: Columns) -> tuple[Columns, np.ndarray]:

@@ -1,1 +1,21 @@
-"""The solver for contacts at rest: soft, firm and rigid ones, light bodies between heavy ones, and their warm start."""
+"""The solver of contacts at rest: rows in islands, solved in substeps.
+
+Reads the contacts at rest with normal and gap where the step starts, the velocities there, the mean acceleration of the
+step, and the impulses of the last one. Writes into its own records (``records.py``) the shift and the velocity of each
+body, and the impulses.
+
+``islands.order_rows`` joins rows into islands, chooses the substeps of each and sorts the rows. Then
+``solver.solve_contacts`` runs ``solver.solve_substep`` for each island and substep:
+
+1. ``apply_forces``.
+2. ``apply_warm_start``: the impulses of the last substep.
+3. ``solve_pass`` that pushes: closing rows stop, overlapping rows part like an overdamped spring.
+4. ``move``, ``measure``: the bodies move; what each row may close from there.
+5. ``solve_pass`` that relaxes, two times, four in the last substep: the speed of pushing is taken back.
+6. ``guard.finish_substep``: further passes over islands that gained energy, or whose rows are far from solved; then
+   the bound on their energy.
+
+A pass is ``rows.solve_normals`` and ``rows.solve_friction``. How a row moves its bodies is ``rows.closing_speed`` and
+``rows.apply_impulse``, nowhere else. ``hard`` chooses contacts that do not sag. ``warm_start`` keeps impulses between
+steps, ``prediction`` applies them before the impacts.
+"""

@@ -1,91 +1,98 @@
-"""Records of the solver: contacts at rest and their bodies in a step, and what is known of those of the last one."""
+"""Records of the solver: rows and their bodies in a step, and what is known of the contacts of the last one."""
 
 from __future__ import annotations
 
-from ....framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, table, vectors
+from ....framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, vectors
 
-# Contacts at rest and their bodies, while they are solved.
 SOLVER = Schema(
     "Solver",
+    # rows: contacts at rest, in the order of their ranges and colours
     contacts=integer(),
-    first=ints("uint32"),
+    slot=ints("int32"),  # the row of contact r,
+    pair=ints("int32"),  # and its pair
+    colour=ints("int8"),  # of contact r
+    listed=ints("int32"),  # some rows
+    first=ints("uint32"),  # places of the two bodies
     second=ints("uint32"),
-    slot=ints("int32"),  # place of contact r in these columns, which are sorted by colour
-    pair=ints("int32"),  # and whose place that is
-    colour=ints("int8"),
     normal=vectors(),
-    tangent=vectors(),
-    gap=floats(),
-    apart=flags(),  # where the step starts
+    gap=floats(),  # m, along the normal, where the step starts; below 0: overlap
+    apart=flags(),  # there is a gap where the step starts
     varies=flags(),  # its normal stands for several faces
-    mass=floats(),
+    parting=flags(),  # it bounces: no overlap to be pushed out
+    mass=floats(),  # kg, see effective_mass
     friction=floats(),
     extent=floats(),
-    impulse=floats(),
-    total=floats(),
-    opening=floats(),
-    pushing=floats(),
-    in_block=flags(),
-    blow=floats(),  # impulse of a shock in this substep,
-    blow_tangent=vectors(),
-    shock=floats(),  # and of all in this step
-    asked=ints(),  # a bit for each contact
-    batch=ints("int32"),  # contacts that are asked at the same time, how much their impulses change,
-    change=floats(),
-    speed=floats(),  # and the speed of the shock that they come from
-    contact_of=table("int32", 8),  # the contacts of each body that can be moved, body by body,
-    worked=flags(),
-    parting=flags(),
-    active=flags(),
+    impulse=floats(),  # N s in a substep, along the normal,
+    tangent=vectors(),  # and along the surface
+    total=floats(),  # N s in the step
+    previous=floats(),  # impulse before a pass or a substep
+    opening=floats(),  # m/s at which it may close,
+    pushing=floats(),  # and the same in the pass that pushes: below 0 where overlap is to open
+    loaded=floats(),  # m of sag under the impulse of the last step
+    worked=flags(),  # it has pushed in this step
     soft=flags(),
-    firm=flags(),  # of a body that touches only what cannot be moved
-    rigid=flags(),
-    any_rigid=flag(),
-    any_uneven=flag(),  # contacts of a light body and a heavy one that can be moved
-    deep=flags(),
-    direction=floats(),
-    tolerance=floats(),
-    previous=floats(),
-    error=floats(),
-    converging=flags(),  # in an island with rigid contacts
-    velocity_before=vectors(),
-    velocity_way=vectors(),
-    island=ints("int32"),
-    size=ints("int32"),  # contacts of an island
-    open=flags(),
-    going=flags(),
-    across=floats(),
-    along=floats(),
-    far=floats(),
-    worst=floats(),
-    stopper=ints("int32"),
-    islands_known=flag(),
-    squeezed=integer(),  # bodies for which there is no room where they are pushed,
-    squeezed_row=integer(),  # and the first of them
-    light_of=ints("int32"),
-    before=ints("int32"),
-    heaviest=ints("int32"),
-    fastest=floats(),
-    blocks=integer(),
-    block=table("int32", 2),
+    hard=flags(),
+    any_hard=flag(),
     has_friction=flag(),
+    visits=integer(),  # rows solved in this step
+    starts=ints(),  # where each colour begins
+    # bodies, in the order of their ranges
     bodies=integer(),
     body_row=ints("int32"),
-    used=ints(),
-    last=ints("int32"),
+    used=ints(),  # colours of its rows; later a row
+    number=ints("int32"),
+    island=ints("int32"),  # -1: cannot be moved
     velocity=vectors(),
-    shift=vectors(),
+    velocity_before=vectors(),  # of a substep, without contacts
+    shift=vectors(),  # m since the step began
     acceleration=vectors(),
     inverse_mass=floats(),
-    contacts_until=ints("int32"),  # and where those of each body end
-    linked=flag(),
-    reach=floats(),
-    visits=integer(),  # times that a contact was solved in this step,
-    shock_visits=integer(),  # and in shocks
-    waits=flags(),  # a firm one that is open where the step starts
-    unsettled=flags(),
-    any_unsettled=flag(),
-    starts=ints(),
+    heft=floats(),  # kg; 0 for what cannot be moved
+    mover=ints("int32"),  # bodies that move by themselves
+    movers=integer(),
+    shared=flags(),  # something presses on it
+    way=vectors(),  # sum of the normals of what holds it
+    held=floats(),  # N s, by its strongest hard contact
+    # islands
+    islands=integer(),
+    size_of=ints("int32"),  # rows
+    mass_of=floats(),  # kg
+    force_of=floats(),  # N s that forces give in the step
+    lightest=floats(),  # inverse mass of the heaviest body
+    most_change=floats(),  # m/s that forces make in the step
+    stiff=floats(),  # 1 / (kg m): largest inverse mass of a row over its extent
+    own=floats(),  # 1 / m: the same times the mass of the lighter body
+    strike=floats(),  # extents per step that some row closes
+    substeps_of=ints("int32"),
+    hard_of=flags(),
+    passes=ints("int32"),  # further ones in a substep, at most
+    bears=floats(),  # share of its heaviest body that it can bear
+    range_of=ints("int32"),
+    slope=floats(),  # J, see guard.weigh
+    curvature=floats(),
+    energy=floats(),
+    momentum=vectors(),
+    allowed=floats(),
+    share=floats(),
+    taken=floats(),  # J that the guard has taken in this step
+    struck=flags(),  # some row is far from solved
+    unsolved=flags(),
+    leader=ints("int32"),  # row of its first body
+    remembered=ints("int32"),
+    # ranges: the ordinary islands, then each special one
+    ranges=integer(),
+    usual=integer(),  # substeps,
+    push_rate=number(),  # 1 / s: overlap that they push out of itself
+    special=ints("int32"),  # island of a range
+    row_ends=ints("int32"),
+    body_ends=ints("int32"),
+    # faults: how many bodies, and the row of the first
+    squeezed=integer(),  # there is no room where they are pushed
+    squeezed_row=integer(),
+    overloaded=integer(),  # they count as lighter than they are
+    overloaded_row=integer(),
+    restrained=integer(),  # first bodies of islands to which contacts would have given much energy
+    restrained_row=integer(),
 )
 
 # Impulses of the contacts at rest, for the next step: [now, i] is the memory, [1 - now, i] is written.
@@ -97,13 +104,19 @@ WARM_START = Schema(
     entity_a=ints(stacked=True),
     entity_b=ints(stacked=True),
     normal=vectors(stacked=True),
-    impulse=floats(stacked=True),
-    total=floats(stacked=True),
-    tangent=vectors(stacked=True),
+    impulse=floats(stacked=True),  # N s of the last substep, as if the step were one,
+    tangent=vectors(stacked=True),  # and along the surface
+    push=vectors(stacked=True),  # what it gave in the step, with its friction
+    island=ints(stacked=True),  # entity of the first body of its island,
+    group=ints("int32", stacked=True),  # and the first contact of it, for ``rows_version``
     first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
     second=ints("int32", stacked=True),
     rows_version=ints(),
-    step=floats(),
-    substep=floats(),
-    work=floats(),
+    step=floats(),  # s that the impulses are for
+    # the prediction
+    share=floats(),  # of each push
+    off=flags(),
+    going=flags(),  # groups that gain energy
+    slope=floats(),
+    curvature=floats(),
 )

@@ -1,12 +1,10 @@
 """The solver of contacts at rest: soft constraints, solved in each of a few substeps.
 
-After Box2D v3's "soft step" (E. Catto, "Solver2D", 2024): per substep the forces act, last substep's impulses are
+After Box2D v3's "soft step" (E. Catto, "Solver2D", 2024): per substep the forces act, the impulses of the last one are
 applied again, one pass pushes overlapping bodies apart like a stiff, overdamped spring, the bodies move, and relaxing
-passes take back the speed that pushing has given them. The spring's frequency follows the rate of the substeps, so
-that more of them mean stiffer contacts.
-
-Contacts come sorted by colour: no two neighbours in the order move the same body, so that the processor can work on
-several at once.
+passes take back the speed that pushing has given them. The spring's frequency follows the rate of the substeps: more of
+them mean stiffer contacts. Where loads or blows ask for it, an island has more than others (see islands); what the
+passes leave undone gives no energy (see guard).
 """
 
 from __future__ import annotations
@@ -14,183 +12,330 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import packed, part
-from ....framework.vectors import add, add_scaled, dot, scale, sub
+from ....framework.jit.records.record_type import zero_of
+from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
-from .firm import leave_open
-from .heavy_light_blocks import hold_light, solve_blocks
-from .passes import solve_friction, solve_normals
-from .rigid import choose_rigid, converge, leave_out_rigid
-from .shocks import closes_fast, solve_shocks
-from .softness import DAMPING_RATIO, FREQUENCY
-
-RELAX_PASSES = 2
-LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
-LET_GO_PASSES = 4  # once, after contacts have been lost
-DEEP = 0.02  # of the extent: overlap beyond it is pushed out in position only, for a speed given to many adds up
-PUSH_RATE = 0.2  # of the deep overlap, per step
-PUSH_LIMIT = 0.05  # of the extent, per step
+from ..constants import (
+    AGREED,
+    AGREED_SHARE,
+    DAMPING_RATIO,
+    DEEP,
+    DEEPEST,
+    FREQUENCY,
+    HARD_PASSES,
+    LAST_RELAX_PASSES,
+    LOADED,
+    MOST_LOAD,
+    MOST_LOADED,
+    RELAX_PASSES,
+    SAG,
+    SLOPE,
+    STILL,
+    SUBSTEP_WORK,
+    TOLD_GAIN,
+    VERY_DEEP,
+)  # fmt: skip
+from .guard import find_struck, finish_substep
+from .hard import choose_hard, leave_open
+from .rows import apply_impulse, closing_speed, effective_mass, relax_listed, solve_friction, solve_normals
 
 
 @part
-def measure(solver, k, h, bias_rate):
-    """What contact k asks of the speed along its normal, from where the bodies are now.
+def measure(solver, h, bias_rate, dt, stiff, ends, span):
+    """What each row asks of the speed along its normal, from where the bodies are now.
 
-    opening: at most closing what is open within a substep; pushing: in the pass that pushes, overlap is to open as
-    well, softly where ``soft`` says so, unless it is too ``deep`` for that.
+    opening: at most closing what is open within a substep, or, in the one that ``ends`` the step, within a usual one;
+    pushing: in the pass that pushes, overlap is to open as well, softly where ``soft`` says so.
     """
-    room = solver.gap[k] + dot(sub(solver.shift[solver.second[k]], solver.shift[solver.first[k]]), solver.normal[k])
-    opening = pushing = max(0.0, room) / h
-    soft = deep = False
-    if room <= 0.0 and not solver.parting[k]:
-        deep = room < -DEEP * solver.extent[k]
-        if solver.rigid[k] or not deep:
-            pushing = bias_rate * max(room, -DEEP * solver.extent[k])
-            soft = not (solver.rigid[k] or solver.in_block[k] or solver.firm[k])
-    solver.opening[k], solver.pushing[k], solver.soft[k], solver.deep[k] = opening, pushing, soft, deep
-
-
-@part
-def measure_all(solver, h, bias_rate, dt):
-    """The same of all contacts, and which have pushed; returns (whether some are too deep, whether some close as fast
-    as shocks)."""
-    any_deep = any_fast = False
-    for k in range(solver.contacts):
+    shift, ahead = solver.shift, dt / solver.usual if ends else h
+    for k in range(span[0], span[1]):
+        room = solver.gap[k] + dot(sub(shift[solver.second[k]], shift[solver.first[k]]), solver.normal[k])
+        opening = pushing = max(0.0, room) / ahead
+        soft = False
+        if room <= 0.0 and not solver.parting[k]:
+            extent, hard = solver.extent[k], solver.hard[k]
+            deep = DEEP * extent + solver.loaded[k]
+            if room < -deep:
+                room = -deep + max(min(0.0, SLOPE * (room + VERY_DEEP * extent)), -DEEPEST * extent)
+            elif hard:  # at once
+                room = max(room / (h * bias_rate), -deep)
+            pushing = bias_rate * room
+            soft = not (stiff or hard)
         solver.worked[k] |= solver.impulse[k] > 0.0
-        measure(solver, k, h, bias_rate)
-        any_deep |= solver.deep[k]
-        any_fast |= closes_fast(solver, k, dt)
-    return any_deep, any_fast
+        solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
 
 
 @part
-def measure_moved(solver, h, bias_rate, dt):
-    """The same of the contacts of bodies that were pushed apart; returns whether some close as fast as shocks."""
-    moved, any_fast = solver.going, False
-    for k in range(solver.contacts):
-        if moved[solver.first[k]] or moved[solver.second[k]]:
-            measure(solver, k, h, bias_rate)
-            any_fast |= closes_fast(solver, k, dt)
-    return any_fast
+def apply_forces(solver, h, span):
+    """The forces of a substep act; ``velocity_before`` is what they make of the velocities without any contact."""
+    for q in range(span[2], span[3]):
+        v = add_scaled(solver.velocity[q], solver.acceleration[q], h)
+        solver.velocity[q], solver.velocity_before[q] = v, v
 
 
 @part
-def propagate(solver, begins):
-    """The contacts of unsettled bodies are active, and unsettle the bodies on their other sides; in the pass that
-    begins only those that do not wait, so that these bear the load."""
-    unsettled, inverse_mass, active = solver.unsettled, solver.inverse_mass, solver.active
-    for k in range(solver.contacts):
-        a, b = solver.first[k], solver.second[k]
-        active[k] = (unsettled[a] and inverse_mass[a] > 0.0) or (unsettled[b] and inverse_mass[b] > 0.0)
-    for k in range(solver.contacts):
-        if active[k]:
-            unsettled[solver.first[k]] = unsettled[solver.second[k]] = True
-            active[k] = not (begins and solver.waits[k])
-
-
-@part
-def push_deep(solver, substeps):
-    """Move bodies that overlap deeply apart, a part of the way, without giving them speed."""
-    shift, inverse_mass, moved = solver.shift, solver.inverse_mass, solver.going
-    for q in range(solver.bodies):
-        moved[q] = False
-    for k in range(solver.contacts):
-        a, b, n = solver.first[k], solver.second[k], solver.normal[k]
-        if not (solver.deep[k] or moved[a] or moved[b]):
-            continue
-        overlap = -solver.gap[k] - dot(sub(shift[b], shift[a]), n)
-        if overlap > DEEP * solver.extent[k] and not (solver.parting[k] or solver.rigid[k]):
-            push = min(PUSH_RATE * overlap, PUSH_LIMIT * solver.extent[k]) / substeps * solver.mass[k]
-            shift[a] = add_scaled(shift[a], n, -push * inverse_mass[a])
-            shift[b] = add_scaled(shift[b], n, push * inverse_mass[b])
-            solver.worked[k] = moved[a] = moved[b] = True
-
-
-@part
-def apply_warm_start(solver, h):
-    """The forces of a substep act, and the impulses of the last one again."""
-    velocity, inverse_mass, impulse = solver.velocity, solver.inverse_mass, solver.impulse
-    for q in range(solver.bodies):
-        velocity[q] = add_scaled(velocity[q], solver.acceleration[q], h)
-    for k in range(solver.contacts):
-        if impulse[k] > 0.0:
-            push = scale(solver.normal[k], impulse[k])
+def apply_warm_start(solver, most, span):
+    """The impulses of the last substep act again, no more than ``most`` of each: what is more was a blow."""
+    for k in range(span[0], span[1]):
+        old = solver.impulse[k]
+        if old > 0.0:
+            if old > most:
+                solver.impulse[k], solver.tangent[k] = most, scale(solver.tangent[k], most / old)
+            push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
-            a, b = solver.first[k], solver.second[k]
-            if inverse_mass[a] > 0.0:
-                velocity[a] = add_scaled(velocity[a], push, -inverse_mass[a])
-            if inverse_mass[b] > 0.0:
-                velocity[b] = add_scaled(velocity[b], push, inverse_mass[b])
+            apply_impulse(solver, k, push)
 
 
 @part
-def solve_substep(solver, h, substeps, passes, plastic, ends):
-    """One substep; passes: (how many before the one that pushes, how many after it); ends: it is the last one."""
-    omega = 2.0 * math.pi * FREQUENCY / h
-    damping = 2.0 * DAMPING_RATIO + h * omega
-    stiffness = h * omega * damping
-    bias_rate = omega / damping
-    softness = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness)
-    any_rigid = choose_rigid(solver, h)
-    apply_warm_start(solver, h)
-    turn, last = -passes[0], passes[1]
-    while turn <= last:
-        if turn < 0:
-            propagate(solver, turn == -passes[0])
-        elif any_rigid:
-            leave_out_rigid(solver)
-        chosen = turn < 0 or any_rigid
-        bias = solver.pushing if turn == 0 else solver.opening
-        solver.visits += solver.contacts
-        solve_normals(solver, bias, softness, turn == 0, chosen)
-        solve_blocks(solver, bias, chosen)
-        if solver.has_friction:
-            solve_friction(solver, chosen)
-        if any_rigid and turn >= 0:
-            if turn == 0:
-                converge(solver, bias, softness, True, DEEP, h)
-            converge(solver, bias, softness, turn == 0, math.inf, h)
-        if turn == 0:
-            for q in range(solver.bodies):
-                solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
-            any_deep, any_fast = measure_all(solver, h, bias_rate, h * substeps)
-            if any_deep:
-                push_deep(solver, substeps)
-                any_fast |= measure_moved(solver, h, bias_rate, h * substeps)
-            if ends:
-                leave_open(solver, h)
-            if plastic and any_fast:
-                solve_shocks(solver, h * substeps)
-        turn += 1
-    for k in range(solver.contacts):
+def move(solver, h, span):
+    """Bodies move for a substep; what moves by itself belongs to no special range, but moves with each of them."""
+    for q in range(span[2], span[3]):
+        solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
+    for m in range(solver.movers if span[2] > 0 else 0):
+        q = solver.mover[m]
+        solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
+
+
+@part
+def note_impulses(solver, span):
+    """What the impulses are before a pass or a substep."""
+    for k in range(span[0], span[1]):
+        solver.previous[k] = solver.impulse[k]
+
+
+@part
+def least_change(solver, h, span):
+    """The change of a speed that matters in a hard island, m/s for each m of extent; see AGREED_SHARE."""
+    fastest = 0.0
+    for q in range(span[2], span[3]):
+        fastest = max(fastest, length(solver.acceleration[q]) * h)
+    return AGREED_SHARE * fastest if fastest > 0.0 else math.inf
+
+
+@part
+def agrees(solver, h, least, span):
+    """Whether the last pass has changed nothing that matters."""
+    any_wrong = False
+    for k in range(span[0], span[1]):
+        wrong = min(AGREED * solver.extent[k] / h, least) * solver.mass[k]
+        any_wrong |= not abs(solver.impulse[k] - solver.previous[k]) <= wrong
+    return not any_wrong
+
+
+@part
+def converge(solver, soft, pushes, h, span):
+    """Passes over a hard island until they agree."""
+    start, stop, least = span[0], span[1], least_change(solver, h, span)
+    for _ in range(min(HARD_PASSES, SUBSTEP_WORK // (stop - start))):
+        note_impulses(solver, span)
+        solve_pass(solver, solver.pushing if pushes else solver.opening, soft, pushes, start, stop)
+        if agrees(solver, h, least, span):
+            break
+
+
+@part
+def list_by_gap(solver, span):
+    """The rows of a range into ``listed``, what is nearest first; Shell's sort."""
+    start, count, listed, opening = span[0], span[1] - span[0], solver.listed, solver.opening
+    for e in range(count):
+        listed[e] = start + e
+    stride = count // 2
+    while stride > 0:
+        for e in range(stride, count):
+            k, place = listed[e], e
+            while place >= stride and (
+                opening[listed[place - stride]] > opening[k]
+                or (opening[listed[place - stride]] == opening[k] and listed[place - stride] > k)
+            ):
+                listed[place] = listed[place - stride]
+                place -= stride
+            listed[place] = k
+        stride //= 2
+
+
+@part
+def close_in_order(solver, h, span):
+    """What falls far in a substep: rows come in as they close, the nearest first, each once those before it agree.
+
+    All at once would not end: a pass takes back of an impulse no more than what is open, and one of a row that another
+    one should have held before is as high as a whole fall.
+    """
+    list_by_gap(solver, span)
+    count, least = span[1] - span[0], least_change(solver, h, span)
+    work = SUBSTEP_WORK
+    for e in range(count):
+        k = solver.listed[e]
+        new = closing_speed(solver, k) > solver.opening[k]
+        while new and work > 0:
+            note_impulses(solver, span)
+            relax_listed(solver, e + 1)
+            work -= e + 1
+            new = not agrees(solver, h, least, span)
+
+
+@part
+def solve_pass(solver, bias, soft, pushes, start, stop):
+    """One pass over the rows of a range: along their normals, then along their surfaces."""
+    solve_normals(solver, bias, soft, pushes, start, stop)
+    if solver.has_friction:
+        solve_friction(solver, start, stop)
+    solver.visits += stop - start
+
+
+@part
+def solve_substep(solver, spring, most, dt, h, stiff, ends, span):
+    """One substep of a range. spring: (see solve_normals, twice; speed per overlap at which it is pushed out)."""
+    start, stop = span[0], span[1]
+    soft, bias_rate, opening = (spring[0], spring[1]), spring[2], solver.opening
+    apply_forces(solver, h, span)
+    apply_warm_start(solver, most, span)
+    if stiff:
+        close_in_order(solver, h, span)
+    solve_pass(solver, solver.pushing, soft, True, start, stop)
+    if stiff:
+        converge(solver, soft, True, h, span)
+    move(solver, h, span)
+    measure(solver, h, bias_rate, dt, stiff, ends, span)
+    any_struck = find_struck(solver, dt, span)
+    if ends and solver.any_hard:
+        leave_open(solver, h, span)
+    for _ in range(LAST_RELAX_PASSES if ends else RELAX_PASSES):
+        solve_pass(solver, opening, soft, False, start, stop)
+    if stiff:
+        converge(solver, soft, False, h, span)
+    finish_substep(solver, bias_rate, any_struck, h, dt, span)
+    for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
         solver.worked[k] |= solver.impulse[k] > 0.0
 
 
-@packed
-def solve_contacts(state, dt):
-    """Advance the bodies by the step's substeps under their mean acceleration and their contacts.
+@part
+def is_still(solver, dt, span):
+    """Whether an island rests, and its last substep has changed nothing that matters: those that follow would not."""
+    start, stop, begin, end = span
+    extent, fastest = math.inf, 0.0
+    for q in range(begin, end):
+        fastest = max(fastest, dot(solver.velocity[q], solver.velocity[q]))
+    for k in range(start, stop):
+        extent = min(extent, solver.extent[k])
+    if not math.sqrt(fastest) * dt <= STILL * extent:
+        return False
+    changes = False
+    for k in range(start, stop):
+        changes |= abs(solver.impulse[k] - solver.previous[k]) > STILL * solver.impulse[k]
+    return not changes
 
-    What closes fast is a shock where nothing has bounced in this step. Where a contact that pushed in the last step has
-    gone, the others push too much: these let go before anything else, and their neighbours.
-    """
-    solver, substeps = state.solver, state.substeps
-    if solver.contacts == 0:
-        return OK
+
+@part
+def repeat_substep(solver, left, h, span):
+    """The substeps that are left of an island that rests do what the last one did."""
+    for k in range(span[0], span[1]):
+        solver.total[k] += left * solver.impulse[k]
+    for q in range(span[2], span[3]):
+        solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
+
+
+@part
+def scale_impulses(solver, by, span):
+    """Impulses of a step become those of one of its substeps, or the other way."""
+    for k in range(span[0], span[1]):
+        solver.impulse[k] *= by
+        solver.tangent[k] = scale(solver.tangent[k], by)
+
+
+@part
+def most_impulse(solver, t, substeps):
+    """The most that a substep may start with: what bears the loads of island t, or pushes all of it out. What is more
+    was a blow, which does not act again."""
+    pushes = solver.mass_of[t] * solver.push_rate * DEEP / solver.own[t]
+    return MOST_LOAD * (solver.force_of[t] / substeps + pushes)
+
+
+@part
+def solve_range(solver, substeps, stiff, special, dt, span):
+    """The substeps of a range. Where there are more than usual, springs are damped by as much more: for the heavy
+    bodies that they bear, and so that overlap is pushed out at the usual rate."""
     h = dt / substeps
     omega = 2.0 * math.pi * FREQUENCY / h
-    _, any_fast = measure_all(solver, h, omega / (2.0 * DAMPING_RATIO + h * omega), dt)
-    for k in range(solver.contacts):
-        solver.total[k], solver.worked[k], solver.shock[k] = 0.0, False, 0.0
-    solver.islands_known = solver.linked = False
-    solver.shock_visits = solver.visits = 0
-    plastic = state.impacts.logged == 0
-    if plastic and any_fast:
-        solve_shocks(solver, dt)
+    damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
+    stiffness, bias_rate = h * omega * damping, omega / damping
+    spring = stiffness / (1.0 + stiffness), 1.0 / (1.0 + stiffness), bias_rate
+    scale_impulses(solver, 1.0 / substeps, span)
+    for k in range(span[0], span[1]):
+        sag = LOADED * SAG * solver.impulse[k] * h / solver.mass[k]
+        solver.loaded[k] = 0.0 if stiff else min(sag, MOST_LOADED * solver.extent[k])
+    measure(solver, h, bias_rate, dt, stiff, False, span)
+    most = most_impulse(solver, solver.island[span[2]], substeps) if special else math.inf
     for step in range(substeps):
-        before = LET_GO_PASSES if solver.any_unsettled and step == 0 else 0
-        ends = step == substeps - 1
-        after = LAST_RELAX_PASSES if ends else RELAX_PASSES
-        solve_substep(solver, h, substeps, (before, after), plastic, ends)
-    hold_light(state, dt)
+        left = substeps - 1 - step
+        if special:
+            note_impulses(solver, span)
+        solve_substep(solver, spring, most, dt, h, stiff, left == 0, span)
+        if special and left > 0 and is_still(solver, dt, span):
+            repeat_substep(solver, left, h, span)
+            break
+    scale_impulses(solver, float(substeps), span)
+
+
+@part
+def lighten(solver, t, span):
+    """What an island cannot bear with the most substeps counts as no heavier than it can, in the solver only."""
+    least = solver.lightest[t] / solver.bears[t]
+    for q in range(span[2], span[3]):
+        if solver.inverse_mass[q] < least:
+            if solver.overloaded == 0:
+                solver.overloaded_row = solver.body_row[q]
+            solver.overloaded += 1
+            solver.inverse_mass[q], solver.heft[q] = least, 1.0 / least
+    for k in range(span[0], span[1]):
+        solver.mass[k] = effective_mass(solver, k)
+
+
+@part
+def count_work(state, dt):
+    """Counters of the step, and what faults will tell: islands that contacts would have given much energy."""
+    solver = state.solver
+    state.islands_counted += solver.islands
+    state.refined_counted += solver.ranges - 1
+    state.solved_counted += solver.visits
+    for t in range(solver.islands):
+        taken = solver.taken[t]
+        if taken > 0.0:
+            state.restrained_counted += 1
+            state.restrained_energy += taken
+            step = math.sqrt(2.0 * taken / solver.mass_of[t]) * dt * solver.own[t]
+            if taken > 0.5 * solver.energy[t] and step > TOLD_GAIN:
+                if solver.restrained == 0:
+                    solver.restrained_row = solver.leader[t]
+                solver.restrained += 1
+
+
+@packed
+def solve_contacts(state, dt):
+    """Advance the bodies by their substeps under their mean acceleration and their contacts."""
+    solver = state.solver
+    if solver.contacts == 0:
+        return OK
+    for k in range(solver.contacts):
+        solver.mass[k] = effective_mass(solver, k)
+        solver.total[k], solver.worked[k] = 0.0, False
+    solver.visits, solver.usual = 0, state.substeps
+    omega = 2.0 * math.pi * FREQUENCY * state.substeps / dt
+    solver.push_rate = omega / (2.0 * DAMPING_RATIO + omega * dt / state.substeps)
+    choose_hard(state, dt, zero_of(state))
+    start = begin = 0
+    for s in range(solver.ranges):
+        span = start, solver.row_ends[s], begin, solver.body_ends[s]
+        t, special = solver.special[s], s > 0
+        if special:
+            for m in range(solver.movers):
+                solver.shift[solver.mover[m]] = zero_of(state)
+            if solver.bears[t] < 1.0:
+                lighten(solver, t, span)
+        if span[1] > start:
+            substeps = solver.substeps_of[t] if special else state.substeps
+            solve_range(solver, substeps, special and solver.hard_of[t], special, dt, span)
+        start, begin = span[1], span[3]
+    count_work(state, dt)
     return OK

@@ -1,7 +1,7 @@
 """What is known of last step's contacts at rest: the impulses that the solver starts with.
 
-Pairs in canonical order with the impulse of the last substep, its friction (tangent), and the sum of the normal impulse
-over the step (total).
+Pairs in canonical order with the impulse of the last substep and its friction (tangent), as if the step were one
+substep, and what they gave in the whole step (push).
 """
 
 from __future__ import annotations
@@ -11,25 +11,21 @@ from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, scale
 from ...codes import NEED_WARM_START, OK
-from .firm import choose_firm, let_go
-
-TURNED = 0.5  # cosine between last step's normal and this one's, below which the impulses say nothing
+from ..constants import MOST_LOAD, TURNED
+from .guard import island_of
 
 
 @part
 def scale_to(state, dt):
     """The impulses that belong to steps of other length than this one."""
     memory, now = state.warm_start, state.warm_start.now
-    substep = dt / state.substeps
-    if dt != memory.step[now] or substep != memory.substep[now]:
-        by_step, by_substep = dt / memory.step[now], substep / memory.substep[now]
+    if dt != memory.step[now]:
+        by = dt / memory.step[now]
         for m in range(memory.counts[now]):
-            if dt != memory.step[now]:
-                memory.total[now, m] *= by_step
-            if substep != memory.substep[now]:
-                memory.impulse[now, m] *= by_substep
-                memory.tangent[now, m] = scale(memory.tangent[now, m], by_substep)
-        memory.step[now], memory.substep[now] = dt, substep
+            memory.impulse[now, m] *= by
+            memory.tangent[now, m] = scale(memory.tangent[now, m], by)
+            memory.push[now, m] = scale(memory.push[now, m], by)
+        memory.step[now] = dt
 
 
 @part
@@ -47,7 +43,7 @@ def row_of(state, wanted):
 
 @part
 def find_rows(state):
-    """The rows of the remembered pairs; -1 for bodies that are gone. They hold until rows move."""
+    """The rows of the remembered pairs, -1 for bodies that are gone, and their groups. They hold until rows move."""
     memory, now = state.warm_start, state.warm_start.now
     if memory.rows_version[now] == state.version:
         return
@@ -55,23 +51,28 @@ def find_rows(state):
         memory.first[now, m] = row_of(state, memory.entity_a[now, m])
         memory.second[now, m] = row_of(state, memory.entity_b[now, m])
     memory.rows_version[now] = state.version
+    place = state.bodies.place  # of no use between steps: -1
+    for m in range(memory.counts[now]):
+        i = row_of(state, memory.island[now, m])
+        if i >= 0 and place[i] < 0:
+            place[i] = m
+        memory.group[now, m] = place[i] if i >= 0 else m
+    for m in range(memory.counts[now]):
+        i = row_of(state, memory.island[now, m])
+        if i >= 0:
+            place[i] = -1
 
 
 def match_warm_start(state, dt):
-    """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none.
-
-    Bodies that a contact of the last step pushes no more become unsettled: their other contacts push too much.
-    """
+    """Start each contact with the impulses that its pair had, if its normal has not turned far; else with none."""
     solver, memory, bodies, pairs = state.solver, state.warm_start, state.bodies, state.pairs
     if solver.contacts == 0:
         return OK
     entity, now, zero = bodies.entity, memory.now, zero_of(state)
     for k in range(solver.contacts):
         solver.impulse[k], solver.tangent[k] = 0.0, zero
-    for q in range(solver.bodies):
-        solver.unsettled[q] = False
-    solver.any_unsettled = False
     if memory.counts[now] > 0:
+        scale_to(state, dt)
         find_rows(state)
     r = 0
     for m in range(memory.counts[now]):
@@ -92,14 +93,6 @@ def match_warm_start(state, dt):
                 pull = memory.tangent[now, m]
                 solver.impulse[k] = memory.impulse[now, m]
                 solver.tangent[k] = add_scaled(pull, n, -dot(pull, n))
-                continue
-        for side in range(2):
-            i = first if side == 0 else second
-            if i >= 0 and bodies.place[i] >= 0:
-                solver.unsettled[bodies.place[i]] = True
-                solver.any_unsettled = True
-    choose_firm(state, dt / state.substeps, zero)
-    let_go(solver, zero)
     return OK
 
 
@@ -108,10 +101,12 @@ def store_warm_start(state, dt):
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
     if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
         return OK
-    if solver.contacts > len(memory.work):
+    if solver.contacts > len(memory.share):
         state.needed = solver.contacts
         return NEED_WARM_START
     new, count = 1 - memory.now, 0
+    for t in range(solver.islands if solver.contacts > 0 else 0):
+        solver.remembered[t] = -1
     for r in range(solver.contacts):
         k, c = solver.slot[r], pairs.resting[r]
         if not solver.total[k] > 0.0:  # also nan
@@ -119,10 +114,20 @@ def store_warm_start(state, dt):
         a, b = pairs.a[c], pairs.b[c]
         memory.first[new, count], memory.second[new, count] = a, b
         memory.entity_a[new, count], memory.entity_b[new, count] = entity[a], entity[b]
-        memory.impulse[new, count], memory.total[new, count] = solver.impulse[k], solver.total[k]
-        memory.normal[new, count], memory.tangent[new, count] = solver.normal[k], solver.tangent[k]
+        last, total, t = solver.impulse[k], solver.total[k], island_of(solver, k)
+        push, most = scale(solver.normal[k], total), MOST_LOAD * solver.force_of[t]
+        if last > 0.0 and solver.friction[k] != 0.0:
+            push = add_scaled(push, solver.tangent[k], min(1.0, total / last))
+        memory.push[new, count] = scale(push, most / total) if total > most else push
+        kept = most / last if last > most else 1.0
+        memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
+        if solver.remembered[t] < 0:
+            solver.remembered[t] = count
+        memory.group[new, count] = solver.remembered[t]
+        memory.island[new, count] = entity[solver.leader[t]]
+        memory.normal[new, count] = solver.normal[k]
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
-    memory.step[new], memory.substep[new] = dt, dt / state.substeps
+    memory.step[new] = dt
     memory.now = new
     return OK

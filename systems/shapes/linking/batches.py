@@ -1,5 +1,8 @@
 """The narrow phase of a run of candidates that are all of one pair of shapes.
 
+Each gets a manifold: the contact, and where the two shapes were to each other then. Pairs that rested in the step
+before are taken where the step starts (``early``), all others where free flight leads.
+
 A candidate names its bodies in the order of their ids. The pair's function wants them in the order in which the pair is
 registered, so they are turned round before it and its answer after it: once where the bodies do not come in the order
 of their shapes (``swapped``), once where the pair is registered against that order (``flipped``).
@@ -22,32 +25,32 @@ SOUND, UNSOUND = 0, 1  # what a batch returns
 
 
 @inlined
-def centres_of(state, a, b):
-    """(centre of a's shape, vector from there to that of b's)."""
+def centres_apart(state, c, a, b):
+    """From the centre of a's shape to that of b's."""
     bodies = state.bodies
-    centre = add(bodies.position[a], bodies.offset[a])
-    return centre, sub(add(bodies.position[b], bodies.offset[b]), centre)
+    position = bodies.previous_position if state.pairs.early[c] else bodies.position
+    return sub(add(position[b], bodies.offset[b]), add(position[a], bodies.offset[a]))
 
 
 @inlined
 def in_given_order(state, c, first, flipped):
-    """(swapped, a, b, centre, d) of candidate c, both of one shape."""
+    """(swapped, a, b, d, d) of candidate c, both of one shape."""
     a, b = state.pairs.a[c], state.pairs.b[c]
-    centre, d = centres_of(state, a, b)
-    return False, a, b, centre, d
+    d = centres_apart(state, c, a, b)
+    return False, a, b, d, d
 
 
 @inlined
 def in_order_of_shapes(state, c, first, flipped):
-    """(swapped, a, b, centre, d) of candidate c as the pair's function takes it; ``first``: the cheaper shape.
+    """(swapped, a, b, at, d) of candidate c as the pair's function takes it; ``first``: the cheaper shape.
 
-    The centre is that of the candidate's own first body, d leads from the centre of a to that of b.
+    at: from the centre of the candidate's own first body to that of its second; d: from that of a to that of b.
     """
     a, b = state.pairs.a[c], state.pairs.b[c]
-    centre, d = centres_of(state, a, b)
-    opposite, swapped = negative(d), state.bodies.shape[a] != first
+    at = centres_apart(state, c, a, b)
+    opposite, swapped = negative(at), state.bodies.shape[a] != first
     turned = swapped != flipped
-    return swapped, b if turned else a, a if turned else b, centre, opposite if turned else d
+    return swapped, b if turned else a, a if turned else b, at, opposite if turned else at
 
 
 @inlined
@@ -80,12 +83,12 @@ def checked(state, a, b, d, contact):
 
 
 @inlined
-def write_contact(state, c, centre, contact):
-    """Store a contact as the candidate's first body sees it, its point in the world."""
+def write_manifold(state, c, at, contact):
+    """Store a contact as the candidate's first body sees it."""
     hit, depth, normal, point = contact
     pairs = state.pairs
-    pairs.hit[c], pairs.depth[c] = hit, depth
-    pairs.normal[c], pairs.point[c] = normal, add(centre, point)
+    pairs.at[c], pairs.hit[c], pairs.depth[c] = at, hit, depth
+    pairs.normal[c], pairs.point[c] = normal, point
 
 
 @inlined
@@ -121,11 +124,11 @@ def make_batch(contact: Any, order: Any, at_a: Any, at_b: Any) -> Any:
         sound = True
         for k in range(start, stop):
             c = state.candidates.bucket[k]
-            swapped, a, b, centre, d = order(state, c, first, flipped)
+            swapped, a, b, at, d = order(state, c, first, flipped)
             state.row_a, state.row_b = a, b
             hit, depth, normal, point = contact(one, a, two, b, d)
             sound &= is_sound(hit, depth, normal, point)
-            write_contact(state, c, centre, turned_back(swapped, flipped, d, (hit, depth, normal, point)))
+            write_manifold(state, c, at, turned_back(swapped, flipped, d, (hit, depth, normal, point)))
         return SOUND if sound else UNSOUND
 
     return batch
@@ -143,9 +146,9 @@ def batch_by_address(state, start, stop):
     address = state.shapes.evaluate[first * state.shapes.count + second]
     for k in range(start, stop):
         c = state.candidates.bucket[k]
-        swapped, a, b, centre, d = in_order_of_shapes(state, c, first, flipped)
+        swapped, a, b, at, d = in_order_of_shapes(state, c, first, flipped)
         found = call_evaluate(address, state, pa, a, pb, b, d)
-        write_contact(state, c, centre, turned_back(swapped, flipped, d, found))
+        write_manifold(state, c, at, turned_back(swapped, flipped, d, found))
     return SOUND
 
 

@@ -1,0 +1,70 @@
+"""Constants of contacts at rest, each with its unit and its reason.
+
+Extent: the smallest full extent of the smaller body of a pair. Soft contacts are springs, so stiff that their period is
+a few substeps: how much they sag follows from the substeps alone, never from the masses.
+"""
+
+from __future__ import annotations
+
+import math
+
+# The spring of a soft contact.
+FREQUENCY = 0.25  # times the rate of the substeps; above .5 an explicit spring is unstable
+DAMPING_RATIO = 10.0  # at the usual number of substeps; overdamped, so that pushing out gives little speed
+SAG = 1.0 / (2.0 * math.pi * FREQUENCY) ** 2  # of a contact that bears an impulse J per substep h: SAG J h / mass
+
+# How fast overlap is pushed out. A bounded push bounds the force, so the bound grows with the load.
+DEEP = 0.03  # extents: more overlap does not push faster; .2 lets rooms of mixed masses gain energy
+LOADED = 1.0  # of the sag under the last impulse is pushed out as well,
+MOST_LOADED = 0.1  # extents; without it jammed bodies keep overlaps of .15 at equal, bounded pushes
+VERY_DEEP = 0.2  # extents, from where overlap pushes faster again: crowds without room must spread
+SLOPE = 0.5  # of what is beyond it,
+DEEPEST = 0.17  # extents at most
+
+# Passes over the rows in a substep.
+RELAX_PASSES = 2  # after the pass that pushes: they take back the speed that pushing has given
+LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
+FURTHER_PASSES = 1000  # at most, over rows that are not solved and islands that have gained energy,
+FURTHER_WORK = 20_000  # rows of the island in all of these,
+LEAST_FURTHER_PASSES = 8  # if they are not these,
+SWEEPS = 2  # between two looks at which rows these are
+EXCESS = 0.01  # extents per step: where the speed of a row is wrong by more, its island is struck, and solved until
+SOLVED = 1e-4  # less than this is wrong
+
+# The number of substeps of an island.
+MOST_SAG = 0.005  # extents: no contact sags more under the island's heaviest body,
+OWN_SAG = 0.002  # nor a contact under one body alone: grains, whose contacts are hard
+STRUCK = 0.01  # extents per step: what closes slower strikes nothing
+STRIKE = 4.0  # substeps for each extent per step that a light body is closed on, times the ratio of masses
+MOST_SUBSTEPS = 1024  # then the heaviest count as lighter, and a fault says so
+SUBSTEP_WORK = 20_000  # rows in all substeps of an island, if it has more than the usual number,
+LEAST_WORK_SUBSTEPS = 64  # which are allowed whatever its size
+
+# Hard islands: passes until they agree.
+HARD_PASSES = 1000
+AGREED = 1e-5  # extents per substep,
+AGREED_SHARE = 1e-3  # and of the change of speed that forces make in it
+
+# An island that rests does in the substeps that are left what it did in the last one.
+STILL = 1e-10  # extents per step, and of an impulse
+
+# What contacts may add to the energy of their island in a step.
+GAIN_MOTION = 0.008  # of its kinetic energy against its mean velocity,
+GAIN_PUSH = 0.004  # of the energy at the speed of pushing,
+GAIN_WEIGHT = 2.5  # of the energy that forces give from rest: towers that are pushed out need it
+GAIN_ROUNDING = 1e-12  # of an energy: less is none
+TOLD_GAIN = 0.05  # extents per step: a fault tells where contacts would have made an island faster by more
+FADING = 0.5  # of an impulse is kept at least for the next substep, where the guard has scaled it
+
+# Hard contacts of bodies that nothing presses on.
+LOAD = 1e-6  # of the impulse that forces give in a step: less is none
+ALONG = 0.5  # cosine: a hard contact lies along the sum of the normals of its body
+OPEN = 1e-9  # extents: a smaller gap or overlap is none
+IDLE = 1e-9  # of the impulse that holds a body: less is none
+UNREACHED = 1e6  # extents: a row that is left to the next step
+
+# What is remembered of a step.
+TURNED = 0.5  # cosine between the normals of two steps, below which the impulses say nothing
+MOST_LOAD = 4.0  # of what forces give an island in a step: what is more was a blow, and not what holds it
+PREDICTION_PASSES, MOST_PREDICTION_PASSES = 2, 16  # the latter while an island gains energy
+PREDICTION_STEADY = 1e-6  # of an impulse: smaller changes are left

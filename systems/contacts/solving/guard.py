@@ -1,0 +1,182 @@
+"""What the usual passes of a substep leave undone: further passes, and a bound on the energy that contacts give.
+
+Contacts at rest take energy from their island. Impulses that were those of another moment may give some: passes go on
+over the rows of such islands, and over rows that are not solved. What energy is left after these, but for a
+bounded push, is taken back: of all that the contacts have changed only the share acts that takes the most.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ....framework.compilation import inlined, part
+from ....framework.vectors import add, add_scaled, dot, scale, sub
+from ..constants import (
+    DEEP,
+    EXCESS,
+    FADING,
+    GAIN_MOTION,
+    GAIN_PUSH,
+    GAIN_ROUNDING,
+    GAIN_WEIGHT,
+    SOLVED,
+    SWEEPS,
+)  # fmt: skip
+from .rows import closing_speed, relax_listed
+
+
+@part
+def island_of(solver, k):
+    """The island of row k."""
+    return max(solver.island[solver.first[k]], solver.island[solver.second[k]])
+
+
+@part
+def islands_of(solver, span):
+    """The first island of a range and the one behind its last."""
+    if span[2] == 0:
+        return 0, solver.islands
+    return solver.island[span[2]], solver.island[span[2]] + 1
+
+
+@part
+def weigh(solver, span, islands):
+    """What contacts do to the energy of each island if a share s of all that they have changed acts: E(s) = slope s +
+    curvature s^2 / 2, which is exact. What moves by itself gives its work to the island, not the contacts."""
+    start, stop, begin, end = span
+    slope, curvature, energy, island = solver.slope, solver.curvature, solver.energy, solver.island
+    for t in range(islands[0], islands[1]):
+        slope[t] = curvature[t] = energy[t] = 0.0
+    for q in range(begin, end):
+        t = island[q]
+        if t >= 0:
+            v, m = solver.velocity_before[q], solver.heft[q]
+            change = sub(solver.velocity[q], v)
+            slope[t] += m * dot(v, change)
+            curvature[t] += m * dot(change, change)
+            energy[t] += m * dot(v, v)
+    for k in range(start, stop if solver.movers > 0 else start):
+        a, b = solver.first[k], solver.second[k]
+        if island[a] < 0 or island[b] < 0:
+            push = scale(solver.normal[k], solver.impulse[k])
+            if solver.has_friction:
+                push = add(push, solver.tangent[k])
+            work = -dot(push, solver.velocity[a]) if island[a] < 0 else dot(push, solver.velocity[b])
+            slope[island_of(solver, k)] += work
+
+
+@part
+def gains(solver, t):
+    """Whether the contacts of island t have given it more energy than ``allowed``."""
+    gained = solver.slope[t] - solver.allowed[t] + 0.5 * solver.curvature[t]
+    return not gained <= GAIN_ROUNDING * (solver.energy[t] + solver.curvature[t])
+
+
+@part
+def allow(solver, bias_rate, h, dt, span, islands):
+    """What each island may gain in a substep: what forces give from rest, more of that where it is pushed out, and a
+    small share of its motion and of the energy at the speed of pushing."""
+    start, stop, begin, end = span
+    allowed, motion = solver.allowed, solver.momentum
+    share, zero = h / dt, scale(solver.normal[start], 0.0)  # of what a step may give
+    for t in range(islands[0], islands[1]):
+        motion[t] = zero
+    for q in range(begin, end):
+        if solver.island[q] >= 0:
+            t = solver.island[q]
+            motion[t] = add_scaled(motion[t], solver.velocity_before[q], solver.heft[q])
+    for t in range(islands[0], islands[1]):
+        mass, force = solver.mass_of[t], solver.force_of[t] * h / dt
+        energy = max(0.0, solver.energy[t] - dot(motion[t], motion[t]) / mass)
+        allowed[t] = (0.5 + GAIN_WEIGHT * dt / h) * force * force / mass + share * GAIN_MOTION * energy
+    for k in range(start, stop):
+        speed = bias_rate * DEEP * solver.extent[k]
+        allowed[island_of(solver, k)] += share * GAIN_PUSH * solver.mass[k] * speed * speed
+
+
+@inlined
+def excess_speed(solver, k):
+    """The speed that a pass over row k would still change: what closes too fast, and what an impulse sends apart."""
+    excess = closing_speed(solver, k) - solver.opening[k]
+    return max(excess, -excess * (solver.impulse[k] > 0.0))  # without a branch, which would be as good as random
+
+
+@part
+def find_struck(solver, dt, span):
+    """Mark the islands of which some row is far from what the passes are to make of it; returns whether there are
+    any."""
+    start, stop, any_struck = span[0], span[1], False
+    for k in range(start, stop):
+        any_struck |= excess_speed(solver, k) * dt > EXCESS * solver.extent[k]
+    first, last = islands_of(solver, span)
+    for t in range(first, last if any_struck else first):
+        solver.struck[t] = False
+    for k in range(start, stop if any_struck else start):
+        if excess_speed(solver, k) * dt > EXCESS * solver.extent[k]:
+            solver.struck[island_of(solver, k)] = True
+    return any_struck
+
+
+@part
+def find_unsolved(solver, turn, any_struck, dt, span, islands):
+    """The rows of struck islands that are not solved, and all of islands that gain, come first in ``listed``; returns
+    how many. An island has as many passes as its own size allows: what is solved elsewhere changes none of its bits."""
+    unsolved, any_gain, count = solver.unsolved, False, 0
+    for t in range(islands[0], islands[1]):
+        unsolved[t] = gains(solver, t)
+        any_gain |= unsolved[t]
+    for k in range(span[0], span[1] if any_gain or any_struck else span[0]):
+        wrong = any_struck and excess_speed(solver, k) * dt > SOLVED * solver.extent[k]
+        if wrong or any_gain:
+            t = island_of(solver, k)
+            if ((wrong and solver.struck[t]) or unsolved[t]) and turn < solver.passes[t]:
+                solver.listed[count] = k
+                count += 1
+    return count
+
+
+@part
+def restrain(solver, span, islands):
+    """In islands that still gain only the share acts that takes the most energy: the least of E(s)."""
+    start, stop, begin, end = span
+    share, any_gain = solver.share, False
+    for t in range(islands[0], islands[1]):
+        share[t] = 1.0
+        if gains(solver, t):
+            slope, curvature = solver.slope[t] - solver.allowed[t], solver.curvature[t]
+            share[t] = min(1.0, max(0.0, -slope / curvature)) if curvature < math.inf else 0.0
+            solver.taken[t] += slope + 0.5 * curvature - share[t] * (slope + 0.5 * share[t] * curvature)
+            any_gain = True
+    for q in range(begin, end if any_gain else begin):
+        t = solver.island[q]
+        if t >= 0 and share[t] < 1.0:
+            before = solver.velocity_before[q]
+            change = sub(solver.velocity[q], before)
+            solver.velocity[q] = add_scaled(before, change, share[t]) if share[t] > 0.0 else before
+    for k in range(start, stop if any_gain else start):
+        kept = share[island_of(solver, k)]
+        if kept < 1.0:
+            kept = max(kept, FADING)
+            solver.impulse[k] *= kept
+            solver.tangent[k] = scale(solver.tangent[k], kept)
+
+
+@part
+def finish_substep(solver, bias_rate, any_struck, h, dt, span):
+    """Further passes over the islands of a range that gain or are struck, then the bound on their energy."""
+    islands, any_gain = islands_of(solver, span), False
+    weigh(solver, span, islands)
+    for t in range(islands[0], islands[1]):
+        solver.allowed[t] = 0.0
+        any_gain |= gains(solver, t)
+    if not (any_gain or any_struck):
+        return
+    allow(solver, bias_rate, h, dt, span, islands)
+    turn, count = 0, find_unsolved(solver, 0, any_struck, dt, span, islands)
+    while count > 0:
+        for _ in range(SWEEPS):
+            relax_listed(solver, count)
+        weigh(solver, span, islands)
+        turn += SWEEPS
+        count = find_unsolved(solver, turn, any_struck, dt, span, islands)
+    restrain(solver, span, islands)

@@ -1,0 +1,101 @@
+"""Hard contacts do not give way: those of a body that nobody presses on, with what cannot be moved.
+
+Soft contacts sag, by an amount that depends on how many there are. A body that slides over floors which lie flush would
+rise and sink at each seam, and meet the next floor's corner below its own underside.
+"""
+
+from __future__ import annotations
+
+from ....framework.compilation import part
+from ....framework.vectors import add, dot, sub
+from ..approach import between, between_at_start
+from ..constants import ALONG, IDLE, LOAD, OPEN, UNREACHED
+
+
+@part
+def presses(solver, k, dt):
+    """Whether contact k, of two bodies that can be moved, bears a load, or will: they overlap."""
+    a, b, acceleration = solver.first[k], solver.second[k], solver.acceleration
+    if solver.gap[k] < -OPEN * solver.extent[k]:
+        return True
+    least = LOAD * solver.mass[k] * dt
+    load = max(dot(acceleration[a], acceleration[a]), dot(acceleration[b], acceleration[b]))
+    return solver.impulse[k] > 0.0 and solver.impulse[k] * solver.impulse[k] > least * least * load
+
+
+@part
+def choose_hard(state, dt, nothing):
+    """Contacts with what cannot be moved are hard if their body has rested until now, and nobody presses on it.
+
+    Not those that push against the sum of its normals: no impulse is high enough for what is squeezed. Nor one that
+    stands for several faces: how much it overlaps each of them says which way it pushes.
+    """
+    solver, supported = state.solver, state.bodies.supported
+    inverse_mass, way, shared = solver.inverse_mass, solver.way, solver.shared
+    for q in range(solver.bodies):
+        way[q], shared[q] = nothing, False
+    for k in range(solver.contacts):
+        a, b = solver.first[k], solver.second[k]
+        if inverse_mass[a] == 0.0:
+            way[b] = add(way[b], solver.normal[k])
+        elif inverse_mass[b] == 0.0:
+            way[a] = sub(way[a], solver.normal[k])
+        elif not (shared[a] and shared[b]) and presses(solver, k, dt):
+            shared[a] = shared[b] = True
+    any_hard = any_apart = False
+    for k in range(solver.contacts):
+        a, b, n = solver.first[k], solver.second[k], solver.normal[k]
+        solver.hard[k] = False
+        if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
+            body, along = (b, dot(way[b], n)) if inverse_mass[b] > 0.0 else (a, -dot(way[a], n))
+            rested = state.any_support and supported[solver.body_row[body]]
+            hard = rested and along > ALONG and not (shared[body] or solver.varies[k])
+            solver.hard[k] = hard
+            any_hard |= hard
+            any_apart |= hard and solver.apart[k]
+            if hard and solver.apart[k]:
+                solver.gap[k] = max(0.0, solver.gap[k])  # faces that meet in the end do not overlap at the start
+                if dot(sub(solver.velocity[b], solver.velocity[a]), n) > 0.0:  # the body has passed the corner
+                    solver.impulse[k], solver.tangent[k] = 0.0, nothing
+    solver.any_hard = any_hard
+    if any_apart:
+        leave_out_of_reach(state)
+
+
+@part
+def leave_out_of_reach(state):
+    """A hard contact that is open at the start of the step and not reached in the prediction is none in this step, if
+    its body is held by another one: the body may slide past that corner, whose plane lies across its way."""
+    solver, bodies, pairs, held = state.solver, state.bodies, state.pairs, state.solver.held
+    for q in range(solver.bodies):
+        held[q] = 0.0
+    for k in range(solver.contacts):
+        if solver.hard[k] and not solver.apart[k]:
+            held[solver.first[k]] = held[solver.second[k]] = 1.0
+    for k in range(solver.contacts):
+        if solver.hard[k] and solver.apart[k]:
+            body = solver.first[k] if solver.inverse_mass[solver.first[k]] > 0.0 else solver.second[k]
+            a, b = pairs.a[solver.pair[k]], pairs.b[solver.pair[k]]
+            travel = sub(between(bodies, a, b), between_at_start(bodies, a, b))
+            if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > OPEN * solver.extent[k]:
+                solver.gap[k] += UNREACHED * solver.extent[k]
+
+
+@part
+def leave_open(solver, h, span):
+    """A hard contact that was open when the step began and is not overlapped when it ends is left to the next step if
+    its body is held by another one: it slides on, and by then it may have passed the corner that it would stop at."""
+    start, stop, begin, end = span
+    first, second, shift, held = solver.first, solver.second, solver.shift, solver.held
+    for q in range(begin, end):
+        held[q] = 0.0
+    for k in range(start, stop):
+        if solver.hard[k]:
+            body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
+            held[body] = max(held[body], solver.impulse[k])
+    for k in range(start, stop):
+        if solver.hard[k] and solver.apart[k]:
+            body = first[k] if solver.inverse_mass[first[k]] > 0.0 else second[k]
+            room = solver.gap[k] + dot(sub(shift[second[k]], shift[first[k]]), solver.normal[k])
+            if held[body] > 0.0 and solver.impulse[k] <= IDLE * held[body] and room > -OPEN * solver.extent[k]:
+                solver.opening[k] = UNREACHED * solver.extent[k] / h

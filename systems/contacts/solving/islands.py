@@ -1,0 +1,215 @@
+"""The order of rows and bodies in a step: islands, how many substeps each has, and colours.
+
+An island is what contacts join, without what cannot be moved; islands do not know of each other. Most have as many
+substeps as the settings say: these are one range of rows, sorted by colour. Special ones have more, as their masses
+and what strikes them ask for, or are hard: each is a range by itself, behind the others.
+
+Rows of one colour share no body that moves, so that the processor can work on several at once.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ....framework.compilation import part
+from ....framework.jit.records.record_type import zero_of
+from ....framework.vectors import dot, sub
+from ...bits import lowest_bit
+from ...islands import root_of
+from ...shapes.tolerances import smaller_extent
+from ..constants import (
+    FURTHER_PASSES,
+    FURTHER_WORK,
+    LEAST_FURTHER_PASSES,
+    LEAST_WORK_SUBSTEPS,
+    MOST_SAG,
+    MOST_SUBSTEPS,
+    OWN_SAG,
+    SAG,
+    STRIKE,
+    STRUCK,
+    SUBSTEP_WORK,
+)  # fmt: skip
+
+COLOURS = 62  # bits of a mask; rows of a body beyond them share the last one
+
+
+@part
+def number_body(state, i):
+    """The place of a row among the bodies of the solver, a new one if it has none yet."""
+    solver, place = state.solver, state.bodies.place
+    if place[i] < 0:
+        q = solver.bodies
+        place[i] = q
+        solver.body_row[q], solver.used[q], solver.island[q] = i, 0, q
+        solver.bodies += 1
+    return place[i]
+
+
+@part
+def colour_rows(state):
+    """Number the bodies of the rows, join them into islands and choose the colours."""
+    solver, pairs, inverse_mass = state.solver, state.pairs, state.bodies.inverse_mass
+    used, starts, island = solver.used, solver.starts, solver.island
+    solver.bodies = 0
+    for k in range(COLOURS + 2):
+        starts[k] = 0
+    for r in range(solver.contacts):
+        c, taken = pairs.resting[r], 0
+        a, b = pairs.a[c], pairs.b[c]
+        p, q = number_body(state, a), number_body(state, b)
+        moves_a, moves_b = inverse_mass[a] > 0.0, inverse_mass[b] > 0.0
+        if moves_a:
+            taken |= used[p]
+        if moves_b:
+            taken |= used[q]
+        colour = min(lowest_bit(~taken), COLOURS - 1)
+        if moves_a:
+            used[p] |= 1 << colour
+        if moves_b:
+            used[q] |= 1 << colour
+        if moves_a and moves_b:
+            one, other = root_of(island, p), root_of(island, q)
+            island[max(one, other)] = min(one, other)
+        solver.colour[r] = colour
+        starts[colour + 1] += 1
+    for k in range(1, COLOURS + 1):
+        starts[k] += starts[k - 1]
+
+
+@part
+def number_islands(state):
+    """``island`` becomes the number of each body's island, in the order of their first bodies; -1 for what cannot be
+    moved. What is known of its bodies is summed up."""
+    solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
+    velocity, start, supported = bodies.linear_velocity, bodies.start_velocity, bodies.supported
+    for q in range(solver.bodies):
+        i = solver.body_row[q]
+        w = bodies.inverse_mass[i]
+        if w == 0.0:
+            solver.number[q] = -1
+            continue
+        root = root_of(island, q)
+        t = solver.number[root]
+        if root == q:
+            t = count
+            count += 1
+            solver.lightest[t], solver.most_change[t], solver.mass_of[t], solver.force_of[t] = math.inf, 0.0, 0.0, 0.0
+            solver.stiff[t] = solver.own[t] = solver.strike[t] = solver.taken[t] = 0.0
+            solver.size_of[t], solver.leader[t] = 0, i
+        solver.number[q] = t
+        change = sub(velocity[i], start[i])
+        if supported[i]:
+            change = sub(change, bodies.support_change[i])
+        speed = math.sqrt(dot(change, change))
+        solver.lightest[t], solver.most_change[t] = min(solver.lightest[t], w), max(solver.most_change[t], speed)
+        solver.mass_of[t] += 1.0 / w
+        solver.force_of[t] += speed / w
+    solver.islands = count
+    for q in range(solver.bodies):
+        island[q] = solver.number[q]
+
+
+@part
+def weigh_rows(state, dt):
+    """What each island's rows ask for: how stiff they must be, and how fast they are struck."""
+    solver, pairs, bodies, nothing = state.solver, state.pairs, state.bodies, zero_of(state)
+    velocity, inverse_mass = bodies.start_velocity, bodies.inverse_mass
+    for r in range(solver.contacts):
+        c = pairs.resting[r]
+        a, b = pairs.a[c], pairs.b[c]
+        t = max(solver.island[bodies.place[a]], solver.island[bodies.place[b]])
+        w_a, w_b, inverse_extent = inverse_mass[a], inverse_mass[b], 1.0 / smaller_extent(bodies, a, b)
+        v_a, v_b = velocity[a] if a < state.moving else nothing, velocity[b] if b < state.moving else nothing
+        solver.size_of[t] += 1
+        stiff = (w_a + w_b) * inverse_extent
+        solver.stiff[t], solver.own[t] = max(solver.stiff[t], stiff), max(solver.own[t], stiff / max(w_a, w_b))
+        strike = dot(sub(v_a, v_b), pairs.normal[c]) * dt * inverse_extent
+        if strike > solver.strike[t]:
+            solver.strike[t] = strike
+
+
+@part
+def choose_substeps(solver, t, usual, dt):
+    """How many substeps island t has, and whether its contacts are hard; returns whether it is special.
+
+    Its contacts may have to bear its heaviest body: the sag under that falls with the square of the substeps, what one
+    is struck by goes in by 1 / substeps. Where the own weight of bodies asks for too many, contacts are hard. What the
+    most substeps cannot bear counts as lighter, see ``bears``. From masses, not from impulses, which would change with
+    the substeps; by factors of two, so that it seldom changes.
+    """
+    sag = SAG * solver.most_change[t] * dt
+    own = sag * solver.own[t] / OWN_SAG
+    need = sag * solver.stiff[t] / (solver.lightest[t] * MOST_SAG)
+    hard = own > float(usual * usual)
+    if hard:
+        need *= OWN_SAG / max(OWN_SAG, own)
+    strike = solver.strike[t] - 2.0 * solver.most_change[t] * solver.own[t] * dt
+    ratio = solver.stiff[t] / (solver.lightest[t] * solver.own[t])
+    struck = STRIKE * strike * ratio if strike > STRUCK else 0.0
+    most = max(LEAST_WORK_SUBSTEPS, min(MOST_SUBSTEPS, SUBSTEP_WORK // solver.size_of[t]))
+    asked, substeps = max(need, struck * struck), usual
+    while float(substeps * substeps) < asked and 2 * substeps <= most:
+        substeps *= 2
+    solver.substeps_of[t], solver.hard_of[t] = substeps, hard
+    solver.passes[t] = max(LEAST_FURTHER_PASSES, min(FURTHER_PASSES, FURTHER_WORK // solver.size_of[t]))
+    solver.bears[t] = float(substeps * substeps) / need if need > 0.0 else math.inf
+    return substeps > usual or hard
+
+
+@part
+def place_rows(state):
+    """``slot`` of each row by (range, colour), and the bodies by range: the ordinary islands are range 0."""
+    solver, bodies, pairs, starts = state.solver, state.bodies, state.pairs, state.solver.starts
+    row, island, number, range_of = solver.body_row, solver.island, solver.number, solver.range_of
+    ends, body_ends = solver.row_ends, solver.body_ends
+    for r in range(solver.contacts):
+        e = starts[solver.colour[r]]
+        starts[solver.colour[r]] += 1
+        solver.slot[r], solver.listed[e] = e, r
+    ends[0], body_ends[0] = solver.contacts, solver.bodies
+    if solver.ranges == 1:
+        return
+    for s in range(solver.ranges):
+        ends[s] = body_ends[s] = 0
+    for r in range(solver.contacts):
+        c = pairs.resting[r]
+        t = max(island[bodies.place[pairs.a[c]]], island[bodies.place[pairs.b[c]]])
+        solver.slot[r] = range_of[t]
+        ends[range_of[t]] += 1
+    for q in range(solver.bodies):
+        body_ends[range_of[island[q]] if island[q] >= 0 else 0] += 1
+    rows = places = 0
+    for s in range(solver.ranges):  # from how many to where each begins
+        rows, ends[s] = rows + ends[s], rows
+        places, body_ends[s] = places + body_ends[s], places
+    for e in range(solver.contacts):
+        r = solver.listed[e]
+        s = solver.slot[r]
+        solver.slot[r] = ends[s]
+        ends[s] += 1
+    for q in range(solver.bodies):
+        s = range_of[island[q]] if island[q] >= 0 else 0
+        number[q] = body_ends[s]
+        body_ends[s] += 1
+    for q in range(solver.bodies):
+        bodies.place[row[q]] = number[q]
+        solver.used[number[q]], solver.mover[number[q]] = row[q], island[q]
+    for q in range(solver.bodies):
+        row[q], island[q] = solver.used[q], solver.mover[q]
+
+
+@part
+def order_rows(state, dt):
+    """Islands, their substeps, and the order of rows and bodies."""
+    solver = state.solver
+    colour_rows(state)
+    number_islands(state)
+    weigh_rows(state, dt)
+    solver.ranges = 1
+    for t in range(solver.islands):
+        solver.range_of[t] = 0
+        if choose_substeps(solver, t, state.substeps, dt):
+            solver.range_of[t], solver.special[solver.ranges] = solver.ranges, t
+            solver.ranges += 1
+    place_rows(state)

@@ -1,0 +1,160 @@
+"""Manifolds: the contact of a pair, made once in a step and read for as long as the two hardly move to each other.
+
+A manifold is a plane: normal, depth and point where the centres of the two shapes were ``at`` from each other. Pairs
+that rested in the step before have theirs where the step starts, all others where free flight leads. Elsewhere the
+depth follows from the plane, up to the curvature of the shapes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...framework.compilation import inlined, part
+from ...framework.vectors import add, add_scaled, dot, length, sub
+from ..codes import OK
+from ..shapes.dispatch import both_convex, evaluate
+from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, contact_margin, slop_for
+
+
+@inlined
+def between(bodies, a, b):
+    """From the centre of a's shape to that of b's, where they are now."""
+    position, offset = bodies.position, bodies.offset
+    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
+
+
+@inlined
+def between_at_start(bodies, a, b):
+    """The same where the step starts."""
+    position, offset = bodies.previous_position, bodies.offset
+    return sub(add(position[b], offset[b]), add(position[a], offset[a]))
+
+
+@part
+def meet(state, a, b, d):
+    """The answer of the pair's function: (hit, depth, normal, point)."""
+    shape = state.bodies.shape
+    return evaluate(state, shape[a], a, shape[b], b, d)
+
+
+@part
+def make_manifold(state, c, d):
+    """The manifold of pair c where the centres are d apart."""
+    pairs = state.pairs
+    hit, depth, normal, point = meet(state, pairs.a[c], pairs.b[c], d)
+    pairs.at[c], pairs.hit[c], pairs.depth[c], pairs.normal[c], pairs.point[c] = d, hit, depth, normal, point
+
+
+@inlined
+def forget_manifold(pairs, c):
+    """The pair is not where its manifold was made, and has another normal."""
+    pairs.at[c], pairs.depth[c] = add_scaled(pairs.at[c], pairs.at[c], math.nan), 0.0
+
+
+@inlined
+def is_at_manifold(pairs, c, d, extent):
+    """Whether d is where the manifold was made, so that all of it holds there."""
+    move, nearest = sub(d, pairs.at[c]), SAME_PLACE * extent
+    return dot(move, move) <= nearest * nearest
+
+
+@inlined
+def depth_by_plane(pairs, c, d):
+    """The depth where the centres are d apart, as far as the surfaces are flat."""
+    return pairs.depth[c] - dot(sub(d, pairs.at[c]), pairs.normal[c])
+
+
+@part
+def deepest_possible(pairs, c, d):
+    """The most that the depth may be where the centres are d apart: nothing gets deeper by more than it moves."""
+    depth = pairs.depth[c]
+    return depth + length(sub(d, pairs.at[c])) if depth > -math.inf else math.inf
+
+
+@part
+def plane_tells(state, c, d, extent):
+    """Whether the plane gives the depth there, but for a small part of the slop.
+
+    What goes by t along the plane of two round shapes gets nearer by t^2 / 2 extent, or less. Of a concave shape
+    another face may be the nearest there.
+    """
+    pairs, bodies = state.pairs, state.bodies
+    move = sub(d, pairs.at[c])
+    along, square, most = dot(move, pairs.normal[c]), dot(move, move), PLANE_SIZES * extent
+    flat = square - along * along <= 2.0 * extent * FLAT_SLOPS * slop_for(state, extent) and square <= most * most
+    a, b = pairs.a[c], pairs.b[c]
+    return flat and pairs.depth[c] > -math.inf and both_convex(state, bodies.shape[a], bodies.shape[b])
+
+
+@part
+def depth_at(state, c, d, extent, exact):
+    """(depth, normal) where the centres are d apart: by the manifold if that tells, else by the pair's function.
+
+    exact: as the function says; else but for a small part of the slop.
+    """
+    pairs = state.pairs
+    if is_at_manifold(pairs, c, d, extent) or (not exact and plane_tells(state, c, d, extent)):
+        return depth_by_plane(pairs, c, d), pairs.normal[c]
+    _, depth, normal, _ = meet(state, pairs.a[c], pairs.b[c], d)
+    return depth, normal
+
+
+@part
+def mark_early(state):
+    """Pairs that rested in the step before, and touched, are taken where this one starts. Both lists are in canonical
+    order."""
+    pairs, contacts, entity, memory = state.pairs, state.contacts, state.bodies.entity, state.warm_start
+    now, k = contacts.now, 0
+    any_rested = state.moved and memory.counts[memory.now] > 0
+    count = contacts.counts[now] if any_rested else 0
+    for c in range(pairs.count if any_rested else 0):
+        first, second = entity[pairs.a[c]], entity[pairs.b[c]]
+        while k < count and (
+            contacts.entity_a[now, k] < first
+            or (contacts.entity_a[now, k] == first and contacts.entity_b[now, k] < second)
+        ):
+            k += 1
+        if k == count:
+            break
+        same = contacts.entity_a[now, k] == first and contacts.entity_b[now, k] == second
+        pairs.early[c] = same and contacts.rested[now, k] and pairs.is_solid[c]
+
+
+@inlined
+def is_near(state, span, c):
+    """Whether a solid pair may touch within the step, by its depth where free flight leads."""
+    pairs = state.pairs
+    return pairs.is_solid[c] and pairs.depth[c] >= -contact_margin(state, span, pairs.a[c], pairs.b[c])
+
+
+@part
+def move_to_end(state, dt):
+    """The contacts of the narrow phase become those where free flight leads."""
+    pairs, bodies, found = state.pairs, state.bodies, 0
+    if state.found_at_end:
+        return
+    state.found_at_end = True
+    for h in range(pairs.found):
+        c, near = pairs.hits[h], True
+        if pairs.early[c]:
+            make_manifold(state, c, between(bodies, pairs.a[c], pairs.b[c]))
+            near = pairs.hit[c] or is_near(state, dt, c)
+        if near:
+            pairs.hits[found] = c
+            found += 1
+    pairs.found = found
+
+
+@part
+def move_to_start(state):
+    """The response finds what it would have found if nobody had read the contacts."""
+    pairs, bodies = state.pairs, state.bodies
+    for c in range(pairs.count if state.found_at_end else 0):
+        if pairs.early[c]:
+            make_manifold(state, c, between_at_start(bodies, pairs.a[c], pairs.b[c]))
+
+
+def finish_found(state, dt):
+    """The same as a stage, for code that reads these contacts."""
+    move_to_end(state, dt)
+    return OK

@@ -1,0 +1,76 @@
+"""Laws of containment: in rooms of any masses, sizes, speeds and walls, no body comes out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from laws.helpers_laws import SWEPT, beyond, seeds, walls
+from worlds import ball, box, make_world
+
+TOO_FAST = "so fast that discrete collisions may miss"
+IMPACTS = 50_000  # of a room, then it ends: elastic bodies of very different masses have millions
+METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
+
+
+class Kept(NamedTuple):
+    """Bodies out of the room at any step; the faults."""
+
+    out: int
+    faults: list[str]
+
+
+def room(seed, mode):
+    """A room drawn by its seed: 2D or 3D, walls of 1 cm to 2 m, 20 to 120 bodies with masses to 1:1e6, sizes to 1:10,
+    speeds of 3 to 100 m/s, at 60 or 20 Hz, with gravity, friction, sleeping and any integrator.
+
+    What is swept cannot pass a wall, whoever pushes it.
+    """
+    random = np.random.default_rng([seed, 8])
+    d = 2 if random.random() < 0.7 else 3
+    rate, wall = int(random.choice([60, 20])), float(random.choice([0.01, 0.1, 2.0]))
+    masses, e = float(random.choice([1.0, 10.0, 100.0, 1e3, 1e3, 1e3])), float(random.choice([0.0, 0.3, 0.8, 1.0]))
+    speed, gravity = float(random.choice([3.0, 10.0, 30.0, 100.0])), float(random.choice([0.0, 9.81, 9.81, 50.0]))
+    method = str(random.choice(METHODS)) if random.random() < 0.4 else "semi_implicit_euler"
+    count, half = int(random.choice([20, 60, 120])), float(random.choice([4.0, 7.0, 10.0]))
+    makers = ((ball, ball), (box, box), (ball, box))[random.integers(3)]
+    friction = None if random.random() < 0.5 else 0.5
+    smallest, sleeping = float(random.choice([1.0, 3.0, 10.0])), bool(random.random() < 0.3)
+    settings = {"collision": mode, "dt": 1 / rate, "integrator": method, "sleeping": sleeping}
+    with make_world(d, gravity, on_fault="ignore", **settings) as world:
+        walls(world, half, wall, restitution=e, friction=friction)
+        row = int(np.ceil(count ** (1 / d)))
+        cell = 2 * half / row
+        for k in range(count):
+            place = (np.array(np.unravel_index(k, (row,) * d)) + 0.5) * cell - half
+            way = random.normal(size=d)
+            size = min(0.45 * cell, 0.6) * smallest ** -random.uniform(0.0, 1.0)
+            mass, maker = masses ** random.uniform(-1.0, 1.0), makers[random.integers(2)]
+            size = {"radius": size} if maker is ball else {"half": size}
+            velocity = speed * way / np.linalg.norm(way)
+            maker(world, place, velocity, mass=mass, restitution=e, friction=friction, **size)
+        out = 0
+        for _ in range(150):
+            world.step()
+            out = max(out, beyond(world, half + wall))
+            if out or world.stats().counters["impacts"] > IMPACTS:
+                break
+        return Kept(out, list(world.faults))
+
+
+def too_fast(found):
+    return any(TOO_FAST in text for text in found.faults)
+
+
+@pytest.mark.parametrize("mode", SWEPT)
+@pytest.mark.parametrize("seed", seeds(15, 500))
+def test_what_is_swept_stays_inside(seed, mode):
+    found = room(seed, mode)
+    assert found.out == 0, found.faults[-1:]
+
+
+@pytest.mark.parametrize("seed", seeds(15, 500))
+def test_discrete_bodies_stay_inside_or_are_called_too_fast(seed):
+    found = room(seed, "discrete")
+    assert found.out == 0 or too_fast(found), found.faults[-1:]
