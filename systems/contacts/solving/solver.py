@@ -27,6 +27,7 @@ from ..constants import (
     LOADED,
     MOST_LOAD,
     MOST_LOADED,
+    OPEN,
     RELAX_PASSES,
     SAG,
     SLOPE,
@@ -51,9 +52,9 @@ def measure(solver, h, bias_rate, dt, stiff, ends, span):
     for k in range(span[0], span[1]):
         room = solver.gap[k] + dot(sub(shift[solver.second[k]], shift[solver.first[k]]), solver.normal[k])
         opening = pushing = max(0.0, room) / ahead
-        soft = False
-        if room <= 0.0 and not solver.parting[k]:
-            extent, hard = solver.extent[k], solver.hard[k]
+        extent, soft = solver.extent[k], False
+        if room <= OPEN * extent and not solver.parting[k]:  # what was just closed is soft, on either side of rounding
+            hard = solver.hard[k]
             deep = DEEP * extent + solver.loaded[k]
             if room < -deep:
                 room = -deep + max(min(0.0, SLOPE * (room + VERY_DEEP * extent)), -DEEPEST * extent)

@@ -11,7 +11,7 @@ from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, scale
 from ...codes import NEED_WARM_START, OK
-from ..constants import MOST_LOAD, TURNED
+from ..constants import MOST_LOAD, OPEN, TURNED
 from .guard import island_of
 
 
@@ -109,7 +109,7 @@ def store_warm_start(state, dt):
         solver.remembered[t] = -1
     for r in range(solver.contacts):
         k, c = solver.slot[r], pairs.resting[r]
-        if not solver.total[k] > 0.0:  # also nan
+        if not solver.total[k] * dt > OPEN * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
         memory.first[new, count], memory.second[new, count] = a, b
