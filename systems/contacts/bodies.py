@@ -6,7 +6,6 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
-from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
 from .solving.islands import order_rows
 from .solving.prediction import drop_support
@@ -89,5 +88,5 @@ def put_back(state, dt):
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]
     if state.any_support:
-        drop_support(state, dt, STOPPED)
+        drop_support(state, dt)
     return OK

@@ -10,6 +10,7 @@ from ..ccd.search_bounds import FAST
 from ..codes import NEED_EVENTS, NEED_TOGETHER, OK, REFRESH_PAIRS
 from ..linking.parts import TAKE_SWEPT, TAKE_TOGETHER, call_take_swept, call_take_together
 from ..narrow_phase.manifolds import forget_manifold
+from ..narrow_phase.stages import find_hasty
 from .find import consider
 from .heap import heap_pop
 from .impulses import CROSS, LAND, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
@@ -264,6 +265,8 @@ def resolve_impacts(state, dt):
             halt(state)
         else:
             break
+    if impacts.logged > 0:
+        find_hasty(state, dt)
     state.impacts_counted += impacts.logged
     state.looks_counted += impacts.looked
     state.capped_counted += impacts.capped

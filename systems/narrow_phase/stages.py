@@ -139,9 +139,10 @@ def is_solid_pair(state, a, b):
 @part
 def find_hasty(state, dt):
     """Note the body that moves farthest beyond its own extent, if that is more than the extent of the thinnest: where
-    no pair is swept, the two may have passed through each other."""
+    no pair is swept, the two may have passed through each other. Once before the impacts, and once with their speeds.
+    """
     bodies, farthest, thinnest = state.bodies, 0.0, min(state.thinnest_static, state.thinnest_moving)
-    state.hasty, any_fast = False, False
+    any_fast = False
     if state.sweeping or not state.moved:
         return
     for i in range(state.moving):  # seldom; squares, so that there are no roots, nor divisions
@@ -151,9 +152,8 @@ def find_hasty(state, dt):
         if bodies.shape[i] >= 0:
             extent = bodies.min_extent[i]
             beyond = length(bodies.start_velocity[i]) * dt - extent
-            if beyond > farthest:
-                farthest, state.hasty_row = beyond, i
-    state.hasty = farthest > thinnest
+            if beyond > max(farthest, thinnest):
+                farthest, state.hasty, state.hasty_row = beyond, True, i
 
 
 def select_pairs(state, dt):
@@ -166,6 +166,7 @@ def select_pairs(state, dt):
     changed = state.moved and (state.limits_speed or not state.drifted)
     for i in range(state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
+    state.hasty = False
     find_hasty(state, dt)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):

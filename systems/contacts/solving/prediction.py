@@ -171,13 +171,13 @@ def predict_rest(state, dt):
 
 
 @part
-def drop_support(state, dt, stopped):
-    """Bodies that no contact has pushed after all fly as the integrator said; those that were ``stopped``, by so many
-    impacts, stay where they are."""
+def drop_support(state, dt):
+    """Bodies that no contact has pushed after all fly as the integrator said. What has had an impact stays on the path
+    that this has given it: beside it there may be a wall."""
     bodies, travels = state.bodies, state.force_travels
     for i in range(state.moving):
         if bodies.supported[i] and not bodies.held[i]:
             dv = bodies.support_change[i]
-            if bodies.impact_count[i] < stopped:
+            if bodies.impact_count[i] == 0:
                 bodies.position[i] = add_scaled(bodies.position[i], dv, -travels * dt)
             bodies.linear_velocity[i] = sub(bodies.linear_velocity[i], dv)
