@@ -246,21 +246,23 @@ class Scene:
             levels = np.where(levels < 0, -1, np.searchsorted(used, levels)).astype(np.int8)
             present, slots = [present[index] for index in used], slots[used]
         state.shapes.slots = slots
-        self._set_levels(levels)
+        self._set_levels(levels, self.table.capacity if present else 0)
         boxes = present.index(AABBCollider) if AABBCollider in present else len(present)
         if len(levels) > 1:
             self.stretches = (levels[1:] == boxes).any(axis=0) & (levels[0] != boxes)
         return present
 
-    def _set_levels(self, levels: np.ndarray) -> None:
-        """The last level decides; it is also known as the body's shape."""
+    def _set_levels(self, levels: np.ndarray, rows: int) -> None:
+        """The last level decides; it is also known as the body's shape.
+
+        rows: that many have places of their shapes, none while there is no shape, present or prepared.
+        """
         state, bodies, capacity = self.state, self.state.bodies, self.table.capacity
         several = len(levels) > 1
         self._columns_made += 1
         self.levels = np.full((len(levels), capacity), -1, np.int8)
         self.levels[:, : levels.shape[1]] = levels
         self._taken_out = np.empty(0, np.int64), self.levels[:, :0]
-        rows = capacity if (levels >= 0).any() else 0
         offsets = np.zeros((len(levels), rows, state.dimensions))
         bodies.levels, bodies.level_offsets = self.levels, offsets
         bodies.shape, bodies.offset = self.levels[-1], offsets[-1]

@@ -359,3 +359,17 @@ def test_what_cannot_be_prepared():
     world.add_system(InMidStep())
     with pytest.raises(CaromError, match="between steps"):
         world.step()
+
+
+def test_shapes_prepared_for_an_empty_world_have_room():
+    """What all bodies of a world have left behind, and what is prepared, has columns as long as the table."""
+    world = make_world()
+    entity = ball(world, (0.0, 0.0))
+    world.step()
+    world.delete_entity(entity, immediate=True)
+    world.prepare(SphereCollider, AABBCollider)
+    world.step()
+    ball(world, (0.0, 0.0), (1.0, 0.0))
+    world.step()
+    bodies = world.physics.state.bodies
+    assert bodies.level_offsets.shape[1] == bodies.offset.shape[0] == bodies.levels.shape[1]
