@@ -60,7 +60,7 @@ def check(found):
 
 
 MISSED = {  # the fastest today, m/s
-    ("discrete", 0.5, 1000.0): 3.6,
+    ("discrete", 0.5, 1000.0): 4e-3,
     ("continuous", 0.2, 1000.0): 6e-3,
     ("event_driven", 0.0, 1000.0): 5e-3,
 }
