@@ -52,7 +52,7 @@ install: $(DEV)
 # Kernels as plain Python: the same bits as compiled, and which lines of the engine tests have run. What compares them
 # comes last: by then the tests beside have compiled them.
 PLAIN := components_* systems_* world_* contacts_rows filters_enabled filters_sensors forces_kinds forces_systems \
-  plugins_* plugin_checks plugin_springs adoption array_pool undo vectors profile quarantine saving plain_python
+  sweep_kernels plugins_* plugin_checks plugin_springs adoption array_pool undo vectors profile quarantine saving plain_python
 
 coverage: $(TEST)
 	NUMBA_DISABLE_JIT=1 $(BIN)/pytest $(TOGETHER) -m "not slow and not compiled" --cov --cov-report=term $(ARGS) \
