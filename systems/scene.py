@@ -49,7 +49,7 @@ SLEEPING = ("prints", "rest_root", "restless")
 ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "held", "place")
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells who has arrived.
-KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper")
+KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")
 ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.
 ZERO_WHERE_STATIC = (

@@ -13,6 +13,8 @@ from helpers_modes import MODES, along, bullet, each_mode, mode_world, positions
 from helpers_pairwise import pairwise
 from worlds import EPS, ball, both_dimensions, box, floor, make_world, position, run, velocity
 
+from carom.components import Transform
+
 DT, G = 1 / 60, 9.81
 RATIOS = [10.0**k for k in (0, 3, -3, 6, -6, 9, -9, 12, -12)]
 makers = pytest.mark.parametrize("maker", [ball, box])
@@ -225,6 +227,23 @@ def test_a_piston_drives_a_ball(mode, d, maker):
     assert velocity(world, mover)[0] == pytest.approx(v, rel=1e-13)
     assert position(world, mover)[0] == pytest.approx(x + v * (end - t), abs=1e-10)
     assert world.stats().counters["capped_impacts"] == 0
+
+
+@pytest.mark.parametrize("start", [(-50.0, 0.0), (-1.0, 0.0)], ids=["apart", "inside"])
+@each_mode
+def test_a_wall_that_the_game_has_moved_is_met_where_it_stands(mode, start):
+    """In the very step after the write, also by what begins inside it and would be through it at the end."""
+    with make_world(2, dt=DT, collision=mode) as world:
+        wall = ball(world, (900.0, 0.0), radius=3.0, kind="static", restitution=1.0)
+        bullet_ = ball(world, start, velocity=(6000.0, 0.0), radius=0.5, restitution=1.0)
+        for x in (0.0, 0.9):  # so that there is a response in the step before, too
+            ball(world, (x, 900.0), radius=0.5)
+        world.step()
+        world.component_for_entity(bullet_, Transform).position = start
+        world.component_for_entity(wall, Transform).position = (0.0, 0.0)
+        world.step()
+        assert len(world.contacts.impacts) == 1
+        assert np.allclose(velocity(world, bullet_), (-6000.0, 0.0))
 
 
 @exact

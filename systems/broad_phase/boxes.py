@@ -154,7 +154,7 @@ def box_statics(state, dt):
     state.statics_changed = state.statics_stale or statics_moved(state)
     if state.statics_changed:
         for i in range(moving, state.count):
-            bodies.previous_position[i] = bodies.position[i]
+            bodies.previous_position[i] = bodies.origin[i] = bodies.position[i]
             bodies.static_position[i - moving] = bodies.position[i]
         call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
         state.statics_stale = False

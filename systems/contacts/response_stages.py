@@ -28,8 +28,6 @@ def begin_response(state, dt):
             bodies.previous_position[i] = bodies.position[i]
             bodies.path_velocity[i] = bodies.linear_velocity[i]
             bodies.start_velocity[i] = bodies.linear_velocity[i]
-    known = state.origins_version == state.version and state.origins_statics == state.statics_version
-    for i in range(state.moving if known else state.count):
+    for i in range(state.moving):
         bodies.origin[i] = bodies.previous_position[i]
-    state.origins_version, state.origins_statics = state.version, state.statics_version
     return OK

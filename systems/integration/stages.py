@@ -332,8 +332,7 @@ def note_path(state, dt):
     """x(t) = x0 + p1 t + p2 t^2 + p3 t^3 for the dynamic bodies, x0 + v t for the kinematic ones."""
     bodies, degree, dynamic = state.bodies, state.path_degree, state.dynamic
     v0, v1, path = bodies.start_velocity, bodies.linear_velocity, bodies.path_velocity
-    known = state.origins_version == state.version and state.origins_statics == state.statics_version
-    for i in range((state.moving if known else state.count) if state.sweeping else 0):
+    for i in range(state.moving if state.sweeping else 0):
         bodies.origin[i] = bodies.previous_position[i]
     for i in range(state.moving):
         path[i] = v1[i] if degree == LINE and not state.moves_with_old_velocity else v0[i]
