@@ -86,6 +86,7 @@ BODIES = Schema(
     cluster_holder=ints("int32"),  # what cannot be moved and holds it, or -1
     supported=flags(default=False),  # the resting prediction has changed its velocity
     support_change=vectors(),
+    most_support=floats(),  # m/s, that the resting prediction may change
     held=flags(default=False),  # a contact at rest has pushed it
     place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
     # sleeping; the first ones are columns of the table, and move with its rows

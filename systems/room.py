@@ -41,15 +41,15 @@ MEMBERS = ("member", "group", "is_left", "share", "before", "ahead", "weight", "
 LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
 SOLVER_BODIES = (
     "body_row", "used", "number", "island", "velocity", "velocity_before", "shift", "acceleration", "inverse_mass",
-    "heft", "mover", "shared", "way", "held", "size_of", "mass_of", "force_of", "lightest", "most_change", "stiff",
-    "own", "strike", "substeps_of", "hard_of", "passes", "bears", "range_of", "slope", "curvature", "energy",
-    "momentum", "allowed", "share", "taken", "struck", "unsolved", "leader", "remembered",
+    "heft", "mover", "shared", "squeezes", "way", "held", "size_of", "mass_of", "force_of", "lightest", "most_change",
+    "stiff", "own", "strike", "substeps_of", "hard_of", "passes", "bears", "range_of", "slope", "curvature", "energy",
+    "momentum", "allowed", "share", "taken", "struck", "unsolved", "leader",
     "special", "row_ends", "body_ends",
 )  # fmt: skip
 # What these stages need of the bodies before they do anything.
 COLUMNS_OF = {
     "sum_forces": ("force",), "end_flight": ("kept_step_force",),
-    "predict_rest": ("supported", "support_change", "place"), "gather": ("held", "place"),
+    "predict_rest": ("supported", "support_change", "most_support"), "gather": ("held", "place"),
 }  # fmt: skip
 SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
 
@@ -165,9 +165,9 @@ class Room:
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""
         memory = self._state.warm_start
-        if rows > len(memory.share):
+        if rows > len(memory.off):
             _grow_stacked(memory, max(_with_spare(rows), memory.entity_a.shape[1]))
-            memory.reserve(memory.entity_a.shape[1], "share", "off", "going", "slope", "curvature")
+            memory.reserve(memory.entity_a.shape[1], "off")
 
     def reserve_contacts(self, rows: int) -> None:
         """Room for so many contacts, if there is less."""

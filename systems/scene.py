@@ -46,7 +46,7 @@ HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
 SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
 SLEEPING = ("prints", "rest_root", "restless")
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
-ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "held", "place")
+ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "most_support", "held", "place")
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells who has arrived.
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")

@@ -78,7 +78,7 @@ def test_a_pair_at_rest_that_is_a_plugins_is_evaluated_once_a_step():
 
 def test_a_pile_that_settles_is_evaluated_at_most_twice_a_step():
     """Where the step starts and where it ends; and pairs near each other where free flight leads."""
-    with settled("pile2d", 120, n=200) as world:
+    with settled("pile2d", 180, n=200) as world:
         pairs = world.physics.state.pairs
         total = sum(evaluations_of_a_step(world) for _ in range(10))
         assert total < 10 * 2.3 * pairs.count

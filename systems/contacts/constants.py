@@ -24,6 +24,7 @@ DEEPEST = 0.17  # extents at most
 # Passes over the rows in a substep.
 RELAX_PASSES = 2  # after the pass that pushes: they take back the speed that pushing has given
 LAST_RELAX_PASSES = 4  # of the last substep, whose velocities stay
+REFINED_PASSES = 8  # of each substep of an island with more: columns under heavy bodies sway with 2, pyramids with 12
 FURTHER_PASSES = 1000  # at most, over rows that are not solved and islands that have gained energy,
 FURTHER_WORK = 20_000  # rows of the island in all of these,
 LEAST_FURTHER_PASSES = 8  # if they are not these,
@@ -66,5 +67,3 @@ UNREACHED = 1e6  # extents: a row that is left to the next step
 # What is remembered of a step.
 TURNED = 0.5  # cosine between the normals of two steps, below which the impulses say nothing
 MOST_LOAD = 4.0  # of what forces give an island in a step: what is more was a blow, and not what holds it
-PREDICTION_PASSES, MOST_PREDICTION_PASSES = 2, 16  # the latter while an island gains energy
-PREDICTION_STEADY = 1e-6  # of an impulse: smaller changes are left

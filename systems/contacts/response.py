@@ -39,7 +39,7 @@ class Response(StagedSystem):
     STAGES = (
         Stage(begin_response, "where the paths begin", ("pairs",), ("path_velocity",), "colliders"),
         Stage(
-            predict_rest, "the impulses of the last step act on the prediction, as far as they take energy",
+            predict_rest, "the impulses of the last step act on the prediction, as far as there is something to hold",
             ("warm_start",), MOTION, "colliders", RESTED,
         ),
         Stage(begin_impacts, "no impact yet", ("pairs", "restitution"), ("impacts",), "colliders"),

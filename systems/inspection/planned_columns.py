@@ -29,7 +29,7 @@ GROUPS = (
     ("the step", ("start_velocity",), "velocity at the start of the step, for the path"),
     ("the step", ("quarantined",), "a body had a value that cannot be: it takes no part"),
     ("collisions", COLLISIONS, "some body has a collider: boxes, extents, the path in the step, the response"),
-    ("collisions", ("supported", "support_change", "held", "place"), "contacts have rested"),
+    ("collisions", ("supported", "support_change", "most_support", "held", "place"), "contacts have rested"),
     ("curved paths", CURVES, "the integrator's paths are curved"),
     ("swept bodies", SWEEPS, "bodies are swept along their paths: how far impacts may send them"),
     (

@@ -51,6 +51,7 @@ SOLVER = Schema(
     mover=ints("int32"),  # bodies that move by themselves
     movers=integer(),
     shared=flags(),  # something presses on it
+    squeezes=flags(),  # some row of it still closes in the end
     way=vectors(),  # sum of the normals of what holds it
     held=floats(),  # N s, by its strongest hard contact
     # islands
@@ -78,7 +79,6 @@ SOLVER = Schema(
     struck=flags(),  # some row is far from solved
     unsolved=flags(),
     leader=ints("int32"),  # row of its first body
-    remembered=ints("int32"),
     # ranges: the ordinary islands, then each special one
     ranges=integer(),
     usual=integer(),  # substeps,
@@ -107,16 +107,9 @@ WARM_START = Schema(
     impulse=floats(stacked=True),  # N s of the last substep, as if the step were one,
     tangent=vectors(stacked=True),  # and along the surface
     push=vectors(stacked=True),  # what it gave in the step, with its friction
-    island=ints(stacked=True),  # entity of the first body of its island,
-    group=ints("int32", stacked=True),  # and the first contact of it, for ``rows_version``
     first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
     second=ints("int32", stacked=True),
     rows_version=ints(),
     step=floats(),  # s that the impulses are for
-    # the prediction
-    share=floats(),  # of each push
-    off=flags(),
-    going=flags(),  # groups that gain energy
-    slope=floats(),
-    curvature=floats(),
+    off=flags(),  # of no use in this step
 )

@@ -28,6 +28,7 @@ from ..constants import (
     MOST_LOAD,
     MOST_LOADED,
     OPEN,
+    REFINED_PASSES,
     RELAX_PASSES,
     SAG,
     SLOPE,
@@ -39,6 +40,8 @@ from ..constants import (
 from .guard import find_struck, finish_substep
 from .hard import choose_hard, leave_open
 from .rows import apply_impulse, closing_speed, effective_mass, relax_listed, solve_friction, solve_normals
+
+ORDINARY, REFINED, HARD = range(3)  # ranges: with the usual substeps, with more, with contacts that do not sag
 
 
 @part
@@ -185,10 +188,10 @@ def solve_pass(solver, bias, soft, pushes, start, stop):
 
 
 @part
-def solve_substep(solver, spring, most, dt, h, stiff, ends, span):
+def solve_substep(solver, spring, most, dt, h, kind, ends, span):
     """One substep of a range. spring: (see solve_normals, twice; speed per overlap at which it is pushed out)."""
     start, stop = span[0], span[1]
-    soft, bias_rate, opening = (spring[0], spring[1]), spring[2], solver.opening
+    soft, bias_rate, opening, stiff = (spring[0], spring[1]), spring[2], solver.opening, kind == HARD
     apply_forces(solver, h, span)
     apply_warm_start(solver, most, span)
     if stiff:
@@ -201,7 +204,7 @@ def solve_substep(solver, spring, most, dt, h, stiff, ends, span):
     any_struck = find_struck(solver, dt, span)
     if ends and solver.any_hard:
         leave_open(solver, h, span)
-    for _ in range(LAST_RELAX_PASSES if ends else RELAX_PASSES):
+    for _ in range(REFINED_PASSES if kind != ORDINARY else (LAST_RELAX_PASSES if ends else RELAX_PASSES)):
         solve_pass(solver, opening, soft, False, start, stop)
     if stiff:
         converge(solver, soft, False, h, span)
@@ -254,10 +257,10 @@ def most_impulse(solver, t, substeps):
 
 
 @part
-def solve_range(solver, substeps, stiff, special, dt, span):
+def solve_range(solver, substeps, kind, dt, span):
     """The substeps of a range. Where there are more than usual, springs are damped by as much more: for the heavy
     bodies that they bear, and so that overlap is pushed out at the usual rate."""
-    h = dt / substeps
+    h, stiff, special = dt / substeps, kind == HARD, kind != ORDINARY
     omega = 2.0 * math.pi * FREQUENCY / h
     damping = 2.0 * DAMPING_RATIO * substeps / solver.usual + h * omega
     stiffness, bias_rate = h * omega * damping, omega / damping
@@ -272,7 +275,7 @@ def solve_range(solver, substeps, stiff, special, dt, span):
         left = substeps - 1 - step
         if special:
             note_impulses(solver, span)
-        solve_substep(solver, spring, most, dt, h, stiff, left == 0, span)
+        solve_substep(solver, spring, most, dt, h, kind, left == 0, span)
         if special and left > 0 and is_still(solver, dt, span):
             repeat_substep(solver, left, h, span)
             break
@@ -335,8 +338,10 @@ def solve_contacts(state, dt):
             if solver.bears[t] < 1.0:
                 lighten(solver, t, span)
         if span[1] > start:
-            substeps = solver.substeps_of[t] if special else state.substeps
-            solve_range(solver, substeps, special and solver.hard_of[t], special, dt, span)
+            substeps, kind = state.substeps, ORDINARY
+            if special:
+                substeps, kind = solver.substeps_of[t], HARD if solver.hard_of[t] else REFINED
+            solve_range(solver, substeps, kind, dt, span)
         start, begin = span[1], span[3]
     count_work(state, dt)
     return OK

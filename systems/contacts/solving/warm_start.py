@@ -11,8 +11,8 @@ from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add_scaled, dot, scale
 from ...codes import NEED_WARM_START, OK
-from ..constants import MOST_LOAD, OPEN, TURNED
-from .guard import island_of
+from ..constants import EXCESS, MOST_LOAD, OPEN, TURNED
+from .guard import excess_speed, island_of
 
 
 @part
@@ -43,7 +43,7 @@ def row_of(state, wanted):
 
 @part
 def find_rows(state):
-    """The rows of the remembered pairs, -1 for bodies that are gone, and their groups. They hold until rows move."""
+    """The rows of the remembered pairs, -1 for bodies that are gone. They hold until rows move."""
     memory, now = state.warm_start, state.warm_start.now
     if memory.rows_version[now] == state.version:
         return
@@ -51,16 +51,6 @@ def find_rows(state):
         memory.first[now, m] = row_of(state, memory.entity_a[now, m])
         memory.second[now, m] = row_of(state, memory.entity_b[now, m])
     memory.rows_version[now] = state.version
-    place = state.bodies.place  # of no use between steps: -1
-    for m in range(memory.counts[now]):
-        i = row_of(state, memory.island[now, m])
-        if i >= 0 and place[i] < 0:
-            place[i] = m
-        memory.group[now, m] = place[i] if i >= 0 else m
-    for m in range(memory.counts[now]):
-        i = row_of(state, memory.island[now, m])
-        if i >= 0:
-            place[i] = -1
 
 
 def match_warm_start(state, dt):
@@ -96,35 +86,44 @@ def match_warm_start(state, dt):
     return OK
 
 
+@part
+def find_squeezed(solver, dt):
+    """Bodies of which some row still closes: the impulses of their rows do not tell what holds them."""
+    for q in range(solver.bodies):
+        solver.squeezes[q] = False
+    for k in range(solver.contacts):
+        if excess_speed(solver, k) * dt > EXCESS * solver.extent[k]:
+            a, b = solver.first[k], solver.second[k]
+            solver.squeezes[a] |= solver.inverse_mass[a] > 0.0
+            solver.squeezes[b] |= solver.inverse_mass[b] > 0.0
+
+
 def store_warm_start(state, dt):
     """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
     if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
         return OK
-    if solver.contacts > len(memory.share):
+    if solver.contacts > len(memory.off):
         state.needed = solver.contacts
         return NEED_WARM_START
+    find_squeezed(solver, dt)
     new, count = 1 - memory.now, 0
-    for t in range(solver.islands if solver.contacts > 0 else 0):
-        solver.remembered[t] = -1
     for r in range(solver.contacts):
         k, c = solver.slot[r], pairs.resting[r]
         if not solver.total[k] * dt > OPEN * solver.extent[k] * solver.mass[k]:  # of rounding; also nan
             continue
         a, b = pairs.a[c], pairs.b[c]
+        if solver.squeezes[solver.first[k]] or solver.squeezes[solver.second[k]]:
+            continue
         memory.first[new, count], memory.second[new, count] = a, b
         memory.entity_a[new, count], memory.entity_b[new, count] = entity[a], entity[b]
-        last, total, t = solver.impulse[k], solver.total[k], island_of(solver, k)
-        push, most = scale(solver.normal[k], total), MOST_LOAD * solver.force_of[t]
+        last, total = solver.impulse[k], solver.total[k]
+        push, most = scale(solver.normal[k], total), MOST_LOAD * solver.force_of[island_of(solver, k)]
         if last > 0.0 and solver.friction[k] != 0.0:
             push = add_scaled(push, solver.tangent[k], min(1.0, total / last))
-        memory.push[new, count] = scale(push, most / total) if total > most else push
+        memory.push[new, count] = push
         kept = most / last if last > most else 1.0
         memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
-        if solver.remembered[t] < 0:
-            solver.remembered[t] = count
-        memory.group[new, count] = solver.remembered[t]
-        memory.island[new, count] = entity[solver.leader[t]]
         memory.normal[new, count] = solver.normal[k]
         count += 1
     memory.counts[new], memory.rows_version[new] = count, state.version
