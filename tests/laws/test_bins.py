@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers_pairwise import pairwise
 from helpers_rest import G
-from laws.helpers_laws import MODES, cases, fastest
+from laws.helpers_laws import MODES, fastest
 from worlds import ball, box, make_world
 
 HALF, LIGHT = 5.0, 150
@@ -59,14 +59,7 @@ def check(found):
     assert found.fastest < REST
 
 
-MISSED = {  # the fastest today, m/s
-    ("discrete", 0.5, 1000.0): 4e-3,
-    ("continuous", 0.2, 1000.0): 6e-3,
-    ("event_driven", 0.0, 1000.0): 5e-3,
-}
-
-
-@pytest.mark.parametrize(("mode", "e", "heavy"), cases(pairwise(MODES, RESTITUTIONS, HEAVY), missed=MISSED))
+@pytest.mark.parametrize(("mode", "e", "heavy"), pairwise(MODES, RESTITUTIONS, HEAVY))
 def test_bins_come_to_rest(mode, e, heavy):
     check(settle(0, mode, e, heavy))
 
@@ -74,6 +67,6 @@ def test_bins_come_to_rest(mode, e, heavy):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("seed", "mode", "e", "heavy"), list(itertools.product(range(1, 7), MODES, RESTITUTIONS, HEAVY))
-)
+)  # four of seed 4 with 1,000 kg are missed: .002 to .009 m/s
 def test_every_bin_comes_to_rest(seed, mode, e, heavy):
     check(settle(seed, mode, e, heavy))
