@@ -52,10 +52,12 @@ def mutations(path):
                 yield from between(node.left, node.right, *SIGNS[type(node.op)], "sign")
             elif isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARISONS:
                 yield from between(node.left, node.comparators[0], *COMPARISONS[type(node.ops[0])], "bound")
-            elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
-                yield node.lineno, "constant", *replaced(node, str(node.value + 1))
-            elif isinstance(node, ast.Assign | ast.AugAssign | ast.Expr) and node.lineno == node.end_lineno:
-                if not isinstance(node.value, ast.Constant):  # a docstring
+            elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+                new = not node.value if isinstance(node.value, bool) else node.value + 1
+                yield node.lineno, "constant", *replaced(node, str(new))
+            elif isinstance(node, ast.Assign | ast.AugAssign | ast.Expr):
+                docstring = isinstance(node.value, ast.Constant)
+                if node.lineno == node.end_lineno and not docstring:
                     yield node.lineno, "dropped", *replaced(node, "pass")
 
 
