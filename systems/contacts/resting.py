@@ -15,6 +15,7 @@ from ..narrow_phase.manifolds import (
     depth_at,
     depth_by_plane,
     forget_manifold,
+    has_manifold,
     is_at_manifold,
     make_manifold,
     meet,
@@ -103,7 +104,8 @@ def is_resting(state, dt, c):
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
         depth, normal, far = deepest(state, dt, c, d)
-    if depth < -margin and (hit or not pairs.near_contact[c]):  # the prediction may push too much
+    was_near = pairs.near_contact[c] and has_manifold(pairs, c)  # not so pairs that were found within the step
+    if depth < -margin and (hit or not was_near):  # the prediction may push too much
         return False
     if depth >= 0.0:
         pairs.near_contact[c] = True

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from ...framework.compilation import inlined, part
-from ...framework.vectors import add, add_scaled, dot, length, sub
+from ...framework.vectors import add, add_scaled, dot, item, length, sub
 from ..codes import OK
 from ..shapes.dispatch import both_convex, evaluate
 from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, contact_margin, slop_for
@@ -49,6 +49,13 @@ def make_manifold(state, c, d):
 def forget_manifold(pairs, c):
     """The pair is not where its manifold was made, and has another normal."""
     pairs.at[c], pairs.depth[c] = add_scaled(pairs.at[c], pairs.at[c], math.nan), 0.0
+
+
+@inlined
+def has_manifold(pairs, c):
+    """Whether a manifold of the pair has been made, and is not forgotten."""
+    first = item(pairs.at[c], 0)
+    return first == first
 
 
 @inlined

@@ -98,11 +98,9 @@ def test_a_mirrored_heap_is_the_same_to_the_bit(seed, turn, mode):
 
 
 FAR = list(itertools.product(range(10), MODES))
-# Search bounds of fast bodies follow the mean energy of all: a pair that is found by one margin is missed by another.
-MISSED_FAR = [(0, "continuous"), (2, "continuous"), (5, "continuous"), (9, "continuous"), (5, "event_driven")]
 
 
-@pytest.mark.parametrize(("seed", "mode"), cases(FAR, 3, missed=MISSED_FAR))
+@pytest.mark.parametrize(("seed", "mode"), cases(FAR, 3))
 def test_others_far_away_change_no_bit(seed, mode):
     """Rounds, passes and bounds of one island do not depend on another."""
     x, v = heap(seed, mode)
@@ -147,7 +145,7 @@ def check_frame(seed, mode, d, e):
 
 
 FRAMES = list(itertools.product(range(10), MODES, (2, 3)))
-# Ten of the twenty driven by events, 1e-9 to .1 m apart: of plastic bodies in a row that touch but for rounding, some
+# Nine of the twenty driven by events, 1e-9 to .1 m apart: of plastic bodies in a row that touch but for rounding, some
 # strike each other in one frame and not in the other.
 MISSED_FRAMES = [case for case in FRAMES if case[1] == "event_driven"]
 
