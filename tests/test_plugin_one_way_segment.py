@@ -381,6 +381,22 @@ def test_the_order_of_ids_does_not_matter():
     assert results[0] == results[1] == pytest.approx([0.5, 0.5], abs=REST)
 
 
+def test_the_last_body_that_stands_on_it_is_deleted():
+    """Then nothing moves any more, and no contact of the step before is left for systems of NARROW."""
+    with World(Physics(2, gravity=(0, -9.81)), one_way_segment.plugin) as world:
+        world.create_entity(Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0)))
+        body = world.create_entity(Transform((0, 0.5)), RigidBody(), SphereCollider(0.5))
+        ended = []
+        world.on("contact_end", ended.append)
+        for _ in range(30):
+            world.step()
+        assert len(world.contacts) == 1
+        world.delete_entity(body)
+        world.step()
+        assert len(world.contacts) == 0
+        assert [contact.entity_b for contact in ended] == [body]
+
+
 def test_queries_find_it_from_both_sides():
     world = make_world()
     for side in (1, -1):

@@ -40,7 +40,7 @@ class NarrowPhase(StagedSystem):
             evaluate_levels, "the shapes' functions, level by level", ("pairs", "position"), ("pairs",),
             "several levels",
         ),
-        Stage(collect_contacts, "which pairs touch or nearly do", ("pairs",), ("pairs",), "colliders"),
+        Stage(collect_contacts, "which pairs touch or nearly do", ("pairs",), ("pairs",), "contacts"),
         Stage(
             sweep_pairs, "which pairs touch on their paths only", ("pairs", "path_velocity"), ("pairs",),
             "swept bodies", "pairs are near each other",
