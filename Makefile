@@ -4,8 +4,8 @@
 #                test-long: more cases and steps of what the others test, before a release
 #   make coverage: which lines they run
 #   make wheel   a wheel that carries compiled kernels, into dist/
-#   make bench   carom against pymunk on this machine; ARGS="--quick" or ARGS="scaling" as docs/benchmarks.md says
-#   make figures measure again what the tables and charts of docs/tables show
+#   make bench   carom against pymunk on this machine; ARGS="--quick" as docs/benchmarks.md says
+#   make figures measure again what the tables of accuracy, limits and settings in docs/tables show
 
 PYTHON ?= python3
 SCENE ?= asteroids
@@ -68,7 +68,7 @@ wheel: $(RUN)
 bench: $(BENCH)
 	$(BIN)/carom bench $(ARGS)
 
-STUDIES := $(BIN)/python -m carom.lab.studies
+STUDIES := $(BIN)/python -m studies
 ACCURACY := spring orbit jump bouncing stack thermal_gas
 
 figures: $(BENCH)
@@ -79,11 +79,7 @@ figures: $(BENCH)
 	cp $(foreach scene,$(filter-out bouncing,$(ACCURACY)) billiards,out/$(scene)/trade-$(scene)-*-work.png) docs/pictures/
 	cp out/bouncing/trade-bouncing-*-time.png docs/pictures/
 	$(STUDIES) limits --long --into docs/tables/limits.md --out docs/pictures
-	$(STUDIES) limits --pairs --into docs/tables/limits.md
 	$(STUDIES) settings --into docs/tables/settings.md
-	$(STUDIES) settings --games --into docs/tables/settings.md
-	$(STUDIES) promises $(foreach game,pool platformer crates survivors,examples/games/$(game).py) --into docs/tables/trade.md
-	$(STUDIES) geometry --into docs/tables/levels.md --out docs/pictures
 
 # Checkers and editors do not follow the import hooks of an editable install; they follow links.
 ide:

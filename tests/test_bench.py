@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import sys
 
 import helpers_cli
 import pytest
-from click.testing import CliRunner
 
 from carom import scenes
 from carom.framework.compilation import CompilationLog
@@ -26,16 +24,6 @@ from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.measure import timing as bench_clock
 from carom.lab.measure.timing import Spread
 from carom.lab.reporting.progress import Progress
-from carom.lab.studies.__main__ import cli as studies_cli
-from carom.lab.studies.bench import (
-    feature_ladder as bench_ladder,
-)
-from carom.lab.studies.bench import (
-    scaling as bench_scaling,
-)
-from carom.lab.studies.bench import (
-    startup as bench_startup,
-)
 
 carom = helpers_cli.carom  # fixture
 SHORT_GAS = Subject("gas2d", (Window("first", 2, 12), Window("later", 20, 40)), targets={("later", 30): 2.0})
@@ -191,62 +179,7 @@ def test_timed_says_what_came_meanwhile(monkeypatch):
     assert bench_clock.timed(lambda: setattr(log, "waited", 0.1))[1] is False
 
 
-# -- scaling and startup ----------------------------------------------------------------------------------------
-
-
-def test_scaling_grows_from_the_first_size():
-    series = bench_scaling.scaling((40, 10, 40), repeats=2, body_steps=400)
-    assert [point.bodies for point in series.points] == [10, 40]
-    assert [point.steps for point in series.points] == [40, 10]
-    assert series.points[0].growth == 1.0
-    assert series.points[1].growth == pytest.approx(series.grown(10, 40))
-    assert series.grown(10, 50) is None
-    for point in series.points:
-        assert 0.0 < point.set_up.low <= point.set_up.high
-        assert point.memory > 100.0  # position, velocity, mass, radius and where it was are that much alone
-    assert bench_scaling.Scaling.from_dict(json.loads(json.dumps(series.as_dict()))) == series
-    assert len(bench_scaling.table(series).rows) == 2
-
-
-def test_startup_times_processes_with_caches_of_their_own(monkeypatch):
-    """The order matters: each repeat fills an empty cache, then uses it; with shipped kernels it is empty again."""
-    started, shipped = [], []
-
-    def start(scene, cache, portable):
-        started.append((cache, portable != ""))
-        number = float(len(started))
-        return {"seconds": number, "imports": 0.5, "first": number / 8, "worst": 0.002, "compiled": 4 - number}
-
-    monkeypatch.setattr(bench_startup, "_ship", lambda scene, folder: shipped.append(scene))
-    monkeypatch.setattr(bench_startup, "_start", start)
-    found = bench_startup.startup(["jump"], repeats=2)
-    caches = [cache for cache, _ in started]
-    assert shipped == ["jump"]
-    assert [portable for _, portable in started] == [False, False, True] * 2
-    assert [caches[0] == caches[1], len(set(caches))] == [True, 4]
-    empty, kept, with_shipped = found.starts
-    assert (empty.seconds.values, kept.seconds.values) == ((1.0, 4.0), (2.0, 5.0))
-    assert (with_shipped.kernels, with_shipped.first_step, with_shipped.worst_step) == ("shipped", 4.5 / 8, 0.002)
-    assert bench_startup.Startup.from_dict(json.loads(json.dumps(found.as_dict()))) == found
-
-
-def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
-    told = bench_startup._start("jump", os.environ["CAROM_CACHE_DIR"], "")
-    assert 0 < told["imports"] < told["seconds"]
-    assert 0 < told["worst"] < told["seconds"]
-    assert told["compiled"] >= 0
-    with pytest.raises(Problem, match="nothing"):
-        bench_startup._start("nothing", str(tmp_path), "")
-
-
 # -- the command ------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def studies(tmp_path, monkeypatch):
-    """``python -m carom.lab.studies`` in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return lambda *arguments: CliRunner().invoke(studies_cli, arguments)
 
 
 TINY = ("bench", "--scenes", "fastgas", "--repeats", "1")
@@ -273,51 +206,6 @@ def test_tables_and_charts(carom, tiny, tmp_path):
     plain = carom(*TINY)
     assert "fastgas 20" in plain.stdout
     assert "quality" in plain.stdout
-
-
-def test_scaling_by_command(studies, tmp_path):
-    done = studies("scaling", "--sizes", "20,10", "--repeats", "1", "--json", "--out", "p")
-    assert done.exit_code == 0, done.stderr
-    assert [point["bodies"] for point in json.loads(done.stdout)["points"]] == [10, 20]
-    assert (tmp_path / "p" / "scaling.png").exists()
-
-
-def test_the_ladder_measures_each_rung_beside_another():
-    found = bench_ladder.ladder(bodies=30, repeats=2, steps=2)
-    costs = {cost.feature: cost for cost in found.costs}
-    assert list(costs) == [rung.feature for rung in bench_ladder.RUNGS]
-    for cost in found.costs:
-        assert len(cost.nanoseconds.values) == 2
-        assert cost.bytes > 0
-        if cost.extra is not None:
-            beside = costs[cost.beside].nanoseconds.values
-            assert cost.extra.values == tuple(a - b for a, b in zip(cost.nanoseconds.values, beside, strict=True))
-    assert {"sum_forces", "semi_implicit_euler"} <= set(costs["drifting"].kernels)
-    assert costs["gravity"].kernels == costs["linear_damping"].kernels == []  # the same stages have more to do
-    assert costs["rotation"].kernels == costs["friction"].kernels == costs["contacts at rest"].kernels == []
-    assert costs["velocity_verlet"].kernels == ["verlet_drift"]
-    assert costs["two levels"].kernels == ["evaluate_levels"]
-    collisions = {"box_motions", "evaluate_pairs", "solve_contacts", "resolve_impacts"}
-    assert collisions <= set(costs["spheres, apart"].kernels)
-    assert costs["spheres, apart"].bytes > costs["drifting"].bytes
-    assert bench_ladder.Ladder.from_dict(json.loads(json.dumps(found.as_dict()))) == found
-
-
-def test_the_ladder_by_command(studies, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- studies ladder -->\n<!-- end of studies ladder -->\n")
-    done = studies("ladder", "--bodies", "20", "--repeats", "1", "--into", "page.md")
-    assert done.exit_code == 0, done.stderr
-    assert "| drifting |  | " in page.read_text()
-
-
-def test_startup_by_command(studies, monkeypatch):
-    told = {"seconds": 0.5, "imports": 0.25, "first": 0.125, "worst": 0.002, "compiled": 3}
-    monkeypatch.setattr(bench_startup, "_ship", lambda scene, folder: None)
-    monkeypatch.setattr(bench_startup, "_start", lambda scene, cache, shipped: told)
-    done = studies("startup", "--scenes", "jump", "--repeats", "1", "--markdown")
-    assert "| jump | shipped | 3 | 0.500 | 0.500 .. 0.500 | 0.250 | 0.125 | 2.00 |" in done.stdout
-    assert "no scene" in studies("startup", "--scenes", "nothing").stderr
 
 
 def test_without_pymunk_it_times_carom_and_says_what_is_missing(carom, tiny, no_pymunk):

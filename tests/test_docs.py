@@ -118,7 +118,7 @@ def namespace(monkeypatch, tmp_path):
 # Each compiles for a quarter of a minute or more where the cache is empty, or is a study of many runs.
 SLOW = (
     "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md", "trade.md", "tune.md",
-    "integrators.md", "limits.md", "which-collision.md",
+    "integrators.md", "which-collision.md",
 )  # fmt: skip
 RUN = [
     pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())

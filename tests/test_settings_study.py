@@ -1,51 +1,28 @@
-"""The settings study: it has every field, and its figures agree with theory."""
+"""The study of each field of Settings: it has every field, and its figures agree with theory."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import re
 from functools import partial
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from carom.framework import Settings
-from carom.lab.cli.group import Commands
-from carom.lab.measure.timing import Spread
-from carom.lab.studies.settings import (
-    clock as settings_clock,
-)
-from carom.lab.studies.settings import (
-    command as settings_command,
-)
-from carom.lab.studies.settings import (
-    games,
-)
-from carom.lab.studies.settings import (
-    report as settings_report,
-)
-from carom.lab.studies.settings import (
-    scenes as settings_scenes,
-)
-from carom.lab.studies.settings import (
-    study as settings_study,
-)
-from carom.lab.studies.settings.clock import costs
-from carom.lab.studies.settings.records import TUNED, Choice, GameChoices, GamesStudy, SettingsStudy
-from carom.lab.studies.settings.study import VARIED, measured
 from carom.scenes import drops, jump, stack
 from carom.systems.contacts.constants import OWN_SAG
+from studies.runner import run
+from studies.settings import fields as settings_fields
+from studies.settings import scenes as settings_scenes
+from studies.settings.fields import VARIED
+from studies.settings.tables import default_of, report, times
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
 
 PAGE = Path(__file__).parent.parent / "docs" / "tables" / "settings.md"
 EVERY = {(varied.field, varied.scene): varied for varied in VARIED}
-
-
-STUDIED = [("dt", "jump"), ("slop", "tiles"), ("debug", "jump"), ("friction_mixing", "sliding box")]
 
 
 def errors(field, scene, *values):
@@ -57,16 +34,7 @@ def errors(field, scene, *values):
 def works(field, scene):
     """The work of each value of a field, by value; counted, so reproducible."""
     varied = EVERY[field, scene]
-    taken = next(costs([partial(varied.world, value) for value in varied.values], varied.timed, 1, varied.play))
-    return dict(zip(varied.values, (cost.work for cost in taken), strict=True))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def short_timing():
-    """One timed span is enough where only counts are checked."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settings_clock, "ENOUGH", 1e-4)
-        yield
+    return {value: varied.run(value)[1] for value in varied.values}
 
 
 # -- what is varied ------------------------------------------------------------------------------
@@ -86,8 +54,8 @@ def test_each_field_is_varied_alone(varied):
     for value in varied.values:
         with varied.world(value) as world:
             assert world.settings == varied.base.replace(**{varied.field: value})
-            if varied.play is not settings_scenes.frames:  # blocks hold whole steps, so that the ratios are true
-                steps = varied.timed / 5 / world.settings.dt
+            if varied.play is not settings_scenes.frames:  # whole steps, so that the ratios are true
+                steps = varied.timed / world.settings.dt
                 assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
@@ -226,208 +194,28 @@ def test_what_must_change_nothing():
         assert len(set(works(field, scene).values())) == 1
 
 
-# -- the study, its records and tables -----------------------------------------------------------
+# -- the tables ----------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def study():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settings_study, "VARIED", [EVERY[key] for key in STUDIED])
-        return settings_study.settings_study(["dt", "slop", "friction_mixing"], repeats=2)
-
-
-def test_the_study_can_be_kept(study):
-    assert study.fields == ["dt", "slop", "friction_mixing"]
-    kept = json.loads(json.dumps(study.as_dict(), allow_nan=False))
-    assert SettingsStudy.from_dict(kept) == study
-    of = study.setting("dt", "jump")
-    own = of.sample(1 / 60)
-    assert own.time == Spread.of([1.0, 1.0])
-    assert own.work == 1
-    assert of.sample(1 / 120).work == pytest.approx(2)
-    assert of.milliseconds.low > 0
-    with pytest.raises(KeyError, match="no dt in 'nowhere'"):
-        study.setting("dt", "nowhere")
-    with pytest.raises(KeyError, match="dt=2 was not tried in jump"):
-        of.sample(2)
-
-
-def test_all_that_is_counted_is_the_same_twice(study):
-    again = measured(EVERY["slop", "tiles"], repeats=1)
-    before = study.setting("slop", "tiles")
-    assert [(s.work, s.errors) for s in again.samples] == [(s.work, s.errors) for s in before.samples]
-
-
-def test_the_tables(study):
-    table, meanings = settings_report.tables(study)
+def test_the_tables(monkeypatch):
+    monkeypatch.setattr(settings_fields, "ENOUGH", 1e-4)
+    keys = [("dt", "jump"), ("slop", "tiles"), ("friction_mixing", "sliding box")]
+    result = run([EVERY[key].axis() for key in keys], repeats=2)
+    line = result.line("dt", "jump")
+    assert times(line)[1 / 60].values == (1.0, 1.0)
+    assert default_of(line).value == 1 / 60
+    (table, meanings), remarks = report(result)
     assert table.headings == ("field", "scene", "value", "time", "work", "error")
     first, own = table.rows[:2]
     assert (first[:3], first[4:]) == (("dt", "jump", "1/30"), ("0.50", "4 px"))
     assert own == ("", "", "1/60 (default)", "1.00", "1.00", "2 px")
-    assert len(table.rows) == sum(len(of.samples) for of in study.settings)
-    assert [row[:2] for row in meanings.rows] == [(of.field, of.scene) for of in study.settings]
-    assert "repeats of one value lie at most" in settings_report.remarks(study)[0]
+    assert len(table.rows) == sum(len(of.samples) for of in result.lines)
+    assert [row[:2] for row in meanings.rows] == keys
+    assert "repeats of one value lie at most" in remarks[0]
 
 
-# -- games ---------------------------------------------------------------------------------------
-
-
-def test_the_six_kinds_of_games():
-    assert games.NAMES == (
-        "platformer", "shooter with bullets", "billiards", "particle rain", "puzzle stacks", "orbits"
-    )  # fmt: skip
-
-
-def check_game(game):
-    """The choice meets its target, is the cheapest shown, and its line gives settings."""
-    tuned = game.tuned
-    assert tuned is not None
-    assert tuned.met
-    assert tuned.error <= game.target
-    assert tuned.milliseconds.low > 0
-    for choice in game.choices:
-        assert choice.met == (choice.error <= game.target)
-        assert not choice.met or tuned.work <= choice.work * (1 + 1e-9)
-        settings = eval(choice.line.removesuffix(f" with RigidBody({games.CCD})"), {"Settings": Settings})
-        assert settings.dt <= 1 / 60
-
-
-def test_the_shooter():
-    (shooter,) = games.games_study(["shooter with bullets"], repeats=1).games
-    check_game(shooter)
-    assert shooter.choice("balanced").also == {"of 8 wrong": 7, "of 300 out": 300, "impacts capped": 0}
-    assert shooter.choice(games.FINEST).also["of 300 out"] == 300
-    assert shooter.choice(games.CCD).met
-    assert "continuous" in shooter.tuned.line
-
-
-@pytest.mark.long
-def test_games_get_what_they_need(monkeypatch):
-    """Those with a short search, in short runs; the shooter has its own test."""
-    names = ["platformer", "orbits"]
-    short = {
-        "jump": {"repeats": 8}, "ten turns, e = 0.6": {"seconds": settings_scenes.TEN_TURNS / 10},
-    }  # fmt: skip
-    shorter = [dataclasses.replace(game, **short[game.label]) for game in games.ALL if game.label in short]
-    monkeypatch.setattr(games, "ALL", shorter)
-    found = games.games_study(names, repeats=1)
-    assert [game.game for game in found.games] == [game.name for game in games.ALL if game.name in names]
-    for game in found.games:
-        check_game(game)
-    jumps = found.game("platformer", "jump")
-    assert jumps.choice("balanced").error == pytest.approx(2.0)
-    assert jumps.tuned.error == pytest.approx(1 / 64)
-    assert not found.game("orbits").choice("balanced").met
-    text = settings_report.choices(found).markdown()
-    assert 'Settings(integrator="velocity_verlet")' in text
-
-
-def made_up():
-    choices = [
-        Choice(TUNED, "Settings(substeps=8)", 0.03, True, 3.6e6, Spread.of([7.0]), also={"mm/s": 0.0}),
-        Choice("balanced", "Settings()", math.inf, False, 3.5e6, None, "escaped in 1 of 4"),
-    ]
-    lost = [Choice("fast", "Settings.fast()", 3.0, False, 1e6)]
-    return GamesStudy(
-        {"clock": "processor time", "processor": "none"},
-        [
-            GameChoices("puzzle stacks", "tower", "stands", 0.1, "%", games.SEARCH, 5, choices),
-            GameChoices("orbits", "one", "stays", 0.01, "%", games.SEARCH, 2, lost),
-        ],
-    )
-
-
-def test_games_as_tables_and_as_json():
-    study = made_up()
-    kept = json.loads(json.dumps(study.as_dict(), allow_nan=False))
-    assert GamesStudy.from_dict(kept) == study
-    table, needs = settings_report.game_tables(study)
-    assert table.rows == [
-        ("puzzle stacks", "tower", "Settings(substeps=8)", "0.0300 %, 0 mm/s", "3.33", "3.60", "7.00"),
-        ("", "", "Settings.balanced()", "escaped in 1 of 4", "misses", "3.50", "-"),
-        ("orbits", "one", "Settings.fast()", "3 %", "misses", "1.00", "-"),
-    ]
-    assert needs.rows[0] == ("puzzle stacks", "tower", "stands", "0.100 %", "search, 5 tried")
-    assert "nothing that was tried meets the target of orbits (one)" in settings_report.game_remarks(study)
-    assert study.game("orbits").tuned is None
-    with pytest.raises(KeyError, match="no game 'chess'"):
-        study.game("chess")
-    with pytest.raises(KeyError, match="no choice 'accurate' for orbits"):
-        study.game("orbits").choice("accurate")
-
-
-# -- the command and the page --------------------------------------------------------------------
-
-
-@pytest.fixture
-def carom(monkeypatch, study):
-    """The command with finished studies; returns a function to call with arguments."""
-    cli = Commands("carom")
-    cli.add_command(settings_command.settings_command)
-    asked = []
-
-    def done(result):
-        return lambda names, repeats, bar: asked.append((names, repeats)) or result
-
-    monkeypatch.setattr(settings_command, "settings_study", done(study))
-    monkeypatch.setattr(settings_command, "games_study", done(made_up()))
-
-    def call(*arguments):
-        answer = CliRunner().invoke(cli, ["settings", *map(str, arguments)])
-        answer.asked = asked
-        return answer
-
-    return call
-
-
-def test_the_command(carom, study, tmp_path):
-    page = tmp_path / "page.md"
-    names = "studies settings", "studies settings games"
-    marks = [f"<!-- {name} -->\nold\n<!-- end of {name} -->\n" for name in names]
-    page.write_text("".join(marks), encoding="utf-8")
-    done = carom("--json", "--repeats", 3, "--into", page)
-    assert done.exit_code == 0, done.output
-    assert done.asked == [(None, 3)]
-    assert SettingsStudy.from_dict(json.loads(done.stdout)) == study
-    assert "| dt | jump | 1/30 |" in page.read_text(encoding="utf-8")
-    done = carom("--games", "--json", "--into", page)
-    assert done.exit_code == 0, done.output
-    assert GamesStudy.from_dict(json.loads(done.stdout)) == made_up()
-    text = page.read_text(encoding="utf-8")
-    assert "| Settings(substeps=8) |" in text
-    assert "| dt | jump | 1/30 |" in text
-    assert "old" not in text
-    assert carom("dt", "slop", "--markdown").stdout.startswith("**each field alone")
-    assert done.asked[-1] == (("dt", "slop"), settings_study.REPEATS)
-    assert "what each game asks for" in carom("--games").stdout
-
-
-@pytest.mark.parametrize(("arguments", "message"), [
-    (("--json", "--markdown"), "--json and --markdown exclude each other"),
-    (("--repeats", 0), "0 is not in the range x>=1"),
-    (("--into", "missing.md"), "--into missing.md: No such file or directory"),
-    (("dt", "--into", PAGE), "--into fills the page with all of them: it takes no names"),
-    (("substep",), "no field 'substep'; did you mean 'substeps'"),
-    (("--games", "orbit"), "no game 'orbit'; did you mean 'orbits'"),
-])  # fmt: skip
-def test_what_the_command_refuses(carom, arguments, message):
-    done = carom(*arguments)
-    assert done.exit_code == 2
-    assert message in done.stderr
-    assert done.asked == []
-
-
-def test_the_page_has_all_fields_and_all_games():
+def test_the_page_has_all_fields():
     text = PAGE.read_text(encoding="utf-8")
-    fields, kinds = (
-        re.search(f"<!-- {name} -->(.*)<!-- end of {name} -->", text, re.DOTALL)[1]
-        for name in ("studies settings", "studies settings games")
-    )
+    fields = re.search("<!-- studies settings -->(.*)<!-- end of studies settings -->", text, re.DOTALL)[1]
     for varied in VARIED:
         assert f"| {varied.field} | {varied.scene} | " in fields
-    for game in games.ALL:
-        assert f"| {game.name} | {game.label} | Settings(" in kinds
-    lines = re.findall(r"\| (Settings[.(][^|]*?) \|", kinds)
-    assert len(lines) >= 4 * len(games.ALL)
-    for line in lines:
-        assert isinstance(eval(line.removesuffix(f" with RigidBody({games.CCD})"), {"Settings": Settings}), Settings)

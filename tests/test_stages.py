@@ -14,12 +14,12 @@ from carom.framework import System, World
 from carom.framework.jit.records.record import make_record
 from carom.framework.jit.records.schema import Schema, flags, integer, ints, number, vectors
 from carom.framework.schedule.stages import Program, Stage
-from carom.lab.studies.page import between_marks
-from carom.lab.studies.stages import Stages
 from carom.plugins import Physics
 from carom.systems import ContactEvents
 from carom.systems.records import STATE
 from carom.systems.stage_list import CLOSING, check_stages
+from studies.page import between_marks
+from studies.stages import Stages
 
 ROOT = Path(__file__).resolve().parent.parent
 INNER = Schema("TestInner", total=number())

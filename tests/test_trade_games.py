@@ -18,7 +18,6 @@ from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.effects import NEVER, at_worst, effects_of, in_words, noticed, told
 from carom.lab.measure.norms import errors_of, norm_of, other_touches
 from carom.lab.measure.observation import Seen, mean_of
-from carom.lab.studies import promises
 from carom.lab.trading.answer import answer
 from carom.lab.trading.records import CHAOTIC, IMPACTS
 from carom.plugins import Physics
@@ -237,35 +236,3 @@ def test_the_games_of_the_examples_play(name, options):
         assert game.values_of(world).keys() == before.keys() == set(game.names)
         assert game.values_of(world) != before
         assert world.faults == [] or name == "survivors"
-
-
-EXACT = 'Settings(collision="event_driven")'
-PRINTED = """pool.py: use Settings()
-  cost     4 ms per frame
-
-after 20 s: pool.py: use Settings(collision="event_driven")
-  cost     40 us per frame of 1/60 s on this machine, 0.2 % of it
-  error    potted: 1, as it should be; ball 4: none, as it should be; ball 0 ends 3 cm from where it should
-  noticed  nothing
-  now      Settings(): 0.5 times the cost; noticed: hits: 5 on average instead of 7; one game differs from the next by 1
-
-tables
-"""
-
-
-def test_promises_are_read_and_measured_again():
-    found = list(promises.promises(PRINTED))
-    assert [one[:2] for one in found] == [
-        (EXACT, "cost"), (EXACT, "error"), ("Settings()", f"cost of {EXACT}"), ("Settings()", "error"),
-    ]  # fmt: skip
-    assert found[2][2] == "0.5"
-    game = promises.Game(ROOT / "examples" / "games" / "pool.py")
-    again = list(promises.kept("pool", game, *found[1]))
-    assert [(one.promise, one.printed) for one in again] == [
-        ("potted", 1.0), ("ball 4: none", 1.0), ("ball 0: m off", 0.03)
-    ]  # fmt: skip
-    assert [one.again for one in again[:2]] == [1.0, 1.0]
-    kept = promises.Kept("a", "b", "c", 2.0, 3.0)
-    assert (kept.factor, dataclasses.replace(kept, chance=1.0).factor) == (1.5, 1.0)
-    assert dataclasses.replace(kept, again=0.0).factor == math.inf
-    assert dataclasses.replace(kept, again=1.0, at_most=True).factor == 1.0

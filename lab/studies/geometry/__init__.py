@@ -1,5 +1,0 @@
-"""Which geometry levels suit which objects.
-
-Reads convex polygons with their enclosing circles and boxes, and a numpy reference by separating axes. Writes records,
-tables and a picture.
-"""

@@ -1,0 +1,84 @@
+"""Tables in pages of the docs: between two comments that name the command which writes them."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import click
+
+from carom.lab.cli.options import shown_options as printed_options
+from carom.lab.cli.options import together
+from carom.lab.cli.usage_errors import Problem
+from carom.lab.reporting.output import Output, as_markdown
+from carom.lab.reporting.text_tables import TextTable
+
+shown_options = together(
+    printed_options,
+    click.option(
+        "--into", type=click.Path(path_type=Path, dir_okay=False),
+        help="Also put the tables between the marks of this page.",
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PageOutput(Output):
+    """Output that also goes into a page, between the marks of that name."""
+
+    mark: str = ""
+    into: Path | None = None
+
+    @classmethod
+    def of(cls, mark: str, as_json: bool, as_markdown: bool, into: Path | None) -> Self:
+        """Problem for impossible options and a page without the marks, raised before the long run."""
+        if into is not None:
+            between_marks(into, mark)
+        return cls(**vars(Output.checked(as_json, as_markdown)), mark=mark, into=into)
+
+    def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
+        """Print the result, and write the tables into the page."""
+        super().show(result, tables, remarks)
+        if self.into is not None:
+            replace_between_marks(self.into, self.mark, as_markdown(tables, remarks))
+            click.echo(f"tables: {self.into}", err=True)
+
+
+@click.command("page", context_settings={"ignore_unknown_options": True})
+@click.argument("page", type=click.Path(path_type=Path, dir_okay=False))
+@click.argument("words", nargs=-1, required=True, type=click.UNPROCESSED)
+def page_command(page: Path, words: tuple[str, ...]) -> None:
+    """Put what `carom WORDS --markdown` prints into a page, between the marks with the words before all options."""
+    mark = " ".join(["carom", *itertools.takewhile(lambda word: not word.startswith("-"), words)])
+    between_marks(page, mark)
+    done = subprocess.run([sys.executable, "-m", "carom", *words, "--markdown"], stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        raise click.exceptions.Exit(done.returncode)
+    replace_between_marks(page, mark, done.stdout.strip())
+
+
+def between_marks(path: Path, name: str) -> tuple[str, str, str]:
+    """A page up to the comment ``<!-- name -->``, to ``<!-- end of name -->`` and after; Problem if one is missing."""
+    first, last = f"<!-- {name} -->", f"<!-- end of {name} -->"
+    try:
+        page = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise Problem(f"--into {path}: {error.strerror or error}") from error
+    before, mark, rest = page.partition(first)
+    inside, end, after = rest.partition(last)
+    if not (mark and end):
+        raise Problem(f"--into {path}: it has no line {first} with a line {last} after it")
+    return before + mark, inside, end + after
+
+
+def replace_between_marks(path: Path, name: str, text: str) -> None:
+    """Replace the text between the two comments of a page; Problem if they are missing."""
+    before, _, after = between_marks(path, name)
+    try:
+        path.write_text(f"{before}\n\n{text}\n\n{after}", encoding="utf-8")
+    except OSError as error:
+        raise Problem(f"--into {path}: {error.strerror or error}") from error

@@ -1,0 +1,149 @@
+"""One runner for all studies: an axis is a quantity with values, and each value is measured in a world of its own."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from carom.framework import World
+from carom.lab.bench.results import machine
+from carom.lab.cli.usage_errors import Problem
+from carom.lab.measure.timing import Spread, no_garbage_collection, timed
+from carom.lab.plain import Plain
+from carom.lab.reporting.progress import NO_PROGRESS, Progress
+
+WARM_UP_STEPS = 10
+
+
+@dataclass
+class Sample(Plain):
+    """One value. ``figures``: with all repeats, by name; ``facts``: what was found once."""
+
+    value: Any
+    figures: dict[str, Spread]
+    facts: dict[str, Any]
+
+
+@dataclass
+class Line(Plain):
+    """One axis in one scene, or by one method; the samples in the order of the values."""
+
+    axis: str
+    of: str
+    samples: list[Sample]
+
+    def sample(self, value: Any) -> Sample:
+        """The sample of that value; KeyError if it was not measured."""
+        for sample in self.samples:
+            if sample.value == value and type(sample.value) is type(value):
+                return sample
+        raise KeyError(f"{self.axis}, {self.of}: {value!r} was not measured")
+
+
+@dataclass
+class Result(Plain):
+    """All axes of a study, with the machine and the versions that they were measured on."""
+
+    machine: dict[str, str]
+    repeats: int
+    lines: list[Line]
+
+    def line(self, axis: str, of: str) -> Line:
+        """That axis there; KeyError if it was not measured."""
+        for line in self.lines:
+            if (line.axis, line.of) == (axis, of):
+                return line
+        raise KeyError(f"{axis}, {of} was not measured")
+
+
+def in_order(values: Sequence[Any], repeat: int) -> Sequence[Any]:
+    """The values as they are, in every repeat."""
+    del repeat
+    return values
+
+
+def rotated(values: Sequence[Any], repeat: int) -> Sequence[Any]:
+    """The values, another one first in each repeat, so that no value is always measured after the same one."""
+    first = repeat % max(len(values), 1)
+    return (*values[first:], *values[:first])
+
+
+def no_facts(value: Any) -> dict[str, Any]:
+    """For axes of which nothing is found but figures."""
+    del value
+    return {}
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One quantity that is varied.
+
+    of
+        the scene or the method
+    values
+        measured in each repeat
+    measure
+        (value, repeat) -> figures by name, which may differ between repeats; None: there are no repeats
+    facts
+        value -> what is the same in every repeat
+    order
+        (values, repeat) -> the order in that repeat
+    explore
+        the samples so far, by value -> values to sample; the runner adds each sample before it asks for the next value.
+        None: ``values``
+    """
+
+    name: str
+    of: str
+    values: tuple[Any, ...] = ()
+    measure: Callable[[Any, int], Mapping[str, float]] | None = None
+    facts: Callable[[Any], dict[str, Any]] = no_facts
+    order: Callable[[Sequence[Any], int], Sequence[Any]] = field(default=rotated)
+    explore: Callable[[Mapping[Any, Sample]], Iterator[Any]] | None = None
+
+
+def run(axes: Sequence[Axis], repeats: int = 1, progress: Progress = NO_PROGRESS) -> Result:
+    """Measure these axes, one after the other."""
+    progress.begin(sum(_amount(axis, repeats) for axis in axes))
+    return Result(machine(), repeats, [_line(axis, repeats, progress) for axis in axes])
+
+
+def _amount(axis: Axis, repeats: int) -> int:
+    return 1 + (repeats * len(axis.values) if axis.measure is not None else 0)
+
+
+def _line(axis: Axis, repeats: int, progress: Progress) -> Line:
+    taken: dict[Any, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    if axis.measure is not None:
+        for repeat in range(repeats):
+            for value in axis.order(axis.values, repeat):
+                progress.say(f"{axis.name} {value}: {axis.of}, repeat {repeat + 1} of {repeats}")
+                with no_garbage_collection():
+                    figures = axis.measure(value, repeat)
+                for name, figure in figures.items():
+                    taken[value][name].append(figure)
+                progress.advance(1)
+    samples: dict[Any, Sample] = {}
+    for value in axis.values if axis.explore is None else axis.explore(samples):
+        progress.say(f"{axis.name} {value}: {axis.of}")
+        figures = {name: Spread.of(found) for name, found in taken[value].items()}
+        samples[value] = Sample(value, figures, axis.facts(value))
+    progress.advance(1)
+    return Line(axis.name, axis.of, list(samples.values()))
+
+
+def nanoseconds_per_step(world: World, what: str, steps: int) -> float:
+    """The mean over so many steps; what: names the world in the Problem if each try compiled kernels."""
+
+    def take(count: int) -> None:
+        for _ in range(count):
+            world.step()
+
+    take(WARM_UP_STEPS)
+    for _ in range(2):  # kernels loaded during the first try are ready in the second
+        seconds, counts, _ = timed(lambda: take(steps))
+        if counts:
+            return seconds / steps * 1e9
+    raise Problem(f"{what}: kernels were compiled in all steps; run it once more")

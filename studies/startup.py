@@ -1,0 +1,139 @@
+"""Starting a game: the time to its first step and its longest later step, by what is compiled already."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+
+from carom import scenes
+from carom.framework.jit.cache import CACHE_FOLDER_VARIABLE
+from carom.lab.bench.report import digits, span
+from carom.lab.cli.usage_errors import Problem
+from carom.lab.reporting.text_tables import TextTable
+
+from .runner import Axis, Result, in_order
+
+STEPS = 600  # after the first
+COMMANDS = {
+    "python -c pass": ["-c", "pass"],
+    "import carom.framework": ["-c", "import carom.framework"],
+    "carom --help": ["-m", "carom", "--help"],
+    "carom scenes": ["-m", "carom", "scenes"],
+}
+COMMANDS_AXIS = "commands"
+EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
+PROGRAM = f"""
+import json, sys, time
+import carom.framework.jit.dispatchers  # numba, as the first kernel imports it
+from carom import scenes
+from carom.framework import use_kernels
+from carom.framework.compilation import log
+name, shipped = sys.argv[1:]
+if shipped:
+    use_kernels(shipped)
+imported = time.process_time()
+world = scenes.get(name).build()
+world.step()
+first, at = time.process_time(), time.time()
+worst = 0.0
+for _ in range({STEPS}):
+    started = time.perf_counter()
+    world.step()
+    worst = max(worst, time.perf_counter() - started)
+found = {{"at": at, "imports": imported, "first": first - imported, "worst": worst, "compiled": len(log.compiled)}}
+print(json.dumps(found))
+"""
+
+
+def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+    """Commands that need no kernel, and the scenes of the library by what is compiled already."""
+    del quick, long
+    commands = Axis(COMMANDS_AXIS, "", tuple(COMMANDS), lambda name, repeat: {"seconds": _seconds_of(COMMANDS[name])})
+    kernels = (EMPTY, KEPT, SHIPPED)
+    return [commands, *(Axis(name, "kernels", kernels, Starts(name), order=in_order) for name in scenes.names())]
+
+
+class Starts:
+    """Starts processes that build a scene and step it. In each repeat the first has an empty cache folder, which the
+    second uses again; the third has another empty one, and kernels to load that were shipped."""
+
+    def __init__(self, scene: str) -> None:
+        self.scene = scene
+        self._cache = self._shipped = ""
+        self._folders: list[tempfile.TemporaryDirectory[str]] = []  # removed with the last reference to them
+
+    def __call__(self, kernels: str, repeat: int) -> dict[str, float]:
+        del repeat
+        if kernels == SHIPPED and not self._shipped:
+            self._shipped = self._folder()
+            _ship(self.scene, self._shipped)
+        if kernels != KEPT:
+            self._cache = self._folder()
+        return _start(self.scene, self._cache, self._shipped if kernels == SHIPPED else "")
+
+    def _folder(self) -> str:
+        self._folders.append(tempfile.TemporaryDirectory())
+        return self._folders[-1].name
+
+
+def _seconds_of(command: list[str]) -> float:
+    """Processor seconds that it takes in a process of its own."""
+
+    def of_ended() -> float:
+        ended = os.times()
+        return ended.children_user + ended.children_system
+
+    before = of_ended()
+    _run([sys.executable, *command], {})
+    return of_ended() - before
+
+
+def _ship(scene: str, folder: str) -> None:
+    _run([sys.executable, "-m", "carom", "warm-up", scene, "--portable", folder], {})
+
+
+def _start(scene: str, cache: str, shipped: str) -> dict[str, float]:
+    """Of one process, by name: seconds by the wall clock to the end of its first step; processor seconds of imports and
+    of building the world with the first step; seconds of the longest step after it; kernels that were compiled."""
+    started = time.time()
+    found = json.loads(_run([sys.executable, "-c", PROGRAM, scene, shipped], {CACHE_FOLDER_VARIABLE: cache}))
+    return {"seconds": found.pop("at") - started, **found}
+
+
+def _run(command: Sequence[str], environment: dict[str, str]) -> str:
+    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
+    if done.returncode:
+        raise Problem(f"the process that was timed failed: {(done.stderr.splitlines() or ['no message'])[-1]}")
+    return done.stdout
+
+
+def report(result: Result) -> tuple[list[TextTable], list[str]]:
+    """The times of commands that need no kernel, and those of scenes."""
+    tables, cells = [], []
+    for line in result.lines:
+        found = [(sample.value, sample.figures) for sample in line.samples]
+        if line.axis == COMMANDS_AXIS:
+            rows = [(name, digits(of["seconds"].median), span(of["seconds"])) for name, of in found]
+            tables.append(TextTable("commands that need no kernel", ("command", "CPU s", "from .. to"), rows))
+            continue
+        cells += [
+            (
+                line.axis, kernels, f"{of['compiled'].median:.0f}", digits(of["seconds"].median), span(of["seconds"]),
+                digits(of["imports"].median), digits(of["first"].median), digits(of["worst"].median * 1e3),
+            )
+            for kernels, of in found
+        ]  # fmt: skip
+    columns = (
+        "scene", "kernels", "compiled", "first step after s", "from .. to", "imports CPU s", "first step CPU s",
+        f"worst of {STEPS} ms",
+    )  # fmt: skip
+    title = (
+        "from starting a process to the end of its first step, and the longest step after it, medians of "
+        f"{result.repeats}"
+    )
+    return [*tables, TextTable(title, columns, cells)] if cells else tables, []

@@ -1,0 +1,253 @@
+"""The runner of the studies, its command, the pages it fills, and the studies that only measure: their figures may be
+anything on a busy machine, so what is tested is their meaning."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import helpers_trade as made
+import pytest
+from click.testing import CliRunner
+
+from carom.lab.cli.usage_errors import Problem
+from carom.lab.reporting.progress import Progress
+from carom.lab.trading.charts import TIME, WORK, figure
+from carom.lab.trading.records import Trade
+from studies import ladder, scaling, startup
+from studies.__main__ import STUDIES, cli
+from studies.accuracy.published import published
+from studies.accuracy.summary import summary
+from studies.runner import Axis, Result, in_order, run
+
+
+@pytest.fixture
+def studies(tmp_path, monkeypatch):
+    """``python -m studies`` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner(env={"COLUMNS": "200"}).invoke(cli, arguments)
+
+
+# -- the runner ----------------------------------------------------------------------------------
+
+
+def test_each_value_is_measured_in_each_repeat_another_one_first():
+    taken = []
+
+    def measure(value, repeat):
+        taken.append((repeat, value))
+        return {"ns": 10.0 * value + repeat}
+
+    result = run([Axis("n", "here", (1, 2, 3), measure, lambda value: {"even": value % 2 == 0})], repeats=2)
+    assert taken == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (1, 1)]
+    sample = result.line("n", "here").sample(2)
+    assert (sample.figures["ns"].values, sample.facts) == ((20.0, 21.0), {"even": True})
+    assert Result.from_dict(json.loads(json.dumps(result.as_dict()))) == result
+    with pytest.raises(KeyError, match="n, here: 4 was not measured"):
+        result.line("n", "here").sample(4)
+    with pytest.raises(KeyError, match="n, there was not measured"):
+        result.line("n", "there")
+    taken.clear()
+    run([Axis("n", "here", (1, 2), measure, order=in_order)], repeats=2)
+    assert taken == [(0, 1), (0, 2), (1, 1), (1, 2)]
+
+
+def test_an_axis_may_choose_by_what_it_has_found():
+    def explore(samples):
+        value = 1
+        while not samples or samples[value].facts["square"] < 10:
+            value = max(samples, default=0) + 1
+            yield value
+
+    (line,) = run([Axis("n", "here", facts=lambda value: {"square": value**2}, explore=explore)]).lines
+    assert [sample.value for sample in line.samples] == [1, 2, 3, 4]
+
+
+def test_progress_ends_where_it_said():
+    class Recorder(Progress):
+        total = 0.0
+
+        def begin(self, total, done=0.0):
+            self.total = total
+
+    recorder = Recorder()
+    run([Axis("n", "a", (1, 2), lambda value, repeat: {}), Axis("m", "b", (1,))], 3, recorder)
+    assert recorder.done == recorder.total > 0
+
+
+# -- the command and its pages -------------------------------------------------------------------
+
+
+def test_a_study_prints_json_draws_and_fills_a_page(studies, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Page\n\n<!-- studies limits -->\nold\n<!-- end of studies limits -->\nafter\n")
+    done = studies("limits", "mass", "--quick", "--json", "--into", "page.md", "--out", "pictures")
+    assert done.exit_code == 0, done.output
+    found = Result.from_dict(json.loads(done.stdout))
+    assert {line.axis for line in found.lines} == {"mass"}
+    assert (tmp_path / "pictures" / "limits.png").read_bytes().startswith(b"\x89PNG")
+    text = page.read_text()
+    assert "| method | 1 % at | 10 % at | breaks at | worst | how |" in text
+    assert "old" not in text
+    assert text.startswith("# Page\n\n<!-- studies limits -->\n\n**ratio of masses")
+    assert text.endswith("\n\n<!-- end of studies limits -->\nafter\n")
+
+
+def test_what_a_command_prints_goes_into_a_page(studies, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Mine\n\n<!-- carom bench -->\nold\n<!-- end of carom bench -->\nend\n")
+    refused = studies("page", "page.md", "bench", "--scenes", "nothing")
+    assert (refused.exit_code, "old" in page.read_text()) == (2, True)
+    done = studies("page", "page.md", "bench", "--scenes", "gas2d", "--sizes", "20", "--repeats", "1", "--no-peer")
+    assert done.exit_code == 0, done.output
+    text = page.read_text()
+    assert "| gas2d 20 |" in text
+    assert "old" not in text
+    assert text.startswith("# Mine\n\n<!-- carom bench -->\n\n**ms per step")
+    assert text.endswith("\n\n<!-- end of carom bench -->\nend\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("limits", "sped"), "no axis 'sped'; did you mean 'speed'?"),
+        (("settings", "substep"), "no axis 'substep'; did you mean 'substeps'"),
+        (("startup", "nothing"), "no axis 'nothing'"),
+        (("limits", "--quick", "--long"), "--quick and --long exclude each other"),
+        (("ladder", "--long"), "No such option"),
+        (("scaling", "--repeats", "0"), "0 is not in the range x>=1"),
+        (("limits", "--json", "--markdown"), "--json and --markdown exclude each other"),
+        (("limits", "--into", "nowhere.md"), "--into nowhere.md: No such file"),
+        (("page", "page.md", "bench", "--repeats", "2"), "it has no line <!-- carom bench -->"),
+        (("accuracy", "spring", "--into", "page.md"), "it has no line <!-- studies accuracy spring -->"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line_before_the_run(studies, tmp_path, arguments, words):
+    (tmp_path / "page.md").write_text("nothing\n")
+    done = studies(*arguments)
+    assert done.exit_code == 2
+    assert words in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_the_axes_of_a_study_have_names_of_their_own(name):
+    study = STUDIES[name]
+    for how in ((False, False), (True, False), (False, True)):
+        axes = study.chosen((), *how)
+        assert axes
+        assert len({(axis.name, axis.of) for axis in axes}) == len(axes)
+
+
+# -- scaling, ladder, startup --------------------------------------------------------------------
+
+
+def test_scaling_grows_from_the_first_size():
+    result = run([scaling.axis((10, 40), body_steps=400)], repeats=2)
+    for sample in result.lines[0].samples:
+        assert sample.figures["set up"].low > 0.0
+        assert sample.facts["memory"] > 100.0  # position, velocity, mass, radius and where it was are that much alone
+    (table,), _ = scaling.report(result)
+    assert [row[0] for row in table.rows] == ["10", "40"]
+    assert table.rows[0][4] == "1.00"
+    first, last = (sample.figures["ns"].median for sample in result.lines[0].samples)
+    assert table.rows[1][4] == f"{last / first:.2f}"
+
+
+def test_the_ladder_measures_each_rung_beside_another():
+    result = run([ladder.axis(bodies=30, steps=2)], repeats=2)
+    (table,), _ = ladder.report(result)
+    assert [row[0] for row in table.rows] == [rung.feature for rung in ladder.RUNGS]
+    kernels = {row[0]: set(filter(None, row[2].split(", "))) for row in table.rows}
+    assert {"sum_forces", "semi_implicit_euler"} <= kernels["drifting"]
+    for feature in ("gravity", "linear_damping", "rotation", "friction", "contacts at rest"):
+        assert not kernels[feature]  # the same stages have more to do
+    assert kernels["velocity_verlet"] == {"verlet_drift"}
+    assert kernels["two levels"] == {"evaluate_levels"}
+    assert {"box_motions", "evaluate_pairs", "solve_contacts", "resolve_impacts"} <= kernels["spheres, apart"]
+    (line,) = result.lines
+    bare, gravity, spheres = (line.sample(name) for name in ("drifting", "gravity", "spheres, apart"))
+    assert spheres.facts["bytes"] > bare.facts["bytes"] > 0
+    pairs = zip(gravity.figures["ns"].values, bare.figures["ns"].values, strict=True)
+    assert ladder.extra(gravity, bare).values == tuple(one - other for one, other in pairs)
+
+
+def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
+    """The order matters: each repeat fills an empty cache, then uses it; with shipped kernels it is empty again."""
+    started, shipped = [], []
+
+    def start(scene, cache, portable):
+        started.append((cache, portable != ""))
+        return {"seconds": float(len(started)), "imports": 0.25, "first": 0.125, "worst": 0.002, "compiled": 3}
+
+    monkeypatch.setattr(startup, "_ship", lambda scene, folder: shipped.append(scene))
+    monkeypatch.setattr(startup, "_start", start)
+    done = studies("startup", "jump", "--repeats", "2", "--markdown")
+    caches = [cache for cache, _ in started]
+    assert shipped == ["jump"]
+    assert [portable for _, portable in started] == [False, False, True] * 2
+    assert [caches[0] == caches[1], len(set(caches))] == [True, 4]
+    assert "| jump | shipped | 3 | 4.50 | 3.00 .. 6.00 | 0.250 | 0.125 | 2.00 |" in done.stdout
+
+
+def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
+    found = startup._start("jump", os.environ["CAROM_CACHE_DIR"], "")
+    assert 0 < found["imports"] < found["seconds"]
+    assert 0 < found["worst"] < found["seconds"]
+    assert found["compiled"] >= 0
+    with pytest.raises(Problem, match="nothing"):
+        startup._start("nothing", str(tmp_path), "")
+
+
+# -- accuracy ------------------------------------------------------------------------------------
+
+
+def test_published_points_follow_the_laws_that_are_known_of_them():
+    curves = {curve.label: curve for curve in published("bouncing", "energy_square")}
+    assert sum(len(curve.points) for curve in curves.values()) == 20
+    assert published("orbit", "energy_square") == published("bouncing", "position") == []
+    # ODE's error is the lag of semi-implicit Euler: (M g dt / 2)^2 2/3 g (H - R), M = 490 kg, H - R = 4.9 m
+    lag = (490 * 9.81 / 2) ** 2 * 2 / 3 * 9.81 * 4.9
+    of_ode = {point.cell.dt: point for point in curves["ODE, published"].points}
+    for dt in (1e-5, 1e-4, 1e-3):
+        assert of_ode[dt].errors["energy_square"].mean == pytest.approx(lag * dt**2, rel=1e-3)
+    assert of_ode[1e-3].milliseconds.median == pytest.approx(1.89 / 20 * 1000)
+
+
+def test_published_points_share_the_axes_of_wall_time():
+    case = made.bouncing()
+    case.curves += published("bouncing", "energy_square")
+    by_time, by_work = figure(case, TIME), figure(case, WORK)
+    drawn = {line.get_label(): line for line in by_time.axes[0].get_lines()}
+    for engine in ("RaiSim", "ODE", "Bullet", "DART"):
+        assert len(drawn[f"{engine}, published"].get_xdata()) == 5
+    assert "The work of 20 points is not known: they are not here." in [text.get_text() for text in by_work.texts]
+
+
+def test_the_summary_has_the_largest_step_of_each_method_that_meets_a_target():
+    table = summary(made.smooth(), targets=(0.1, 0.01))
+    assert table.headings == ("method", "position, order", "energy, order", "10 %", "1 %", "best", "failed")
+    rows = {row[0]: row for row in table.rows}
+    assert rows["rk4"][1:] == ("4.00 (4)", "5.00 (5)", "1/30: 2.7e6", "1/60: 5.4e6", "1.2e-8", "-")
+    assert rows["explicit euler"][-1] == "1/15: tunnelled; 1/30: 2 of 64 escaped"
+
+
+def test_accuracy_writes_a_page_and_a_chart(studies, tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- studies accuracy bouncing -->\nold\n<!-- end of studies accuracy bouncing -->\n")
+    asked = []
+
+    def trade(scene: str, **options: object) -> Trade:
+        asked.append((scene, options["against_pymunk"], options["command"]))
+        return Trade(made.MACHINE, str(options["command"]), [made.bouncing()])
+
+    monkeypatch.setattr("studies.accuracy.command.trade", trade)
+    done = studies("accuracy", "bouncing", "--against", "pymunk", "--into", "page.md", "--out", "pictures")
+    assert done.exit_code == 0, done.output
+    command = "python -m studies accuracy bouncing --against pymunk --into page.md --out pictures"
+    assert asked == [("bouncing", True, command)]
+    text = page.read_text()
+    assert "**bouncing: orders observed" in text
+    assert command in text
+    assert "published by SimBenchmark" in text
+    assert (tmp_path / "pictures" / "trade-bouncing-energy_square-time.png").exists()
