@@ -12,8 +12,6 @@ from typing import Any, Self
 
 import numpy as np
 
-INFINITE = "inf"  # in the place of infinity, which JSON has no number for
-
 
 def jsonable(value: Any) -> Any:
     """Records as plain data, with None instead of numbers that JSON cannot represent: infinity and NaN."""
@@ -58,8 +56,6 @@ def _read(plain: Any, kind: Any) -> Any:
     if origin is tuple and isinstance(plain, Sequence):
         kinds = [inner[0]] * len(plain) if inner[-1] is Ellipsis else inner
         return tuple(_read(value, one) for value, one in zip(plain, kinds, strict=True))
-    if kind is float and plain == INFINITE:
-        return math.inf
     if origin is np.ndarray:
         return np.array(plain, float)
     if origin is list:

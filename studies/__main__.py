@@ -17,7 +17,7 @@ from carom.lab.reporting.progress import Bar
 from carom.lab.reporting.text_tables import TextTable
 
 from . import ladder, limits, scaling, settings, startup
-from .accuracy.command import accuracy_command
+from .accuracy import accuracy_command
 from .page import PageOutput, page_command, shown_options
 from .runner import Axis, Result, run
 from .stages import stages_command

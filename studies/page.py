@@ -17,13 +17,10 @@ from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.output import Output, as_markdown
 from carom.lab.reporting.text_tables import TextTable
 
-shown_options = together(
-    printed_options,
-    click.option(
-        "--into", type=click.Path(path_type=Path, dir_okay=False),
-        help="Also put the tables between the marks of this page.",
-    ),
-)  # fmt: skip
+into_option = click.option(
+    "--into", type=click.Path(path_type=Path, dir_okay=False), help="Put the tables between the marks of this page."
+)
+shown_options = together(printed_options, into_option)
 
 
 @dataclass(frozen=True)

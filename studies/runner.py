@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from carom.framework import World
@@ -58,24 +58,6 @@ class Result(Plain):
         raise KeyError(f"{axis}, {of} was not measured")
 
 
-def in_order(values: Sequence[Any], repeat: int) -> Sequence[Any]:
-    """The values as they are, in every repeat."""
-    del repeat
-    return values
-
-
-def rotated(values: Sequence[Any], repeat: int) -> Sequence[Any]:
-    """The values, another one first in each repeat, so that no value is always measured after the same one."""
-    first = repeat % max(len(values), 1)
-    return (*values[first:], *values[:first])
-
-
-def no_facts(value: Any) -> dict[str, Any]:
-    """For axes of which nothing is found but figures."""
-    del value
-    return {}
-
-
 @dataclass(frozen=True)
 class Axis:
     """One quantity that is varied.
@@ -88,8 +70,8 @@ class Axis:
         (value, repeat) -> figures by name, which may differ between repeats; None: there are no repeats
     facts
         value -> what is the same in every repeat
-    order
-        (values, repeat) -> the order in that repeat
+    rotate
+        True: each repeat begins with another value, so that none is always measured after the same one
     explore
         the samples so far, by value -> values to sample; the runner adds each sample before it asks for the next value.
         None: ``values``
@@ -99,8 +81,8 @@ class Axis:
     of: str
     values: tuple[Any, ...] = ()
     measure: Callable[[Any, int], Mapping[str, float]] | None = None
-    facts: Callable[[Any], dict[str, Any]] = no_facts
-    order: Callable[[Sequence[Any], int], Sequence[Any]] = field(default=rotated)
+    facts: Callable[[Any], dict[str, Any]] | None = None
+    rotate: bool = True
     explore: Callable[[Mapping[Any, Sample]], Iterator[Any]] | None = None
 
 
@@ -118,7 +100,8 @@ def _line(axis: Axis, repeats: int, progress: Progress) -> Line:
     taken: dict[Any, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     if axis.measure is not None:
         for repeat in range(repeats):
-            for value in axis.order(axis.values, repeat):
+            first = repeat % len(axis.values) if axis.rotate else 0
+            for value in (*axis.values[first:], *axis.values[:first]):
                 progress.say(f"{axis.name} {value}: {axis.of}, repeat {repeat + 1} of {repeats}")
                 with no_garbage_collection():
                     figures = axis.measure(value, repeat)
@@ -129,7 +112,7 @@ def _line(axis: Axis, repeats: int, progress: Progress) -> Line:
     for value in axis.values if axis.explore is None else axis.explore(samples):
         progress.say(f"{axis.name} {value}: {axis.of}")
         figures = {name: Spread.of(found) for name, found in taken[value].items()}
-        samples[value] = Sample(value, figures, axis.facts(value))
+        samples[value] = Sample(value, figures, {} if axis.facts is None else axis.facts(value))
     progress.advance(1)
     return Line(axis.name, axis.of, list(samples.values()))
 

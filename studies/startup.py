@@ -16,7 +16,7 @@ from carom.lab.bench.report import digits, span
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.text_tables import TextTable
 
-from .runner import Axis, Result, in_order
+from .runner import Axis, Result
 
 STEPS = 600  # after the first
 COMMANDS = {
@@ -55,7 +55,7 @@ def axes(quick: bool = False, long: bool = False) -> list[Axis]:
     del quick, long
     commands = Axis(COMMANDS_AXIS, "", tuple(COMMANDS), lambda name, repeat: {"seconds": _seconds_of(COMMANDS[name])})
     kernels = (EMPTY, KEPT, SHIPPED)
-    return [commands, *(Axis(name, "kernels", kernels, Starts(name), order=in_order) for name in scenes.names())]
+    return [commands, *(Axis(name, "kernels", kernels, Starts(name), rotate=False) for name in scenes.names())]
 
 
 class Starts:
@@ -72,7 +72,7 @@ class Starts:
         if kernels == SHIPPED and not self._shipped:
             self._shipped = self._folder()
             _ship(self.scene, self._shipped)
-        if kernels != KEPT:
+        if kernels != KEPT:  # which comes after EMPTY
             self._cache = self._folder()
         return _start(self.scene, self._cache, self._shipped if kernels == SHIPPED else "")
 

@@ -19,7 +19,7 @@ from carom.systems import ContactEvents
 from carom.systems.records import STATE
 from carom.systems.stage_list import CLOSING, check_stages
 from studies.page import between_marks
-from studies.stages import Stages
+from studies.stages import GROUPS, file_of, table
 
 ROOT = Path(__file__).resolve().parent.parent
 INNER = Schema("TestInner", total=number())
@@ -31,14 +31,14 @@ OUTER = Schema(
 def test_the_page_shows_the_stages_that_run():
     """``studies stages --into docs/architecture.md`` writes what the page has to hold."""
     _, written, _ = between_marks(ROOT / "docs" / "architecture.md", "studies stages")
-    assert written.strip() == Stages().table().markdown()
+    assert written.strip() == table().markdown()
 
 
 def test_every_stage_is_described_and_its_file_is_there():
-    for stages in Stages().as_dict().values():
+    for stages in GROUPS.values():
         for stage in stages:
-            assert stage["what"]
-            assert f"def {stage['stage']}(state, " in (ROOT / str(stage["file"])).read_text(encoding="utf-8")
+            assert stage.why
+            assert f"def {stage.name}(state, " in (ROOT / file_of(stage)).read_text(encoding="utf-8")
 
 
 def test_the_checked_build_names_the_column_and_the_index():

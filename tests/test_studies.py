@@ -16,9 +16,8 @@ from carom.lab.trading.charts import TIME, WORK, figure
 from carom.lab.trading.records import Trade
 from studies import ladder, scaling, startup
 from studies.__main__ import STUDIES, cli
-from studies.accuracy.published import published
-from studies.accuracy.summary import summary
-from studies.runner import Axis, Result, in_order, run
+from studies.accuracy import published, summary
+from studies.runner import Axis, Result, run
 
 
 @pytest.fixture
@@ -48,7 +47,7 @@ def test_each_value_is_measured_in_each_repeat_another_one_first():
     with pytest.raises(KeyError, match="n, there was not measured"):
         result.line("n", "there")
     taken.clear()
-    run([Axis("n", "here", (1, 2), measure, order=in_order)], repeats=2)
+    run([Axis("n", "here", (1, 2), measure, rotate=False)], repeats=2)
     assert taken == [(0, 1), (0, 2), (1, 1), (1, 2)]
 
 
@@ -241,7 +240,7 @@ def test_accuracy_writes_a_page_and_a_chart(studies, tmp_path, monkeypatch):
         asked.append((scene, options["against_pymunk"], options["command"]))
         return Trade(made.MACHINE, str(options["command"]), [made.bouncing()])
 
-    monkeypatch.setattr("studies.accuracy.command.trade", trade)
+    monkeypatch.setattr("studies.accuracy.trade", trade)
     done = studies("accuracy", "bouncing", "--against", "pymunk", "--into", "page.md", "--out", "pictures")
     assert done.exit_code == 0, done.output
     command = "python -m studies accuracy bouncing --against pymunk --into page.md --out pictures"

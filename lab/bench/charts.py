@@ -23,7 +23,11 @@ def draw_ratios(result: Result, folder: Path) -> Path | None:
     rows = [row for row in reversed(result.rows) if row.ratio is not None]
     if not rows:
         return None
-    axes = new_axes(f"carom against pymunk {result.machine['pymunk']}", 1.8 + ROW_HEIGHT * len(rows))
+    figure = Figure(figsize=(canvas.LONG_SIDE, 1.8 + ROW_HEIGHT * len(rows)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set_title(f"carom against pymunk {result.machine['pymunk']}", fontsize=15, fontweight="bold", loc="left")
+    axes.grid(axis="x")
     places = range(len(rows))
     ratios = [row.ratio for row in rows if row.ratio is not None]
     colours = [BAR if ratio.median >= 1 else SLOWER for ratio in ratios]
@@ -42,17 +46,9 @@ def draw_ratios(result: Result, folder: Path) -> Path | None:
     _plain_numbers(axes)
     if targets:
         axes.legend(loc="best")
-    return saved(axes, folder / "bench.png")
-
-
-@canvas.styled
-def new_axes(title: str, height: float) -> Any:
-    figure = Figure(figsize=(canvas.LONG_SIDE, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    axes.set_title(title, fontsize=15, fontweight="bold", loc="left")
-    axes.grid(axis="x")
-    return axes
+    path = folder / "bench.png"
+    figure.savefig(path, facecolor=canvas.BACKGROUND)
+    return path
 
 
 def _plain_numbers(axes: Any) -> None:
@@ -62,8 +58,3 @@ def _plain_numbers(axes: Any) -> None:
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
-
-
-def saved(axes: Any, path: Path) -> Path:
-    axes.figure.savefig(path, facecolor=canvas.BACKGROUND)
-    return path
