@@ -9,42 +9,14 @@ DEBUG for each that is loaded.
 from __future__ import annotations
 
 import functools
-import logging
-import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from .jit.late import JIT, Late
+from .jit.late import JIT, Late, dispatchers
+from .jit.log import CHECKED, log
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-logger = logging.getLogger("carom")
-
-
-@dataclass
-class CompilationLog:
-    """What compiling has cost this process so far; the lab reports it apart from run time."""
-
-    compiled: list[tuple[str, float]] = field(default_factory=list)  # (kernel, seconds)
-    loaded: int = 0
-    waited: float = 0.0  # s, for kernels to be compiled or loaded
-    listeners: list[Callable[[str], None]] = field(default_factory=list)  # told the kernel that begins to compile
-    announced: bool = False
-    left: int = 0  # functions to compile before a step can go on, that which compiles now included; 0: not known
-    processes: int = 1  # that may compile at once, see link_all
-    background: bool = os.environ.get("CAROM_BACKGROUND", "") != "0"  # whether a thread compiles ahead, see background
-
-    @property
-    def seconds(self) -> float:
-        """Spent compiling."""
-        return sum(seconds for _, seconds in self.compiled)
-
-
-log = CompilationLog()
-
-CHECKED = os.environ.get("CAROM_CHECK", "") not in ("", "0")  # a build that checks every index into a record
 
 # A wrapper for C callers costs compile time and serves none of our kernels.
 _OPTIONS = {"nopython": True, "boundscheck": None, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -97,11 +69,6 @@ def packed(function: Function) -> Function:
     return function
 
 
-def is_packed(function: Any) -> bool:
-    """Whether it is such a kernel."""
-    return getattr(function, "carom_packed", False)
-
-
 def allocating_part(function: Any) -> Any:
     """The same part with its options, but it may make arrays and raise exceptions with values."""
     return Part(function.py_func, {**function.targetoptions, "_nrt": True})
@@ -134,9 +101,7 @@ class Compiled(Late):
         self.targetoptions = options
 
     def _make(self) -> Any:
-        from .jit.dispatchers import KeptDispatcher
-
-        return KeptDispatcher(self.py_func, self.targetoptions)
+        return dispatchers.KeptDispatcher(self.py_func, self.targetoptions)
 
     def __call__(self, *args: Any) -> Any:
         return self.made(*args)
@@ -171,9 +136,7 @@ class Part(Compiled):
     __call__ = Late.__call__
 
     def _make(self) -> Any:
-        from .jit.dispatchers import PartDispatcher
-
-        return PartDispatcher(self.py_func, self.targetoptions)
+        return dispatchers.PartDispatcher(self.py_func, self.targetoptions)
 
 
 _timing: Callable[[str, int, bool], None] | None = None
@@ -191,29 +154,3 @@ def time_calls(record: Callable[[str, int, bool], None] | None) -> None:
 def timing() -> bool:
     """Whether calls are timed at the moment."""
     return _timing is not None
-
-
-def announcement() -> str:
-    """What is said once of a process that compiles: where the kernels are kept."""
-    from .jit.cache import CACHE_FOLDER_VARIABLE, cache_folder
-
-    log.announced = True
-    folder = cache_folder()
-    if folder is not None:
-        return (
-            f"carom: compiling kernels that are not in {folder} yet; this takes some seconds, once: later runs load "
-            "them (carom warm-up compiles ahead)"
-        )
-    return (
-        "carom: compiling kernels, which takes some seconds in every run: there is no folder that can be written to "
-        f"keep them ({CACHE_FOLDER_VARIABLE} names one)"
-    )
-
-
-def announce(dispatcher: Any) -> None:
-    """Say that a kernel is about to compile."""
-    for listener in log.listeners:
-        listener(dispatcher.py_func.__qualname__)
-    if not log.announced and not log.listeners:
-        logger.warning(announcement())
-    logger.info("compiling %s (%d so far, %.1f s)", dispatcher.py_func.__name__, len(log.compiled), log.seconds)

@@ -13,7 +13,7 @@ import helpers_cli
 import pytest
 
 from carom import scenes
-from carom.framework.compilation import CompilationLog
+from carom.framework.jit.log import CompilationLog
 from carom.lab.bench import report as bench_report
 from carom.lab.bench import results as bench_results
 from carom.lab.bench.against_pymunk import bench

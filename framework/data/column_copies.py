@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..compilation import kernel
-from ..jit.late import JIT, cgutils, intrinsic, ir, types
+from ..jit.late import JIT
 from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at
 from ..jit.records.schema import Schema, ints
-
-if TYPE_CHECKING:
-    from .table import Table
+from .row_moves import move_bytes
+from .table import Table
 
 BLOCKS = Schema("Blocks", sources=ints(), targets=ints(), sizes=ints())  # addresses, bytes
 
 _blocks_at = record_at(BLOCKS, 2)
-
-
-@intrinsic
-def move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
-    """Copy so many bytes from one address to another; the two may overlap."""
-
-    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-        byte = ir.IntType(8).as_pointer()
-        places = [builder.inttoptr(value, byte) for value in values[:2]]
-        cgutils.raw_memmove(builder, places[0], places[1], values[2], 1)
-        return context.get_dummy_value()
-
-    return types.none(types.int64, types.int64, types.int64), emit
 
 
 @kernel

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from ..compilation import kernel, part
-from ..jit.late import JIT
+from ..jit.late import JIT, cgutils, intrinsic, ir, types
 from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at
 from ..jit.records.schema import Schema, integer, ints
-from .column_copies import move_bytes
 
 ROW_PLAN = Schema(
     "RowPlan",
@@ -41,6 +40,19 @@ MOST_KEPT = 128  # rows; the lists of more do not stay in memory
 
 _plan_at = record_at(ROW_PLAN, 2)
 _columns_at = record_at(MOVED_COLUMNS, 2)
+
+
+@intrinsic
+def move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
+    """Copy so many bytes from one address to another; the two may overlap."""
+
+    def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        places = [builder.inttoptr(value, byte) for value in values[:2]]
+        cgutils.raw_memmove(builder, places[0], places[1], values[2], 1)
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64), emit
 
 
 @part

@@ -18,7 +18,7 @@ import os
 import pickle
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from numba.core.serialize import dumps
 
 from . import prebuilt
 from .hash import hash_and_reach, type_names
+from .log import log
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
 KERNELS, UNFINISHED = "*.kernel", "*.unfinished"
@@ -122,12 +123,35 @@ def _read(path: Path) -> Any:
         return None
 
 
-class KernelCache(_Cache):
-    """numba's cache interface over those files. ``missing`` is called before a kernel compiles that was not found."""
+def announcement() -> str:
+    """What is said once of a process that compiles: where the kernels are kept."""
+    log.announced = True
+    folder = cache_folder()
+    if folder is not None:
+        return (
+            f"carom: compiling kernels that are not in {folder} yet; this takes some seconds, once: later runs load "
+            "them (carom warm-up compiles ahead)"
+        )
+    return (
+        "carom: compiling kernels, which takes some seconds in every run: there is no folder that can be written to "
+        f"keep them ({CACHE_FOLDER_VARIABLE} names one)"
+    )
 
-    def __init__(self, dispatcher: Any, missing: Callable[[Any], None]) -> None:
+
+def announce(dispatcher: Any) -> None:
+    """Say that a kernel is about to compile."""
+    for listener in log.listeners:
+        listener(dispatcher.py_func.__qualname__)
+    if not log.announced and not log.listeners:
+        logger.warning(announcement())
+    logger.info("compiling %s (%d so far, %.1f s)", dispatcher.py_func.__name__, len(log.compiled), log.seconds)
+
+
+class KernelCache(_Cache):
+    """numba's cache interface over those files."""
+
+    def __init__(self, dispatcher: Any) -> None:
         self._dispatcher = dispatcher
-        self._missing = missing
         self._enabled = True
         self._hash_and_reach: tuple[str, int] | None = None
 
@@ -153,7 +177,7 @@ class KernelCache(_Cache):
                 if found is not None:
                     used.add(path)
                     return compiler.CompileResult._rebuild(target_context, *found)
-        self._missing(self._dispatcher)
+        announce(self._dispatcher)
         return None
 
     def holds(self, sig: Any, target_context: Any) -> bool:

@@ -15,8 +15,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
-from ..compilation import announce, log
 from .cache import KernelCache
+from .log import log
 from .pipeline import kernel_compiler, part_compiler
 
 logger = logging.getLogger("carom")
@@ -62,7 +62,7 @@ class KeptDispatcher(CPUDispatcher):
 
     def __init__(self, function: Any, targetoptions: dict[str, Any], pipeline_class: Any = kernel_compiler) -> None:
         super().__init__(function, targetoptions=targetoptions, pipeline_class=pipeline_class)
-        self._cache = KernelCache(self, announce)
+        self._cache = KernelCache(self)
 
     def compile(self, sig: Any) -> Any:
         with Wait() as wait:

@@ -20,8 +20,6 @@ import numpy as np
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
-from ..compilation import is_packed
-
 # What numba makes other code for: its switches, by their names in the environment less NUMBA_.
 SWITCHES = (
     "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX",
@@ -34,6 +32,11 @@ def toolchain() -> dict[str, str]:
         "python": f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}",
         "numba": numba.__version__, "llvmlite": llvmlite.__version__, "numpy": np.__version__,
     }  # fmt: skip
+
+
+def is_packed(function: Any) -> bool:
+    """Whether it is such a kernel."""
+    return getattr(function, "carom_packed", False)
 
 
 def deep_hash(function: Any) -> str:

@@ -39,12 +39,10 @@ if TYPE_CHECKING:
     from numba.np import arrayobj
 
     from . import dispatchers
-    from .records import record_code
 else:
     ir, arrayobj = LateModule("llvmlite.ir"), LateModule("numba.np.arrayobj")
     cgutils, errors, types = (LateModule(f"numba.core.{name}") for name in ("cgutils", "errors", "types"))
-    names = ("dispatchers", "records.record_code")
-    dispatchers, record_code = (LateModule(f"{__package__}.{name}") for name in names)
+    dispatchers = LateModule(f"{__package__}.dispatchers")
 
 
 class Late:

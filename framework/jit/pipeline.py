@@ -26,7 +26,7 @@ from numba.core.environment import lookup_environment
 from numba.core.transforms import canonicalize_cfg
 from numba.core.typing.templates import Signature
 
-from ..compilation import is_packed
+from .hash import is_packed
 
 TRIED = (0, 62), (0, 68)  # the versions whose internals are as expected here
 

@@ -9,7 +9,7 @@ from typing import Self
 import rich.progress
 from rich.console import Console
 
-from ...framework.compilation import announcement, log
+from ...framework.compilation import log
 
 REFRESH = 0.1  # s between two drawings of the bar
 LINES = 5.0  # s between two lines where there is no terminal
@@ -114,6 +114,8 @@ class Bar(Progress):
 
     def _compiles(self, kernel: str) -> None:
         if not log.announced:
+            from ...framework.jit.cache import announcement  # loads numba
+
             self._line(announcement())
         left = f" ({log.left} left)" if log.left else ""
         text = f"{self._what}: compiling {kernel.rpartition('.')[2]}{left} ..."

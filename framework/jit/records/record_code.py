@@ -25,8 +25,8 @@ from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, inf
 from numba.np.arrayobj import populate_array
 from numba.np.numpy_support import from_dtype
 
-from ...compilation import CHECKED
 from ..late import intrinsic, operation
+from ..log import CHECKED
 from .schema import WORD, Column, Schema
 
 _BYTE_POINTER = ir.IntType(8).as_pointer()

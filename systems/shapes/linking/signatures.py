@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
-from ....framework.jit.late import JIT, Late, operation, record_code, types
+from ....framework.jit.late import JIT, Late, operation, types
 from ....framework.jit.linking import linked_call
-from ....framework.jit.records.record_type import record_type
+from ....framework.jit.records.record_type import record_code, record_type
 from ...records import STATE
 
 # Values of ``state.unsound``: what was wrong with an answer of a plugin's function.
