@@ -35,10 +35,8 @@ class Physics(Plugin):
 
     def install(self, world: World) -> None:
         """Give the world its table and its systems; ValueError if it has physics already."""
-        if world.physics is not None:
-            raise ValueError("a world takes one Physics")
         simulation = Simulation(world, self.dimensions, self.gravity)
         simulation.check_settings(world.settings)  # the systems read them
-        world.physics = simulation
+        world.take_physics(simulation)
         for system in simulation.systems:
             world.add_system(system)

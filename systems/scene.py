@@ -93,6 +93,11 @@ class Scene:
         self._several = False  # bodies have several colliders
         table.on_rows_moved = self._move_rows
 
+    @property
+    def seen_version(self) -> tuple[int, int, int]:
+        """Another one whenever shapes, rows, or where the bodies are may have changed."""
+        return self.version, self.table.static_version, self.state.motion_version
+
     # -- structure --------------------------------------------------------------------------------
 
     def refresh(self) -> bool:

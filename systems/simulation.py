@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from ..components import RigidBody, Transform
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
-from ..framework.data.esper_bridge import Membership
+from ..framework.data.esper_bridge import Contents, Membership
 from ..framework.data.table import Table
 from ..framework.jit.records.record import make_record
 from ..framework.schedule.phases import System
 from ..framework.schedule.plan import PlannedColumn, PlannedKernel
 from ..framework.schedule.stages import Program, Segment
-from ..framework.world.contacts import Contacts, EntityLookup
-from ..framework.world.services import PhysicsServices
+from ..framework.world.contacts import Contacts
+from ..framework.world.world import World
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
 from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, WAKE, WAKE_TOUCHED
@@ -30,11 +30,10 @@ from .inspection.energies import kinetic_energy, momentum, potential_energy
 from .inspection.planned_columns import planned_columns
 from .inspection.planned_kernels import planned_kernels
 from .integration.system import Integration
-from .linking.preparation import prepare
+from .linking.preparation import evaluate_forces, keep_ready, link_needed
 from .linking.steps import StepLinks
 from .narrow_phase.system import NarrowPhase
 from .quarantine.taken_out import Quarantine
-from .queries.queried_scene import QueriedScene
 from .queries.system import Queries
 from .records import STATE
 from .room import Room
@@ -47,11 +46,15 @@ from .sleeping.sleepers import Sleepers, add_columns
 from .stage_list import CLOSING, OPENING, STAGES, SYSTEM_OF_STAGE
 from .tracking import CONTACTS, WARM_START, put_rows_back, saved_rows
 
-if TYPE_CHECKING:
-    from ..framework.world.world import World
 
-class Simulation(PhysicsServices):
-    """What a physics plugin gives to a world."""
+class Simulation:
+    """What a physics plugin gives to a world; see ``PhysicsServices`` of the framework, and ``NoPhysics``.
+
+    program
+        the stages of all built-in systems
+    parts_version
+        changes whenever a system consists of other parts
+    """
 
     def __init__(self, world: World, dimensions: int, gravity: Any) -> None:
         self._world, self.dimensions = world, dimensions
@@ -63,9 +66,8 @@ class Simulation(PhysicsServices):
         self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
         self.adoption = Adoption(self.table, Transform, LevelCheck(self.table, world.registry))
         self.bodies = Bodies(self.table)
-        lookup = EntityLookup(self._membership)
         source = RecordedContacts(self.state)
-        self.contacts = Contacts(dimensions, lookup, self._running_step, source)
+        self.contacts = Contacts(dimensions, self._membership, self._running_step, source)
         self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
         self._room = Room(self.state, self.scene, self.search)
         self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
@@ -80,13 +82,15 @@ class Simulation(PhysicsServices):
         self.sleepers = Sleepers(self.state, self.table, self.scene, self.program, self._room)
         source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
         source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
-        self._attribution = ErrorAttribution(
+        self.wake, self.taken_out = self.sleepers.wake, self.quarantine.out_now
+        self.attribute_errors = ErrorAttribution(
             world.registry, self.state, lambda: self.scene.linked.shapes if self.scene.linked else ()
         )
-        self.program.describe_error, self.program.on_alarm = self._attribution.describe, self._attribution.check
+        self.program.describe_error, self.program.on_alarm = self.attribute_errors.describe, self.attribute_errors.check
         self.program.alarm = self.state.word_of("unsound")
-        queried = QueriedScene(self.scene, self.refresh_for_queries)
-        self.queries = Queries(self.state, self.table, world.registry, queried, self.search)
+        self.queries = Queries(
+            self.state, self.table, world.registry, self.scene, self.search, self.refresh_for_queries
+        )
         self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies)
         self.integration = Integration(
             self.program, self.scene, self.forces, world.registry, lambda: world.settings
@@ -94,7 +98,9 @@ class Simulation(PhysicsServices):
         self.broad_phase = BroadPhase(self.program, self.search)
         self.narrow_phase = NarrowPhase(self.program, self.scene, world.registry, self.bodies)
         self.response = Response(self.program, self.contacts, lambda: world.settings)
-        self.contact_events = ContactEvents(self.program, source, self.contacts, lookup, lambda: world.settings)
+        self.contact_events = ContactEvents(
+            self.program, source, self.contacts, self._membership, lambda: world.settings
+        )
         self.parts_version = 0
         self.links = StepLinks(self.scene, self.program, self.integration, self.search)
         self._must_check = False  # in every step: sensors among levels, pairs that no plugin has
@@ -105,6 +111,7 @@ class Simulation(PhysicsServices):
         self._found_current = self.state.word_of("found_current")
         self._contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
+        self.settled, self.take_deferred = self.adoption.settled, self.contacts.take_deferred
 
     @property
     def systems(self) -> tuple[System, ...]:
@@ -131,7 +138,21 @@ class Simulation(PhysicsServices):
 
     # -- a step -----------------------------------------------------------------------------------
 
+    def synchronize(self, contents: Contents) -> None:
+        """Bring the table in step with esper."""
+        self.take_deferred()
+        self.adoption.synchronize(contents)
+
+    def open_window(self, step: int) -> None:
+        self.contacts.open_window(step)
+        self.table.frame += 1
+
     def begin_step(self, others_write: bool) -> None:
+        """Refresh what depends on the table's structure and keep what a failed step puts back.
+
+        others_write: whether code that is not carom's runs in the step, and may write any column.
+        """
+        self.table.in_step = True
         sleepers = self.sleepers
         if sleepers.on:
             sleepers.kept = None
@@ -208,7 +229,7 @@ class Simulation(PhysicsServices):
         try:
             self.parts_version += self.links.link(len(self._world.force_systems))
         except Exception as error:
-            self._attribution.describe(error)
+            self.attribute_errors.describe(error)
             raise
 
     def refresh_for_queries(self) -> None:
@@ -233,13 +254,16 @@ class Simulation(PhysicsServices):
         self._link()
 
     def opening(self) -> list[Any]:
+        """The parts of a step before all systems."""
         return [Segment(self.program, 0, len(OPENING))]
 
     def closing(self) -> list[Any]:
+        """The parts of a step after all systems."""
         start = self.program.index[CLOSING[0].function.__name__]
         return [Segment(self.program, start, start + len(CLOSING)), *self.contact_events.closing()]
 
     def abandon_step(self) -> None:
+        """The step failed: put everything back to its start."""
         state, table, bodies = self.state, self.table, self.state.bodies
         if state.others_write:
             if self._copies.kept:
@@ -260,6 +284,7 @@ class Simulation(PhysicsServices):
             bodies.place[:] = -1
         table.static_version += 1
         self.queries.forget()
+        table.in_step = False
 
     def _put_back(self, bodies: Any) -> None:
         """What keep_state and keep_start have kept; without the latter the step has written velocities at most."""
@@ -274,7 +299,13 @@ class Simulation(PhysicsServices):
         if state.step_force_kept:
             bodies.step_force[:dynamic] = bodies.kept_step_force[:dynamic]
 
+    def end_phase(self) -> None:
+        """One phase has run alone."""
+        self.contacts.columns_now()  # rows may move before they are read
+        self.table.in_step = False
+
     def end_step(self) -> None:
+        self.table.in_step = False
         self._copies.kept = False
         if self.sleepers.on:
             self.sleepers.end_step()
@@ -291,10 +322,8 @@ class Simulation(PhysicsServices):
             for row in np.flatnonzero(~np.isfinite(column).all(axis=1)).tolist():
                 self.quarantine.tell(row, name, column[row].tolist(), prefix)
 
-    def taken_out(self) -> np.ndarray:
-        return self.quarantine.out_now()
-
     def end_window(self) -> None:
+        """The last step of a ``step()`` or ``advance()`` is over: forces applied from outside have done their work."""
         table, words = self.table, self._words
         if "applied_force" in table.arrays and (words[self._pushed] or words[self._others_write]):
             table.arrays["applied_force"][: table.stops[0]] = 0.0
@@ -303,12 +332,13 @@ class Simulation(PhysicsServices):
                 table.arrays["applied_frame"][: table.stops[0]] = -1  # else state_hash would tell frame rates apart
             table.frames_applied = False
 
-    def wake(self, entity: int) -> None:
-        self.sleepers.wake(entity)
-
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any]:
+        """What goes on from step to step beside the table, the contacts that users see, and the clock: a copy.
+
+        Arrays, numbers, texts, and lists and dicts (by text) of these.
+        """
         state = self.state
         if state.found_current:  # contacts of a narrow phase that no RESPONSE has followed are in no history
             self.contacts.columns_now()
@@ -324,6 +354,7 @@ class Simulation(PhysicsServices):
         }
 
     def take_back(self, saved: dict[str, Any], moved: bool) -> None:
+        """Go on from that; the table is what it was then. moved: it has had other rows, or other components."""
         state = self.state
         self.set_gravity(saved["gravity"])
         self._room.reserve_warm_start(saved["warm_start"]["counts"])
@@ -345,9 +376,11 @@ class Simulation(PhysicsServices):
     # -- looking inside ---------------------------------------------------------------------------
 
     def system_of_stage(self, stage: int) -> str:
+        """The name of the system that a stage belongs to; "" for those that open and close a step."""
         return SYSTEM_OF_STAGE[stage]
 
     def look_ahead(self, others_write: bool) -> None:
+        """Before a plan is made, between two steps."""
         self._follow(others_write)
         self._copies.kept = False
         self.scene.refresh_rotation()
@@ -378,12 +411,12 @@ class Simulation(PhysicsServices):
         return momentum(self.bodies.dynamic, self.dimensions)
 
     def prepare(self, components: tuple[type[Any], ...]) -> None:
-        """See :mod:`linking.preparation`."""
-        prepare(self, self._world, components)
-
-    def attribute_errors(self) -> Any:
-        """A context in which errors get notes about the plugin that they come from."""
-        return self._attribution()
+        """Compile what bodies of these component types need, and those there are, see :mod:`linking.preparation`."""
+        keep_ready(self.scene, self.adoption, components)
+        with self.attribute_errors():
+            self.refresh_for_queries()
+            link_needed(self.scene, self.integration)
+        evaluate_forces(self.table, self.bodies.dynamic, self._world)
 
     def _running_step(self) -> int | None:
         return self._world.step_count if self.table.in_step else None

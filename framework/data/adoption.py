@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import MissingComponentError
 from . import esper_bridge
-from .batches import Batch, Stores
+from .batches import Batch
 from .component import Component
 from .handles import bind_handles, write_handles
 from .table import STATIC, Table
@@ -50,33 +50,18 @@ class Changes:
     deleted: list[np.ndarray] = field(default_factory=list)
 
 
-class TogetherCheck:
-    """May refuse, with a ValueError, what does not go together on one entity."""
-
-    def __call__(
-        self,
-        fresh: Mapping[type[Component], Handles],
-        members: Mapping[type[Component], Handles],
-        gone: Mapping[type[Component], Ids],
-    ) -> None:
-        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: who loses them."""
-
-    def batch(self, stores: Stores, entities: np.ndarray, rows: Any) -> None:
-        """entities (n,) have all these components, with the values of these rows of the stores."""
-
-
 class Adoption:
-    """Adopts the components of entities that form a body: those with ``anchor`` and any that ``makes_body``."""
+    """Adopts the components of entities that form a body: those with ``anchor`` and any that ``makes_body``.
 
-    def __init__(
-        self,
-        table: Table,
-        anchor: type[Component],
-        check_together: TogetherCheck | None = None,
-    ) -> None:
+    check_together
+        may refuse, with a ValueError, what does not go together on one entity, see
+        :class:`~carom.systems.shapes.geometry_levels.LevelCheck`
+    """
+
+    def __init__(self, table: Table, anchor: type[Component], check_together: Any) -> None:
         self.table = table
         self.anchor = anchor
-        self._check_together = check_together or TogetherCheck()
+        self._check_together = check_together
         self._roles: dict[Any, int] = {}  # by component type
         # Handles of the bodies in the table, but for those of batches that nobody has asked for.
         self._members: dict[type[Component], Handles] = {}

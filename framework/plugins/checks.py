@@ -11,7 +11,7 @@ import inspect
 import math
 import numbers
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from ..data.columns import REQUIRED
 from ..data.component import Component
 from ..errors import PluginError
 from .registry import Convex, Shape
-
-if TYPE_CHECKING:
-    from .plugin import Plugin
 
 SHAPE_FUNCTIONS = {
     "bounds": ("shape", "dimensions"),
@@ -44,7 +41,7 @@ ENCLOSED = 1e-9  # how far a support point may stick out of the bounds, of their
 # -- shapes ---------------------------------------------------------------------------------------
 
 
-def check_shape(plugin: Plugin, component: Any, cost: float) -> None:
+def check_shape(plugin: Any, component: Any, cost: float) -> None:
     """PluginError unless the class can be a shape; also tries its functions."""
     where = f"plugin {plugin.name}: shape {getattr(component, '__name__', component)!s}"
     if not (isinstance(component, type) and issubclass(component, Component)) or component._abstract:
@@ -118,7 +115,7 @@ def directions(dimensions: int) -> list[tuple[float, ...]]:
 # -- pairs ----------------------------------------------------------------------------------------
 
 
-def check_pair(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
+def check_pair(plugin: Any, first: Any, second: Any, function: Any) -> None:
     """PluginError unless the function can be that of the two shapes; also tries it."""
     name = getattr(function, "__name__", repr(function))
     where = f"plugin {plugin.name}: pair {name} of {_name(first)} and {_name(second)}"
@@ -223,7 +220,7 @@ def check_symmetry(where: str, function: Any, a: Any, b: Any, d: tuple[Any, ...]
         )
 
 
-def check_sweep(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
+def check_sweep(plugin: Any, first: Any, second: Any, function: Any) -> None:
     name = getattr(function, "__name__", repr(function))
     where = f"plugin {plugin.name}: sweep {name} of {_name(first)} and {_name(second)}"
     if (first, second) not in plugin.pairs:
@@ -243,7 +240,7 @@ def check_sweep(plugin: Plugin, first: Any, second: Any, function: Any) -> None:
             raise PluginError(f"{said}: the time of a hit is the part of v after which they touch, from 0 to 1")
 
 
-def check_corner(plugin: Plugin, first: Any, second: Any, corner: Any) -> None:
+def check_corner(plugin: Any, first: Any, second: Any, corner: Any) -> None:
     """PluginError unless it is None or can tell corners."""
     if corner is None:
         return
@@ -270,7 +267,7 @@ def _samples(first: Any, second: Any) -> Iterator[tuple[Any, Any, Any]]:
 # -- other things ---------------------------------------------------------------------------------
 
 
-def check_integrator(plugin: Plugin, name: str, integrator: Any) -> None:
+def check_integrator(plugin: Any, name: str, integrator: Any) -> None:
     where = f"plugin {plugin.name}: integrator {name!r}"
     check_name(where, name)
     missing = [part for part in ("advance", "order", "evaluations", "path") if not hasattr(integrator, part)]
@@ -286,7 +283,7 @@ def check_integrator(plugin: Plugin, name: str, integrator: Any) -> None:
             raise PluginError(f"{where}: {part} must be a whole number from {least} to {most}, got {value!r}")
 
 
-def check_broad_phase(plugin: Plugin, name: str, broad_phase: Any) -> None:
+def check_broad_phase(plugin: Any, name: str, broad_phase: Any) -> None:
     where = f"plugin {plugin.name}: broad phase {name!r}"
     check_name(where, name)
     if not isinstance(broad_phase, type) or not inspect.isfunction(getattr(broad_phase, "pairs", None)):
@@ -294,7 +291,7 @@ def check_broad_phase(plugin: Plugin, name: str, broad_phase: Any) -> None:
     _check_arity(f"{where}: pairs", broad_phase.pairs, ("self", "lower", "upper", "moving"))
 
 
-def check_mixing_rule(plugin: Plugin, name: str, function: Any) -> None:
+def check_mixing_rule(plugin: Any, name: str, function: Any) -> None:
     where = f"plugin {plugin.name}: mixing rule {name!r}"
     check_name(where, name)
     if not inspect.isfunction(function):
@@ -308,14 +305,14 @@ def check_mixing_rule(plugin: Plugin, name: str, function: Any) -> None:
             raise PluginError(f"{where}: for {x} and {y} it returned {there!r}, for {y} and {x} {back!r}: both are one")
 
 
-def check_filter(plugin: Plugin, function: Any) -> None:
+def check_filter(plugin: Any, function: Any) -> None:
     where = f"plugin {plugin.name}: pair filter {getattr(function, '__name__', function)!s}"
     if not inspect.isfunction(function):
         raise PluginError(f"{where}: register a function of (bodies, a, b), got {function!r}")
     _check_arity(where, function, ("bodies", "a", "b"))
 
 
-def check_system(plugin: Plugin, make: Any) -> None:
+def check_system(plugin: Any, make: Any) -> None:
     if not callable(make):
         raise PluginError(f"plugin {plugin.name}: system takes a class, or a function that makes one, got {make!r}")
 

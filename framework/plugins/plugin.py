@@ -6,7 +6,7 @@ import functools
 import inspect
 import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from ..compilation import inlined, pasted
 from ..data.component import Component
@@ -14,9 +14,6 @@ from ..errors import PluginError
 from ..vectors import dot, scale
 from . import checks
 from .registry import Convex, Pair, Registry, Shape
-
-if TYPE_CHECKING:
-    from ..world.world import World
 
 Thing = TypeVar("Thing")
 P = ParamSpec("P")
@@ -212,23 +209,23 @@ class Plugin:
 
     # -- being taken by a world -------------------------------------------------------------------
 
-    def install(self, world: World) -> None:
+    def install(self, world: Any) -> None:
         """Called by the world after all its plugins are registered; all of it, or an error and nothing."""
         self._add_systems(world, self.systems)
 
     # -- snapshots --------------------------------------------------------------------------------
 
-    def saved(self, world: World) -> Any:
+    def saved(self, world: Any) -> Any:
         """What the plugin knows of that world and will need to go on, for snapshots and saved worlds; None: nothing.
 
         A copy, of arrays, numbers, texts, and lists and dicts (by text) of these.
         """
         return None
 
-    def take_back(self, world: World, saved: Any) -> None:
+    def take_back(self, world: Any, saved: Any) -> None:
         """Go on from what :meth:`saved` has returned, here or in another process; the world has its bodies again."""
 
-    def _add_systems(self, world: World, factories: list[Any]) -> None:
+    def _add_systems(self, world: Any, factories: list[Any]) -> None:
         added: list[Any] = []
         try:
             for make in factories:

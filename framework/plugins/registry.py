@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..data.component import Component
 from ..errors import PluginError
 from ..settings import AUTOMATIC, MIXING_RULES
-
-if TYPE_CHECKING:
-    from ..world.world import World
-    from .plugin import Plugin
 
 
 class Convex:
@@ -99,8 +95,8 @@ class Pair:
 class Registry:
     """Everything the plugins of one world have registered; ``version`` changes whenever they register more."""
 
-    plugins: list[Plugin] = field(default_factory=list)
-    world: World | None = None  # once its plugins are installed
+    plugins: list[Any] = field(default_factory=list)
+    world: Any = None  # once its plugins are installed
     version: int = 0
     shapes: dict[type[Component], Shape] = field(default_factory=dict)
     pairs: dict[tuple[type[Any], type[Any]], Pair] = field(default_factory=dict)
@@ -109,7 +105,7 @@ class Registry:
     mixing_rules: dict[str, Any] = field(default_factory=dict)
     pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
 
-    def add(self, plugin: Plugin) -> None:
+    def add(self, plugin: Any) -> None:
         """PluginError if something of it is registered already; what it registers later is seen too."""
         self.plugins.append(plugin)
         try:
@@ -119,7 +115,7 @@ class Registry:
             raise
         plugin.registries.add(self)
 
-    def drop(self, plugin: Plugin) -> None:
+    def drop(self, plugin: Any) -> None:
         """Forget a plugin again."""
         plugin.registries.discard(self)
         self.plugins.remove(plugin)

@@ -5,15 +5,12 @@ from __future__ import annotations
 import graphlib
 from collections.abc import Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import esper
 
 from ..data.component import Component
 from ..errors import ScheduleError
-
-if TYPE_CHECKING:
-    from ..world.world import World
 
 
 class Phase(IntEnum):
@@ -42,7 +39,7 @@ FIRST_PRIORITY = 1_000_000  # the processor that runs the step
 class OfOneWorld:
     """What gets a ``world`` when it is added to one: a copy of it is in none."""
 
-    world: World
+    world: Any  # declare ``world: World`` in a class of your own to have it typed
 
     def __getstate__(self) -> object:
         state = super().__getstate__()

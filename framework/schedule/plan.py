@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from ..world.world import World
+from .phases import System
 
 NO_SYSTEM = "no system"
 WIDTH = 120  # of the printed lines
@@ -81,20 +80,17 @@ class Plan:
     columns: tuple[PlannedColumn, ...] = ()
 
     @classmethod
-    def of(cls, world: World) -> Plan:
-        physics = world.physics
+    def of(cls, systems: Sequence[System], physics: Any) -> Plan:
         entries = [
             PlanEntry(
                 s.phase.name,
                 s.name,
                 s.priority,
-                s.reason() if hasattr(s, "reason") else "added by the game",
-                tuple(s.kernels()) if hasattr(s, "kernels") else (),
+                getattr(s, "reason", lambda: "added by the game")(),
+                tuple(getattr(s, "kernels", tuple)()),
             )
-            for s in world.systems
+            for s in systems
         ]
-        if physics is None:
-            return cls(tuple(entries))
         return cls(tuple(entries), tuple(physics.planned_kernels()), tuple(physics.planned_columns()))
 
     @property

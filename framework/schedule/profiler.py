@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,14 +12,11 @@ from .. import compilation
 from ..errors import CaromError
 from .profile_report import OUTSIDE, Stats, Totals, units_of
 
-if TYPE_CHECKING:
-    from .step import Pipeline
-
 
 class Profiler:
     """Time by system, always; calls and time by stage and by kernel called from Python inside :meth:`profile`."""
 
-    def __init__(self, pipeline: Pipeline) -> None:
+    def __init__(self, pipeline: Any) -> None:
         self._pipeline = pipeline
         self.steps = 0
         self._sums = Totals()  # of what is Python
@@ -58,14 +55,11 @@ class Profiler:
 
     def _counts(self) -> np.ndarray:
         """Calls and ticks of all stages since the world began."""
-        physics = self._pipeline.world.physics
-        return np.zeros((3, 0)) if physics is None else physics.program.counts()
+        return self._pipeline.physics.program.counts()
 
     def _stages(self) -> Totals:
         """What all stages have taken since measuring began."""
-        physics, totals = self._pipeline.world.physics, Totals()
-        if physics is None:
-            return totals
+        physics, totals = self._pipeline.physics, Totals()
         program = physics.program
         counts = program.counts() - self._before
         seconds = program.seconds_of(counts).tolist()
@@ -80,8 +74,7 @@ class Profiler:
 
     def totals(self) -> Totals:
         """The sums so far."""
-        physics = self._pipeline.world.physics
-        counters = physics.counters() if physics is not None else {}
+        counters = self._pipeline.physics.counters()
         kept = Totals(self.steps, counters={**counters, "dropped_steps": self._pipeline.clock.dropped_steps})
         return self._sums + self._stages() + kept
 
@@ -99,7 +92,6 @@ class Profiler:
     def reset(self) -> None:
         self.steps, self._sums, self._before = 0, Totals(), self._counts()
         self._profiled = Totals()
-        if self._pipeline.world.physics is not None:
-            self._pipeline.world.physics.reset_counters()
+        self._pipeline.physics.reset_counters()
         if self._profile_start is not None:
             self._profile_start = self.totals()

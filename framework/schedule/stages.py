@@ -7,6 +7,7 @@ docs/architecture.md all read it, and it is checked that a failed step puts back
 from __future__ import annotations
 
 import dis
+import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -117,13 +118,16 @@ class Program:
         self._addresses = np.zeros(len(stages), np.int64)
         state.program = self._addresses
         state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
-        self._run_stages = entry_point(run_stages)
         self._clock: TickClock | None = None  # from the first link on
         self._python_seconds = np.zeros(len(stages))  # of what Python has done for each stage
         self.inside = 0.0  # s of stages that Python has run within a step: not to be counted twice
         self.describe_error: Callable[[BaseException], None] = lambda error: None  # adds notes to it
         self.alarm = 0  # the word of the state that is not 0 when a stage has noted something wrong
         self.on_alarm: Callable[[], None] = lambda: None
+
+    @functools.cached_property
+    def _run_stages(self) -> Any:
+        return entry_point(run_stages)
 
     def functions(self, wanted: Callable[[Stage], bool]) -> Iterator[Linked | Called]:
         """What :meth:`link` and :meth:`run` call."""

@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import esper
 
 from ..compilation import log
 from ..data import esper_bridge
-from ..errors import CaromError, NoPhysicsError, StepError
+from ..errors import CaromError, StepError
 from .clock import Clock
 from .faults import Faults
+from .no_physics import NoPhysics
 from .phases import FIRST_PRIORITY, Phase, System
 from .profiler import Profiler
 from .stages import PythonPart, Segment, merged
 from .system_order import SystemOrder
 
-if TYPE_CHECKING:
-    from ..world.world import World
 
+class Pipeline(esper.Processor):
+    """Owns the order of a world's systems and its clock, and takes its steps.
 
-class StepRunner(esper.Processor):
-    """The first of a world's processors: it runs the whole step, the other processors included."""
+    It is the first of a world's processors, which runs the whole step, the other processors included.
+    """
 
-    def __init__(self, pipeline: Pipeline) -> None:
-        self._pipeline = pipeline
-
-    def process(self, *args: Any, **kwargs: Any) -> None:
-        self._pipeline.process(*args, *kwargs.values())
-
-
-class Pipeline:
-    """Owns the order of a world's systems and its clock, and takes its steps."""
-
-    RUNNER = StepRunner
-
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: Any) -> None:
         self.world = world
         self.clock = Clock(world.settings.dt)
-        self.order = SystemOrder(self)
+        self.order = SystemOrder(world, self)
         self.in_step = False
         self.profiler = Profiler(self)
         self.faults = Faults(lambda: world.settings)
@@ -50,12 +39,14 @@ class Pipeline:
         self._at = ""  # the system at work
         self.processors: esper_bridge.Processors
         self.contents: esper_bridge.Contents
+        self.physics: Any  # what a plugin provides, or NoPhysics
 
     def attach(self) -> None:
         """Become the first processor of the world's context; called in it."""
         self.processors = esper_bridge.take_over_processors()
         self.contents = esper_bridge.Contents()
-        esper.add_processor(StepRunner(self), FIRST_PRIORITY)
+        self.physics = NoPhysics(self.contents)
+        esper.add_processor(self, FIRST_PRIORITY)
 
     def must_be_between_steps(self, what: str) -> None:
         if self.in_step:
@@ -106,8 +97,8 @@ class Pipeline:
         self._in_window = True
         try:
             for k in range(steps):
-                if k and self.world.physics is not None:
-                    self.world.physics.contacts.take_deferred()
+                if k:
+                    self.physics.take_deferred()
                 others_write = self.others_write()
                 if others_write or self.contents.dead or self.processors.changed:  # code of the game needs its context
                     with esper_bridge.context(self.world.name):
@@ -121,10 +112,11 @@ class Pipeline:
             self._in_window = False
         self._close_window()
 
-    def process(self, *args: Any) -> None:
+    def process(self, *args: Any, **kwargs: Any) -> None:
         """One step, called by esper's ``process()`` in the world's context."""
         if self.in_step:
             raise CaromError("a step cannot be taken inside a step")
+        args = (*args, *kwargs.values())
         dt = self.world.settings.dt
         if len(args) != 1 or args[0] != dt:
             raise ValueError(
@@ -147,19 +139,13 @@ class Pipeline:
 
     def _run(self, dt: float, others_write: bool) -> None:
         """Open the step, run its parts, close it."""
-        physics = self.world.physics
-        if physics is None:
-            self._refuse_bodies()
-        elif not physics.adoption.settled():
-            self.synchronize()
-        waited, order = log.waited, self.order
+        self.synchronize()
+        waited, order, physics = log.waited, self.order, self.physics
         self._begin(others_write)
-        if self._parts_order != order.version or (physics is not None and self._parts_physics != physics.parts_version):
+        if self._parts_order != order.version or self._parts_physics != physics.parts_version:
             self._make_parts()
         self._run_parts(self._parts, dt)
-        if physics is not None:
-            physics.table.in_step = False
-            physics.end_step()
+        physics.end_step()
         self.in_step = False
         esper_bridge.running.discard(self.world.name)
         self.clock.step_count += 1
@@ -169,15 +155,6 @@ class Pipeline:
         if order.changed:
             with esper_bridge.context(self.world.name):
                 order.apply()
-
-    def _refuse_bodies(self) -> None:
-        """NoPhysicsError if there is something that only physics can move."""
-        for component, entities in self.contents.members.items() if self.contents.log.dirty else ():
-            if entities and isinstance(component, type) and getattr(component, "makes_body", False):
-                raise NoPhysicsError(
-                    f"entity {next(iter(entities))} has {component.__name__}, and there is no physics in this world: "
-                    f"World(Physics(dimensions=2))"
-                )
 
     def _run_parts(self, parts: list[Any], dt: float) -> None:
         try:
@@ -197,12 +174,11 @@ class Pipeline:
     def _run_python(self, part: PythonPart, dt: float) -> None:
         """A system in Python: its time is taken, less that of stages inside and what it has waited for the compiler."""
         self._at = part.name
-        physics = self.world.physics
-        inside = 0.0 if physics is None else physics.program.inside
-        waited, started = log.waited, time.perf_counter()
+        program = self.physics.program
+        inside, waited, started = program.inside, log.waited, time.perf_counter()
         part.function(dt)
         seconds = time.perf_counter() - started - (log.waited - waited)
-        self.profiler.add(part.name, seconds - (0.0 if physics is None else physics.program.inside - inside))
+        self.profiler.add(part.name, seconds - (program.inside - inside))
         self._at = ""
 
     @property
@@ -212,8 +188,7 @@ class Pipeline:
 
     def _system_at(self) -> str:
         """The system whose stage ran last."""
-        physics = self.world.physics
-        return "" if physics is None else physics.system_of_stage(physics.program.state.stage)
+        return self.physics.system_of_stage(self.physics.program.state.stage)
 
     # -- what a step runs -------------------------------------------------------------------------
 
@@ -223,35 +198,29 @@ class Pipeline:
 
     def _make_parts(self) -> None:
         """The parts of all processors in esper's order, between those that open and close a step."""
-        physics, debug = self.world.physics, self.world.settings.debug
-        parts: list[Any] = [] if physics is None else [*physics.opening()]
+        physics, debug = self.physics, self.world.settings.debug
+        parts: list[Any] = [*physics.opening()]
         for processor in self.order.in_esper_order():
             parts += parts_of(processor)
-            if debug and physics is not None:
+            if debug:
                 name = name_of(processor)
                 parts.append(PythonPart(name, lambda dt, name=name: physics.report_faults(f"after {name}: ")))
-        if physics is not None:
-            parts += physics.closing()
-        self._parts = merged(parts)
-        self._parts_order, self._parts_physics = self.order.version, 0 if physics is None else physics.parts_version
+        self._parts = merged([*parts, *physics.closing()])
+        self._parts_order, self._parts_physics = self.order.version, physics.parts_version
 
     def look_ahead(self) -> None:
         """Between two steps: know what the next one will do."""
         self.synchronize()
-        if self.world.physics is not None and not self.in_step:
-            self.world.physics.look_ahead(self.others_write())
+        if not self.in_step:
+            self.physics.look_ahead(self.others_write())
 
     # -- opening and closing ----------------------------------------------------------------------
 
     def _begin(self, others_write: bool) -> None:
-        physics = self.world.physics
         self.in_step = True
         esper_bridge.running.add(self.world.name)
-        if physics is None:
-            return
-        physics.table.in_step = True
         try:
-            physics.begin_step(others_write)
+            self.physics.begin_step(others_write)
         except BaseException as error:
             if hasattr(error, "__notes__"):  # it comes from a plugin's function
                 self.fail("compiling what the bodies' shapes need", error)
@@ -259,14 +228,10 @@ class Pipeline:
             raise
 
     def _open_window(self) -> None:
-        physics = self.world.physics
-        if physics is not None:
-            physics.contacts.open_window(self.clock.step_count)
-            physics.table.frame += 1
+        self.physics.open_window(self.clock.step_count)
 
     def _close_window(self) -> None:
-        if self.world.physics is not None:
-            self.world.physics.end_window()
+        self.physics.end_window()
         if self.faults.pending:
             self._tell_faults()
 
@@ -275,33 +240,25 @@ class Pipeline:
 
     def synchronize(self) -> None:
         """Bring the table in step with esper, unless a step is running: its rows stand still."""
-        physics = self.world.physics
-        if physics is None or self.in_step or physics.adoption.settled():
-            return
-        physics.contacts.take_deferred()
-        physics.adoption.synchronize(self.contents)
+        if not self.in_step and not self.physics.settled():
+            self.physics.synchronize(self.contents)
 
     def run(self, phase: Phase) -> None:
         """One phase alone; the clock stands still. If it raises, all is as it was before."""
         self.must_be_between_steps("a phase can be run")
-        physics = self.world.physics
         with esper_bridge.context(self.world.name):
             if self.processors.changed:
                 self.order.reconcile()
             self.synchronize()
-            if physics is not None:
-                physics.contacts.take_deferred()
+            self.physics.take_deferred()
             self._begin(True)
-            parts = [] if physics is None else [*physics.opening()]
+            parts = [*self.physics.opening()]
             for system in [s for s in self.order.systems if s.phase == phase]:
                 parts += parts_of(system)
             self._run_parts(merged(parts), self.world.settings.dt)
-            if physics is not None:
-                physics.contacts.columns_now()  # rows may move before they are read
+            self.physics.end_phase()
             self.in_step = False
             esper_bridge.running.discard(self.world.name)
-            if physics is not None:
-                physics.table.in_step = False
             self.order.apply()
         if self.faults.pending:
             self._tell_faults()
@@ -326,10 +283,7 @@ class Pipeline:
             return False
         self.in_step = False
         esper_bridge.running.discard(self.world.name)
-        physics = self.world.physics
-        if physics is not None:
-            physics.abandon_step()
-            physics.table.in_step = False
+        self.physics.abandon_step()
         with esper_bridge.context(self.world.name):
             self.order.apply()
         return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import esper
 
@@ -11,20 +11,18 @@ from ..data import esper_bridge
 from ..errors import NoPhysicsError, ScheduleError
 from .phases import ForceSystem, Phase, System, in_order, means
 
-if TYPE_CHECKING:
-    from .step import Pipeline
-
 PLACED = ("before", "after", "phase")  # attributes of a system that being added may set
 
 
 class SystemOrder:
     """What runs in a step. A system added or removed while one runs joins or leaves at its end."""
 
-    def __init__(self, pipeline: Pipeline) -> None:
+    def __init__(self, world: Any, runner: Any) -> None:
+        self.world = world
         self.systems: list[System] = []
         self.force_systems: list[ForceSystem] = []
         self.frame_systems: list[Any] = []
-        self._pipeline = pipeline
+        self._runner = runner  # the processor that runs the step
         self.version = 0  # changes with every change of what runs
         self._wanted: list[System] = []  # in order of addition, as they will be after the step
         self._wanted_forces: list[ForceSystem] = []
@@ -32,10 +30,6 @@ class SystemOrder:
         self.changed = False  # whether something has been asked for that is not so yet
         self.foreign = True  # whether code that is not carom's runs in the step and may write any column
         self._given: dict[int, dict[str, Any]] = {}  # what PLACED attributes a system had before it was added
-
-    @property
-    def world(self) -> Any:
-        return self._pipeline.world
 
     # -- adding -----------------------------------------------------------------------------------
 
@@ -153,7 +147,7 @@ class SystemOrder:
     def remove_processor(self, processor: Any) -> None:
         """By instance, or the last one added of a type; KeyError if there is none."""
         with esper_bridge.context(self.world.name):
-            if self._pipeline.processors.changed:
+            if self._runner.processors.changed:
                 self.reconcile()
             hits = [s for s in self._wanted if s is processor or type(s) is processor]
             if hits:
@@ -176,13 +170,13 @@ class SystemOrder:
         self.changed = True
         if action is not None:
             self._later.append(action)
-        if not self._pipeline.in_step:
+        if not self._runner.in_step:
             self.apply()
 
     def in_esper_order(self) -> list[esper.Processor]:
         """All processors but the one that runs the step, by priority."""
-        processors = self._pipeline.processors
-        return [processors[k] for k in range(len(processors)) if not isinstance(processors[k], self._pipeline.RUNNER)]
+        processors = self._runner.processors
+        return [processors[k] for k in range(len(processors)) if processors[k] is not self._runner]
 
     def apply(self) -> None:
         """Make the order what was asked for."""
@@ -211,7 +205,7 @@ class SystemOrder:
 
     def reconcile(self) -> None:
         """Take in what plain esper calls have added and removed, before a step."""
-        if self._pipeline.in_step:
+        if self._runner.in_step:
             return
         present = self.in_esper_order()
         lost = [s for s in self.systems if not any(s is p for p in present)]
@@ -222,12 +216,12 @@ class SystemOrder:
                     esper_bridge.remove_processor_instance(processor)  # it gets a place in its phase instead
                 self._add_system(processor, (), ())
         self.apply()
-        self._pipeline.processors.changed = False
+        self._runner.processors.changed = False
 
     def detach(self) -> None:
         """Leave esper; called in the world's context when the world closes."""
-        for processor in list(self._pipeline.processors):
-            if isinstance(processor, (System, self._pipeline.RUNNER)):
+        for processor in list(self._runner.processors):
+            if isinstance(processor, System) or processor is self._runner:
                 esper_bridge.remove_processor_instance(processor)
         esper_bridge.give_back_processors()
 

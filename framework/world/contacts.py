@@ -87,9 +87,9 @@ class ContactRows:
     step (m,); time_of_impact (m,) seconds since the start of the step, for impacts.
     """
 
-    def __init__(self, columns: dict[str, np.ndarray], lookup: EntityLookup) -> None:
+    def __init__(self, columns: dict[str, np.ndarray], membership: Callable[[], Membership]) -> None:
         self._own_columns = columns
-        self._lookup = lookup
+        self._membership = membership
 
     @property
     def _columns(self) -> dict[str, np.ndarray]:
@@ -128,7 +128,7 @@ class ContactRows:
         The contact is oriented from a to b. Entities that have been deleted meanwhile are skipped, also those deleted
         while iterating; so are contacts that are not enabled. :meth:`between` gives the same as columns.
         """
-        seen, start = ContactRows(self._columns, self._lookup), 0  # its columns stay when the loop takes a step
+        seen, start = ContactRows(self._columns, self._membership), 0  # its columns stay when the loop takes a step
         made: Iterator[tuple[int, Contact | None]] = iter(())
         if len(seen) >= VECTORIZED_MIN:  # find and make at once what matches now
             found = seen.between(first, second)
@@ -147,7 +147,7 @@ class ContactRows:
             if enabled is not None and not enabled[row]:
                 continue
             if types_of is None:  # at the first row
-                membership = self._lookup.membership()
+                membership = self._membership()
                 types_of, dead = membership.types_of, membership.dead
             of_a, of_b = types_of(a), types_of(b)
             if first in of_a and second in of_b:
@@ -156,7 +156,7 @@ class ContactRows:
                 a, b, turned = b, a, True
             else:
                 if not of_a and not of_b:
-                    self._lookup.membership()  # CaromError if the loop has closed the world
+                    self._membership()  # CaromError if the loop has closed the world
                 continue
             if dead and (a in dead or b in dead):
                 continue
@@ -169,7 +169,7 @@ class ContactRows:
         a, b, enabled = self.entity_a, self.entity_b, self._columns.get("enabled")
         rows = np.arange(len(a)) if enabled is None else np.flatnonzero(enabled)
         if len(rows):
-            membership = self._lookup.membership()
+            membership = self._membership()
             a_first, b_first = membership.mask(a[rows], first), membership.mask(b[rows], first)
             some = a_first | b_first
             rows, a_first, b_first = rows[some], a_first[some], b_first[some]
@@ -213,46 +213,6 @@ class ContactRows:
         return enabled is None or bool(enabled[index])
 
 
-class EntityLookup:
-    """Tells which living entities of the world have a component; CaromError if the world is closed."""
-
-    def __init__(self, membership: Callable[[], Membership]) -> None:
-        self.membership = membership
-
-
-class ContactSource:
-    """Where the contacts of a world come from; this one has none.
-
-    version
-        changes whenever :meth:`columns` has others to give
-    stay_step
-        the number of the step that :meth:`stay_columns` are of
-    """
-
-    @property
-    def version(self) -> int:
-        return 0
-
-    @property
-    def stay_step(self) -> int:
-        return -1
-
-    def columns(self) -> dict[str, np.ndarray]:
-        """The contacts as they are now, copies."""
-        raise NotImplementedError
-
-    def stay_columns(self) -> dict[str, np.ndarray]:
-        """Those that touched in the step before, too."""
-        raise NotImplementedError
-
-    def lively(self, columns: dict[str, np.ndarray]) -> np.ndarray:
-        """``enabled`` of those rows of these columns that take part in the step."""
-        return columns["enabled"]
-
-    def record_impacts(self) -> None:
-        """Add the impacts of the step that is running to the history, unless they are in it already."""
-
-
 class Contacts(ContactRows):
     """The last step's contacts, with ``enabled`` that systems between NARROW and RESPONSE may clear.
 
@@ -260,6 +220,12 @@ class Contacts(ContactRows):
 
     ``begin``, ``end`` and ``impacts`` hold everything since the start of the last ``step()`` or ``advance()``; inside
     a step they hold that step's rows only, so that a system sees each event once, however many steps a frame takes.
+
+    membership
+        which living entities of the world have a component; CaromError if the world is closed
+    source
+        of columns and events, see :class:`~carom.systems.contacts.events.RecordedContacts`; its version changes
+        whenever it has other columns to give
     """
 
     HISTORIES = ("begin", "end", "impacts")
@@ -267,14 +233,14 @@ class Contacts(ContactRows):
     def __init__(
         self,
         dimensions: int,
-        lookup: EntityLookup,
-        running_step: Callable[[], int | None] = lambda: None,
-        source: ContactSource | None = None,
+        membership: Callable[[], Membership],
+        running_step: Callable[[], int | None],
+        source: Any,
     ) -> None:
-        super().__init__(empty_columns(dimensions, enabled=True), lookup)
+        super().__init__(empty_columns(dimensions, enabled=True), membership)
         self._running_step = running_step  # the number of the step that is running, None between steps
         self.dimensions = dimensions
-        self._source = source or ContactSource()
+        self._source = source
         self._columns_of = self._source.version  # the version that the columns show
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
         self._window = 0  # number of the step that the window was opened with
@@ -311,8 +277,8 @@ class Contacts(ContactRows):
     def stay(self) -> ContactRows:
         """Pairs that touched in the last step and in the one before."""
         if self._source.stay_step < self._window:
-            return ContactRows(empty_columns(self.dimensions), self._lookup)
-        return ContactRows(self._source.stay_columns(), self._lookup)
+            return ContactRows(empty_columns(self.dimensions), self._membership)
+        return ContactRows(self._source.stay_columns(), self._membership)
 
     # -- what the systems write -------------------------------------------------------------------
 
@@ -381,13 +347,13 @@ class Contacts(ContactRows):
         if step is not None:
             chunks = [chunk for chunk in chunks if chunk["step"][0] == step]
         if not chunks:
-            return ContactRows(empty_columns(self.dimensions, impact=name == "impacts"), self._lookup)
+            return ContactRows(empty_columns(self.dimensions, impact=name == "impacts"), self._membership)
         if len(chunks) > 1:
             joined = {key: np.concatenate([chunk[key] for chunk in chunks]) for key in chunks[0]}
             if step is not None:
-                return ContactRows(joined, self._lookup)
+                return ContactRows(joined, self._membership)
             chunks[:] = [joined]
-        return ContactRows(chunks[0], self._lookup)
+        return ContactRows(chunks[0], self._membership)
 
 
 def _copied(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from ..data.saved.population import LooseValues, Population, Return
 from ..data.saved.table import SavedTable
 from ..errors import CaromError
 from .services import PhysicsServices
-
-if TYPE_CHECKING:
-    from .world import World
 
 
 @dataclass
@@ -55,7 +52,7 @@ class Snapshot:
     steps: int
 
     @classmethod
-    def of(cls, world: World, physics: PhysicsServices) -> Snapshot:
+    def of(cls, world: Any, physics: PhysicsServices) -> Snapshot:
         """Of a world whose table is up to date with esper; shares with it what is not carom's."""
         contents = world._contents()
         population = Population.of(contents.entities, physics.adoption)
@@ -75,7 +72,7 @@ class Snapshot:
         return {**vars(self), "owner": None, "population": self.population.without_handles()}
 
 
-def restore(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
+def restore(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> None:
     """Make the world what it was, whatever has come or gone since; its settings stay, dt too.
 
     CaromError, and nothing is changed, if the snapshot is of another kind of world.
@@ -84,7 +81,7 @@ def restore(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
     restore_plugins(snapshot, world)
 
 
-def restore_world(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
+def restore_world(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> None:
     """All but what plugins keep."""
     _check(snapshot, world, physics)
     if snapshot.owner is not physics:
@@ -113,13 +110,13 @@ def restore_world(snapshot: Snapshot, world: World, physics: PhysicsServices) ->
     physics.contacts.take_back(snapshot.contacts)
 
 
-def restore_plugins(snapshot: Snapshot, world: World) -> None:
+def restore_plugins(snapshot: Snapshot, world: Any) -> None:
     for plugin in world.plugins:
         if plugin.name in snapshot.kept:
             plugin.take_back(world, snapshot.kept[plugin.name])
 
 
-def _check(snapshot: Snapshot, world: World, physics: PhysicsServices) -> None:
+def _check(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> None:
     if snapshot.dimensions != physics.dimensions:
         raise CaromError(
             f"this snapshot is of a world of {snapshot.dimensions} dimensions; world {world.name!r} has "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable
-from typing import TYPE_CHECKING, Any, NoReturn, Self
+from typing import Any, NoReturn, Self
 
 from ..data.component import Component
 from ..errors import CaromError
@@ -12,14 +12,11 @@ from ..plugins.plugin import Plugin
 from . import saved_files, snapshots
 from .snapshots import Snapshot
 
-if TYPE_CHECKING:
-    from .world import World
-
 
 class StateVerbs:
     """Mixed into :class:`World`."""
 
-    def snapshot(self: World) -> Snapshot:  # type: ignore[misc]
+    def snapshot(self: Any) -> Snapshot:
         """A copy of the state: entities with their components, columns, contacts, clock, gravity, what plugins keep.
 
         Objects that are not carom's components are in it by reference. It can be pickled.
@@ -27,7 +24,7 @@ class StateVerbs:
         self._pipeline.must_be_between_steps("a snapshot can be taken")
         return Snapshot.of(self, self._synchronized())
 
-    def restore(self: World, snapshot: Snapshot) -> None:  # type: ignore[misc]
+    def restore(self: Any, snapshot: Snapshot) -> None:
         """Go back to a snapshot, whatever has been created, deleted, given or taken since; the settings stay.
 
         The steps that follow repeat those that followed the snapshot, to the bit. CaromError if it is of a world of
@@ -38,13 +35,13 @@ class StateVerbs:
         self._pipeline.must_be_between_steps("a snapshot can be restored")
         snapshots.restore(snapshot, self, self._services)
 
-    def state_hash(self: World) -> str:  # type: ignore[misc]
+    def state_hash(self: Any) -> str:
         """A hash of every body's state, in order of the ids: equal bits, equal hash."""
         return snapshots.state_hash(self._synchronized())
 
     # -- files ------------------------------------------------------------------------------------
 
-    def save(self: World, path: str | os.PathLike[str], *, leave_out: Collection[type[Any]] = ()) -> None:  # type: ignore[misc]
+    def save(self: Any, path: str | os.PathLike[str], *, leave_out: Collection[type[Any]] = ()) -> None:
         """Write a snapshot and the settings into a file, for :meth:`load`; one that is there is replaced at once.
 
         leave_out

@@ -92,9 +92,8 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         try:
             for plugin in plugins:
                 plugin.install(self)
-            if self.physics is not None:
-                self.physics.check_settings(self._settings)
-                self.physics.take_settings(self._settings)
+            self._pipeline.physics.check_settings(self._settings)
+            self._pipeline.physics.take_settings(self._settings)
             self.registry.world = self
         except BaseException:
             self._give_back()
@@ -190,12 +189,16 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             raise TypeError(f"settings must be Settings, got {settings!r}")
         self._open()
         self._pipeline.must_be_between_steps("settings can be replaced")
-        if self.physics is not None:
-            self.physics.check_settings(settings)
+        self._pipeline.physics.check_settings(settings)
         self._pipeline.clock.set_dt(settings.dt)
         self._settings = settings
+        self._pipeline.physics.take_settings(settings)
+
+    def take_physics(self, physics: PhysicsServices) -> None:
+        """Called by the plugin that provides physics; ValueError if there is some already."""
         if self.physics is not None:
-            self.physics.take_settings(settings)
+            raise ValueError("a world takes one Physics")
+        self.physics = self._pipeline.physics = physics
 
     @property
     def dimensions(self) -> int | None:
@@ -429,4 +432,4 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             if self._pipeline.processors.changed:
                 self._pipeline.order.reconcile()
             self._pipeline.look_ahead()
-            return Plan.of(self)
+            return Plan.of(self.systems, self._pipeline.physics)

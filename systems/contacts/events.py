@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ...framework.data.esper_bridge import Membership
 from ...framework.jit.records.record import Record
 from ...framework.schedule.phases import Phase
 from ...framework.schedule.stages import Check, Program, PythonPart, Stage
 from ...framework.settings import Settings
-from ...framework.world.contacts import ContactRows, Contacts, ContactSource, EntityLookup
+from ...framework.world.contacts import ContactRows, Contacts
 from ...framework.world.events import CONTACT_EVENTS
 from ..sleeping.stored import merged
 from ..staged import StagedSystem
@@ -20,7 +21,7 @@ from .event_stages import compare_contacts
 Columns = dict[str, np.ndarray]
 
 
-class RecordedContacts(ContactSource):
+class RecordedContacts:
     """The contacts in a world's records, as columns."""
 
     def __init__(self, state: Record) -> None:
@@ -33,10 +34,12 @@ class RecordedContacts(ContactSource):
 
     @property
     def version(self) -> int:
+        """Changes whenever :meth:`columns` has others to give."""
         return self._state.contacts_version
 
     @property
     def stay_step(self) -> int:
+        """The number of the step that :meth:`stay_columns` are of."""
         return int(self._touching.steps[self._touching.now])
 
     def columns(self) -> Columns:
@@ -54,8 +57,11 @@ class RecordedContacts(ContactSource):
         return columns
 
     def lively(self, columns: Columns) -> np.ndarray:
-        """Of what sleeps a contact that has been disabled wakes the two, and holds for one more step: a system that
-        looks at velocities sees none of sleepers. The records hold the others."""
+        """``enabled`` of those rows of these columns that take part in the step.
+
+        Of what sleeps a contact that has been disabled wakes the two, and holds for one more step: a system that
+        looks at velocities sees none of sleepers. The records hold the others.
+        """
         enabled, stored = columns["enabled"], self.stored.columns
         if not len(self.stored):
             return enabled
@@ -71,6 +77,7 @@ class RecordedContacts(ContactSource):
         return enabled[~asleep]
 
     def stay_columns(self) -> Columns:
+        """The contacts that touched in the step before, too."""
         now = self._touching.now
         columns = self._rows(now, self._touching.stayed[now, : self._touching.stays[now]])
         if len(self.stored):
@@ -113,6 +120,7 @@ class RecordedContacts(ContactSource):
         }
 
     def record_impacts(self) -> None:
+        """Add the impacts of the step that is running to the history, unless they are in it already."""
         if self._impacts.logged and not self._state.impacts_recorded:
             self._state.impacts_recorded = True
             self.record("impacts", self.impacts())
@@ -188,13 +196,13 @@ class ContactEvents(StagedSystem):
     )  # fmt: skip
 
     def __init__(
-        self, program: Program, source: RecordedContacts, contacts: Contacts, lookup: EntityLookup,
-        settings: Callable[[], Settings],
+        self, program: Program, source: RecordedContacts, contacts: Contacts,
+        membership: Callable[[], Membership], settings: Callable[[], Settings],
     ) -> None:  # fmt: skip
         super().__init__(program)
         self._state, self._source, self._contacts = program.state, source, contacts
         self._touching, self._impacts = program.state.contacts, program.state.impacts
-        self._lookup, self._settings = lookup, settings
+        self._membership, self._settings = membership, settings
         source.record = contacts.record
 
     def _parts(self) -> list[Any]:
@@ -288,7 +296,7 @@ class ContactEvents(StagedSystem):
         impacts = source.impacts() if events.wanted("impact") else None
         for columns, event in zip((begin, stay, end, impacts), CONTACT_EVENTS, strict=True):
             if columns is not None and len(columns["entity_a"]) and events.wanted(event):
-                events.dispatch_many(event, ContactRows(columns, self._lookup))
+                events.dispatch_many(event, ContactRows(columns, self._membership))
 
     def reason(self) -> str:
         if not self._state.collides:

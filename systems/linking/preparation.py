@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
+from ...framework.data.adoption import Adoption
 from ...framework.data.bodies import SelectedBodies
 from ...framework.data.column_copies import COPY_BLOCKS
 from ...framework.data.component import Component
 from ...framework.data.row_moves import MOVE_ROWS
+from ...framework.data.table import Table
 from ...framework.jit.background import link_in_background
 from ...framework.jit.link_all import link_all
 from ...framework.jit.linking import Called, Linked
@@ -36,9 +38,6 @@ from ..shapes.linking.linked_shapes import LinkedShapes
 from ..shapes.query import LinkedQuery, linked_query
 from ..stage_list import LINKED_PARTS, STAGES, WITH_COLLIDERS
 from .parts import linked_part
-
-if TYPE_CHECKING:
-    from ..simulation import Simulation
 
 QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside casts of the shapes of the scene
 
@@ -87,28 +86,29 @@ def link_possible(*kind: Any) -> None:
     link_in_background(functions)
 
 
-def prepare(simulation: Simulation, world: World, components: tuple[type[Any], ...]) -> None:
-    """Compile what bodies of these types will need beside those there are; TypeError for what is no component type.
+def keep_ready(scene: Scene, adoption: Adoption, components: tuple[type[Any], ...]) -> None:
+    """Let what bodies of these types will need belong to the scene; TypeError for what is no component type.
 
     The world keeps to the functions of all these shapes from now on, whether bodies of each exist or not.
     """
     for component in components:
         if not (isinstance(component, type) and issubclass(component, Component)):
             raise TypeError(f"prepare takes component types, got {component!r}")
-    table, registry, scene = simulation.table, world.registry, simulation.scene
+    table = scene.table
     wanted = {c for c in components if issubclass(c, Collider)}
     wanted.update(c for c in table.stacked_types(Collider.stack) if table.has_mask(c)[: table.count].any())
-    in_order(registry, wanted)
-    simulation.adoption.register(sorted({*wanted, *components}, key=lambda c: c.__name__))
+    in_order(scene.registry, wanted)
+    adoption.register(sorted({*wanted, *components}, key=lambda c: c.__name__))
     scene.prepared |= wanted
     scene.forget()
-    with simulation.attribute_errors():
-        simulation.refresh_for_queries()
-        link_all(needed_functions(*kind_of(scene, simulation.integration)))
-    _evaluate_forces(simulation, world)
 
 
-def _evaluate_forces(simulation: Simulation, world: World) -> None:
+def link_needed(scene: Scene, integration: Integration) -> None:
+    """Compile or load now all that such a world may call."""
+    link_all(needed_functions(*kind_of(scene, integration)))
+
+
+def evaluate_forces(table: Table, dynamic: Any, world: World) -> None:
     """Force systems of the game are pure: called for the bodies there are, they compile what they call.
 
     They get columns in place if all bodies have what they require, else copies that cannot be written: to numba two
@@ -116,7 +116,7 @@ def _evaluate_forces(simulation: Simulation, world: World) -> None:
     """
     if not world.force_systems:
         return
-    dynamic, force = simulation.bodies.dynamic, simulation.table.make("force").copy()
+    force = table.make("force").copy()
     try:
         for system in world.force_systems:
             has = np.ones(len(dynamic), bool)
@@ -125,6 +125,6 @@ def _evaluate_forces(simulation: Simulation, world: World) -> None:
             if has.any() and has.all():
                 system.add_forces(dynamic, world.time)
             if has.any():
-                system.add_forces(SelectedBodies(simulation.table, np.flatnonzero(has)), world.time)
+                system.add_forces(SelectedBodies(table, np.flatnonzero(has)), world.time)
     finally:
-        simulation.table.arrays["force"][...] = force
+        table.arrays["force"][...] = force

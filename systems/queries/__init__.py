@@ -8,8 +8,7 @@ moves and of what does not, which are built when the first query after a change 
 - :mod:`.overlap`: what touches a shape; :mod:`.nearest`: the nearest surface; :mod:`.neighbours`: bodies near bodies
 - :mod:`.casts`: along the path, with :mod:`.first_touch` for each body that comes near
 - :mod:`.candidates`: what these share; :mod:`.kernels`: how Python calls them
-- :mod:`.batch`: memory of batches, query shapes; :mod:`.queried_scene`: what queries see of a world; :mod:`.system`:
-  the verbs
+- :mod:`.batch`: memory of batches, query shapes; :mod:`.system`: the verbs
 
 Reads positions, offsets, shapes, their parameters and layers. Writes the record of the batch, and of the state the
 trace that errors name (``row_a`` to ``unsound_b``).

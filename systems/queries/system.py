@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +14,10 @@ from ...framework.jit.linking import Linked
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.world.hits import CastHits, Hits, NearestHits, Neighbours
-from ...framework.world.services import QueryServices
+from ..broad_phase.search import CandidateSearch
 from ..broad_phase.tree.tree import SpatialTree
+from ..scene import Scene
 from ..shapes.attribution import ErrorAttribution
-from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
 from .batch import CollectedHits, QueryBatch, QueryShape, joined, slices_of
 from .kernels import query_kernels
 from .neighbours import ALL_LAYERS
@@ -27,39 +28,7 @@ NEAREST_COLUMNS = ("entity", "row", "distance", "point", "normal")  # as the fie
 NEVER: Any = object()  # in place of a version
 
 
-class Scene(Protocol):
-    """What the queries need to know of the scene."""
-
-    @property
-    def linked(self) -> LinkedShapes | None:
-        """None if nothing has a collider."""
-        ...
-
-    @property
-    def parameter_records(self) -> ParameterRecords:
-        """Of these shapes; read only if there are any."""
-        ...
-
-    @property
-    def version(self) -> Any:
-        """Another value whenever shapes, rows, or where the bodies are may have changed."""
-
-    def refresh(self) -> None:
-        """Bring shapes, rows and the state's columns up to date; called by every query, so it has to be quick."""
-
-    def refresh_rotation(self) -> None:
-        """Bring axes and rotated parameters up to date; called when ``version`` has changed."""
-
-
-class CandidateSearch(Protocol):
-    """The trees of the broad phase."""
-
-    def partitions(self) -> tuple[SpatialTree, SpatialTree]:
-        """Of what moves and of what does not, with boxes around where the bodies are at this moment."""
-        ...
-
-
-class Queries(QueryServices):
+class Queries:
     """Answers to queries, from trees that are built when the first query after a change needs them.
 
     state
@@ -69,15 +38,18 @@ class Queries(QueryServices):
         tells the rows of entities
     registry
         the pairs of query shapes and bodies
-    scene, candidate_search
-        see :class:`Scene` and :class:`CandidateSearch`
+    candidate_search
+        has the trees of the broad phase
+    refresh
+        between two steps: brings shapes, rows and columns up to date; called by every query
     """
 
     def __init__(
-        self, state: Record, table: Table, registry: Registry, scene: Scene, candidate_search: CandidateSearch
-    ) -> None:
+        self, state: Record, table: Table, registry: Registry, scene: Scene, candidate_search: CandidateSearch,
+        refresh: Callable[[], None],
+    ) -> None:  # fmt: skip
         self._state, self._table, self._registry, self._scene = state, table, registry, scene
-        self._search, self._dimensions = candidate_search, state.dimensions
+        self._search, self._refresh, self._dimensions = candidate_search, refresh, state.dimensions
         self._kernels = query_kernels(state.dimensions)
         self._attribute_errors = ErrorAttribution(registry, state, lambda: scene.linked.shapes if scene.linked else ())
         self._shapes: dict[tuple[type[Any], bool], QueryShape] = {}  # and whether its parameters are the batch's own
@@ -160,7 +132,7 @@ class Queries(QueryServices):
         return NearestHits(*joined(pieces))
 
     def neighbours(self, radius: float, mask: int, askers: np.ndarray | None) -> Neighbours:
-        self._scene.refresh()
+        self._refresh()
         state, entity = self._state, self._state.bodies.entity
         if askers is None:
             rows = np.argsort(entity[: state.count], kind="stable")
@@ -186,10 +158,10 @@ class Queries(QueryServices):
 
     def _points_tree(self) -> int:
         """Address of a tree of the bodies' positions, boxes without size."""
-        if self._scene.version != self._points_version:
+        if self._scene.seen_version != self._points_version:
             position = self._state.bodies.position
             self._points.build(position, position, 0, self._state.count)
-            self._points_version = self._scene.version
+            self._points_version = self._scene.seen_version
         return self._points.record.address
 
     # -- what is met on the way -------------------------------------------------------------------
@@ -198,6 +170,7 @@ class Queries(QueryServices):
         self, origins: np.ndarray, directions: np.ndarray, limits: np.ndarray, mask: int, excluded: np.ndarray,
         only_nearest: bool,
     ) -> CastHits:  # fmt: skip
+        """What rays meet: the nearest, a row for each ray; or everything on one ray, in order."""
         if self._query_shape(SphereCollider, len(origins), sweeps=True) is None:
             return _no_cast_hits(len(origins), self._dimensions, only_nearest)
         queries, pieces = self._batch.record, []
@@ -213,6 +186,7 @@ class Queries(QueryServices):
         self, component: type[Any], columns: dict[str, np.ndarray], positions: np.ndarray, displacements: np.ndarray,
         mask: int, excluded: np.ndarray, only_nearest: bool,
     ) -> CastHits:  # fmt: skip
+        """What moving shapes meet: the nearest, a row for each shape; or everything that one shape meets, in order."""
         shape = self._query_shape(component, len(positions), own=False, sweeps=True)
         if shape is None:
             return _no_cast_hits(len(positions), self._dimensions, only_nearest)
@@ -264,17 +238,17 @@ class Queries(QueryServices):
             it is going to move
         """
         scene = self._scene
-        scene.refresh()
-        if scene.version != self._version:
+        self._refresh()
+        if scene.seen_version != self._version:
             self._renew()
-        if scene.linked is None:
+        if scene.linked is None or scene.parameters is None:
             return None
         if count > self._batch.queries or self._state.count > self._batch.results:
             self._reserve(count)
         shape = self._shapes.get((component, own))
         if shape is None:
             with self._attribute_errors(query=component):
-                shape = QueryShape(self._registry, scene.linked, scene.parameter_records, component)
+                shape = QueryShape(self._registry, scene.linked, scene.parameters, component)
             self._shapes[component, own] = shape
             if own:
                 self._bind(shape)
@@ -288,13 +262,13 @@ class Queries(QueryServices):
         """Build the trees again, and forget the query shapes if the shapes of the scene are others."""
         scene = self._scene
         if scene.linked is not None:
-            version = scene.linked, scene.parameter_records, self._registry.version
+            version = scene.linked, scene.parameters, self._registry.version
             if version != self._linked_version:
                 self._shapes, self._linked_version = {}, version
             scene.refresh_rotation()
             moving, static = self._search.partitions()
             self._trees = moving.record.address, static.record.address
-        self._version = scene.version
+        self._version = scene.seen_version
 
     def _reserve(self, count: int) -> None:
         """Make room for so many queries, and for hits with all bodies."""

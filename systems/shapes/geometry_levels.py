@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
-from ...framework.data.adoption import TogetherCheck
 from ...framework.data.batches import Stores
 from ...framework.data.component import Component
 from ...framework.data.handles import Sources
@@ -61,7 +60,7 @@ def arrange(has: np.ndarray) -> np.ndarray:
     return levels
 
 
-class LevelCheck(TogetherCheck):
+class LevelCheck:
     """Called before colliders are adopted: ValueError if those of one entity cannot be its levels."""
 
     def __init__(self, table: Table, registry: Registry) -> None:
@@ -74,6 +73,7 @@ class LevelCheck(TogetherCheck):
         members: Mapping[type[Component], Handles],
         gone: Mapping[type[Component], set[int]],
     ) -> None:
+        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: who loses them."""
         for component, handles in fresh.items():
             if issubclass(component, Collider):
                 self._check_dimensions(component, next(iter(handles)))
