@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 from ..components import Collider, RigidBody
-from ..framework.jit.records.schema import Schema, flag, flags, floats, integer, ints, number, vectors
+from ..framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
-from .broad_phase.records import GRID, VIEWS
+from .broad_phase.records import GRID, STATIC_GRID, VIEWS
 from .contacts.solving.records import SOLVER, WARM_START
 
 
@@ -21,75 +21,31 @@ def default_of(field: Any) -> Any:
     return field.empty_value(2)
 
 
-BODIES = Schema(
-    "Bodies",
-    # columns of the table
-    entity=ints(),
-    position=vectors(),
-    previous_position=vectors(),
-    linear_velocity=vectors(),
-    force=vectors(default=0.0),
-    mass=floats(),
-    inverse_mass=floats(),  # 0 for what cannot be moved
-    gravity_scale=floats(default=default_of(RigidBody.gravity_scale)),
-    linear_damping=floats(default=default_of(RigidBody.linear_damping)),
-    max_linear_speed=floats(default=default_of(RigidBody.max_linear_speed)),  # nan: no limit
-    constant_force=vectors(default=default_of(RigidBody.constant_force)),
-    applied_force=vectors(default=default_of(RigidBody.applied_force)),
-    step_force=vectors(default=default_of(RigidBody.step_force)),
-    ccd=flags(default=default_of(RigidBody.ccd)),
-    rotation=floats(),  # one angle, in 3D four numbers per body; without rows no body is rotated
-    quarantined=flags(default=False),  # takes no part: some value of it cannot be right
-    # the start of the step, for going back when it fails
-    kept_previous=vectors(),
-    kept_velocity=vectors(),
-    kept_step_force=vectors(),
-    # flight: x(t) = origin + path_velocity t + path_second t^2 + path_third t^3 within the step
-    start_velocity=vectors(),
-    origin=vectors(),
-    path_velocity=vectors(),
-    path_second=vectors(),
-    path_third=vectors(),
-    flight_velocity=vectors(),  # of an event-driven world, after the first half kick
-    acceleration=vectors(),
-    rk_middle=vectors(),
-    rk_speeds=vectors(),
-    rk_kicks=vectors(),
-    # colliders
-    rank=ints("int32"),  # place in the order of entity ids
-    collider_slot=ints("int8"),  # slot of the collider that gives layer, mask and material
-    shape=ints("int8"),  # of the last level; -1: none
-    offset=vectors(),  # of the last level, in the world
-    levels=ints("int8", stacked=True),  # shapes, cheapest first, the last one repeated
-    level_offsets=vectors(stacked=True),
-    level_not_enclosing=flags(),  # a rotated level may reach out of the one around it
-    axes=floats(),  # rotation matrices (n, d, d), flat
-    half_extents=vectors(),  # of the box around the shape; nan without one
-    min_extent=floats(),  # smallest full extent of the shape; 0 for what has no end
-    force_speed_change=floats(),  # by which forces change the speed in this step
-    lower=vectors(),  # boxes around the motion
-    upper=vectors(),
-    static_position=vectors(),  # of the static bodies when their boxes were made, from row 0
-    # swept bodies
-    search_margin=floats(),
-    search_lower=vectors(),  # where the centre may be while all neighbours are known
-    search_upper=vectors(),
-    # response
-    impact_count=ints("int32"),
-    counted_impacts=ints("int32"),  # those that the cap counts
-    caught=ints("int32"),  # impacts one after the other with what cannot be moved
-    last_impact=floats(),  # s since the start of the step
-    cluster_root=ints("int32"),
-    cluster_next=ints("int32"),
-    cluster_tail=ints("int32"),
-    cluster_inverse_mass=floats(),
-    cluster_holder=ints("int32"),  # what cannot be moved and holds it, or -1
-    supported=flags(default=False),  # the resting prediction has changed its velocity
-    support_change=vectors(),
-    most_support=floats(),  # m/s, that the resting prediction may change
-    held=flags(default=False),  # a contact at rest has pushed it
-    place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
-    # sleeping; the first ones are columns of the table, and move with its rows
+TABLE_SECTIONS = (
+    Section("body", "the table", "the entity of each row", entity=ints()),
+    Section(
+        "body", "the table", "the start of the step: for drawing between steps, and for going back",
+        previous_position=vectors(),
+    ),
+    Section("body", "the table", "the sum of forces", force=vectors(default=0.0)),
+    Section("body", "the table", "0 for what cannot be moved", inverse_mass=floats()),
+    Section(  # fields of components, of which the plan shows what the game has set
+        position=vectors(),
+        linear_velocity=vectors(),
+        mass=floats(),
+        gravity_scale=floats(default=default_of(RigidBody.gravity_scale)),
+        linear_damping=floats(default=default_of(RigidBody.linear_damping)),
+        max_linear_speed=floats(default=default_of(RigidBody.max_linear_speed)),  # nan: no limit
+        constant_force=vectors(default=default_of(RigidBody.constant_force)),
+        applied_force=vectors(default=default_of(RigidBody.applied_force)),
+        step_force=vectors(default=default_of(RigidBody.step_force)),
+        ccd=flags(default=default_of(RigidBody.ccd)),
+    ),
+)  # fmt: skip
+TABLE_COLUMNS = tuple(name for section in TABLE_SECTIONS for name in section)
+# Columns of the table too, which has them under names that begin with _ and are not shown.
+SLEEP_COLUMNS = Section(
+    "body", "the table", "bodies may sleep: who does, since when, and what they were like then",
     still=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
     rest_steps=ints("int32"),  # for how many steps it has been at rest
     island=ints(),  # entity id of the first body of those that sleep together; 0: none
@@ -98,10 +54,102 @@ BODIES = Schema(
     rest_force=vectors(),
     flown_position=vectors(),  # where free flight leads it from there
     flown_velocity=vectors(),
+)  # fmt: skip
+
+# Columns of the bodies that are made within a step or when rows have moved. Those that the first stage asks for which
+# needs them have a row for each of the table then, like all others.
+START = Section(
+    "body", "the step", "velocity at the start of the step, for the path",
+    start_velocity=vectors(),
+)  # fmt: skip
+QUARANTINE = Section(
+    "body", "the step", "a body had a value that cannot be: it takes no part",
+    quarantined=flags(default=False),
+)  # fmt: skip
+# Flight: x(t) = origin + path_velocity t + path_second t^2 + path_third t^3 within the step.
+COLLISIONS = Section(
+    "body", "collisions", "some body has a collider: boxes, extents, the path in the step, the response",
+    origin=vectors(),
+    path_velocity=vectors(),
+    half_extents=vectors(),  # of the box around the shape; nan without one
+    min_extent=floats(),  # smallest full extent of the shape; 0 for what has no end
+    force_speed_change=floats(),  # by which forces change the speed in this step
+    lower=vectors(),  # boxes around the motion
+    upper=vectors(),
+    rank=ints("int32"),  # place in the order of entity ids
+    collider_slot=ints("int8"),  # slot of the collider that gives layer, mask and material
+    impact_count=ints("int32"),
+    counted_impacts=ints("int32"),  # those that the cap counts
+)  # fmt: skip
+RESTED = "contacts have rested"
+PREDICTED = Section(
+    "body", "collisions", RESTED,
+    supported=flags(default=False),  # the resting prediction has changed its velocity
+    support_change=vectors(),
+    most_support=floats(),  # m/s, that the resting prediction may change
+)  # fmt: skip
+HELD = Section(
+    "body", "collisions", RESTED,
+    held=flags(default=False),  # a contact at rest has pushed it
+    place=ints("int32", default=-1),  # among the bodies of the solver; -1 between steps
+)  # fmt: skip
+CURVES = Section(
+    "body", "curved paths", "the integrator's paths are curved",
+    path_second=vectors(),
+    path_third=vectors(),
+)  # fmt: skip
+SWEEPS = Section(
+    "body", "swept bodies", "bodies are swept along their paths: how far impacts may send them",
+    search_margin=floats(),
+    search_lower=vectors(),  # where the centre may be while all neighbours are known
+    search_upper=vectors(),
+    caught=ints("int32"),  # impacts one after the other with what cannot be moved
+    last_impact=floats(),  # s since the start of the step
+    cluster_root=ints("int32"),
+    cluster_next=ints("int32"),
+    cluster_tail=ints("int32"),
+    cluster_inverse_mass=floats(),
+    cluster_holder=ints("int32"),  # what cannot be moved and holds it, or -1
+)  # fmt: skip
+EVALUATIONS = Section(
+    "body", "integrator", "the integrator evaluates forces more than once, or flies exactly",
+    acceleration=vectors(),
+    flight_velocity=vectors(),  # of an event-driven world, after the first half kick
+    rk_middle=vectors(),
+    rk_speeds=vectors(),
+    rk_kicks=vectors(),
+)  # fmt: skip
+FAILS = "the start of the step, for one that fails"
+UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())
+UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors())
+SLEEPING = Section(
+    "body", "sleeping", "bodies may sleep: islands, and whether anything has changed them",
     prints=ints(),  # of what code of the game may change unseen
     rest_root=ints("int32"),
     restless=flags(),
-)
+)  # fmt: skip
+
+BODIES = Schema(
+    "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, START, QUARANTINE, COLLISIONS, PREDICTED, HELD, CURVES, SWEEPS,
+    EVALUATIONS, UNDO, UNDO_FORCE, SLEEPING,
+    Section(
+        "body", "rotation", "some body is rotated, or a shape reads its axes",
+        axes=floats(),  # rotation matrices (n, d, d), flat
+    ),
+    Section(
+        "body", "shapes", "which shapes a body has, and where they are",
+        levels=ints("int8", stacked=True),  # shapes, cheapest first, the last one repeated
+        level_offsets=vectors(stacked=True),
+    ),
+    Section(
+        "static body", "collisions", "where it stood when its box was made",
+        static_position=vectors(),  # from row 0
+    ),
+    rotation=floats(),  # one angle, in 3D four numbers per body; without rows no body is rotated
+    shape=ints("int8"),  # of the last level; -1: none
+    offset=vectors(),  # of the last level, in the world
+    level_not_enclosing=flags(),  # a rotated level may reach out of the one around it
+)  # fmt: skip
 
 DYNAMIC_ROWS, STATIC_ROWS, ALL_ROWS = range(3)
 
@@ -162,27 +210,30 @@ SHAPES = Schema(
     mixing=ints(),  # rules of plugins
 )
 
-CANDIDATES = Schema(
-    "Candidates",
-    count=integer(),
-    first=ints("int32"),
-    second=ints("int32"),
-    half_a=ints("int32"),
-    half_b=ints("int32"),
-    starts=ints("int32"),
+NEAR = "bodies have come near each other"
+FOUND = Section("pair", "pairs", NEAR, first=ints("int32"), second=ints("int32"))
+HALVES = Section("pair", "pairs", NEAR, half_a=ints("int32"), half_b=ints("int32"))
+SORTED = Section(
+    "pair", "pairs", NEAR,
     sorted_a=ints("int32"),
     sorted_b=ints("int32"),
     kind=ints("int32"),  # pair of shapes
     bucket=ints("int32"),  # candidates by pair of shapes
+)  # fmt: skip
+CANDIDATES = Schema(
+    "Candidates", FOUND, HALVES, Section("pair", "pairs", NEAR, starts=ints("int32")), SORTED,
+    Section(
+        "pair", "pairs", NEAR,
+        seekers=ints("int32"),  # rows of bodies that look for others, all others being still, ascending
+    ),
+    count=integer(),
     bucket_starts=ints("int32"),
-    seeker_count=integer(),  # bodies that look for others, all others being still; ALL: every body does
-    seekers=ints("int32"),  # their rows, ascending
-)
+    seeker_count=integer(),  # how many; ALL: every body does
+)  # fmt: skip
 
 # Pairs whose layers meet, a's entity id the smaller, in canonical order.
-PAIRS = Schema(
-    "Pairs",
-    count=integer(),
+PAIR_COLUMNS = Section(
+    "pair", "pairs", NEAR,
     a=ints("int32"),
     b=ints("int32"),
     is_solid=flags(),  # they push each other
@@ -208,14 +259,12 @@ PAIRS = Schema(
     touching_count=integer(),
     touching=ints("int32"),
     place=ints("int32"),  # while two lists are merged
-)
+)  # fmt: skip
+PAIRS = Schema("Pairs", PAIR_COLUMNS, count=integer())
 
-IMPACTS = Schema(
-    "Impacts",
-    active=flag(),  # something may bounce in this step
-    sweeps=flag(),  # bodies are swept
-    # queue
-    waiting=integer(),
+BOUNCED = "bodies have bounced"
+EVENTS = Section(
+    "impact", "impacts", BOUNCED,
     event_pair=ints("int32"),
     event_count_a=ints(),  # impact_count of both bodies when the event was made
     event_count_b=ints(),
@@ -227,9 +276,46 @@ IMPACTS = Schema(
     event_point=vectors(),
     event_pull=vectors(),  # change of velocity along the surface
     heap=ints("int32"),
+)  # fmt: skip
+QUEUE = Section(
+    "impact", "impacts", BOUNCED,
     heads=ints("int32"),
     links=ints("int32"),
     looks=ints("int32"),
+)  # fmt: skip
+# Impacts at the same time: the events, by member; lists of the members of each body.
+MEMBERS = Section(
+    "impact", "impacts", BOUNCED,
+    member=ints("int32"),
+    group=ints("int32"),
+    is_left=flags(),
+    share=floats(),  # impulses along the normals, N s
+    before=floats(),
+    ahead=floats(),
+    weight=floats(),
+    terms=floats(),
+    rub=vectors(),  # impulses along the surfaces
+)  # fmt: skip
+BODIES_OF_MEMBERS = Section(
+    "impact", "impacts", BOUNCED,
+    firsts=ints("int32"),
+    searched_with=ints("int32"),  # where the log has the body's first one
+    gained=vectors(),  # change of velocity
+)  # fmt: skip
+LOG = Section(
+    "impact", "impacts", BOUNCED,
+    log_pair=ints("int32"),
+    log_time=floats(),
+    log_impulse=floats(),
+    log_normal=vectors(),
+    log_point=vectors(),
+)  # fmt: skip
+IMPACTS = Schema(
+    "Impacts", EVENTS, QUEUE, MEMBERS, Section("impact", "impacts", BOUNCED, next_member=ints("int32")),
+    BODIES_OF_MEMBERS, LOG,
+    active=flag(),  # something may bounce in this step
+    sweeps=flag(),  # bodies are swept
+    waiting=integer(),
     # the loop
     linked=flag(),
     last_pair=integer(),
@@ -240,24 +326,11 @@ IMPACTS = Schema(
     sunk_by=number(),  # the time of its impact while they are searched, else 0
     now=number(),
     until=number(),
-    # impacts at the same time: the events, by member; lists of the members of each body
+    # impacts at the same time
     together=integer(),  # for how many there must be room
     group_visits=integer(),  # impacts in all passes over groups of this step
     searching=integer(),  # the one in the log after which pairs are searched, until search_end
     search_end=integer(),
-    member=ints("int32"),
-    next_member=ints("int32"),
-    group=ints("int32"),
-    is_left=flags(),
-    share=floats(),  # impulses along the normals, N s
-    before=floats(),
-    ahead=floats(),
-    weight=floats(),
-    terms=floats(),
-    rub=vectors(),  # impulses along the surfaces
-    firsts=ints("int32"),
-    searched_with=ints("int32"),  # where the log has the body's first one
-    gained=vectors(),  # change of velocity
     # what has happened in this step
     logged=integer(),
     capped=integer(),
@@ -266,36 +339,43 @@ IMPACTS = Schema(
     halted=integer(),  # bodies that were stopped because these were too many,
     halted_row=integer(),  # and the first of them
     crossings=integer(),
-    log_pair=ints("int32"),
-    log_time=floats(),
-    log_impulse=floats(),
-    log_normal=vectors(),
-    log_point=vectors(),
-)
+)  # fmt: skip
 
 # Contacts at the end of the step and of the one before: [now, i] and [1 - now, i].
 CONTACTS = Schema(
     "Contacts",
+    Section(
+        "contact", "contacts", "bodies have touched",
+        entity_a=ints(stacked=True),
+        entity_b=ints(stacked=True),
+        point=vectors(stacked=True),
+        normal=vectors(stacked=True),
+        depth=floats(stacked=True),
+        impulse=floats(stacked=True),
+        enabled=flags(stacked=True),
+        rested=flags(stacked=True),
+        ended=ints("int32"),
+        began=ints("int32"),
+        stayed=ints("int32", stacked=True),
+    ),
     now=integer(),
     counts=ints(),
-    entity_a=ints(stacked=True),
-    entity_b=ints(stacked=True),
-    point=vectors(stacked=True),
-    normal=vectors(stacked=True),
-    depth=floats(stacked=True),
-    impulse=floats(stacked=True),
-    enabled=flags(stacked=True),
-    rested=flags(stacked=True),
     ends=integer(),
     begins=integer(),
     before=integer(),  # ``now`` at the start of the step
     stays=ints(),  # one for each of the two
-    ended=ints("int32"),
-    began=ints("int32"),
     stored=integer(),  # those among what sleeps, which are kept elsewhere
-    stayed=ints("int32", stacked=True),
     steps=ints(),  # numbers of the steps that the contacts are of
-)
+)  # fmt: skip
+
+# The solver's columns: those of contacts, but for ``starts``, and from ``bodies`` on those of bodies, islands, ranges.
+_fields = list(SOLVER.fields.items())
+_split = list(SOLVER.fields).index("bodies")
+SOLVER_CONTACTS = Section("contact", "contacts at rest", RESTED, **dict(_fields[:_split]))
+del SOLVER_CONTACTS.fields["starts"]
+SOLVER_BODIES = Section("body at rest", "contacts at rest", RESTED, **dict(_fields[_split:]))
+SOLVER.sections = SOLVER_CONTACTS, SOLVER_BODIES
+WARM_START.sections = (Section("contact", "contacts at rest", RESTED, **WARM_START.fields),)
 
 STATE = Schema(
     "State",
@@ -425,11 +505,11 @@ STATE = Schema(
     candidates=CANDIDATES,
     pairs=PAIRS,
     merged=PAIRS,  # room for the pairs of the rest of the step
-    impacts=IMPACTS,
     solver=SOLVER,
     warm_start=WARM_START,
     contacts=CONTACTS,
+    impacts=IMPACTS,
     grid=GRID,  # of what moves
-    static_grid=GRID,
+    static_grid=STATIC_GRID,
     views=VIEWS,
 )

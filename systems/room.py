@@ -30,28 +30,26 @@ from .codes import (
     RUN_NARROW,
 )
 from .impacts.looks import FRESH
-from .records import IMPACTS
+from .records import (
+    BODIES_OF_MEMBERS,
+    EVENTS,
+    HALVES,
+    HELD,
+    LOG,
+    MEMBERS,
+    PAIR_COLUMNS,
+    PREDICTED,
+    SOLVER_BODIES,
+    SOLVER_CONTACTS,
+    SORTED,
+    UNDO_FORCE,
+)
 from .scene import Scene
 
 COLOURS = 64
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
-ORDER = ("half_a", "half_b", "sorted_a", "sorted_b", "kind", "bucket")
-EVENTS = tuple(name for name in IMPACTS.fields if name.startswith("event_"))
-MEMBERS = ("member", "group", "is_left", "share", "before", "ahead", "weight", "terms", "rub")
-LOG = tuple(name for name in IMPACTS.fields if name.startswith("log_"))
-SOLVER_BODIES = (
-    "body_row", "used", "number", "island", "velocity", "velocity_before", "shift", "acceleration", "inverse_mass",
-    "heft", "mover", "shared", "squeezes", "way", "held", "size_of", "mass_of", "force_of", "lightest", "most_change",
-    "stiff", "own", "strike", "substeps_of", "hard_of", "passes", "bears", "range_of", "slope", "curvature", "energy",
-    "momentum", "allowed", "share", "taken", "struck", "unsolved", "leader",
-    "special", "row_ends", "body_ends",
-)  # fmt: skip
 # What these stages need of the bodies before they do anything.
-COLUMNS_OF = {
-    "sum_forces": ("force",), "end_flight": ("kept_step_force",),
-    "predict_rest": ("supported", "support_change", "most_support"), "gather": ("held", "place"),
-}  # fmt: skip
-SOLVER_OTHERS = ("starts", *SOLVER_BODIES)
+COLUMNS_OF = {"sum_forces": ("force",), "end_flight": UNDO_FORCE, "predict_rest": PREDICTED, "gather": HELD}
 
 
 class Room:
@@ -103,7 +101,7 @@ class Room:
     def _grow_order(self, dt: float) -> None:
         candidates, state = self._state.candidates, self._state
         if state.needed > len(candidates.sorted_a):
-            candidates.reserve(_with_spare(state.needed), *ORDER)
+            candidates.reserve(_with_spare(state.needed), *HALVES, *SORTED)
         candidates.reserve(self._scene.table.capacity + 1, "starts")
         kinds = state.shapes.count**2 + 2
         candidates.reserve(kinds, "bucket_starts")
@@ -117,8 +115,7 @@ class Room:
         self._reserve_pairs(state.merged, _with_spare(state.needed))
 
     def _reserve_pairs(self, pairs: Record, rows: int) -> None:
-        columns = [name for name, field in pairs.schema.fields.items() if isinstance(field, Column)]
-        pairs.reserve(rows, *columns, keep=len(pairs.a))
+        pairs.reserve(rows, *PAIR_COLUMNS, keep=len(pairs.a))
 
     def _grow_events(self, dt: float) -> None:
         """Whichever is too small: room for the search among all pairs, the queue, the log."""
@@ -130,7 +127,7 @@ class Room:
         old = len(impacts.heap)
         if state.needed > old:
             size = _with_spare(state.needed)
-            impacts.reserve(size, "heap", *EVENTS, keep=old)
+            impacts.reserve(size, *EVENTS, keep=old)
             impacts.heap[old:size] = np.arange(old, size)
         if impacts.logged + impacts.together >= len(impacts.log_pair):
             impacts.reserve(_with_spare(impacts.logged + impacts.together), *LOG, keep=impacts.logged)
@@ -139,19 +136,14 @@ class Room:
             impacts.reserve(rows, *MEMBERS)
             impacts.reserve(2 * rows, "next_member")
         if impacts.together > 0 and len(impacts.firsts) < state.count:
-            impacts.reserve(self._scene.table.capacity, "firsts", "searched_with", "gained")
+            impacts.reserve(self._scene.table.capacity, *BODIES_OF_MEMBERS)
         impacts.together = 0
         impacts.linked = False
 
     def _grow_solver(self, dt: float) -> None:
         solver, state = self._state.solver, self._state
-        per_contact = [
-            name
-            for name, field in solver.schema.fields.items()
-            if isinstance(field, Column) and name not in SOLVER_OTHERS
-        ]
         if state.needed > len(solver.first):
-            solver.reserve(_with_spare(state.needed), *per_contact)
+            solver.reserve(_with_spare(state.needed), *SOLVER_CONTACTS)
         bodies = min(2 * state.needed, state.count)
         if bodies > len(solver.body_row):
             solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *SOLVER_BODIES)

@@ -13,40 +13,24 @@ from ..framework.data.table import Table
 from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
 from ..framework.settings import Settings
+from .records import (
+    COLLIDERS,
+    COLLISIONS,
+    HELD,
+    PREDICTED,
+    QUARANTINE,
+    SLEEP_COLUMNS,
+    START,
+    TABLE_COLUMNS,
+    UNDO,
+    UNDO_FORCE,
+)
 from .shapes.geometry_levels import arrange, in_order
 from .shapes.linking.linked_shapes import LinkedShapes, ParameterRecords, linked_shapes
 from .shapes.rotation import axes_of
 
-# Columns of the table by their name in ``bodies``.
-TABLE_COLUMNS = (
-    "entity", "position", "previous_position", "linear_velocity", "force", "mass", "inverse_mass", "gravity_scale",
-    "linear_damping", "max_linear_speed", "constant_force", "applied_force", "step_force", "ccd",
-)  # fmt: skip
-# Those of bodies that sleep; the table has them under names that are not shown.
-SLEEP_COLUMNS = {
-    name: f"_{name}"
-    for name in (
-        "still", "rest_steps", "island", "watched", "rest_position", "rest_force", "flown_position", "flown_velocity",
-    )
-}  # fmt: skip
-STACKED_COLUMNS = ("offset", "restitution", "friction", "sensor", "layer", "mask")
-
-# Columns that are made within a step or when rows have moved, by what needs them.
-FLIGHT = ("start_velocity", "kept_previous", "kept_velocity")
-COLLISIONS = (
-    "origin", "path_velocity", "half_extents", "min_extent", "force_speed_change", "lower", "upper", "rank",
-    "collider_slot", "impact_count", "counted_impacts",
-)  # fmt: skip
-CURVES = ("path_second", "path_third")
-SWEEPS = (
-    "search_margin", "search_lower", "search_upper", "caught", "last_impact", "cluster_root", "cluster_next",
-    "cluster_tail", "cluster_inverse_mass", "cluster_holder",
-)  # fmt: skip
-HALF_KICKS = ("acceleration", "flight_velocity")  # of event-driven flight
-SEVERAL_EVALUATIONS = ("acceleration", "rk_middle", "rk_speeds", "rk_kicks")  # of integrators with force systems
-SLEEPING = ("prints", "rest_root", "restless")
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
-ON_DEMAND = ("quarantined", "kept_step_force", "supported", "support_change", "most_support", "held", "place")
+ON_DEMAND = (*QUARANTINE, *UNDO_FORCE, *PREDICTED, *HELD)
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
 # shape comes first: it tells who has arrived.
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")
@@ -139,7 +123,7 @@ class Scene:
         """Make everything that depends on which colliders there are."""
         table, bodies, count, moving = self.table, self.state.bodies, self.table.count, self.table.stops[1]
         self.state.slot_count = len(table.stacked_types(Collider.stack))
-        self.reserve(*FLIGHT, *(name for name in ON_DEMAND if len(getattr(bodies, name))))
+        self.reserve(*START, *UNDO, *(name for name in ON_DEMAND if len(getattr(bodies, name))))
         if present:
             self.reserve(*COLLISIONS)
             if len(bodies.static_position) < count - moving:
@@ -210,12 +194,12 @@ class Scene:
         for name in TABLE_COLUMNS:
             if name in table.arrays:
                 setattr(bodies, name, table.arrays[name])
-        for name, key in SLEEP_COLUMNS.items():
-            if key in table.arrays:
-                setattr(bodies, name, table.arrays[key])
+        for name in SLEEP_COLUMNS:
+            if f"_{name}" in table.arrays:
+                setattr(bodies, name, table.arrays[f"_{name}"])
         if "rotation" in table.arrays:
             bodies.rotation = table.arrays["rotation"].reshape(-1)
-        for name in STACKED_COLUMNS:
+        for name in COLLIDERS.fields:
             stack = table.stacks.get(f"{Collider.stack}.{name}")
             if stack is not None:
                 setattr(colliders, name, stack)

@@ -30,8 +30,7 @@ from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
 from .opening import check_finite, keep_state, read_bodies
 from .quarantine.columns import check_columns
-from .records import BODIES, COLLIDERS, STATE
-from .scene import TABLE_COLUMNS
+from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS
 from .sleeping.stages import judge_rest, take_prints
 
 OPENING = (

@@ -9,7 +9,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
 from carom.framework.jit.records.record import Record
 from carom.framework.jit.records.schema import Scalar
-from carom.systems.room import SOLVER_BODIES
+from carom.systems.records import SOLVER_BODIES
 
 from .worlds import make_world
 

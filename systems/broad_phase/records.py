@@ -2,49 +2,61 @@
 
 from __future__ import annotations
 
-from ...framework.jit.records.schema import Schema, flag, floats, integer, ints, number, table, vectors
+from ...framework.jit.records.schema import Schema, Section, flag, floats, integer, ints, number, table, vectors
 
-# A uniform grid of boxes, see :mod:`.uniform_grid`.
-GRID = Schema(
-    "Grid",
-    suits=flag(),  # the boxes are even enough for a grid
-    version=integer(),  # static grid: ``state.statics_version`` when it was built; -1: never
-    first=integer(),  # static grid: the first static row, of which the other rows are counted
-    # cells are numbered x + y * row + z * layer, with one empty cell around the outermost
-    inverse_cell=number(),  # 1/m
-    row=integer(),
-    layer=integer(),
-    total=integer(),
-    frame=floats(),  # extent of the boxes in the grid, as ``state.frame``
-    scale=vectors(),  # one row; integers of a code per metre
-    # one entry per box
-    keys=ints("int32"),  # its cell
-    order=ints("int32"),  # rows in the order of their cells
-    cells=ints("int32"),  # these cells
-    codes=ints(),  # the boxes in small integers
-    directory=ints("int32"),  # where each cell begins in ``order``
-    notes=table("int32", 4),  # what has to be tested, see uniform_grid.look_around
-    # static grid alone: the rows in the grid with copies of their boxes, and the rows that are not in it
-    rows=ints("int32"),
-    lower=vectors(),
-    upper=vectors(),
-    longest=floats(),  # the longest edges, ascending
-    outside_count=integer(),
-    outside=ints("int32"),
-)
+
+def _grid(group: str, why: str) -> Schema:
+    """A uniform grid of boxes, see :mod:`.uniform_grid`."""
+    return Schema(
+        "Grid",
+        Section(
+            "body", group, why,
+            # one entry per box
+            keys=ints("int32"),  # its cell
+            order=ints("int32"),  # rows in the order of their cells
+            cells=ints("int32"),  # these cells
+            codes=ints(),  # the boxes in small integers
+            # static grid alone: the rows in the grid with copies of their boxes, and the rows that are not in it
+            rows=ints("int32"),
+            lower=vectors(),
+            upper=vectors(),
+        ),
+        suits=flag(),  # the boxes are even enough for a grid
+        version=integer(),  # static grid: ``state.statics_version`` when it was built; -1: never
+        first=integer(),  # static grid: the first static row, of which the other rows are counted
+        # cells are numbered x + y * row + z * layer, with one empty cell around the outermost
+        inverse_cell=number(),  # 1/m
+        row=integer(),
+        layer=integer(),
+        total=integer(),
+        frame=floats(),  # extent of the boxes in the grid, as ``state.frame``
+        scale=vectors(),  # one row; integers of a code per metre
+        directory=ints("int32"),  # where each cell begins in ``order``
+        notes=table("int32", 4),  # what has to be tested, see uniform_grid.look_around
+        longest=floats(),  # static grid: the longest edges, ascending
+        outside_count=integer(),
+        outside=ints("int32"),
+    )  # fmt: skip
+
+
+GRID = _grid("broad phase, grid", "more bodies than are tested pair by pair")
+STATIC_GRID = _grid("broad phase, static grid", "more static bodies than are tested pair by pair")
 
 MOST_SEEN = 8  # static bodies that a view remembers; what sees more looks into the grid in every step
 
 # What moving bodies remember of the static grid, see :mod:`.views`; one entry per moving body.
 VIEWS = Schema(
     "Views",
+    Section(
+        "body", "broad phase, static grid", "what a moving body has seen in the grid",
+        lower=vectors(),
+        upper=vectors(),
+        count=ints("int32"),  # static bodies in the view; -1: not known
+        seen=table("int32", MOST_SEEN),  # their rows
+    ),
     version=integer(),  # ``state.version`` and ``state.statics_version`` that they hold for
     statics_version=integer(),
-    lower=vectors(),
-    upper=vectors(),
-    count=ints("int32"),  # static bodies in the view; -1: not known
-    seen=table("int32", MOST_SEEN),  # their rows
-)
+)  # fmt: skip
 
 # A loose quadtree or octree, see :mod:`.tree`. Columns named level_* have one row per level: level 0 is the finest, row
 # ``levels`` the top level, row ``levels + 1`` the boxes that are in no level because they are empty or nan.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,73 +10,50 @@ from ...framework.data.column_copies import ColumnCopies
 from ...framework.data.columns import REQUIRED
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
+from ...framework.jit.records.schema import Schema, Section
 from ...framework.schedule.plan import PlannedColumn
-from ..room import SOLVER_BODIES
-from ..scene import COLLISIONS, CURVES, HALF_KICKS, SEVERAL_EVALUATIONS, SLEEP_COLUMNS, SLEEPING, SWEEPS, Scene
+from ..records import BODIES, SLEEP_COLUMNS
+from ..scene import Scene
 
 FIELDS = "what the game has set"
 DEFAULTS = "at their defaults, there because handles and world.bodies write in place"
-TABLE = {
-    "entity": "the entity of each row",
-    "previous_position": "the start of the step: for drawing between steps, and for going back",
-    "force": "the sum of forces",
-    "inverse_mass": "0 for what cannot be moved",
-    **dict.fromkeys(SLEEP_COLUMNS.values(), "bodies may sleep: who does, since when, and what they were like then"),
-}
-STANDING = "where it stood when its box was made"
 MASKS = "which components it has"
-GROUPS = (
-    ("the step", ("start_velocity",), "velocity at the start of the step, for the path"),
-    ("the step", ("quarantined",), "a body had a value that cannot be: it takes no part"),
-    ("collisions", COLLISIONS, "some body has a collider: boxes, extents, the path in the step, the response"),
-    ("collisions", ("supported", "support_change", "most_support", "held", "place"), "contacts have rested"),
-    ("curved paths", CURVES, "the integrator's paths are curved"),
-    ("swept bodies", SWEEPS, "bodies are swept along their paths: how far impacts may send them"),
-    (
-        "integrator", tuple(dict.fromkeys((*HALF_KICKS, *SEVERAL_EVALUATIONS))),
-        "the integrator evaluates forces more than once, or flies exactly",
-    ),
-    ("going back", ("kept_previous", "kept_velocity", "kept_step_force"), "the start of the step, for one that fails"),
-    ("sleeping", SLEEPING, "bodies may sleep: islands, and whether anything has changed them"),
-    ("rotation", ("axes",), "some body is rotated, or a shape reads its axes"),
-    ("shapes", ("levels", "level_offsets"), "which shapes a body has, and where they are"),
-)  # fmt: skip
 ROTATED = "some body is rotated: shapes as they are in the world"
 NOT_ENCLOSING = "some body has several colliders: whether the cheaper one still encloses the other"
 UNDO = "copies for going back to the start of a step that fails"
-NEAR = "bodies have come near each other"
-# Other records: what one of their rows is, and why they have any.
-RECORDS = (
-    ("candidates", "pair", "pairs", NEAR), ("pairs", "pair", "pairs", NEAR), ("merged", "pair", "pairs", NEAR),
-    ("solver", "contact", "contacts at rest", "contacts have rested"),
-    ("warm_start", "contact", "contacts at rest", "contacts have rested"),
-    ("contacts", "contact", "contacts", "bodies have touched"), ("impacts", "impact", "impacts", "bodies have bounced"),
-    ("grid", "body", "broad phase, grid", "more bodies than are tested pair by pair"),
-    ("static_grid", "body", "broad phase, static grid", "more static bodies than are tested pair by pair"),
-    ("views", "body", "broad phase, static grid", "what a moving body has seen in the grid"),
-)  # fmt: skip
-
-# Columns of these records whose rows are something else.
-NO_ROWS = {
-    "candidates": ("bucket_starts",), "solver": ("starts",),
-    **dict.fromkeys(("grid", "static_grid"), ("frame", "directory", "notes", "longest", "outside")),
-}  # fmt: skip
 
 
 def planned_columns(state: Record, table: Table, scene: Scene, copies: ColumnCopies) -> Iterator[PlannedColumn]:
     """All arrays of bodies, then of pairs, contacts and impacts; ``copies``: the room for those of all columns."""
+    bodies, capacity = state.bodies, table.capacity
+    of_table = [section for section in BODIES.sections if section.group == "the table"]
     yield from _fields(table)
-    yield from _table(table)
-    yield from _bodies(state.bodies, table.capacity, scene)
+    yield from _sections(bodies, of_table)
+    for component in table.component_types:
+        yield from _column(table.mask_name(component), "body", "the table", table.has_mask(component), capacity, MASKS)
+    yield from _sections(bodies, [section for section in BODIES.sections if section not in of_table])
+    yield from _column("stretches", "body", "shapes", scene.stretches, capacity, NOT_ENCLOSING)
+    yield from _column("level_not_enclosing", "body", "shapes", bodies.level_not_enclosing, capacity, NOT_ENCLOSING)
+    for key, array in sorted(scene.rotated_columns.items()):
+        yield from _column(f"{key}, rotated", "body", "rotation", array, capacity, ROTATED)
     for key, copy in copies.sizes():
         yield from _column(f"copy of {key}", "body", "going back", copy, len(copy), UNDO)
-    for name, of, group, reason in RECORDS:
-        record = getattr(state, name)
-        for key, array in record.columns().items():
-            rows = array.shape[1] if record.schema.fields[key].stacked else len(array)
-            if rows > 2 and key not in NO_ROWS.get(name, ()):  # fewer: numbers of the whole record
-                kind = "body at rest" if name == "solver" and key in SOLVER_BODIES else of
-                yield from _column(key, kind, group, array, rows, reason)
+    for name, schema in state.schema.fields.items():
+        if isinstance(schema, Schema) and schema is not BODIES:
+            yield from _sections(getattr(state, name), schema.sections, least=3)  # fewer: numbers of the whole record
+
+
+def _sections(record: Record, sections: Sequence[Section], least: int = 1) -> Iterator[PlannedColumn]:
+    """The columns of a record that have rows."""
+    for section in sections:
+        for name in section if section.why else ():
+            array = getattr(record, name)
+            rows = array.shape[1] if record.schema.fields[name].stacked else len(array)
+            if name == "axes":
+                rows //= record.dimensions**2
+            if rows >= least:
+                shown = f"_{name}" if section is SLEEP_COLUMNS else name
+                yield from _column(shown, section.of, section.group, array, rows, section.why)
 
 
 def _column(name: str, of: str, group: str, array: np.ndarray, rows: int, reason: str) -> Iterator[PlannedColumn]:
@@ -99,26 +76,3 @@ def _fields(table: Table) -> Iterator[PlannedColumn]:
             for column in columns:
                 array = table.arrays[column.key]
                 yield from _column(column.key, "body", component.__name__, array, table.capacity, reason)
-
-
-def _table(table: Table) -> Iterator[PlannedColumn]:
-    for key, reason in TABLE.items():
-        if key not in table.arrays:
-            continue
-        yield from _column(key, "body", "the table", table.arrays[key], table.capacity, reason)
-    for component in table.component_types:
-        yield from _column(
-            table.mask_name(component), "body", "the table", table.has_mask(component), table.capacity, MASKS
-        )
-
-
-def _bodies(bodies: Record, capacity: int, scene: Scene) -> Iterator[PlannedColumn]:
-    for group, names, reason in GROUPS:
-        for name in names:
-            yield from _column(name, "body", group, getattr(bodies, name), capacity, reason)
-    standing = bodies.static_position
-    yield from _column("static_position", "static body", "collisions", standing, len(standing), STANDING)
-    yield from _column("stretches", "body", "shapes", scene.stretches, capacity, NOT_ENCLOSING)
-    yield from _column("level_not_enclosing", "body", "shapes", bodies.level_not_enclosing, capacity, NOT_ENCLOSING)
-    for key, array in sorted(scene.rotated_columns.items()):
-        yield from _column(f"{key}, rotated", "body", "rotation", array, capacity, ROTATED)

@@ -14,7 +14,8 @@ from ..broad_phase.boxes import box_rows
 from ..broad_phase.search import CandidateSearch
 from ..ccd.search_bounds import DISCRETE
 from ..integration.system import Integration
-from ..scene import SWEEPS, Scene
+from ..records import SWEEPS
+from ..scene import Scene
 from ..stage_list import LINKED_PARTS
 from .parts import BOX_ROWS, COUNT, SWEPT, TAKE_TOGETHER, linked_part
 from .preparation import kind_of, link_possible

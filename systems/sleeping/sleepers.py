@@ -10,8 +10,9 @@ from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
 from ..broad_phase.seekers import ALL
+from ..records import SLEEP_COLUMNS, SLEEPING
 from ..room import Room
-from ..scene import SLEEP_COLUMNS, SLEEPING, Scene
+from ..scene import Scene
 from ..tracking import CONTACTS as CONTACT_NUMBERS
 from ..tracking import WARM_START, put_rows_back, saved_rows
 from .stages import AWAKE, DISTURBED, FALLING, STILL
@@ -23,10 +24,8 @@ PATH = ("origin", "path_velocity", "path_second", "path_third")
 
 def add_columns(table: Table) -> None:
     """The columns that move with the rows; none of them has an array before something sleeps."""
-    for name, dtype in (("still", np.int8), ("rest_steps", np.int32), ("island", np.int64), ("watched", np.int64)):
-        table.add_array(SLEEP_COLUMNS[name], dtype=dtype, on_demand=True)
-    for name in ("rest_position", "rest_force", "flown_position", "flown_velocity"):
-        table.add_array(SLEEP_COLUMNS[name], "vector", on_demand=True)
+    for name, column in SLEEP_COLUMNS.fields.items():
+        table.add_array(f"_{name}", column.item, dtype=column.dtype, on_demand=True)
 
 
 class Sleepers:
@@ -63,8 +62,8 @@ class Sleepers:
             self._all_wake = True
         self._state.sleeping, self.on = sleeping, sleeping or self._all_wake
         if sleeping:
-            for key in SLEEP_COLUMNS.values():
-                self._table.make(key)
+            for name in SLEEP_COLUMNS:
+                self._table.make(f"_{name}")
 
     # -- a step -----------------------------------------------------------------------------------
 
@@ -152,7 +151,7 @@ class Sleepers:
 
     def disturb(self, entities: np.ndarray) -> None:
         """The islands of those that sleep are awake from the next step on."""
-        still, rows = self._table.arrays.get(SLEEP_COLUMNS["still"]), self._table.rows_of(entities)
+        still, rows = self._table.arrays.get("_still"), self._table.rows_of(entities)
         if still is not None:
             rows = rows[(rows >= 0) & (rows < self._table.stops[0])]
             still[rows[still[rows] > AWAKE]] = DISTURBED

@@ -10,6 +10,7 @@ A schema is a list of named fields. :class:`~carom.framework.jit.records.record.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -72,12 +73,26 @@ class Column:
         return np.full((rows, *self.item_shape(dimensions)), self.default or 0, self.dtype)
 
 
+class Section:
+    """Some fields of a schema whose columns are there for one reason and grow together; iterates over their names.
+
+    of, group, why
+        for ``world.plan()``: what one of their rows is, what uses them, and why there are any; empty: not shown
+    """
+
+    def __init__(self, of: str = "", group: str = "", why: str = "", /, **fields: Field) -> None:
+        self.of, self.group, self.why, self.fields = of, group, why, fields
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, field in self.fields.items() if isinstance(field, Column))
+
+
 class Schema:
     """Named fields in a fixed order; a field may be another schema: the address of a record of it."""
 
-    def __init__(self, name: str, **fields: Field) -> None:
-        self.name = name
-        self.fields = fields
+    def __init__(self, name: str, *sections: Section, **fields: Field) -> None:
+        self.name, self.sections = name, sections
+        self.fields = {**{name: field for section in sections for name, field in section.fields.items()}, **fields}
 
     @cached_property
     def layout(self) -> dict[str, int]:
