@@ -69,16 +69,18 @@ class Room:
 
     def handlers(self, simulation: Any) -> dict[int, Callable[[float], None]]:
         """What to do for each code; ``simulation`` has the systems that run when a phase before them has not."""
-        growing = {
-            NEED_ORDER: self._grow_order, NEED_PAIRS: self._grow_pairs, NEED_EVENTS: self._grow_events,
-            NEED_CONTACTS: self._grow_contacts, NEED_SOLVER: self._grow_solver,
-            NEED_WARM_START: self._grow_warm_start, NEED_MERGED: self._grow_merged,
+        state = self._state
+        growing: dict[int, Callable[[], None]] = {
+            NEED_ORDER: self._grow_order, NEED_EVENTS: self._grow_events, NEED_SOLVER: self._grow_solver,
+            NEED_PAIRS: lambda: self._reserve_pairs(state.pairs),
+            NEED_MERGED: lambda: self._reserve_pairs(state.merged),
+            NEED_CONTACTS: lambda: self.reserve_contacts(state.needed),
+            NEED_WARM_START: lambda: self.reserve_warm_start(state.needed),
+            **{code: lambda code=code: self._search.grow(code) for code in (NEED_CANDIDATES, NEED_CELLS)},
         }  # fmt: skip
         return {
             **{code: self._named(grow) for code, grow in growing.items()},
-            NEED_CANDIDATES: self._named(lambda dt: self._search.grow(NEED_CANDIDATES)),
-            NEED_CELLS: self._named(lambda dt: self._search.grow(NEED_CELLS)),
-            NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[self._state.stage].name]),
+            NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[state.stage].name]),
             NEED_SWEEPS: simulation.make_sweeps_ready,
             NEED_TOGETHER: lambda dt: simulation.links.link_together(),
             FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
@@ -88,17 +90,17 @@ class Room:
             REFRESH_PAIRS: lambda dt: self._refresh_pairs(simulation, dt),
         }
 
-    def _named(self, grow: Callable[[float], None]) -> Callable[[float], None]:
+    def _named(self, grow: Callable[[], None]) -> Callable[[float], None]:
         def handler(dt: float) -> None:
             state = self._state
             try:
-                grow(dt)
+                grow()
             except MemoryError as error:
                 raise MemoryError(f"no memory for {state.needed} rows, which stage {state.stage} asks for") from error
 
         return handler
 
-    def _grow_order(self, dt: float) -> None:
+    def _grow_order(self) -> None:
         candidates, state = self._state.candidates, self._state
         if state.needed > len(candidates.sorted_a):
             candidates.reserve(_with_spare(state.needed), *HALVES, *SORTED)
@@ -106,18 +108,10 @@ class Room:
         kinds = state.shapes.count**2 + 2
         candidates.reserve(kinds, "bucket_starts")
 
-    def _grow_pairs(self, dt: float) -> None:
-        state = self._state
-        self._reserve_pairs(state.pairs, _with_spare(state.needed))
+    def _reserve_pairs(self, pairs: Record) -> None:
+        pairs.reserve(_with_spare(self._state.needed), *PAIR_COLUMNS, keep=len(pairs.a))
 
-    def _grow_merged(self, dt: float) -> None:
-        state = self._state
-        self._reserve_pairs(state.merged, _with_spare(state.needed))
-
-    def _reserve_pairs(self, pairs: Record, rows: int) -> None:
-        pairs.reserve(rows, *PAIR_COLUMNS, keep=len(pairs.a))
-
-    def _grow_events(self, dt: float) -> None:
+    def _grow_events(self) -> None:
         """Whichever is too small: room for the search among all pairs, the queue, the log."""
         impacts, state = self._state.impacts, self._state
         if len(impacts.looks) <= 2 * state.pairs.count:
@@ -140,19 +134,13 @@ class Room:
         impacts.together = 0
         impacts.linked = False
 
-    def _grow_solver(self, dt: float) -> None:
+    def _grow_solver(self) -> None:
         solver, state = self._state.solver, self._state
         if state.needed > len(solver.first):
             solver.reserve(_with_spare(state.needed), *SOLVER_CONTACTS)
         bodies = min(2 * state.needed, state.count)
         if bodies > len(solver.body_row):
             solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *SOLVER_BODIES)
-
-    def _grow_warm_start(self, dt: float) -> None:
-        self.reserve_warm_start(self._state.needed)
-
-    def _grow_contacts(self, dt: float) -> None:
-        self.reserve_contacts(self._state.needed)
 
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""

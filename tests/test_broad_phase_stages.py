@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers_boxes import Boxes, overlapping, pair_set
+from helpers_tree import query
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
@@ -230,4 +231,4 @@ def test_indexes_for_queries(d):
             assert sorted(index.rows.tolist()) == list(rows)
             assert (index.record.levels == 0) == (len(rows) <= BRUTE_FORCE_MAX)
             meet = ((lower[rows] <= upper[5]) & (lower[5] <= upper[rows])).all(axis=1)
-            assert index.query_one(lower[5], upper[5]).tolist() == (rows[0] + np.flatnonzero(meet)).tolist()
+            assert query(index, lower[5], upper[5]).tolist() == (rows[0] + np.flatnonzero(meet)).tolist()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers_tree import query
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
@@ -49,7 +50,7 @@ def unordered(first, second):
 
 
 def check_everything(lower, upper, rng):
-    """Pairs within, pairs between two halves, queries of many and of one: all equal to brute force."""
+    """Pairs within, pairs between two halves, single boxes: all equal to brute force."""
     n = len(lower)
     expected = brute_force.all_pairs(lower, upper)
     one_cell = tree_of(lower, upper, one_cell_max=n)
@@ -65,14 +66,10 @@ def check_everything(lower, upper, rng):
     assert set(found) == {(i, j) for i, j in expected if i < cut <= j}
 
     asked = rng.integers(0, n, min(n, 40)) if n else np.zeros(0, int)
-    offsets, rows = tree.query(lower[asked], upper[asked])
-    assert len(offsets) == len(asked) + 1
-    rows = rows.copy()
-    for k, i in enumerate(asked):
+    for i in asked:
         want = np.flatnonzero(brute_force.overlaps(lower, upper, lower[i], upper[i]))
-        np.testing.assert_array_equal(rows[offsets[k] : offsets[k + 1]], want)
-        np.testing.assert_array_equal(tree.query_one(lower[i], upper[i]), want)
-        np.testing.assert_array_equal(one_cell.query_one(lower[i], upper[i]), want)
+        np.testing.assert_array_equal(query(tree, lower[i], upper[i]), want)
+        np.testing.assert_array_equal(query(one_cell, lower[i], upper[i]), want)
 
 
 def scene(name, n, d, rng):
@@ -229,9 +226,7 @@ def test_hardly_any_bodies(n, d):
     assert len(tree.pairs_within()[0]) == n * (n - 1) // 2
     other = tree_of(np.zeros((5, d)), np.ones((5, d)))
     assert len(tree.pairs_between(other)[0]) == len(other.pairs_between(tree)[0]) == 5 * n
-    offsets, _ = tree.query(np.zeros((3, d)), np.ones((3, d)))
-    assert offsets.tolist() == [0, n, 2 * n, 3 * n]
-    assert tree.query(np.zeros((0, d)), np.zeros((0, d)))[0].tolist() == [0]
+    assert query(tree, np.zeros(d), np.ones(d)).tolist() == list(range(n))
 
 
 @both_dimensions
@@ -308,13 +303,11 @@ def test_output_is_a_function_of_the_input_alone(d):
 
 
 @both_dimensions
-def test_a_query_that_finds_everything_is_sorted(d):
+def test_an_endless_box_finds_everything(d):
     centre, half = scene("uniform", 2000, d, np.random.default_rng(13))
     tree = tree_of(centre - half, centre + half)
-    everything = np.full((1, d), np.inf)
-    np.testing.assert_array_equal(tree.query_one(-everything[0], everything[0]), np.arange(2000))
-    _, rows = tree.query(np.repeat(-everything, 3, axis=0), np.repeat(everything, 3, axis=0))
-    np.testing.assert_array_equal(rows, np.tile(np.arange(2000), 3))
+    everything = np.full(d, np.inf)
+    np.testing.assert_array_equal(query(tree, -everything, everything), np.arange(2000))
 
 
 def test_errors_name_what_is_wrong():
@@ -323,9 +316,5 @@ def test_errors_name_what_is_wrong():
     box = np.zeros((2, 2))
     with pytest.raises(ValueError, match=r"rows 0\.\.3 are not within the 2 given"):
         tree_of(box, box, 0, 3)
-    with pytest.raises(ValueError, match="boxes must be"):
-        tree_of(box, box).query(np.zeros((2, 3)), np.zeros((2, 3)))
-    with pytest.raises(ValueError, match="corners must have 2 numbers"):
-        tree_of(box, box).query_one((0, 0, 0), (1, 1, 1))
     with pytest.raises(ValueError, match="trees of 2 and 3 dimensions"):
         tree_of(box, box).pairs_between(SpatialTree(3))

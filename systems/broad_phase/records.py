@@ -106,11 +106,4 @@ TREE = Schema(
     pair_count=integer(),
     first=ints("int32"),
     second=ints("int32"),
-    # queries: query i overlaps found[offsets[i]:offsets[i + 1]]
-    query_count=integer(),
-    query_done=integer(),
-    query_lower=vectors(),
-    query_upper=vectors(),
-    offsets=ints(),
-    found=ints("int32"),
 )

@@ -101,10 +101,6 @@ class CandidateSearch:
         self._build_static()
         return self._moving, self._static
 
-    def make_index(self, count: int) -> SpatialTree:
-        """An index for so many boxes."""
-        return SpatialTree(self._state.dimensions)
-
     def _build(self, index: SpatialTree, start: int, stop: int) -> None:
         index.build(self._state.bodies.lower, self._state.bodies.upper, start, stop)
 

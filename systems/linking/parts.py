@@ -22,67 +22,48 @@ COUNT = 8
 SWEPT = BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS
 
 
-def _int(dimensions: int) -> Any:
-    return types.int64
-
-
-def _float(dimensions: int) -> Any:
-    return types.float64
-
-
-def _bool(dimensions: int) -> Any:
-    return types.boolean
-
-
-def _three_floats(dimensions: int) -> Any:
-    return types.UniTuple(types.float64, 3)
-
-
-def path_type(dimensions: int) -> Any:
-    """(x0, x1, x2, x3), see trajectory."""
-    return types.UniTuple(vector_type(dimensions), 4)
-
-
-def touch_type(dimensions: int) -> Any:
-    """(time, normal, point, from a's centre to b's)."""
-    vector = vector_type(dimensions)
-    return types.Tuple((types.float64, vector, vector, vector))
-
-
-def _signature(result: Callable[[int], Any], *arguments: Callable[[int], Any]) -> Callable[[int], Any]:
-    """Of (state, *arguments); each gives its type for a dimension."""
+def _signature(make: Callable[..., Any]) -> Callable[[int], Any]:
+    """By dimension: what ``make`` gives for (the types of the state, of a vector, of a path, int64, float64)."""
 
     @cache
     def signature_of(dimensions: int) -> Any:
-        return result(dimensions)(record_type(STATE, dimensions), *(kind(dimensions) for kind in arguments))
+        vector = vector_type(dimensions)
+        path = types.UniTuple(vector, 4)  # (x0, x1, x2, x3), see trajectory
+        return make(record_type(STATE, dimensions), vector, path, types.int64, types.float64)
 
     return signature_of
 
 
-def _first_touch(dimensions: int) -> Any:
-    vector = vector_type(dimensions)
-    return types.Tuple((types.int64, types.float64, vector, vector, vector))
+def _first_touch(state: Any, vector: Any, path: Any, i: Any, f: Any) -> Any:
+    found = types.Tuple((i, f, vector, vector, vector))
+    return found(state, i, i, path, types.boolean, f, f, types.UniTuple(f, 3))
+
+
+def _held_by_edge(state: Any, vector: Any, path: Any, i: Any, f: Any) -> Any:
+    touch = types.Tuple((f, vector, vector, vector))  # (time, normal, point, from a's centre to b's)
+    return types.boolean(state, i, i, path, touch, f, f)
 
 
 SIGNATURES = {
-    BOX_ROWS: _signature(_int, _int, _int, _int),
-    BOUND_SEARCHES: _signature(_int, _float, _float),
-    FIRST_TOUCH: _signature(_first_touch, _int, _int, path_type, _bool, _float, _float, _three_floats),
-    HELD_BY_EDGE: _signature(_bool, _int, _int, path_type, touch_type, _float, _float),
-    KIND_BEYOND_CAP: _signature(_int, _int, _int, path_type, _float, _float, _float, _float),
-    TAKE_SWEPT: _signature(_int, _int, _float),
-    WATCH_BOUNDS: _signature(_int, _int, _float),
-    TAKE_TOGETHER: _signature(_int, _int, _float),
+    place: _signature(make)
+    for place, make in {
+        BOX_ROWS: lambda state, vector, path, i, f: i(state, i, i, i),
+        BOUND_SEARCHES: lambda state, vector, path, i, f: i(state, f, f),
+        FIRST_TOUCH: _first_touch,
+        HELD_BY_EDGE: _held_by_edge,
+        KIND_BEYOND_CAP: lambda state, vector, path, i, f: i(state, i, i, path, f, f, f, f),
+        TAKE_SWEPT: lambda state, vector, path, i, f: i(state, i, f),
+        WATCH_BOUNDS: lambda state, vector, path, i, f: i(state, i, f),
+        TAKE_TOGETHER: lambda state, vector, path, i, f: i(state, i, f),
+    }.items()
 }
 
-call_box_rows = call_in_dimension(SIGNATURES[BOX_ROWS])
-call_bound_searches = call_in_dimension(SIGNATURES[BOUND_SEARCHES])
-call_first_touch = call_in_dimension(SIGNATURES[FIRST_TOUCH])
-call_held_by_edge = call_in_dimension(SIGNATURES[HELD_BY_EDGE])
-call_kind_beyond_cap = call_in_dimension(SIGNATURES[KIND_BEYOND_CAP])
-call_take_swept = call_in_dimension(SIGNATURES[TAKE_SWEPT])
-call_watch_bounds = call_in_dimension(SIGNATURES[WATCH_BOUNDS])
-call_take_together = call_in_dimension(SIGNATURES[TAKE_TOGETHER])
+call_box_rows, call_bound_searches, call_first_touch, call_held_by_edge = map(
+    call_in_dimension, [SIGNATURES[place] for place in (BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE)]
+)
+call_kind_beyond_cap, call_take_swept, call_watch_bounds, call_take_together = map(
+    call_in_dimension, [SIGNATURES[place] for place in (KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS, TAKE_TOGETHER)]
+)
 
 _linked: dict[tuple[Any, int], Linked] = {}
 

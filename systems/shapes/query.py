@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...framework.plugins.registry import Registry, Shape
 from ...framework.vectors import add, negative
 from .linking.linked_pair import LinkedPair, convex_sides, linked_pair
 from .linking.linked_shape import linked_shape
-from .linking.linked_shapes import LinkedShapes, ParameterRecords, set_support
+from .linking.linked_shapes import LinkedShapes, ParameterRecords, addresses, set_support
 from .linking.signatures import call_bounds, call_evaluate, call_sweep
 
 QUERY = Schema(
@@ -117,22 +117,16 @@ class LinkedQuery:
             also those of sweeps
         """
         query.parameters, query.bounds = parameters.address, self._functions.bounds.address
-        query.evaluate, query.flipped = self._evaluate, np.array(self.flipped, bool)
-        query.sweep = self._sweep if sweeps else np.zeros(len(self.pairs), np.int64)
+        query.evaluate, query.flipped = self._addresses("evaluate"), np.array(self.flipped, bool)
+        query.sweep = self._addresses("sweep") if sweeps else np.zeros(len(self.pairs), np.int64)
         for number in self._supported:
             if number is None:
                 set_support(parameters, self._functions)
             else:
                 bodies.need_support(number)
 
-    @cached_property
-    def _evaluate(self) -> np.ndarray:
-        return np.array([0 if pair is None else pair.evaluate.address for pair in self.pairs], np.int64)
-
-    @cached_property
-    def _sweep(self) -> np.ndarray:
-        found = (None if pair is None else pair.sweep for pair in self.pairs)
-        return np.array([0 if linked is None else linked.address for linked in found], np.int64)
+    def _addresses(self, name: str) -> np.ndarray:
+        return addresses(getattr(pair, name, None) for pair in self.pairs)
 
 
 @lru_cache(maxsize=KEPT)

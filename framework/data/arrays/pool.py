@@ -7,7 +7,7 @@ import weakref
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +15,6 @@ from ...errors import CaromError
 
 ROOM = 64  # rows, and numbers, of a new pool
 IN_FLIGHT = 16  # more than one component takes; who asks for many at once uses ``kept``
-
-
-class Holder(Protocol):
-    """What keeps numbers of arrays: a table, values outside of tables, a snapshot."""
-
-    def numbers_in(self, pool: Pool) -> Iterable[Any]:
-        """Arrays of numbers, or single ones."""
-        ...
 
 
 class Pool:
@@ -41,7 +33,8 @@ class Pool:
         self._in_flight: deque[int] = deque(maxlen=IN_FLIGHT)  # given last: their holder may not be known yet
         self._replaced: list[tuple[Any, int, int]] = []  # table, step, number: what a failed step puts back
         self._paused = 0
-        self.holders: weakref.WeakSet[Holder] = weakref.WeakSet()
+        # What keeps numbers of arrays: ``numbers_in(pool)`` gives arrays of numbers, or single ones.
+        self.holders: weakref.WeakSet[Any] = weakref.WeakSet()
 
     @property
     def starts(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from ....framework.jit.late import types
 from ....framework.jit.linking import Called, Linked, linked_call
 from ....framework.jit.records.record_type import record_at, record_type
 from ..records import TREE
-from . import build, pairs, queries
+from . import build, pairs
 
 BUILDING: tuple[Callable[..., Any], ...] = (
     build.build_one_cell, build.build_tree, build.assign_again, build.finish_tree,
@@ -19,7 +19,7 @@ BUILDING: tuple[Callable[..., Any], ...] = (
 PAIRS: tuple[Callable[..., Any], ...] = (
     pairs.find_ranges_within, pairs.find_ranges_between, pairs.test_within, pairs.test_between,
 )  # fmt: skip
-FUNCTIONS = (*BUILDING, *PAIRS, queries.query_boxes)
+FUNCTIONS = (*BUILDING, *PAIRS)
 
 
 class TreePasses:

@@ -7,7 +7,6 @@ infinite box overlaps all it covers. Same input, same output in the same order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -17,13 +16,12 @@ from ....framework.jit.records.record import Record, make_record
 from ..brute_force import BRUTE_FORCE_MAX
 from ..records import TREE
 from ..stages import CANDIDATE_LIMIT
-from . import build, pairs, queries
+from . import build, pairs
 from .passes import tree_passes
 from .refine import refine
 
 Rows: TypeAlias = NDArray[np.int32]
 Corners: TypeAlias = NDArray[np.float64]
-Vector: TypeAlias = Sequence[float] | NDArray[np.float64]
 
 
 class CandidateLimitError(RuntimeError):
@@ -64,8 +62,6 @@ class SpatialTree:
         record.level_stride[:], record.level_scale[:] = 0, 0.0
         record.reserve(pairs.CHUNK + pairs.BLOCK, "chunk_owners", "chunk_members")
         record.reserve(2 * pairs.CHUNK, "first", "second")
-        record.reserve(1024, "found")
-        self._one = np.empty((1, dimensions)), np.empty((1, dimensions)), np.zeros(2, np.int64)
         self._reserve(0)
 
     @property
@@ -96,11 +92,6 @@ class SpatialTree:
     def shift_rows(self, by: int) -> None:
         """The same boxes are those of rows further on by that many; until the next build."""
         self.rows[:] += by
-
-    @property
-    def boxes(self) -> Corners:
-        """(count, 2 d): lower and upper corners of the boxes, in the tree's order."""
-        return self.record.boxes[: self.count]
 
     @property
     def rows(self) -> Rows:
@@ -140,41 +131,6 @@ class SpatialTree:
         while run(f"test_{kind}", record, other.record) != pairs.DONE:
             record.reserve(2 * len(record.first), "first", "second", keep=record.pair_count)
         return record.first[: record.pair_count], record.second[: record.pair_count]
-
-    def query(self, query_lower: Corners, query_upper: Corners) -> tuple[NDArray[np.int64], Rows]:
-        """Overlaps of m boxes, (m, d) arrays: box i overlaps rows[offsets[i]:offsets[i + 1]], ascending.
-
-        ``rows`` is a view that holds until the next query.
-        """
-        query_lower = np.ascontiguousarray(query_lower, np.float64)
-        query_upper = np.ascontiguousarray(query_upper, np.float64)
-        if not query_lower.shape == query_upper.shape == (len(query_lower), self.dimensions):
-            raise ValueError(f"boxes must be (m, {self.dimensions}), not {query_lower.shape} and {query_upper.shape}")
-        offsets = np.zeros(len(query_lower) + 1, np.int64)
-        return offsets, self._answer(query_lower, query_upper, offsets)
-
-    def query_one(self, lower: Vector, upper: Vector) -> Rows:
-        """Rows whose box overlaps the one from ``lower`` to ``upper`` (d numbers each), ascending.
-
-        A view that holds until the next query. This is the quick way for a single box.
-        """
-        if not len(lower) == len(upper) == self.dimensions:
-            raise ValueError(f"corners must have {self.dimensions} numbers, not {len(lower)} and {len(upper)}")
-        self._one[0][0], self._one[1][0] = lower, upper
-        return self._answer(*self._one)
-
-    def _answer(self, lower: Corners, upper: Corners, offsets: NDArray[np.int64]) -> Rows:
-        record, run = self.record, self._passes.run
-        if record.offsets is not offsets:
-            record.query_lower, record.query_upper, record.offsets = lower, upper, offsets
-        record.query_done, record.query_count = 0, len(offsets) - 1
-        while run("query_boxes", record) != queries.ANSWERED:
-            record.reserve(2 * len(record.found), "found", keep=int(offsets[record.query_done]))
-        found = record.found[: offsets[-1]]
-        if len(found) > queries.SORTED_HERE:  # longer lists are not sorted yet
-            for i in np.flatnonzero(np.diff(offsets) > queries.SORTED_HERE):
-                found[offsets[i] : offsets[i + 1]].sort()
-        return found
 
     def _reserve(self, capacity: int) -> None:
         record = self.record

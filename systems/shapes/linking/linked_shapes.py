@@ -59,16 +59,12 @@ class LinkedShapes:
             sides = convex_sides(shapes[first], shapes[second], pair)
             self.supported.update(number for number, side in zip((first, second), sides, strict=True) if side)
         self._rules = tuple(linked_rule(rule) for rule in rules)
+        self._tables: dict[str, np.ndarray] = {}
 
     @cached_property
     def unhandled(self) -> tuple[tuple[int, int], ...]:
         """Pairs of numbers of shapes that no plugin has a pair for."""
         return tuple(numbers for numbers, pair in self.pairs.items() if pair is None)
-
-    @property
-    def has_concave(self) -> bool:
-        """Whether some shape is not convex."""
-        return not all(shape.convex for shape in self.shapes)
 
     @cached_property
     def needs_axes(self) -> bool:
@@ -81,11 +77,6 @@ class LinkedShapes:
         columns = (shape.component.columns[name] for shape in self.shapes for name in shape.columns)
         return any(isinstance(column, ArrayColumn) for column in columns)
 
-    @property
-    def rotation_changes(self) -> bool:
-        """Whether rotation changes the parameters of some shape."""
-        return any(shape.turned is not None for shape in self.shapes)
-
     def fill(self, shapes: Record, sweeps: bool = False) -> None:
         """Write the tables of functions into a record of ``SHAPES``; compiles or loads what is new.
 
@@ -95,10 +86,10 @@ class LinkedShapes:
         shapes.count = len(self.shapes)
         shapes.concave = np.array([not shape.convex for shape in self.shapes], bool)
         shapes.sharp = np.array([shape.sharp for shape in self.shapes], bool)
-        shapes.bounds, shapes.rotated, shapes.mixing = self._bounds, self._rotated, self._mixing
-        shapes.evaluate, shapes.batch, shapes.corner = self._evaluate, self._batch, self._corner
-        shapes.flipped = self._flipped
-        shapes.sweep = self._sweep if sweeps else np.zeros(len(self.shapes) ** 2, np.int64)
+        for name in ("bounds", "rotated", "evaluate", "batch", "corner"):
+            setattr(shapes, name, self._table(name))
+        shapes.mixing, shapes.flipped = addresses(self._rules), self._flipped
+        shapes.sweep = self._table("sweep") if sweeps else np.zeros(len(self.shapes) ** 2, np.int64)
 
     def all_functions(self, sweeps: bool) -> Iterator[Linked]:
         """Everything that a step may call for these shapes; sweeps: where there are swept bodies."""
@@ -109,42 +100,15 @@ class LinkedShapes:
             if pair is not None:
                 yield from pair.functions(sweeps)
 
-    @cached_property
-    def _bounds(self) -> np.ndarray:
-        return _addresses(function.bounds for function in self.functions)
-
-    @cached_property
-    def _rotated(self) -> np.ndarray:
-        return _addresses(function.rotated for function in self.functions)
-
-    @cached_property
-    def _mixing(self) -> np.ndarray:
-        return _addresses(self._rules)
-
-    @cached_property
-    def _evaluate(self) -> np.ndarray:
-        return self._of_pairs("evaluate")
-
-    @cached_property
-    def _batch(self) -> np.ndarray:
-        return self._of_pairs("batch")
-
-    @cached_property
-    def _corner(self) -> np.ndarray:
-        return self._of_pairs("corner")
-
-    @cached_property
-    def _sweep(self) -> np.ndarray:
-        return self._of_pairs("sweep")
-
-    def _of_pairs(self, name: str) -> np.ndarray:
-        """Addresses at first * count + second; 0 where there is no such function."""
-        count = len(self.shapes)
-        table = np.zeros(count * count, np.int64)
-        for (i, j), pair in self.pairs.items():
-            linked = None if pair is None else getattr(pair, name)
-            table[i * count + j] = 0 if linked is None else linked.address
-        return table
+    def _table(self, name: str) -> np.ndarray:
+        """Addresses of a function, by shape, or for pairs at first * count + second; 0 where there is none."""
+        if name not in self._tables:
+            if name in ("bounds", "rotated"):
+                functions = [getattr(function, name) for function in self.functions]
+            else:
+                functions = [getattr(self.pairs.get(pair), name, None) for pair in np.ndindex(2 * (len(self.shapes),))]
+            self._tables[name] = addresses(functions)
+        return self._tables[name]
 
 
 @lru_cache(maxsize=KEPT)
@@ -152,7 +116,8 @@ def _made(shapes: tuple[Shape, ...], pairs: tuple[Any, ...], rules: tuple[Any, .
     return LinkedShapes(shapes, dict(pairs), rules, dimensions)
 
 
-def _addresses(functions: Any) -> np.ndarray:
+def addresses(functions: Any) -> np.ndarray:
+    """Of linked functions; 0 where there is none."""
     return np.array([0 if function is None else function.address for function in functions], np.int64)
 
 
