@@ -74,10 +74,10 @@ def allocating_part(function: Any) -> Any:
     return Part(function.py_func, {**function.targetoptions, "_nrt": True})
 
 
-def linked_dispatcher(function: Any, allocates: bool) -> Any:
+def linked_dispatcher(function: Any) -> Any:
     """For functions that are called through their address alone, see :mod:`~carom.framework.jit.linking`."""
     plain = getattr(function, "py_func", function)
-    return Compiled(plain, {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": allocates or CHECKED}).made
+    return Compiled(plain, {**_OPTIONS, "no_cpython_wrapper": True, "_nrt": CHECKED}).made
 
 
 def _kept(kind: type[Compiled], function: Any, **options: Any) -> Any:

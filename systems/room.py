@@ -9,47 +9,18 @@ import numpy as np
 
 from ..framework.jit.records.record import Record
 from ..framework.jit.records.schema import Column
+from . import codes, records
 from .broad_phase.search import CandidateSearch
-from .codes import (
-    FIND_IN_PYTHON,
-    NEED_CANDIDATES,
-    NEED_CELLS,
-    NEED_COLUMNS,
-    NEED_CONTACTS,
-    NEED_EVENTS,
-    NEED_MERGED,
-    NEED_ORDER,
-    NEED_PAIRS,
-    NEED_SOLVER,
-    NEED_SWEEPS,
-    NEED_TOGETHER,
-    NEED_WARM_START,
-    REFRESH_PAIRS,
-    ROTATE,
-    RUN_BROAD,
-    RUN_NARROW,
-)
 from .impacts.looks import FRESH
-from .records import (
-    BODIES_OF_MEMBERS,
-    EVENTS,
-    HALVES,
-    HELD,
-    LOG,
-    MEMBERS,
-    PAIR_COLUMNS,
-    PREDICTED,
-    SOLVER_BODIES,
-    SOLVER_CONTACTS,
-    SORTED,
-    UNDO_FORCE,
-)
 from .scene import Scene
 
 COLOURS = 64
 SPARE = 1 << 16  # rows at most that are reserved beyond what is asked for
 # What these stages need of the bodies before they do anything.
-COLUMNS_OF = {"sum_forces": ("force",), "end_flight": UNDO_FORCE, "predict_rest": PREDICTED, "gather": HELD}
+COLUMNS_OF = {
+    "sum_forces": ("force",), "end_flight": records.UNDO_FORCE, "predict_rest": records.PREDICTED,
+    "gather": records.HELD,
+}  # fmt: skip
 
 
 class Room:
@@ -71,23 +42,25 @@ class Room:
         """What to do for each code; ``simulation`` has the systems that run when a phase before them has not."""
         state = self._state
         growing: dict[int, Callable[[], None]] = {
-            NEED_ORDER: self._grow_order, NEED_EVENTS: self._grow_events, NEED_SOLVER: self._grow_solver,
-            NEED_PAIRS: lambda: self._reserve_pairs(state.pairs),
-            NEED_MERGED: lambda: self._reserve_pairs(state.merged),
-            NEED_CONTACTS: lambda: self.reserve_contacts(state.needed),
-            NEED_WARM_START: lambda: self.reserve_warm_start(state.needed),
-            **{code: lambda code=code: self._search.grow(code) for code in (NEED_CANDIDATES, NEED_CELLS)},
+            codes.NEED_ORDER: self._grow_order,
+            codes.NEED_EVENTS: self._grow_events,
+            codes.NEED_SOLVER: self._grow_solver,
+            codes.NEED_PAIRS: lambda: self._reserve_pairs(state.pairs),
+            codes.NEED_MERGED: lambda: self._reserve_pairs(state.merged),
+            codes.NEED_CONTACTS: lambda: self.reserve_contacts(state.needed),
+            codes.NEED_WARM_START: lambda: self.reserve_warm_start(state.needed),
+            **{code: lambda code=code: self._search.grow(code) for code in (codes.NEED_CANDIDATES, codes.NEED_CELLS)},
         }  # fmt: skip
         return {
             **{code: self._named(grow) for code, grow in growing.items()},
-            NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[state.stage].name]),
-            NEED_SWEEPS: simulation.make_sweeps_ready,
-            NEED_TOGETHER: lambda dt: simulation.links.link_together(),
-            FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
-            ROTATE: lambda dt: self._scene.refresh_rotation(),
-            RUN_BROAD: lambda dt: simulation.broad_phase.process(dt),
-            RUN_NARROW: lambda dt: simulation.narrow_phase.process(dt),
-            REFRESH_PAIRS: lambda dt: self._refresh_pairs(simulation, dt),
+            codes.NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[state.stage].name]),
+            codes.NEED_SWEEPS: simulation.make_sweeps_ready,
+            codes.NEED_TOGETHER: lambda dt: simulation.links.link_together(),
+            codes.FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
+            codes.ROTATE: lambda dt: self._scene.refresh_rotation(),
+            codes.RUN_BROAD: lambda dt: simulation.broad_phase.process(dt),
+            codes.RUN_NARROW: lambda dt: simulation.narrow_phase.process(dt),
+            codes.REFRESH_PAIRS: lambda dt: self._refresh_pairs(simulation, dt),
         }
 
     def _named(self, grow: Callable[[], None]) -> Callable[[float], None]:
@@ -103,13 +76,13 @@ class Room:
     def _grow_order(self) -> None:
         candidates, state = self._state.candidates, self._state
         if state.needed > len(candidates.sorted_a):
-            candidates.reserve(_with_spare(state.needed), *HALVES, *SORTED)
+            candidates.reserve(_with_spare(state.needed), *records.HALVES, *records.SORTED)
         candidates.reserve(self._scene.table.capacity + 1, "starts")
         kinds = state.shapes.count**2 + 2
         candidates.reserve(kinds, "bucket_starts")
 
     def _reserve_pairs(self, pairs: Record) -> None:
-        pairs.reserve(_with_spare(self._state.needed), *PAIR_COLUMNS, keep=len(pairs.a))
+        pairs.reserve(_with_spare(self._state.needed), *records.PAIR_COLUMNS, keep=len(pairs.a))
 
     def _grow_events(self) -> None:
         """Whichever is too small: room for the search among all pairs, the queue, the log."""
@@ -121,26 +94,26 @@ class Room:
         old = len(impacts.heap)
         if state.needed > old:
             size = _with_spare(state.needed)
-            impacts.reserve(size, *EVENTS, keep=old)
+            impacts.reserve(size, *records.EVENTS, keep=old)
             impacts.heap[old:size] = np.arange(old, size)
         if impacts.logged + impacts.together >= len(impacts.log_pair):
-            impacts.reserve(_with_spare(impacts.logged + impacts.together), *LOG, keep=impacts.logged)
+            impacts.reserve(_with_spare(impacts.logged + impacts.together), *records.LOG, keep=impacts.logged)
         if impacts.together > len(impacts.member):
             rows = _with_spare(impacts.together)
-            impacts.reserve(rows, *MEMBERS)
+            impacts.reserve(rows, *records.MEMBERS)
             impacts.reserve(2 * rows, "next_member")
         if impacts.together > 0 and len(impacts.firsts) < state.count:
-            impacts.reserve(self._scene.table.capacity, *BODIES_OF_MEMBERS)
+            impacts.reserve(self._scene.table.capacity, *records.BODIES_OF_MEMBERS)
         impacts.together = 0
         impacts.linked = False
 
     def _grow_solver(self) -> None:
         solver, state = self._state.solver, self._state
         if state.needed > len(solver.first):
-            solver.reserve(_with_spare(state.needed), *SOLVER_CONTACTS)
+            solver.reserve(_with_spare(state.needed), *records.SOLVER_CONTACTS)
         bodies = min(2 * state.needed, state.count)
         if bodies > len(solver.body_row):
-            solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *SOLVER_BODIES)
+            solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *records.SOLVER_BODIES)
 
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""

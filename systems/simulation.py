@@ -416,7 +416,7 @@ class Simulation:
         with self.attribute_errors():
             self.refresh_for_queries()
             link_needed(self.scene, self.integration)
-        evaluate_forces(self.table, self.bodies.dynamic, self._world)
+        evaluate_forces(self.table, self.bodies, self._world)
 
     def _running_step(self) -> int | None:
         return self._world.step_count if self.table.in_step else None

@@ -8,12 +8,13 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
+from helpers_axes import axes_at
 from oracles import convex_brute
 from worlds import both_dimensions, mostly_2d
 
 from carom.components import AABBCollider
 from carom.framework.compilation import inlined, kernel
-from carom.framework.vectors import axes_at, dot, item, negative, replace, row, scale, store
+from carom.framework.vectors import dot, item, negative, replace, row, scale, store
 from carom.plugins import capsule
 from carom.plugins.capsule import CapsuleCollider
 from carom.systems.shapes.convex.pair import convex_convex

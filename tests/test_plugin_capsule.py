@@ -7,13 +7,14 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
+from helpers_axes import axes_at
 from oracles import convex_brute
 from worlds import both_dimensions, mostly_2d
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.framework.compilation import kernel
-from carom.framework.vectors import axes_at, row, store
+from carom.framework.vectors import row, store
 from carom.plugins import Physics, capsule
 from carom.plugins.capsule import CapsuleCollider, capsule_capsule, capsule_sphere
 

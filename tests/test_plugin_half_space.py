@@ -7,12 +7,13 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
+from helpers_axes import axes_at
 from worlds import both_dimensions, mostly_2d
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.framework.compilation import inlined, kernel
-from carom.framework.vectors import axes_at, row, store
+from carom.framework.vectors import row, store
 from carom.plugins import Physics, half_space
 from carom.plugins.half_space import HalfSpaceCollider, half_space_convex, two_half_spaces
 

@@ -30,15 +30,13 @@ class Linked:
         plain Python; helpers that it calls are compiled into it
     signature
         numba's: ``types.int64(state_type, types.float64)``
-    allocates
-        whether it may make arrays and raise exceptions with values; for functions of plugins
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Any, allocates: bool = False) -> None:
+    def __init__(self, function: Callable[..., Any], signature: Any) -> None:
         self.function = getattr(function, "py_func", function)
         self.name = self.function.__name__
         self.signature = signature
-        self._dispatcher = linked_dispatcher(function, allocates) if JIT else function
+        self._dispatcher = linked_dispatcher(function) if JIT else function
         self._address = 0
 
     @property

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
 from ...framework.data.adoption import Adoption
-from ...framework.data.bodies import SelectedBodies
+from ...framework.data.bodies import Bodies, SelectedBodies
 from ...framework.data.column_copies import COPY_BLOCKS
 from ...framework.data.component import Component
 from ...framework.data.row_moves import MOVE_ROWS
@@ -28,6 +28,7 @@ from ...framework.jit.tick_counter import TICKS_NOW
 from ...framework.schedule.stages import RUN_STAGES, linked_stage
 from ...framework.world.world import World
 from ..broad_phase.tree.passes import tree_passes
+from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
 from ..queries.kernels import query_kernels
 from ..records import STATE
@@ -108,7 +109,7 @@ def link_needed(scene: Scene, integration: Integration) -> None:
     link_all(needed_functions(*kind_of(scene, integration)))
 
 
-def evaluate_forces(table: Table, dynamic: Any, world: World) -> None:
+def evaluate_forces(table: Table, bodies: Bodies, world: World) -> None:
     """Force systems of the game are pure: called for the bodies there are, they compile what they call.
 
     They get columns in place if all bodies have what they require, else copies that cannot be written: to numba two
@@ -119,12 +120,11 @@ def evaluate_forces(table: Table, dynamic: Any, world: World) -> None:
     force = table.make("force").copy()
     try:
         for system in world.force_systems:
-            has = np.ones(len(dynamic), bool)
-            for component in system.requires:
-                has &= dynamic.has(component)
-            if has.any() and has.all():
-                system.add_forces(dynamic, world.time)
-            if has.any():
-                system.add_forces(SelectedBodies(table, np.flatnonzero(has)), world.time)
+            required = required_bodies(table, bodies, system)
+            if required is None:
+                continue
+            system.add_forces(required, world.time)
+            if not isinstance(required, SelectedBodies):
+                system.add_forces(SelectedBodies(table, np.arange(len(required))), world.time)
     finally:
         table.arrays["force"][...] = force

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ...compilation import pasted
 from ..columns import Column
 from .pool import Pool
 
@@ -27,10 +26,6 @@ class ArrayColumn(Column):
     convert: Callable[[Any], Any] | None = None
     lengths: bool = True
     pool: Pool = field(default_factory=lambda: Pool(1))
-
-    def parameters(self, numbers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What kernels need for :func:`array_at`."""
-        return numbers, self.pool.data, self.pool.starts
 
     def bounds(self) -> tuple[float, float]:
         """Numbers of arrays in the pool that an entity may have."""
@@ -114,10 +109,3 @@ def array_column(
 def _array_changed(table: Any, row: int) -> None:
     """The pool may have moved."""
     table.members_version += 1
-
-
-@pasted
-def array_at(numbers, data, starts, at):
-    """The array of row ``at``."""
-    number = numbers[at]
-    return data[starts[number] : starts[number + 1]]
