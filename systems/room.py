@@ -54,7 +54,7 @@ class Room:
         return {
             **{code: self._named(grow) for code, grow in growing.items()},
             codes.NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[state.stage].name]),
-            codes.NEED_SWEEPS: simulation.make_sweeps_ready,
+            codes.NEED_SWEEPS: lambda dt: simulation.link(),
             codes.NEED_TOGETHER: lambda dt: simulation.links.link_together(),
             codes.FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
             codes.ROTATE: lambda dt: self._scene.refresh_rotation(),

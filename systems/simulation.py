@@ -170,7 +170,7 @@ class Simulation:
         if self._must_check:
             self._check()
         if not self.links.follows(len(self._world.force_systems)):
-            self._link()
+            self.link()
         if others_write or words[self._others_write]:
             self._take_care(others_write)
 
@@ -224,7 +224,7 @@ class Simulation:
         if linked.unhandled:
             check_pairs(linked, scene.levels, state.bodies.collider_slot, self.table, self._world.registry)
 
-    def _link(self) -> None:
+    def link(self) -> None:
         """Compile or load what the step needs."""
         try:
             self.parts_version += self.links.link(len(self._world.force_systems))
@@ -248,10 +248,6 @@ class Simulation:
         self.program.run_one("box_statics", 0.0)
         self.program.run_one("box_motions", 0.0)
         state.moved, state.candidates_ready = before
-
-    def make_sweeps_ready(self, dt: float) -> None:
-        """Some body is swept from now on."""
-        self._link()
 
     def opening(self) -> list[Any]:
         """The parts of a step before all systems."""

@@ -55,6 +55,7 @@ class Wind(ForceSystem):
 
 class Steer(System):
     phase = Phase.START
+    world: World
 
     def process(self, dt: float) -> None:
         for entity, (transform, body) in self.world.get_components(Transform, RigidBody):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,7 @@ class CastVerbs:
     """``world.ray_cast`` and its kin, which look at the bodies where they stand now."""
 
     registry: Registry
-
-    def _synchronized(self) -> PhysicsServices:
-        """The physics, up to date with what was created and deleted."""
-        raise NotImplementedError
+    _synchronized: Callable[[], PhysicsServices]  # up to date with what was created and deleted
 
     def ray_cast(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
@@ -12,6 +12,7 @@ import esper
 from ..data import esper_bridge
 from ..data.component import Component, Many
 from ..errors import NoPhysicsError
+from .services import PhysicsServices
 
 C = TypeVar("C")
 
@@ -19,18 +20,14 @@ C = TypeVar("C")
 class EntityVerbs:
     """What esper's module functions do, for one world; mixed into :class:`World`."""
 
-    def _context(self) -> AbstractContextManager[None]:
-        """The world's esper context, made the current one for a while."""
-        raise NotImplementedError
-
-    def _contents(self) -> esper_bridge.Contents:
-        """What is in that context, to read without making it the current one."""
-        raise NotImplementedError
+    _context: Callable[[], AbstractContextManager[None]]  # the world's esper context, made the current one for a while
+    _contents: Callable[[], esper_bridge.Contents]  # what is in it, to read without making it the current one
+    physics: PhysicsServices | None
 
     @property
     def dimensions(self) -> int | None:
         """2 or 3; None before physics is in the world."""
-        raise NotImplementedError
+        return None if self.physics is None else self.physics.dimensions
 
     def create_entity(self, *components: Any) -> int:
         """A new entity with these components; its id.

@@ -201,10 +201,6 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
         self.physics = self._pipeline.physics = physics
 
     @property
-    def dimensions(self) -> int | None:
-        return None if self.physics is None else self.physics.dimensions
-
-    @property
     def _services(self) -> PhysicsServices:
         self._open()
         if self.physics is None:
