@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import os
 import shutil
 import subprocess
 import sys
 import tarfile
-import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
 
+import carom
+
 ROOT = Path(__file__).resolve().parent.parent
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-SETUPTOOLS = PROJECT["tool"]["setuptools"]
 FLOORS = (
     "framework",
     "components",
@@ -35,29 +35,46 @@ def python_files(folder: str) -> list[Path]:
 
 
 def package_of(folder: Path) -> str:
-    """The package of a source folder: the nearest mapped folder above it decides."""
-    relative = folder.relative_to(ROOT)
-    mapped = {Path(place): name for name, place in SETUPTOOLS["package-dir"].items()}
-    for parent in (relative, *relative.parents):
-        if parent in mapped:
-            return ".".join((mapped[parent], *relative.relative_to(parent).parts))
-    raise AssertionError(f"{relative} belongs to no package")
+    return ".".join(("carom", *folder.relative_to(ROOT).parts))
 
 
-def test_every_folder_with_modules_is_a_listed_package():
-    folders = {path.parent for floor in FLOORS for path in python_files(floor)}
-    assert {package_of(folder) for folder in folders} == set(SETUPTOOLS["packages"])
-    for folder in folders:
+def test_the_root_package_holds_names_and_links():
+    root = ROOT / "src" / "carom"
+    files = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
+    assert {path.name for path in root.iterdir() if path.name != "__pycache__"} == files | set(FLOORS)
+    for floor in FLOORS:
+        assert (root / floor).resolve() == ROOT / floor
+
+
+def test_every_folder_with_modules_is_a_package():
+    for folder in {path.parent for floor in FLOORS for path in python_files(floor)}:
         assert (folder / "__init__.py").is_file(), f"{folder} lacks __init__.py"
 
 
-def test_the_root_package_stays_bare():
-    root = ROOT / "framework" / "carom"
-    assert {p.name for p in root.iterdir() if p.name != "__pycache__"} == {
-        "__init__.py",
-        "__main__.py",
-        "py.typed",
-    }
+def test_each_name_of_carom_is_one_of_its_module_and_of_the_stub():
+    stub = {}
+    for node in ast.parse((ROOT / "src" / "carom" / "__init__.pyi").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            module = importlib.import_module(f"carom.{node.module}")
+            names = [alias.name for alias in node.names]
+            stub.update(dict.fromkeys(module.__all__ if names == ["*"] else names, module))
+    assert set(carom.__all__) == set(stub) <= set(dir(carom))
+    for name in carom.__all__:
+        assert getattr(carom, name) is getattr(stub[name], name)
+    with pytest.raises(AttributeError, match="module 'carom' has no attribute 'Wrold'"):
+        carom.Wrold  # noqa: B018
+
+
+def run_elsewhere(code: str, folder: Path, place: Path) -> str:
+    """What Python prints in a folder, with carom from a place."""
+    environment = {**os.environ, "PYTHONPATH": str(place)}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+def test_importing_carom_loads_none_of_its_parts():
+    code = "import sys, carom; print([name for name in sys.modules if name.startswith(('carom.', 'numpy', 'numba'))])"
+    assert run_elsewhere(code, ROOT, ROOT / "src").strip() == "[]"
 
 
 def imported_floors(path: Path) -> set[str]:
@@ -105,7 +122,7 @@ def source_copy(tmp_path_factory) -> Path:
     """The sources alone, so that building leaves nothing behind in the checkout."""
     copy = tmp_path_factory.mktemp("source") / "carom"  # the name a clone is likely to have
     hidden = shutil.ignore_patterns(".*", "build", "dist", "out", "*.egg-info", "__pycache__", "uv.lock")
-    shutil.copytree(ROOT, copy, ignore=hidden)
+    shutil.copytree(ROOT, copy, symlinks=True, ignore=hidden)
     return copy
 
 
@@ -113,9 +130,7 @@ def build(kind: str, source: Path, target: Path) -> Path:
     """Call setuptools' own build hooks, the ones pip calls: no network, no isolated environment."""
     code = f"import sys, setuptools.build_meta as b; print(b.build_{kind}(sys.argv[1]))"
     command = [sys.executable, "-c", code, str(target)]
-    result = subprocess.run(
-        command, cwd=source, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""}
-    )
+    result = subprocess.run(command, cwd=source, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""})
     assert result.returncode == 0, result.stderr
     return target / result.stdout.strip().splitlines()[-1]
 
@@ -126,12 +141,24 @@ def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
         metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/entry_points.txt"))
         entry_points = archive.read(metadata).decode()
-    expected = {"carom/py.typed"}
+    expected = {"carom/py.typed", *(f"carom/__{name}" for name in ("init__.py", "init__.pyi", "main__.py"))}
     for floor in FLOORS:
         for path in python_files(floor):
             expected.add("/".join((*package_of(path.parent).split("."), path.name)))
     assert names == expected
     assert "carom = carom.__main__:main" in entry_points
+
+
+@pytest.mark.parametrize("installed", ["editable", "wheel"])
+def test_a_clone_named_carom_in_the_working_folder_hides_nothing(source_copy, tmp_path, installed):
+    """An editable install puts src on the path; a folder without __init__.py comes after any package of its name."""
+    place = ROOT / "src"
+    if installed == "wheel":
+        place = tmp_path
+        with zipfile.ZipFile(build("wheel", source_copy, tmp_path)) as archive:
+            archive.extractall(place)
+    code = "import carom; from carom import Physics, World; print(carom.__file__, World(Physics()))"
+    assert run_elsewhere(code, source_copy.parent, place).startswith(str(place / "carom" / "__init__.py"))
 
 
 def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
@@ -143,8 +170,8 @@ def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
         "studies/runner.py",
         "LICENSE",
         "README.md",
-        "framework/carom/py.typed",
-        "lab/cli/main.py",
+        "src/carom/py.typed",
+        "src/carom/lab/cli/main.py",
     } <= names
 
 

@@ -81,7 +81,7 @@ def wheel(tmp_path_factory):
     """Built from a copy of the sources, as ``make wheel`` does, with the kernels that the tests run."""
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
-    shutil.copytree(ROOT, source, ignore=LEFT_OUT)
+    shutil.copytree(ROOT, source, symlinks=True, ignore=LEFT_OUT)
     run("-m", "carom", "warm-up", "--portable", source / "framework" / "prebuilt")
     run("-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source)
     (made,) = folder.glob("carom-*.whl")

@@ -7,7 +7,8 @@ import warnings
 
 import click
 
-from ... import __version__
+from carom import __version__
+
 from ...framework.compilation import log
 from ...framework.errors import PhysicsWarning
 from .group import LateCommand, LateCommands

@@ -1,0 +1,47 @@
+"""carom: a physics framework for games on the esper entity-component-system.
+
+What a game needs has its name here: ``from carom import World, Physics, Transform, RigidBody, SphereCollider``. A name
+loads its module when it is first used, so ``import carom`` loads nothing else. The parts, with all they hold:
+:mod:`carom.framework`, :mod:`carom.components`, :mod:`carom.systems`, :mod:`carom.plugins`, :mod:`carom.scenes` and
+:mod:`carom.lab` (command line and measuring).
+"""
+
+import importlib
+
+__version__ = "0.1.0"
+
+# Module: its names that are names of carom too. __init__.pyi says the same to editors and type checkers.
+_NAMES = {
+    "framework": (
+        "Bodies", "CaromError", "CastHit", "CastHits", "Column", "Component", "Contact", "Contacts", "ContactsBetween",
+        "Convex", "FaultError", "ForceSystem", "Hits", "MissingComponentError", "NearestHit", "NearestHits",
+        "Neighbours", "NoPhysicsError", "Phase", "PhysicsWarning", "Plan", "Plugin", "PluginError", "ScheduleError",
+        "Settings", "Snapshot", "Stats", "StepError", "System", "UnhandledPairError", "Vector", "World",
+        "array_column", "column", "use_kernels",
+    ),
+    "components": ("ALL_LAYERS", "AABBCollider", "Collider", "RigidBody", "SphereCollider", "Transform"),
+    "systems": (
+        "CUBIC", "LINE", "PARABOLA", "BroadPhase", "CandidateLimitError", "ContactEvents", "ForceAccumulation",
+        "Integration", "Integrator", "NarrowPhase", "Response", "SpatialTree",
+    ),
+    "plugins": ("Physics",),
+    "plugins.capsule": ("CapsuleCollider",),
+    "plugins.convex_polygon": ("ConvexPolygonCollider",),
+    "plugins.half_space": ("HalfSpaceCollider",),
+    "plugins.one_way_segment": ("OneWaySegmentCollider",),
+    "plugins.springs": ("Spring", "Springs"),
+    "plugins.tile_grid": ("TileGridCollider", "cells_of_text"),
+}  # fmt: skip
+_MODULES = {name: module for module, names in _NAMES.items() for name in names}
+__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'carom' has no attribute {name!r}")
+    value = globals()[name] = getattr(importlib.import_module(f"carom.{_MODULES[name]}"), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_MODULES})

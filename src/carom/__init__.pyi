@@ -1,0 +1,14 @@
+from .components import *
+from .framework import *
+from .plugins import *
+from .plugins.capsule import CapsuleCollider as CapsuleCollider
+from .plugins.convex_polygon import ConvexPolygonCollider as ConvexPolygonCollider
+from .plugins.half_space import HalfSpaceCollider as HalfSpaceCollider
+from .plugins.one_way_segment import OneWaySegmentCollider as OneWaySegmentCollider
+from .plugins.springs import Spring as Spring
+from .plugins.springs import Springs as Springs
+from .plugins.tile_grid import TileGridCollider as TileGridCollider
+from .plugins.tile_grid import cells_of_text as cells_of_text
+from .systems import *
+
+__version__: str
