@@ -20,15 +20,6 @@ os.environ["CAROM_CACHE_DIR"] = str(CACHE)
 os.environ.update({"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})
 
 
-# Files that take long begin first, so that no worker is left with one at the end.
-LONG = (
-    "test_tune_grid", "test_checked_build", "test_wheel", "test_trade",
-    "test_quarantine_everywhere", "test_extremes_duration", "test_impact_oracle", "test_tune", "test_piles",
-    "test_plugin_package", "test_docs", "test_settings_study", "test_gas_modes", "test_trade_resume",
-    "test_trade_command", "test_limits", "test_orbits",
-)  # fmt: skip
-
-
 def pytest_configure(config):
     """Tests look at world.faults; those of warnings set filters of their own."""
     config.addinivalue_line("filterwarnings", "ignore::carom.framework.PhysicsWarning")
@@ -40,7 +31,7 @@ def pytest_collection_modifyitems(config, items):
         long = [item for item in items if item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=long)
         items[:] = [item for item in items if not item.get_closest_marker("long")]
-    items.sort(key=lambda item: LONG.index(item.path.stem) if item.path.stem in LONG else len(LONG))
+    items.sort(key=lambda item: bool(item.get_closest_marker("last")) - bool(item.get_closest_marker("early")))
 
 
 def pytest_collection_finish(session):

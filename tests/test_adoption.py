@@ -12,6 +12,8 @@ from worlds import ball, make_world
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import MissingComponentError, System
 
+pytestmark = pytest.mark.plain
+
 world = helpers_adoption.world  # a fixture
 
 

@@ -16,6 +16,8 @@ from carom.plugins.convex_polygon import plugin as convex_polygon
 from carom.plugins.tile_grid import TileGridCollider
 from carom.plugins.tile_grid import plugin as tile_grid
 
+pytestmark = pytest.mark.plain
+
 POOL = ConvexPolygonCollider.columns["vertices"].pool
 TILES = TileGridCollider.columns["sums"].pool
 

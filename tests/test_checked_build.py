@@ -11,7 +11,7 @@ import pytest
 from helpers_determinism import Facade, mixed_scene, settled
 from helpers_processes import run_python
 
-pytestmark = pytest.mark.slow  # compiles everything
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # compiles everything
 
 MIXED = """
 from helpers_determinism import Facade, mixed_scene, settled

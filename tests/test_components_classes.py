@@ -10,6 +10,8 @@ from worlds import ball, make_world
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, column
 
+pytestmark = pytest.mark.plain
+
 # -- classes -------------------------------------------------------------------------------------
 
 

@@ -12,6 +12,8 @@ from worlds import ball, make_world
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import System
 
+pytestmark = pytest.mark.plain
+
 # -- values --------------------------------------------------------------------------------------
 
 

@@ -10,6 +10,8 @@ from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 
+pytestmark = pytest.mark.plain
+
 
 def test_many_broadcasts_and_gives_consecutive_ids():
     world = make_world()

@@ -11,6 +11,8 @@ from carom.framework import CaromError, Component, ForceSystem, NoPhysicsError, 
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.capsule import plugin as capsule
 
+pytestmark = pytest.mark.plain
+
 
 class Bullet(Component):
     expires: float = column(default=3.0)

@@ -7,6 +7,8 @@ import pytest
 from helpers_contacts import ids
 from worlds import ball, both_dimensions, box, floor, make_world, run
 
+pytestmark = pytest.mark.plain
+
 COLUMNS = {"entity_a": 1, "entity_b": 1, "point": 2, "normal": 2, "depth": 1, "normal_impulse": 1, "step": 1}
 
 

@@ -17,6 +17,8 @@ from carom.lab import step_limits
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
 
+pytestmark = pytest.mark.early
+
 MODES = ("discrete", "continuous", "event_driven")
 
 
@@ -89,6 +91,7 @@ def test_c19_a_crowd_parts_slowly(mode, d):
 
 
 # -- C23: from a moving frame ----------------------------------------------------------------------
+
 
 @both_dimensions
 @pytest.mark.parametrize("mode", MODES)

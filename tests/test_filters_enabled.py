@@ -12,6 +12,8 @@ from worlds import ball, both_dimensions, box, floor, make_world, position, run,
 from carom.components import RigidBody, Transform
 from carom.framework import Phase, System
 
+pytestmark = pytest.mark.plain
+
 
 class Disable(System):
     """Clears ``enabled`` in the steps selected by ``when(step)``, for the contacts of one entity or of all."""

@@ -10,6 +10,8 @@ from worlds import ball, both_dimensions, box, floor, make_world, position, run,
 from carom.components import AABBCollider
 from carom.framework import Phase, System
 
+pytestmark = pytest.mark.plain
+
 # -- sensors -------------------------------------------------------------------------------------
 
 

@@ -11,6 +11,8 @@ from worlds import EPS, make_world, position, run, velocity
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase
 
+pytestmark = pytest.mark.plain
+
 
 @all_methods
 def test_speed_limit(method):

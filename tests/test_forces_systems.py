@@ -12,6 +12,8 @@ from worlds import EPS, make_world, run, velocity
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Component, ForceSystem, Phase, StepError, column
 
+pytestmark = pytest.mark.plain
+
 # -- force systems -------------------------------------------------------------------------------
 
 

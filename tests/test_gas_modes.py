@@ -9,6 +9,8 @@ import pytest
 from helpers_gas import FINITE_RATE, RADIUS, RATE, REFERENCE, gas, measure
 from helpers_modes import MODES, each_mode
 
+pytestmark = pytest.mark.early
+
 # v dt / sigma = dt: up to a third of a disc in a step.
 
 

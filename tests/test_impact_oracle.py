@@ -21,6 +21,8 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System
 from carom.lab import testing as kit
 
+pytestmark = pytest.mark.early
+
 DT = 1 / 60
 SHAKEN, GROWN = 1e-14, 1e-10  # of the scale: perturbation, and the growth beyond which a step is not compared
 CAP = 100  # impacts of a body in a step, of which the oracle knows nothing

@@ -12,7 +12,7 @@ from studies.limits.quantity import BrokenError, Method, Quantity
 from studies.limits.tables import QUANTITIES, number, report, table
 from studies.runner import Line, run
 
-pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
 
 PLAIN = Method("plain")
 BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}

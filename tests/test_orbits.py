@@ -13,6 +13,8 @@ from worlds import make_world
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem
 
+pytestmark = pytest.mark.early
+
 # -- orbits: B4, B5 ------------------------------------------------------------------------------
 
 

@@ -15,7 +15,9 @@ import pytest
 from carom.framework.jit.late import JIT
 from tests import helpers_zoo
 
-pytestmark = pytest.mark.skipif(JIT, reason="the kernels are compiled in this run")
+pytestmark = [
+    pytest.mark.plain, pytest.mark.last, pytest.mark.skipif(JIT, reason="the kernels are compiled in this run"),
+]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

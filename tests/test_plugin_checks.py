@@ -13,6 +13,8 @@ from carom.framework import Component, Convex, Plugin, PluginError, StepError, W
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
 
+pytestmark = pytest.mark.plain
+
 
 def disc_class(**members):
     """A round shape; members replace its attributes, None removes one."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.slow  # its shapes take long to compile
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # its shapes take long to compile
 
 PROJECT = """
 [build-system]

@@ -13,6 +13,8 @@ from carom.framework import CaromError, NoPhysicsError, Settings, World
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
 
+pytestmark = pytest.mark.plain
+
 ORIGIN = {2: (0.0, 0.0), 3: (0.0, 0.0, 0.0)}
 
 

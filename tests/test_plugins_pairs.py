@@ -13,6 +13,8 @@ from carom.framework import Plugin, Settings, StepError, UnhandledPairError, Wor
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
 
+pytestmark = pytest.mark.plain
+
 # -- pairs that are missing -----------------------------------------------------------------------
 
 

@@ -12,6 +12,8 @@ from carom.framework import Plugin, Settings, StepError, System, World
 from carom.plugins import Physics
 from carom.systems import Integrator
 
+pytestmark = pytest.mark.plain
+
 
 def test_an_integrator_registered_again_is_seen_at_the_next_step():
     plugin = Plugin("steppers")

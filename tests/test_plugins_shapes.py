@@ -13,6 +13,8 @@ from carom.framework import Plugin, PluginError, Settings, World, array_column, 
 from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
 from carom.plugins import Physics
 
+pytestmark = pytest.mark.plain
+
 
 class RodCollider(Collider):
     """A rounded rod along the body's y axis: a shape that turns, written with the public functions only."""

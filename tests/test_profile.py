@@ -16,6 +16,8 @@ from carom.lab.cli.main import cli
 
 from .worlds import ball, floor, make_world, run
 
+pytestmark = pytest.mark.plain
+
 STEPS = 5
 
 

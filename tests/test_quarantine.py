@@ -14,6 +14,8 @@ from carom.framework import ForceSystem, Phase, StepError, System
 
 from .helpers_poison import column_of, rest_of, told
 
+pytestmark = pytest.mark.plain
+
 MODES = ("discrete", "continuous", "event_driven")
 each_mode = pytest.mark.parametrize("mode", MODES)
 METHODS = ("explicit_euler", "velocity_verlet", "rk4", "yoshida4")

@@ -6,7 +6,7 @@ import pytest
 
 from .helpers_poison import MODES, complaints, scenes
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.early]
 
 # Each mode takes every second or third body, each mode others: all shapes that move in each, all bodies over the three.
 # Every column of every body gets two of the four values, and every column of every world all of them. Every second of

@@ -22,6 +22,8 @@ from carom.framework import CaromError, Component, Plugin, World, column
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
 
+pytestmark = pytest.mark.plain
+
 HERE = Path(__file__).resolve().parent
 MODES = ("discrete", "continuous", "event_driven")
 STEPS = 90

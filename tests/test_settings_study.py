@@ -19,7 +19,7 @@ from studies.settings import scenes as settings_scenes
 from studies.settings.fields import VARIED
 from studies.settings.tables import default_of, report, times
 
-pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
 
 PAGE = Path(__file__).parent.parent / "docs" / "tables" / "settings.md"
 EVERY = {(varied.field, varied.scene): varied for varied in VARIED}

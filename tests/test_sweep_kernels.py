@@ -24,6 +24,8 @@ from carom.systems.integration import trajectory
 from carom.systems.integration.stages import first_half_kick, second_half_kick
 from carom.systems.records import STATE
 
+pytestmark = pytest.mark.plain
+
 DT = 1 / 60
 MANIFOLD = ("at", "hit", "depth", "normal", "point", "early")
 

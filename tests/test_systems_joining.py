@@ -11,6 +11,8 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, NoPhysicsError, Phase, Settings, System, World
 from carom.systems import ForceAccumulation, Response
 
+pytestmark = pytest.mark.plain
+
 # -- once per step, once per frame -----------------------------------------------------------------------------------
 
 

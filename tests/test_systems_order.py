@@ -11,6 +11,8 @@ from carom.components import Transform
 from carom.framework import CaromError, Phase, ScheduleError, System
 from carom.systems import BroadPhase, ContactEvents, ForceAccumulation, Integration, NarrowPhase, Response
 
+pytestmark = pytest.mark.plain
+
 BUILT_IN = {
     Phase.FORCES: "ForceAccumulation",
     Phase.INTEGRATION: "Integration",

@@ -10,6 +10,8 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, StepError, System
 from carom.systems import ContactEvents, ForceAccumulation, Response
 
+pytestmark = pytest.mark.plain
+
 
 class PushApart(System):
     """What overlaps moves apart, and loses the speed at which it approaches."""

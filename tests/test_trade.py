@@ -32,7 +32,7 @@ from carom.lab.trading.records import (
 from carom.lab.trading.report import ORDER_TOLERANCE, order
 from carom.plugins import Physics
 
-pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
 
 ORDERS = {"explicit euler": 1, "semi implicit euler": 1, "velocity verlet": 2, "rk4": 4, "yoshida4": 4}
 

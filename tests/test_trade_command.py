@@ -20,7 +20,7 @@ from carom.lab.measure.norms import NORMS
 from carom.lab.trading import command as trade_command
 from carom.lab.trading.answer import answer
 
-pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
 
 SHORT = ("--dt", "1/30,1/60", "--repeats", "2", "--no-timing", "--workers", "1", "--thorough")
 WRITTEN = {"trade.json", "trade.csv"}

@@ -16,7 +16,7 @@ from carom.lab.jobs.result_store import Store
 from carom.lab.jobs.tasks import perform
 from carom.lab.trading.records import STOPPED
 
-pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
 
 needs_signals = pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
 FEW = {

@@ -30,7 +30,7 @@ from carom.lab.tuning.check import check
 from carom.lab.tuning.search import Tuning
 from carom.plugins import Physics
 
-pytestmark = pytest.mark.slow  # many runs: half a minute or more together
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
 
 SPEED, GRAVITY = 240.0, 450.0  # pixels/s and pixels/s^2: those of the scene jump, apex 64 pixels
 TWO_STEPS = (1 / 30, 1 / 60)

@@ -28,7 +28,7 @@ from carom.lab.tuning.search import Tuning, search
 from carom.plugins import Physics
 from carom.scenes import billiards, get, jump, orbit, spring, stack, thermal_gas
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.early]
 
 DEARER = 1.3  # limit of the choice's cost over that of the grid's cheapest
 BROKEN = 2.0  # limit of the error on other scenes over the promise

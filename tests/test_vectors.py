@@ -11,6 +11,8 @@ import pytest
 from carom.framework.compilation import kernel
 from carom.framework.vectors import absolute, clamped
 
+pytestmark = pytest.mark.plain
+
 VALUES = (0.0, -0.0, 0.5, -0.5, 2.0, -2.0, 5e-324, math.inf, -math.inf)
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from helpers_processes import NATIVE, with_variables
 
+pytestmark = pytest.mark.early
+
 ROOT = Path(__file__).resolve().parent.parent
 LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "dist", "out", "tests", "docs")
 

@@ -13,6 +13,8 @@ from carom.components import RigidBody, Transform
 from carom.framework import CaromError, Settings, System, World
 from carom.plugins import Physics
 
+pytestmark = pytest.mark.plain
+
 esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
 
 

@@ -11,6 +11,8 @@ from worlds import ball, make_world
 
 from carom.framework import CaromError, NoPhysicsError, Settings, System, World
 
+pytestmark = pytest.mark.plain
+
 esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
 
 NO_PHYSICS = "no physics in this world: World(Physics(...))"

@@ -14,6 +14,8 @@ from worlds import ball, make_world
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import World
 
+pytestmark = pytest.mark.plain
+
 esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
 
 

@@ -13,6 +13,8 @@ from worlds import ball, box, make_world
 
 from carom import scenes
 
+pytestmark = pytest.mark.early
+
 
 class Pile(NamedTuple):
     """Greatest speed, and root mean square of all, over the last two seconds, m/s; bodies outside; the energy that all
