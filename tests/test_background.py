@@ -77,6 +77,16 @@ def test_one_function_after_the_other_and_nobody_waits(tmp_path):
     assert lines == ["[True, False, True] 2 0.0", "3", "TypingError"]
 
 
+def test_only_what_the_game_waits_for_is_announced(tmp_path):
+    """A first run that ends early leaves functions to the second one, which has nothing to wait for."""
+    listen = "import logging; logging.getLogger('carom').addHandler(logging.StreamHandler(sys.stdout))\n"
+    ahead = "link_in_background([adding(1.0)])\nwait()\n"
+    assert run(f"import sys; {listen}{FUNCTIONS}{ahead}", tmp_path) == []
+    lines = run(f"import sys; {listen}{FUNCTIONS}{ahead}adding(2.0).link()", tmp_path)
+    assert len(lines) == 1
+    assert lines[0].startswith("carom: compiling kernels that are not in")
+
+
 def test_it_ends_with_the_program(tmp_path):
     run(FUNCTIONS + THE_END, tmp_path)
     assert len(list(tmp_path.glob("*.kernel"))) < 400

@@ -12,9 +12,8 @@ import threading
 from collections import deque
 from collections.abc import Iterable
 
-from ..compilation import log
-from .late import dispatchers
 from .linking import Called, Linked
+from .log import background, log
 
 logger = logging.getLogger("carom")
 
@@ -44,7 +43,7 @@ def wait() -> None:
 
 def _work() -> None:
     global _thread
-    dispatchers.background.active = True
+    background.active = True
     while True:
         with _lock:
             if not _waiting or not threading.main_thread().is_alive():  # the program ends

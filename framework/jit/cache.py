@@ -28,7 +28,7 @@ from numba.core.serialize import dumps
 
 from . import prebuilt
 from .hash import hash_and_reach, type_names
-from .log import log
+from .log import in_background, log
 
 CACHE_FOLDER_VARIABLE = "CAROM_CACHE_DIR"
 KERNELS, UNFINISHED = "*.kernel", "*.unfinished"
@@ -129,20 +129,20 @@ def announcement() -> str:
     folder = cache_folder()
     if folder is not None:
         return (
-            f"carom: compiling kernels that are not in {folder} yet; this takes some seconds, once: later runs load "
-            "them (carom warm-up compiles ahead)"
+            f"carom: compiling kernels that are not in {folder} yet; for all that a world needs this takes about 20 s, "
+            "later runs load them (carom warm-up compiles ahead)"
         )
     return (
-        "carom: compiling kernels, which takes some seconds in every run: there is no folder that can be written to "
+        "carom: compiling kernels, which takes about 20 s in every run: there is no folder that can be written to "
         f"keep them ({CACHE_FOLDER_VARIABLE} names one)"
     )
 
 
 def announce(dispatcher: Any) -> None:
-    """Say that a kernel is about to compile."""
+    """Say that a kernel is about to compile; only INFO where no step waits for it, see background."""
     for listener in log.listeners:
         listener(dispatcher.py_func.__qualname__)
-    if not log.announced and not log.listeners:
+    if not log.announced and not log.listeners and not in_background():
         logger.warning(announcement())
     logger.info("compiling %s (%d so far, %.1f s)", dispatcher.py_func.__name__, len(log.compiled), log.seconds)
 

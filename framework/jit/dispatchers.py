@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gc
 import logging
-import threading
 import time
 from typing import Any, ClassVar
 
@@ -16,11 +15,10 @@ from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
 from .cache import KernelCache
-from .log import log
+from .log import in_background, log
 from .pipeline import kernel_compiler, part_compiler
 
 logger = logging.getLogger("carom")
-background = threading.local()  # active: this thread compiles ahead, nobody waits for it
 
 
 class Wait:
@@ -34,7 +32,7 @@ class Wait:
     def __enter__(self) -> Wait:
         global_compiler_lock.acquire()
         self.own = 0.0
-        self._blocks = not getattr(background, "active", False)  # else the game goes on meanwhile
+        self._blocks = not in_background()  # else the game goes on meanwhile
         self._collecting = gc.isenabled()
         if self._collecting:
             gc.disable()  # the compiler makes millions of objects that live on; looking through them costs a twentieth

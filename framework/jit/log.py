@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -27,5 +28,11 @@ class CompilationLog:
 
 
 log = CompilationLog()
+background = threading.local()  # active: this thread compiles ahead, no step waits for it
+
+
+def in_background() -> bool:
+    return getattr(background, "active", False)
+
 
 CHECKED = os.environ.get("CAROM_CHECK", "") not in ("", "0")  # a build that checks every index into a record
