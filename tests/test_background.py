@@ -77,6 +77,25 @@ def test_one_function_after_the_other_and_nobody_waits(tmp_path):
     assert lines == ["[True, False, True] 2 0.0", "3", "TypingError"]
 
 
+def test_the_time_until_another_thread_has_compiled_counts_as_waiting(tmp_path):
+    hold = """
+import threading
+from numba.core.compiler_lock import global_compiler_lock
+held = threading.Event()
+
+def hold():
+    with global_compiler_lock:
+        held.set()
+        time.sleep(2.0)
+
+threading.Thread(target=hold).start()
+held.wait()
+adding(1.0).link()
+print(log.waited - log.seconds > 0.9)
+"""
+    assert run(FUNCTIONS + hold, tmp_path) == ["True"]
+
+
 def test_only_what_the_game_waits_for_is_announced(tmp_path):
     """A first run that ends early leaves functions to the second one, which has nothing to wait for."""
     listen = "import logging; logging.getLogger('carom').addHandler(logging.StreamHandler(sys.stdout))\n"

@@ -30,7 +30,9 @@ class Wait:
     _running: ClassVar[list[Wait]] = []
 
     def __enter__(self) -> Wait:
+        asked = time.perf_counter()
         global_compiler_lock.acquire()
+        self._asked = asked
         self.own = 0.0
         self._blocks = not in_background()  # else the game goes on meanwhile
         self._collecting = gc.isenabled()
@@ -46,12 +48,13 @@ class Wait:
             if self._blocks:
                 gc.collect(0)  # once now, instead of at some moment soon, which would be taken for run time
             gc.enable()
-        seconds = time.perf_counter() - self._started
+        now = time.perf_counter()
+        seconds = now - self._started
         self.own += seconds
         if self._running:
             self._running[-1].own -= seconds
         elif self._blocks:
-            log.waited += seconds
+            log.waited += now - self._asked  # for another thread's function, too
         global_compiler_lock.release()
 
 
