@@ -81,16 +81,17 @@ def test_the_time_until_another_thread_has_compiled_counts_as_waiting(tmp_path):
     hold = """
 import threading
 from numba.core.compiler_lock import global_compiler_lock
-held = threading.Event()
+held, late = threading.Event(), adding(1.0)
+adding(2.0).link()
 
 def hold():
     with global_compiler_lock:
         held.set()
-        time.sleep(2.0)
+        time.sleep(1.0)
 
 threading.Thread(target=hold).start()
 held.wait()
-adding(1.0).link()
+late.link()
 print(log.waited - log.seconds > 0.9)
 """
     assert run(FUNCTIONS + hold, tmp_path) == ["True"]
