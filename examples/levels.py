@@ -11,10 +11,7 @@ import sys
 
 import numpy as np
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.components.colliders import Collider
-from carom.framework import Plugin, Settings, World, column
-from carom.plugins import Physics
+from carom import AABBCollider, Collider, Physics, Plugin, RigidBody, Settings, SphereCollider, Transform, World, column
 
 STEPS = 20
 rocks = Plugin("rocks")

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, Phase, System, World, column
-from carom.plugins import Physics
+from carom import AABBCollider, Component, Phase, Physics, RigidBody, SphereCollider, System, Transform, World, column
 
 SLACK = 0.05  # of the body's height: a body no deeper than this counts as on top
 

@@ -10,9 +10,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, Phase, Settings, System, World, column
-from carom.plugins import Physics
+from carom import (
+    AABBCollider,
+    Component,
+    Phase,
+    Physics,
+    RigidBody,
+    Settings,
+    SphereCollider,
+    System,
+    Transform,
+    World,
+    column,
+)
 
 DELAY = 8  # frames that an input is under way
 FRAMES = 240

@@ -6,10 +6,8 @@ wall stands still on the floor. Balls roll about on the same map.
 
 from __future__ import annotations
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import World
-from carom.plugins import Physics, tile_grid
-from carom.plugins.tile_grid import TileGridCollider, cells_of_text
+from carom import AABBCollider, Physics, RigidBody, SphereCollider, TileGridCollider, Transform, World, cells_of_text
+from carom.plugins import tile_grid
 
 MAP = """
     ############################################################

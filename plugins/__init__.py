@@ -1,4 +1,4 @@
-"""Plugins that ship with carom; all use only the public registry."""
+"""Plugins that ship with carom. All use only the public registry, but Physics, which also sets ``world.physics``."""
 
 from .physics import Physics
 

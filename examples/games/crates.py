@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from carom.components import AABBCollider, RigidBody, Transform
-from carom.framework import World
-from carom.plugins import Physics
+from carom import AABBCollider, Physics, RigidBody, Transform, World
 
 seconds = 4.0
 

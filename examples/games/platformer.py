@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, Phase, System, World
+from carom import AABBCollider, Component, Phase, Physics, RigidBody, SphereCollider, System, Transform, World
 from carom.lab import Inputs
-from carom.plugins import Physics
 
 KEYS = Inputs.read(Path(__file__).with_name("platformer.keys"))  # recorded while somebody played
 seconds = 6.0

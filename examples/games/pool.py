@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, System, World, column
-from carom.plugins import Physics
+from carom import AABBCollider, Component, Physics, RigidBody, SphereCollider, System, Transform, World, column
 
 LENGTH, WIDTH, RADIUS = 2.54, 1.27, 0.028575  # m
 seconds = 4.0

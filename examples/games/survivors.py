@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import Component, Phase, System, World, column
-from carom.plugins import Physics
+from carom import Component, Phase, Physics, RigidBody, SphereCollider, System, Transform, World, column
 
 ENEMIES, BULLETS = 2000, 600.0  # at once; a second
 PLAYER, ENEMY, BULLET = 1, 2, 4  # layers
