@@ -148,14 +148,14 @@ def out_option(help_text: str, default: Path | None = None) -> Option:
     )
 
 
-def writable_folder(folder: Path, option: Path | None = None) -> None:
-    """Create the folder if missing; Problem if it is not writable. option: the value of --out, if different."""
+def writable_folder(folder: Path, value: Path | None = None, option: str = "--out") -> None:
+    """Create the folder if missing; Problem if it is not writable. value: that of the option, if different."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise Problem(f"--out {option or folder}: {error.strerror or error}") from error
+        raise Problem(f"{option} {value or folder}: {error.strerror or error}") from error
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise Problem(f"--out {option or folder}: no permission to write there")
+        raise Problem(f"{option} {value or folder}: no permission to write there")
 
 
 # -- what is measured -------------------------------------------------------------------------------------------

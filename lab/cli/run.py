@@ -39,6 +39,9 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
     show_default=True,
     help="The folder where pictures go, or a file for that of the paths: NAME.png.",
 )
+@click.option(
+    "--record", type=click.Path(path_type=Path), metavar="FILE", help="A picture that moves: NAME.gif or NAME.webp."
+)
 @click.option("--view", "view_text", metavar="X0,Y0,X1,Y1", help="What the pictures show: two corners.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else, to stdout.")
 @click.option("--no-pictures", is_flag=True, help="Draw nothing.")
@@ -53,6 +56,7 @@ def run_command(
     seed: int,
     plugins: tuple[str, ...],
     out: Path,
+    record: Path | None,
     view_text: str | None,
     as_json: bool,
     no_pictures: bool,
@@ -66,6 +70,7 @@ def run_command(
     if view_text is not None:
         loaded = dataclasses.replace(loaded, view=parse_view(view_text))
     draw = _drawing(no_pictures, out)
+    films = None if record is None else _recording(record)
     screen = Console(stderr=True)
 
     world = loaded.build(settings, changes, seed, added)
@@ -73,11 +78,14 @@ def run_command(
         raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
         steps = _steps_for(loaded, seconds, world.settings.dt)
-    finished = _run_with_progress(loaded, world, steps, seed, screen, profile)
+    film = None if films is None else films.Recording(world, steps)
+    finished = _run_with_progress(loaded, world, steps, seed, screen, profile, film)
     finished.report.compared = loaded.values_of(finished.world)
     if draw is not None:
         with screen.status("drawing ..."):
             finished.report.pictures = _pictures(draw, finished, out, loaded)
+    if film is not None and record is not None:
+        finished.report.pictures.append(_save_film(film, finished, record, loaded, screen))
 
     if as_json:
         click.echo(json.dumps(finished.report.as_dict(), indent=2, allow_nan=False))
@@ -101,6 +109,25 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
     return pictures.draw_run
 
 
+def _recording(file: Path) -> Any:
+    """The module that records; Problem, before a long run, if it cannot write that file."""
+    films = drawing_module("pictures.recording", "--record:")
+    if file.suffix.lower() not in films.KINDS:
+        raise Problem(f"--record takes a name that ends in {' or '.join(films.KINDS)}, not {file}")
+    writable_folder(file.parent, file, "--record")
+    return films
+
+
+def _save_film(film: Any, finished: Run, file: Path, loaded: Loaded, screen: Console) -> str:
+    with Bar(screen) as bar:
+        bar.begin(len(film.frames))
+        bar.say(f"drawing {file.name}")
+        try:
+            return str(film.save(finished, file, loaded.view, lambda _: bar.advance(1)))
+        except OSError as error:
+            raise Problem(f"--record {file}: {error.strerror or error}") from error
+
+
 def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:
     try:
         return [str(path) for path in draw(finished, out, loaded.view)]
@@ -113,8 +140,15 @@ def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
     return max(0, round(wanted / dt))
 
 
-def _run_with_progress(loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool) -> Run:
+def _run_with_progress(
+    loaded: Loaded, world: Any, steps: int, seed: int, screen: Console, profile: bool, film: Any
+) -> Run:
+    def after_step(done: int) -> None:
+        bar.advance(1)
+        if film is not None:
+            film.after_step(done)
+
     with Bar(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
         bar.begin(steps)
         bar.say(loaded.name)
-        return run(world, steps, scene=loaded.name, seed=seed, after_step=lambda _: bar.advance(1), profile=profile)
+        return run(world, steps, scene=loaded.name, seed=seed, after_step=after_step, profile=profile)

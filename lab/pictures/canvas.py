@@ -136,6 +136,13 @@ class Sheet:
         axes.tick_params(colors=MUTED, labelsize=7, length=2, pad=1)
         self.footer.text(MARGIN + 2.12, 0.385, "speed", color=MUTED, fontsize=8.5, va="center")
 
+    def pixels(self, dpi: int) -> np.ndarray:
+        """The picture as (height, width, 3) bytes."""
+        self.figure.set_facecolor(BACKGROUND)
+        self.figure.set_dpi(dpi)
+        self.figure.canvas.draw()
+        return np.asarray(self.figure.canvas.buffer_rgba())[..., :3].copy()  # type: ignore[attr-defined]
+
     def save(self, path: Path) -> Path:
         self.figure.savefig(path, facecolor=BACKGROUND, dpi=DPI, pil_kwargs={"optimize": True})
         return path

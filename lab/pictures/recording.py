@@ -1,0 +1,59 @@
+"""A run as a picture that moves: bodies to scale, coloured by speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from ...framework import World
+from ..measure.body_shapes import Shapes, shapes_of
+from ..measure.run import QUIET, Run
+from . import canvas
+from .canvas import Sheet
+from .marks import draw_bodies, draw_walls
+from .projection import Projection
+from .run_pictures import DRAWABLE, Still, find_view
+
+KINDS = (".gif", ".webp")
+RATE = 25  # frames per simulated second
+MOST_FRAMES = 500  # of longer runs, farther apart
+DPI = 60
+
+
+class Recording:
+    """Keeps the shapes of every ``every``-th step of ``world``; :meth:`save` draws them."""
+
+    def __init__(self, world: World, steps: int) -> None:
+        dt = world.settings.dt
+        self.world = world
+        self.every = max(1, round(1 / (RATE * dt)), -(-steps // MOST_FRAMES))
+        self.milliseconds = 1000 * self.every * dt
+        self.frames: list[Shapes] = [shapes_of(world)]
+
+    def after_step(self, done: int) -> None:
+        if done % self.every == 0:
+            self.frames.append(shapes_of(self.world))
+
+    @QUIET
+    def save(self, run: Run, file: Path, view: Any, drawn: Callable[[int], None]) -> Path:
+        """Write ``file``; ``drawn`` is called with the number of frames done."""
+        ends = find_view(Still.of(run), run.traces) if view is None else view
+        projection = Projection.of(*(np.asarray(end, float) for end in ends))
+        norm = canvas.speed_norm(np.concatenate([shapes.speed[~shapes.static] for shapes in self.frames]))
+        images = []
+        for shapes in self.frames:
+            sheet = Sheet.new(run.report.scene, "", [projection.frame()], numbered=False)
+            (panel,) = sheet.panels
+            bodies = shapes.where(~shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
+            draw_walls(panel, shapes.where(shapes.static), projection)
+            draw_bodies(panel, bodies, canvas.SPEED(norm(bodies.speed)), projection)
+            images.append(Image.fromarray(sheet.pixels(DPI)))
+            drawn(len(images))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        first, *others = images
+        first.save(file, save_all=True, append_images=others, duration=round(self.milliseconds), loop=0, quality=70)
+        return file
