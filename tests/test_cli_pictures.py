@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from helpers_cli import refusal, report_of
 from helpers_processes import run_python
+from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -61,6 +62,26 @@ def test_the_picture_of_the_paths_alone_and_a_part_of_it(carom, tmp_path):
         shapes.append((int.from_bytes(header[16:20]), int.from_bytes(header[20:24])))
     assert shapes[0][1] > 0.8 * shapes[0][0]
     assert shapes[1][1] < 0.4 * shapes[1][0]  # as wide and flat as the part is
+
+
+@pytest.mark.parametrize("scene", ["jump", "pile3d"])
+def test_a_recording_shows_every_third_step_and_changes_none(carom, tmp_path, scene):
+    plain = report_of(carom("run", scene, "--steps", "30", "--no-pictures", "--json"))
+    for name in ("film.gif", "new/film.webp"):
+        report = report_of(carom("run", scene, "--steps", "30", "--record", name, "--no-pictures", "--json"))
+        assert report["pictures"] == [str(Path(name))]
+        assert report["state_hash"] == plain["state_hash"]
+        with Image.open(tmp_path / name) as film:
+            assert film.n_frames == 11
+            first = np.asarray(film.convert("RGB"), int)
+            film.seek(10)
+            assert np.abs(np.asarray(film.convert("RGB"), int) - first).max() > 50
+            assert film.info["duration"] == 50
+
+
+def test_a_recording_of_another_kind_is_refused_before_the_run(carom):
+    line = refusal(carom("run", "billiards", "--record", "film.mp4"))
+    assert "--record takes a name that ends in .gif or .webp, not film.mp4" in line
 
 
 @pytest.mark.parametrize("view", ["0,0,4", "0,0,4,x", "0,0,4,inf", "4,3,0,0", "0,0,4,0", "0,0,0,4,4", ""])

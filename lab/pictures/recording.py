@@ -19,9 +19,9 @@ from .projection import Projection
 from .run_pictures import DRAWABLE, Still, find_view
 
 KINDS = (".gif", ".webp")
-RATE = 25  # frames per simulated second
+RATE = 20  # frames per simulated second
 MOST_FRAMES = 500  # of longer runs, farther apart
-DPI = 60
+DPI = 50
 
 
 class Recording:
@@ -54,6 +54,11 @@ class Recording:
             images.append(Image.fromarray(sheet.pixels(DPI)))
             drawn(len(images))
         file.parent.mkdir(parents=True, exist_ok=True)
+        if file.suffix.lower() == ".gif":
+            some = np.vstack([np.asarray(image) for image in images[:: -(-len(images) // 8)]])
+            palette = Image.fromarray(some).quantize(64)  # one for all, and no dithering: else still parts flicker
+            images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
         first, *others = images
-        first.save(file, save_all=True, append_images=others, duration=round(self.milliseconds), loop=0, quality=70)
+        packing: dict[str, Any] = {"quality": 45, "kmin": 200, "kmax": 400}  # of WebP: still parts are kept once
+        first.save(file, save_all=True, append_images=others, duration=round(self.milliseconds), loop=0, **packing)
         return file
