@@ -27,7 +27,7 @@ from carom.lab.cases import case
 pytestmark = pytest.mark.early
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^(?P<indent> *)(?P<marks>`{3,}|~{3,})(?P<info>[^`]*)$")
 MARKS = ("no-run", "game")  # not run; a part of a game whose lines are counted
 LINK = re.compile(r"\]\(\s*(?P<target>[^()\s]*(?:\([^()\s]*\)[^()\s]*)*)[^()]*\)")  # nested links: both
@@ -120,7 +120,7 @@ def namespace(monkeypatch, tmp_path):
 # Each compiles for a quarter of a minute or more where the cache is empty, or is a study of many runs.
 SLOW = (
     "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md", "trade.md", "tune.md",
-    "integrators.md", "which-collision.md",
+    "integrators.md", "collisions.md",
 )  # fmt: skip
 RUN = [
     pytest.param(page, marks=pytest.mark.slow if page.name in SLOW else ())
@@ -171,7 +171,7 @@ def test_the_scene_file_runs_for_as_long_as_it_says(monkeypatch, tmp_path):
 def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_path):
     from carom.lab.cli.main import cli
 
-    page = ROOT / "docs" / "which-collision.md"
+    page = ROOT / "docs" / "collisions.md"
     blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
     commands = [block.text.split() for block in blocks if block.info == ["sh"]]
     monkeypatch.chdir(tmp_path)
