@@ -1,4 +1,4 @@
-"""How faults are told, and the table of faults in docs/worlds.md against the texts in the code."""
+"""How faults are told, and the table of faults in docs/faults.md against the texts in the code."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def faults_in_code():
 
 
 def faults_in_docs():
-    page = (ROOT / "docs" / "worlds.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
     table = page.split("<!-- faults -->")[1].split("<!-- end of faults -->")[0]
     rows = [line for line in table.splitlines() if line.startswith("| `")]
     assert all(len(row.strip("| ").split(" | ")) == 3 for row in rows)
