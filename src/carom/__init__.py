@@ -6,8 +6,6 @@ loads its module when it is first used, so ``import carom`` loads nothing else. 
 :mod:`carom.lab` (command line and measuring).
 """
 
-import importlib
-
 __version__ = "0.1.0"
 
 # Module: its names that are names of carom too. __init__.pyi says the same to editors and type checkers.
@@ -39,6 +37,8 @@ __all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
 def __getattr__(name: str) -> object:
     if name not in _MODULES:
         raise AttributeError(f"module 'carom' has no attribute {name!r}")
+    import importlib  # not before it is needed
+
     value = globals()[name] = getattr(importlib.import_module(f"carom.{_MODULES[name]}"), name)
     return value
 
