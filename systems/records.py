@@ -284,9 +284,9 @@ QUEUE = Section(
     looks=ints("int32"),
 )  # fmt: skip
 # Impacts at the same time: the events, by member; lists of the members of each body.
+MEMBER_LISTS = Section("impact", "impacts", BOUNCED, member=ints("int32"), next_member=ints("int32"))
 MEMBERS = Section(
     "impact", "impacts", BOUNCED,
-    member=ints("int32"),
     group=ints("int32"),
     is_left=flags(),
     share=floats(),  # impulses along the normals, N s
@@ -311,8 +311,7 @@ LOG = Section(
     log_point=vectors(),
 )  # fmt: skip
 IMPACTS = Schema(
-    "Impacts", EVENTS, QUEUE, MEMBERS, Section("impact", "impacts", BOUNCED, next_member=ints("int32")),
-    BODIES_OF_MEMBERS, LOG,
+    "Impacts", EVENTS, QUEUE, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
     active=flag(),  # something may bounce in this step
     sweeps=flag(),  # bodies are swept
     waiting=integer(),

@@ -100,7 +100,7 @@ class Room:
             impacts.reserve(_with_spare(impacts.logged + impacts.together), *records.LOG, keep=impacts.logged)
         if impacts.together > len(impacts.member):
             rows = _with_spare(impacts.together)
-            impacts.reserve(rows, *records.MEMBERS)
+            impacts.reserve(rows, "member", *records.MEMBERS)
             impacts.reserve(2 * rows, "next_member")
         if impacts.together > 0 and len(impacts.firsts) < state.count:
             impacts.reserve(self._scene.table.capacity, *records.BODIES_OF_MEMBERS)

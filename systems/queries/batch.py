@@ -14,13 +14,10 @@ from ..broad_phase.tree.build import MAX_LEVELS
 from ..shapes.linking.linked_shapes import LinkedShapes, ParameterRecords
 from ..shapes.linking.parameters import bind, make_parameter_record
 from ..shapes.query import QUERY, linked_query
-from .records import QUERY_BATCH
+from .records import QUERIES, QUERY_BATCH, RESULTS
 
 MOST_QUERIES = 4096  # in one call of a kernel; what larger batches need is not kept
 FIRST_ROOM = 64  # rows
-
-QUERY_COLUMNS = ("centre", "half", "direction", "limit", "search_limit", "excluded", "body", "end")
-RESULT_COLUMNS = ("row", "entity", "distance", "fraction", "normal", "point")
 
 
 def slices_of(count: int) -> Iterator[slice]:
@@ -47,12 +44,12 @@ class QueryBatch:
         queries = min(queries, MOST_QUERIES)
         if max(queries, results) > self.results:
             self.results = max(queries, results, 2 * self.results)
-            self.record.reserve(self.results, *RESULT_COLUMNS)
-            self._results = {name: getattr(self.record, name) for name in RESULT_COLUMNS}
+            self.record.reserve(self.results, *RESULTS)
+            self._results = {name: getattr(self.record, name) for name in RESULTS}
         if queries <= self.queries:
             return False
         self.queries = max(queries, 2 * self.queries)
-        self.record.reserve(self.queries, *QUERY_COLUMNS)
+        self.record.reserve(self.queries, *QUERIES)
         self.radius, self.half_extents = np.zeros(self.queries), self.record.half
         return True
 

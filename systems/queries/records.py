@@ -2,39 +2,43 @@
 
 from __future__ import annotations
 
-from ...framework.jit.records.schema import Schema, flag, floats, integer, ints, number, vectors
+from ...framework.jit.records.schema import Schema, Section, flag, floats, integer, ints, number, vectors
 from ..shapes.query import QUERY
 
 ENDLESS = 1e300  # m; in place of infinity, which times zero is nan
 
 # Queries are rows 0..m-1. Overlaps and neighbours write any number of hits per query, those of query q before
 # ``end[q]``. So does a cast of one shape for all that it meets. Nearest surfaces and first hits are in row q.
-QUERY_BATCH = Schema(
-    "QueryBatch",
-    query=QUERY,  # functions and parameters of the query shape
-    # options, for all queries
-    mask=integer(),  # layers
-    only_nearest=flag(),  # casts
-    is_ray=flag(),
-    radius=number(),  # neighbours, m
-    # queries
+QUERIES = Section(
     centre=vectors(),
     half=vectors(),  # overlaps: half extents
     direction=vectors(),  # casts: unit vector, 0 if the shape does not move
     limit=floats(),  # m; how far to look
+    search_limit=floats(),  # of a cast: limit, or distance of the nearest hit so far
     excluded=ints(),  # entity to leave out; -1: none
     body=ints(),  # neighbours: the row of the body itself
-    # results
     end=ints(),
+)
+RESULTS = Section(
     row=ints(),  # -1: nothing found
     entity=ints(),
     distance=floats(),
     fraction=floats(),
     normal=vectors(),
     point=vectors(),
+)
+QUERY_BATCH = Schema(
+    "QueryBatch",
+    QUERIES,
+    RESULTS,
+    query=QUERY,  # functions and parameters of the query shape
+    # options, for all queries
+    mask=integer(),  # layers
+    only_nearest=flag(),  # casts
+    is_ray=flag(),
+    radius=number(),  # neighbours, m
     # memory of a cast
     hit_count=integer(),
-    search_limit=floats(),  # limit, or distance of the nearest hit so far
     slice_level=ints(),  # levels of the tree in use
     slice_begin=floats(),  # and where the next slice of each begins, m
     span=number(),  # m; length of the way that sweeps are given
