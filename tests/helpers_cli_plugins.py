@@ -79,3 +79,13 @@ def refusal(result) -> str:
     assert result.exit_code == 2, (result.stdout, result.stderr, result.exception)
     assert result.stdout == ""
     return result.stderr.strip()
+
+
+def offer(folder: Path, name: str, points: dict[str, str], monkeypatch, version: str = "0.7") -> None:
+    """Simulate an installed package that offers these."""
+    info = folder / f"{name}-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    lines = "".join(f"{point} = {value}\n" for point, value in points.items())
+    (info / "entry_points.txt").write_text(f"[carom.plugins]\n{lines}")
+    monkeypatch.syspath_prepend(str(folder))

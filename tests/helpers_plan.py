@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from worlds import ball, box, floor, make_world
+
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
 from carom.framework import ForceSystem, Phase, Plugin, System, World, column
@@ -10,8 +12,6 @@ from carom.framework.schedule.plan import PlannedKernel
 from carom.framework.vectors import divided, length, scale
 from carom.plugins import Physics
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-
-from .worlds import ball, box, floor, make_world
 
 STEPS = 40
 

@@ -12,10 +12,9 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
+from helpers_zoo import MODES, mixed, platformer
 
 from carom.framework import World
-
-from .helpers_zoo import MODES, mixed, platformer
 
 VALUES = (math.nan, math.inf, -math.inf, -1.0)
 MADE = {"force", "inverse_mass", "previous_position"}  # in every step again

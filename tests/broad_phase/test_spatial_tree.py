@@ -1,0 +1,320 @@
+"""The broad phase's tree against brute force and against the textbook's quadtree with pointers (B21, C3, C4, C11,
+C18, C20 of the accuracy list). All comparisons are of exact sets: a broad phase has no tolerance."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers_tree import query
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import both_dimensions
+
+from carom.systems.broad_phase.tree.tree import CandidateLimitError, SpatialTree
+
+
+def load_oracle(name):
+    """Import a file of tests/oracles in any pytest import mode."""
+    path = Path(__file__).parents[1] / "oracles" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"carom_oracle_{name}", path)
+    module = importlib.util.module_from_spec(spec)
+    # dataclasses look their module up by name
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+brute_force = load_oracle("brute_force")
+PointerQuadtree = load_oracle("pointer_quadtree").PointerQuadtree
+
+
+ONE_CELL_MAX = 24  # so that small trees have levels too; one cell is tested as well
+
+
+def tree_of(lower, upper, start=0, stop=None, one_cell_max=ONE_CELL_MAX):
+    tree = SpatialTree(lower.shape[1], one_cell_max)
+    tree.build(lower, upper, start, len(lower) if stop is None else stop)
+    return tree
+
+
+def unordered(first, second):
+    """The pairs as a set, after checking that there are no duplicates and no self pairs."""
+    pairs = {(min(i, j), max(i, j)) for i, j in zip(first.tolist(), second.tolist(), strict=True)}
+    assert len(pairs) == len(first)
+    assert all(i != j for i, j in pairs)
+    return pairs
+
+
+def check_everything(lower, upper, rng):
+    """Pairs within, pairs between two halves, single boxes: all equal to brute force."""
+    n = len(lower)
+    expected = brute_force.all_pairs(lower, upper)
+    one_cell = tree_of(lower, upper, one_cell_max=n)
+    assert one_cell.record.levels == 0
+    assert unordered(*one_cell.pairs_within()) == expected
+    tree = tree_of(lower, upper)
+    assert unordered(*tree.pairs_within()) == expected
+
+    cut = int(rng.integers(0, n + 1))
+    first, second = tree_of(lower, upper, 0, cut).pairs_between(tree_of(lower, upper, cut, n))
+    found = list(zip(first.tolist(), second.tolist(), strict=True))
+    assert len(set(found)) == len(found)
+    assert set(found) == {(i, j) for i, j in expected if i < cut <= j}
+
+    asked = rng.integers(0, n, min(n, 40)) if n else np.zeros(0, int)
+    for i in asked:
+        want = np.flatnonzero(brute_force.overlaps(lower, upper, lower[i], upper[i]))
+        np.testing.assert_array_equal(query(tree, lower[i], upper[i]), want)
+        np.testing.assert_array_equal(query(one_cell, lower[i], upper[i]), want)
+
+
+def scene(name, n, d, rng):
+    """Centres (n, d) and half sizes (n, 1)."""
+    side = (4.0 * n) ** (1 / d)
+    uniform = rng.random((n, d)) * side
+    half = np.full((n, 1), 0.5)
+    match name:
+        case "uniform":
+            return uniform, half
+        case "power law":
+            return uniform, 0.5 * np.clip((1.0 - rng.random((n, 1))) ** (-1 / 1.5), 1, 1000)
+        case "clusters":
+            return uniform[rng.integers(0, 5, n)] + rng.normal(size=(n, d)), rng.uniform(0.01, 0.2, (n, 1))
+        case "all equal":
+            return uniform[rng.integers(0, n // 4 + 1, n)], half
+        case "split lines":  # centres and edges on multiples of powers of two
+            return rng.integers(0, 17, (n, d)) * 4.0, 2.0 ** rng.integers(-3, 3, (n, 1))
+        case "far outside":  # most of the extent is empty, with a quarter of the bodies
+            far = rng.random((n, 1)) < 0.25
+            return np.where(far, rng.standard_cauchy((n, d)) * 100 * side, uniform), half
+        case "sizes 1e-9 to 1e9":
+            return rng.standard_cauchy((n, d)), 10.0 ** rng.uniform(-9, 9, (n, 1))
+        case "galaxies":  # two dense regions, 1e9 apart
+            return uniform + rng.integers(0, 2, (n, 1)) * 1e9, half
+        case "line":
+            return uniform * np.eye(d)[d - 1], np.full((n, 1), 0.002)
+        case "offset 1e15":
+            return uniform + 1e15, half
+        case "denormal":
+            return rng.integers(0, 40, (n, d)) * 5e-324, rng.integers(0, 2, (n, 1)) * 5e-324
+    raise AssertionError(name)
+
+
+SCENES = (
+    "uniform", "power law", "clusters", "all equal", "split lines", "far outside", "sizes 1e-9 to 1e9", "galaxies",
+    "line", "offset 1e15", "denormal",
+)  # fmt: skip
+
+
+@both_dimensions
+@pytest.mark.parametrize("name", SCENES)
+def test_all_answers_equal_brute_force(name, d):
+    rng = np.random.default_rng(7)
+    centre, half = scene(name, 500, d, rng)
+    check_everything(centre - half, centre + half, rng)
+
+
+@both_dimensions
+def test_many_bodies(d):
+    rng = np.random.default_rng(8)
+    centre, half = scene("power law", 2000, d, rng)
+    lower, upper = centre - half, centre + half
+    assert unordered(*tree_of(lower, upper).pairs_within()) == brute_force.all_pairs(lower, upper)
+
+
+@both_dimensions
+@pytest.mark.parametrize("name", ["uniform", "clusters", "split lines", "all equal"])
+def test_pairs_equal_those_of_a_quadtree_with_pointers(name, d):
+    centre, half = scene(name, 150, d, np.random.default_rng(9))
+    lower, upper = centre - half, centre + half
+    assert unordered(*tree_of(lower, upper).pairs_within()) == PointerQuadtree(lower, upper).pairs()
+
+
+coordinate = st.one_of(
+    st.integers(-4, 4).map(float),
+    st.floats(-10, 10),
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.sampled_from([0.0, 1.0, np.nextafter(1.0, 2.0), np.nextafter(1.0, 0.0), 5e-324, 1e308, -1e308, 1e15]),
+)
+
+
+@both_dimensions
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_any_boxes_at_all(d, data):
+    """NaN, infinities, empty boxes, one ulp apart: exactly the result of brute force."""
+    n = data.draw(st.integers(0, 70))
+    values = data.draw(st.lists(coordinate, min_size=8, max_size=40))
+    rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    boxes = rng.choice(values, (n, 2, d))
+    if data.draw(st.booleans()):
+        boxes = np.sort(boxes, axis=1)  # mostly real boxes
+    check_everything(np.ascontiguousarray(boxes[:, 0]), np.ascontiguousarray(boxes[:, 1]), rng)
+
+
+@both_dimensions
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 10**6), exponent=st.integers(-300, 300), n=st.integers(25, 300))
+def test_any_scale_and_any_spread(d, seed, exponent, n):
+    """Positions and sizes over many magnitudes, in units from 1e-300 to 1e300."""
+    rng = np.random.default_rng(seed)
+    unit = 10.0**exponent
+    centre = rng.normal(size=(n, d)) * 10.0 ** rng.uniform(-3, 3, (n, 1)) * unit
+    half = 10.0 ** rng.uniform(-4, rng.uniform(-3, 4), (n, 1)) * unit
+    check_everything(centre - half, centre + half, rng)
+
+
+@pytest.mark.parametrize("n", [10, 32, 100])
+@pytest.mark.parametrize("spacing", [1.0, 0.25, 2.0**-30, 2.0**40])
+def test_lattice_of_touching_discs(n, spacing):
+    """Touching counts: the boxes of n x n discs at spacing 2 R touch 2 n (n - 1) times along the axes, and
+    2 (n - 1)^2 times at corners. At one ulp less of size none touch."""
+    centre = np.stack(np.meshgrid(np.arange(n), np.arange(n)), axis=-1).reshape(-1, 2) * spacing
+    lower, upper = centre - spacing / 2, centre + spacing / 2
+    first, second = tree_of(lower, upper).pairs_within()
+    along = np.sum(np.abs(centre[first] - centre[second]) > 0, axis=1) == 1
+    assert np.count_nonzero(along) == 2 * n * (n - 1)
+    assert np.count_nonzero(~along) == 2 * (n - 1) ** 2
+    assert len(tree_of(lower, np.nextafter(upper, -np.inf)).pairs_within()[0]) == 0
+
+
+@pytest.mark.parametrize("n", [4, 12])
+def test_lattice_of_touching_balls(n):
+    """3D: 13 neighbour directions; 3 along axes, 6 across an edge, 4 across a corner."""
+    centre = np.stack(np.meshgrid(*[np.arange(n)] * 3), axis=-1).reshape(-1, 3).astype(float)
+    expected = 3 * n * n * (n - 1) + 6 * n * (n - 1) ** 2 + 4 * (n - 1) ** 3
+    assert len(tree_of(centre - 0.5, centre + 0.5).pairs_within()[0]) == expected
+
+
+@both_dimensions
+@pytest.mark.parametrize("offset", [0.0, 1.0, 1e6, 1e15])
+def test_one_ulp_decides(d, offset):
+    """Neighbours in a chain that share an edge overlap; with a gap of one ulp they do not."""
+    edges = offset + np.arange(0, 401, dtype=float)
+    lower = np.full((400, d), offset)
+    upper = np.full((400, d), offset + 1.0)
+    lower[:, 0], upper[:, 0] = edges[:-1], edges[1:]
+    assert len(tree_of(lower, upper).pairs_within()[0]) == 399
+    lower[:, 0] = np.nextafter(lower[:, 0], np.inf)
+    assert len(tree_of(lower, upper).pairs_within()[0]) == 0
+
+
+@both_dimensions
+def test_nan_and_infinite_boxes_leave_others_alone(d):
+    rng = np.random.default_rng(3)
+    centre, half = scene("uniform", 300, d, rng)
+    lower, upper = centre - half, centre + half
+    before = brute_force.all_pairs(lower[:290], upper[:290])
+    lower[290:295, 0] = np.nan
+    lower[295:] = -np.inf
+    upper[295:] = np.inf
+    pairs = unordered(*tree_of(lower, upper).pairs_within())
+    assert {(i, j) for i, j in pairs if j < 290} == before
+    real = [*range(290), *range(295, 300)]
+    assert {(i, j) for i, j in pairs if j >= 295} == {(i, j) for j in range(295, 300) for i in real if i < j}
+
+
+@both_dimensions
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_hardly_any_bodies(n, d):
+    lower = np.zeros((n, d))
+    tree = tree_of(lower, lower)
+    assert len(tree.pairs_within()[0]) == n * (n - 1) // 2
+    other = tree_of(np.zeros((5, d)), np.ones((5, d)))
+    assert len(tree.pairs_between(other)[0]) == len(other.pairs_between(tree)[0]) == 5 * n
+    assert query(tree, np.zeros(d), np.ones(d)).tolist() == list(range(n))
+
+
+@both_dimensions
+def test_many_bodies_at_one_point_are_counted_not_stored(d):
+    lower = np.zeros((100_000, d))
+    tree = SpatialTree(d)
+    tree.build(lower[:1000], lower[:1000], 0, 1000)
+    assert len(tree.pairs_within()[0]) == 1000 * 999 // 2
+    tree.build(lower, lower, 0, len(lower))
+    with pytest.raises(CandidateLimitError, match="4999950000 candidate pairs exceed the limit of 8388608") as caught:
+        tree.pairs_within()
+    assert (caught.value.count, caught.value.limit) == (100_000 * 99_999 // 2, 1 << 23)
+    with pytest.raises(CandidateLimitError):
+        tree.pairs_between(tree)
+    with pytest.raises(CandidateLimitError, match="limit of 10"):
+        tree_of(lower[:30], lower[:30]).pairs_within(limit=10)
+
+
+@both_dimensions
+def test_walls_and_a_static_world(d):
+    """Four huge walls against small movers, in either order; then many static boxes against few movers."""
+    rng = np.random.default_rng(5)
+    centre, half = scene("uniform", 4000, d, rng)
+    lower, upper = centre - half, centre + half
+    side = upper.max()
+    walls_lower, walls_upper = np.full((4, d), -2.0), np.full((4, d), side + 2.0)
+    walls_upper[0, 0] = walls_upper[1, 1] = 0.2
+    walls_lower[2, 0] = walls_lower[3, 1] = side - 0.2
+    walls_lower[3], walls_upper[3, 0] = walls_lower[3] - 1e6, 1e9
+    movers, walls = tree_of(lower, upper), tree_of(walls_lower, walls_upper)
+    expected = {
+        (i, int(j))
+        for i in range(4)
+        for j in np.flatnonzero(brute_force.overlaps(lower, upper, walls_lower[i], walls_upper[i]))
+    }
+    first, second = walls.pairs_between(movers)
+    assert sorted(zip(first.tolist(), second.tolist(), strict=True)) == sorted(expected)
+    second, first = movers.pairs_between(walls)
+    assert sorted(zip(first.tolist(), second.tolist(), strict=True)) == sorted(expected)
+
+    few = tree_of(lower[:20] + 0.25, upper[:20] + 0.25)
+    first, second = few.pairs_between(movers)
+    assert set(zip(first.tolist(), second.tolist(), strict=True)) == {
+        (i, int(j))
+        for i in range(20)
+        for j in np.flatnonzero(brute_force.overlaps(lower, upper, lower[i] + 0.25, upper[i] + 0.25))
+    }
+
+
+@both_dimensions
+def test_one_tree_for_many_scenes(d):
+    """Buffers are reused: a large scene, a small one and a large one again, rows from the middle of the arrays."""
+    rng = np.random.default_rng(11)
+    tree = SpatialTree(d, ONE_CELL_MAX)
+    for n, start, stop in ((900, 0, 900), (60, 20, 50), (900, 100, 800), (10, 5, 5)):
+        centre, half = scene("power law", n, d, rng)
+        lower, upper = centre - half, centre + half
+        tree.build(lower, upper, start, stop)
+        expected = {(i + start, j + start) for i, j in brute_force.all_pairs(lower[start:stop], upper[start:stop])}
+        assert unordered(*tree.pairs_within()) == expected
+        assert tree.count == stop - start
+
+
+@both_dimensions
+def test_output_is_a_function_of_the_input_alone(d):
+    rng = np.random.default_rng(12)
+    centre, half = scene("clusters", 1000, d, rng)
+    lower, upper = centre - half, centre + half
+    used = tree_of(np.zeros((5000, d)) + rng.random((5000, 1)) * 1e3, np.full((5000, d), 1e3))
+    used.build(lower, upper, 0, 1000)
+    for a, b in zip(used.pairs_within(), tree_of(lower, upper).pairs_within(), strict=True):
+        assert a.dtype == np.int32
+        np.testing.assert_array_equal(a, b)
+
+
+@both_dimensions
+def test_an_endless_box_finds_everything(d):
+    centre, half = scene("uniform", 2000, d, np.random.default_rng(13))
+    tree = tree_of(centre - half, centre + half)
+    everything = np.full(d, np.inf)
+    np.testing.assert_array_equal(query(tree, -everything, everything), np.arange(2000))
+
+
+def test_errors_name_what_is_wrong():
+    with pytest.raises(ValueError, match="dimensions must be 2 or 3, not 4"):
+        SpatialTree(4)
+    box = np.zeros((2, 2))
+    with pytest.raises(ValueError, match=r"rows 0\.\.3 are not within the 2 given"):
+        tree_of(box, box, 0, 3)
+    with pytest.raises(ValueError, match="trees of 2 and 3 dimensions"):
+        tree_of(box, box).pairs_between(SpatialTree(3))

@@ -1,0 +1,165 @@
+"""Grids of what does not move against brute force, alone and in the broad phase of whole worlds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers_boxes import STATIC_GRID_ALONE, Boxes, overlapping, pair_set
+from helpers_statics import level
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from worlds import both_dimensions
+
+from carom.components import RigidBody, Transform
+from carom.systems.broad_phase.stages import CANDIDATE_LIMIT
+from carom.systems.broad_phase.static_grid import OUTSIDE_MAX
+from carom.systems.broad_phase.tree.tree import CandidateLimitError
+
+
+def grid_of(lower, upper, moving):
+    """A grid of all but the first rows, into which these look."""
+    boxes = Boxes(lower.shape[1], functions=STATIC_GRID_ALONE)
+    boxes.set(lower, upper, moving)
+    return boxes
+
+
+def outside(boxes):
+    """The rows that are not in the grid."""
+    grid = boxes.state.static_grid
+    return grid.outside[: grid.outside_count]
+
+
+def check(lower, upper, moving):
+    """The number of pairs, after comparing what the first rows find in the grid with brute force; None without one."""
+    boxes = grid_of(lower, upper, moving)
+    found = boxes.find()
+    if not boxes.state.static_grid.suits:
+        return None
+    left_out = set(outside(boxes).tolist())
+    expected = {(i, j) for i, j in overlapping(lower, upper, moving) if j >= moving and j not in left_out}
+    assert pair_set(*found) == expected
+    return len(expected)
+
+
+@both_dimensions
+@settings(max_examples=30, deadline=None)
+@given(data=st.data())
+def test_any_boxes_look_into_even_ones(d, data):
+    """Boxes of all sizes, touching, infinite and without shape; the largest of what does not move stay outside."""
+    rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    count, large = data.draw(st.integers(OUTSIDE_MAX + 1, 300)), data.draw(st.integers(0, OUTSIDE_MAX))
+    unit = 10.0 ** data.draw(st.integers(-100, 100))
+    centre = rng.integers(0, data.draw(st.integers(2, 40)), (count + 100, d)) * 0.5 + data.draw(
+        st.sampled_from([0.0, 0.25, 1e6])
+    )
+    half = np.full((count + 100, 1), 0.25)
+    half[:100] = 10.0 ** rng.uniform(-2, 2, (100, 1))
+    half[100 : 100 + large] = 50.0
+    lower, upper = (centre - half) * unit, (centre + half) * unit
+    lower[3], upper[4, 0], lower[5:9, d - 1], lower[9], upper[9] = np.nan, np.inf, -np.inf, -np.inf, np.inf
+    lower[-1] = np.nan
+    check(lower, upper, 100)
+
+
+@both_dimensions
+def test_walls_stay_outside(d):
+    centre = np.random.default_rng(1).random((2000, d)) * 2000 ** (1 / d)
+    half = np.full((2000, 1), 0.4)
+    half[500:504] = 1e3
+    boxes = grid_of(centre - half, centre + half, 500)
+    boxes.find()
+    assert boxes.state.static_grid.suits
+    assert outside(boxes).tolist() == [500, 501, 502, 503]
+    assert check(centre - half, centre + half, 500) > 100
+
+
+@both_dimensions
+def test_what_does_not_suit(d):
+    """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
+    rng = np.random.default_rng(2)
+    centre, half = rng.random((1000, d)) * 40, np.full((1000, 1), 0.01)
+    half[: OUTSIDE_MAX + 1] = 15.0
+    nothing = np.full((1000, d), np.nan)
+    for lower, upper in (
+        (centre - half, centre + half),
+        (0 * centre - 0.5, 0 * centre + 0.5),
+        (centre, centre),
+        (nothing, nothing),
+        (centre[:0], centre[:0]),
+        (centre[:OUTSIDE_MAX], centre[:OUTSIDE_MAX] + 1.0),
+    ):
+        assert check(lower, upper, 0) is None
+
+
+@both_dimensions
+def test_output_grows(d):
+    """Each of 40 boxes meets all 1,000 in the grid."""
+    centre = np.random.default_rng(3).random((1040, d)) * 2 * 1000 ** (1 / d)
+    lower, upper = centre - 0.1, centre + 0.1
+    lower[:40], upper[:40] = -1.0, 1e3
+    assert check(lower, upper, 40) == 40 * (1000 - len(outside_after(grid_of(lower, upper, 40))))
+
+
+def outside_after(boxes):
+    """The rows that are not in the grid, once it is built."""
+    boxes.find()
+    return outside(boxes)
+
+
+def test_too_many_pairs_are_left_to_the_tree():
+    """Each of 8,500 boxes meets all 1,000 in the grid: what the limit does not allow, no grid finds."""
+    centre = np.random.default_rng(4).random((9500, 2)) * 60
+    lower, upper = centre - 0.1, centre + 0.1
+    lower[:8500], upper[:8500] = -1.0, 1e3
+    boxes = grid_of(lower, upper, 8500)
+    with pytest.raises(CandidateLimitError):
+        boxes.find()
+    assert boxes.state.static_grid.suits
+    assert len(boxes.state.candidates.first) == CANDIDATE_LIMIT
+
+
+def reason(world):
+    return next(line for line in str(world.plan()).splitlines() if "BroadPhase" in line)
+
+
+def touching(world):
+    """Pairs of ids whose shapes overlap, by brute force, at least one of them a sphere."""
+    bodies = world.bodies
+    position, entity, moving = bodies.position, bodies.entity, len(bodies.dynamic)
+    half = bodies.aabb_collider.half_extents[moving:]
+    found = set()
+    for i in range(moving):
+        gap = np.maximum(np.abs(position[moving:] - position[i]) - half, 0.0)
+        near = moving + np.flatnonzero((gap**2).sum(axis=1) < 0.39**2)
+        near = [*near, *np.flatnonzero(((position[:moving] - position[i]) ** 2).sum(axis=1) < 0.78**2)]
+        found |= {(min(entity[i], entity[j]), max(entity[i], entity[j])) for j in near if j != i}
+    return found
+
+
+@both_dimensions
+@pytest.mark.parametrize("movers", [1, 60, 400])
+def test_a_level_is_seen_as_it_is(d, movers):
+    """All that overlaps is in contact; also after static boxes were moved by their handles or in the columns."""
+    with level(d, movers, speed=0.0) as world:
+        sphere = int(world.bodies.entity[0])
+        for turn in range(4):
+            world.step()
+            assert "uniform grid" in reason(world)
+            contacts = set(zip(world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist(), strict=True))
+            assert touching(world) <= contacts
+            box = int(world.bodies.static.entity[40 + turn])
+            beside = world.component_for_entity(sphere, Transform).position + np.eye(d)[0] * 0.2
+            if turn % 2:
+                world.component_for_entity(box, Transform).position = beside
+            else:
+                world.bodies.position[world.bodies.row_of(box)] = beside
+            world.component_for_entity(sphere, RigidBody).linear_velocity = (0.0,) * d
+
+
+def test_what_is_uneven_is_left_to_trees():
+    with level(2, 300) as world:
+        world.step()
+        assert "uniform grid" in reason(world)
+        world.component_for_entity(int(world.bodies.entity[0]), RigidBody).linear_velocity = (1e5, 0.0)
+        world.step()
+        assert "quadtree" in reason(world)

@@ -1,0 +1,365 @@
+"""Islands at rest sleep: they stay to the bit, cost nothing, and what is awake does not notice."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from helpers_pairwise import pairwise
+from helpers_sleeping import MODES, is_asleep, sleep, sleepy_world, tower
+from worlds import ball, box, make_world
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Phase, Settings, System, World
+from carom.plugins import Physics
+from carom.systems.broad_phase.seekers import MOST_SEEKERS
+from carom.systems.broad_phase.stages import SEEKERS, UNIFORM_GRID
+
+METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
+
+
+def rows_of(world: World, entities) -> list[tuple]:
+    """All that can be seen of these bodies and their contacts."""
+    bodies, contacts = world.bodies, world.contacts
+    rows = [bodies.row_of(entity) for entity in entities]
+    touching = np.isin(contacts.entity_a, entities) | np.isin(contacts.entity_b, entities)
+    names = ("entity_a", "entity_b", "point", "normal", "depth", "normal_impulse")
+    seen = [getattr(bodies, name)[rows].tobytes() for name in ("position", "linear_velocity", "previous_position")]
+    return seen + [getattr(contacts, name)[touching].tobytes() for name in names]
+
+
+# -- falling asleep ----------------------------------------------------------------------------------------------------
+
+
+def test_off_by_default_and_nothing_sleeps():
+    world = sleepy_world(sleeping=False)
+    assert Settings().sleeping is False
+    boxes = tower(world, 0.0)
+    for _ in range(60):
+        world.step()
+    assert not any(is_asleep(world, *boxes))
+    assert not world.bodies.asleep.any()
+    assert "_still" not in world.physics.table.arrays
+    assert not any(name in str(world.plan()) for name in ("rest_sleepers", "judge_rest", "leave_out_still"))
+
+
+@pytest.mark.parametrize(
+    ("mode", "method", "d", "substeps"), pairwise(MODES, METHODS, (2, 3), (1, 4)), ids=lambda value: str(value)
+)
+def test_falls_asleep_and_stays_to_the_bit(mode, method, d, substeps):
+    world = sleepy_world(d, collision=mode, integrator=method, substeps=substeps)
+    boxes = tower(world, 0.0, 2)
+    sleep(world, *boxes)
+    before, contacts = world.state_hash(), len(world.contacts)
+    assert contacts == 2
+    for _ in range(20):
+        world.step()
+        assert len(world.contacts) == contacts
+        assert len(world.contacts.begin) == len(world.contacts.end) == 0
+    assert world.state_hash() == before
+    assert not world.bodies.dynamic.linear_velocity.any()
+    world.component_for_entity(boxes[0], RigidBody).apply_impulse((0.5, 0.0, 0.0)[:d])
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+
+
+def test_not_before_half_a_second_at_rest():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    for _ in range(28):
+        world.step()
+    assert is_asleep(world, *boxes) == [False]
+    sleep(world, *boxes)
+
+
+def test_what_drifts_flies_or_is_carried_does_not_sleep():
+    world = make_world(2, 0.0, sleeping=True)
+    drifting, thrown = ball(world, 0.0, 0.001), ball(world, 10.0, 0.0)
+    world.component_for_entity(thrown, RigidBody).constant_force = (0.01, 0.0)
+    lift = sleepy_world()
+    box(lift, (0.0, 5.0), (0.0, 0.1), half=(2.0, 0.5), kind="kinematic")
+    carried = box(lift, (0.0, 6.0))
+    for _ in range(90):
+        world.step()
+        lift.step()
+    assert not any(is_asleep(world, drifting, thrown))
+    assert is_asleep(lift, carried) == [False]
+
+
+def test_what_slides_slowly_does_not_stop():
+    world = sleepy_world()
+    slow = box(world, (0.0, 0.05), (0.02, 0.0), half=0.05, friction=0.0)
+    for _ in range(120):
+        world.step()
+    assert world.component_for_entity(slow, RigidBody).linear_velocity[0] == pytest.approx(0.02)
+
+
+def test_sleeps_on_a_kinematic_body_that_stands_until_it_moves():
+    world = sleepy_world()
+    lift = box(world, (0.0, 5.0), half=(2.0, 0.5), kind="kinematic")
+    carried = tower(world, 0.0, 1)[0]
+    world.component_for_entity(carried, Transform).position = (0.0, 6.0)
+    sleep(world, carried)
+    world.component_for_entity(lift, RigidBody).linear_velocity = (0.0, 1.0)
+    world.step()
+    assert is_asleep(world, carried) == [False]
+    for _ in range(30):
+        world.step()
+    assert world.component_for_entity(carried, Transform).position[1] > 6.4
+
+
+def test_a_sleeping_pile_costs_no_pairs_and_no_solving():
+    world = sleepy_world()
+    boxes = [entity for x in range(0, 8, 2) for entity in tower(world, float(x))]
+    sleep(world, *boxes)
+    world.reset_stats()
+    world.step()
+    counters = world.physics.counters()
+    for name in ("candidates", "pairs", "contacts", "resting_contacts", "impacts"):
+        assert counters[name] == 0, name
+    assert len(world.contacts) == 12
+
+
+# -- the same as without -----------------------------------------------------------------------------------------------
+
+
+def halves(sleeping: bool, d: int, mode: str) -> tuple[World, list[int], list[int]]:
+    """A tower that comes to rest, and far from it balls that bounce and roll among boxes."""
+    world = sleepy_world(d, sleeping=sleeping, collision=mode)
+    still = tower(world, 0.0) + tower(world, 3.0, 2)
+    lively = tower(world, 50.0)
+    for k, e in itertools.product(range(4), (0.0, 0.9)):
+        place = (47.0 + 2.0 * k, 2.0 + k + 3.0 * e, 0.1 * k)[:d]
+        lively.append(ball(world, place, (1.0 - k, -2.0, 0.3)[:d], radius=0.3, restitution=e, friction=0.3))
+    return world, still, lively
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_is_awake_has_the_same_bits_as_without_sleeping(d, mode):
+    (on, still, lively), (off, _, _) = halves(True, d, mode), halves(False, d, mode)
+    kicks, slept = np.random.default_rng(1), 0
+    for step in range(110):
+        for entity in lively if step % 12 == 0 else ():
+            velocity = kicks.uniform(-3.0, 3.0, d)
+            for world in (on, off):
+                world.component_for_entity(entity, RigidBody).linear_velocity = velocity
+        on.step()
+        off.step()
+        slept += all(is_asleep(on, *still))
+        assert not any(is_asleep(on, *lively))
+        assert rows_of(on, lively) == rows_of(off, lively), step
+    assert slept > 60
+
+
+def test_waking_goes_on_as_if_nothing_had_happened():
+    """The impulses that carry a tower are there again: it does not sag."""
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 6)
+    sleep(world, *boxes)
+    before = world.bodies.dynamic.position.copy()
+    impulses = world.contacts.normal_impulse.copy()
+    world.wake(boxes[0])
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+    np.testing.assert_allclose(world.contacts.normal_impulse, impulses, rtol=1e-2)
+    np.testing.assert_allclose(world.bodies.dynamic.position, before, atol=1e-5)
+    assert len(world.contacts.begin) == len(world.contacts.end) == 0
+
+
+# -- contacts ----------------------------------------------------------------------------------------------------------
+
+
+def test_contacts_of_sleepers_are_listed_in_order_and_make_no_events():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    rolling = ball(world, (-10.0, 0.3), (1.0, 0.0), radius=0.3)
+    late = tower(world, 10.0)
+    told = []
+    for name in ("contact_begin", "contact_end"):
+        world.on(name, lambda contact, name=name: told.append((name, contact.entity_a, contact.entity_b)))
+    world.step()
+    told.clear()
+    sleep(world, *boxes, *late)
+    contacts = world.contacts
+    assert not is_asleep(world, rolling)[0]
+    assert len(contacts) == 7
+    pairs = list(zip(contacts.entity_a.tolist(), contacts.entity_b.tolist(), strict=True))
+    assert pairs == sorted(pairs)
+    assert set(contacts.step.tolist()) == {world.step_count - 1}
+    assert (contacts.normal_impulse > 0.0).all()
+    assert len(contacts.stay) == 7
+    assert told == []
+    world.wake(boxes[0])
+    world.step()
+    assert told == []
+    world.delete_entity(late[2])
+    world.step()
+    assert told == [("contact_end", late[1], late[2])]
+
+
+def test_what_a_game_writes_into_the_contacts_of_sleepers_changes_nothing_but_what_it_reads():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    normals = world.contacts.normal.copy()
+    world.contacts.normal[:] = 7.0
+    world.contacts.enabled[:] = False
+    world.step()
+    assert (world.contacts.normal == normals).all()
+    assert world.contacts.enabled.all()
+    assert all(is_asleep(world, *boxes))
+
+
+def test_contact_stay_is_told_of_sleepers():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 2)
+    stays = []
+    world.on("contact_stay", lambda contact: stays.append((contact.entity_a, contact.entity_b)))
+    sleep(world, *boxes)
+    stays.clear()
+    world.step()
+    assert len(stays) == 2
+
+
+def test_sensors_do_not_wake_and_tell_who_comes_and_goes():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 2)
+    zone = world.create_entity(Transform((0.0, 1.0)), AABBCollider((2.0, 2.0), sensor=True))
+    sleep(world, *boxes)
+    assert len(world.contacts) == 4
+    passing = ball(world, (-3.0, 1.0), (4.0, 0.0), radius=0.2, sensor=True)
+    world.component_for_entity(passing, RigidBody).gravity_scale = 0.0
+    begun = ended = 0
+    for _ in range(90):
+        world.step()
+        begun += len(world.contacts.begin.of(boxes[0]))
+        ended += len(world.contacts.end.of(boxes[0]))
+    assert all(is_asleep(world, *boxes))
+    assert (begun, ended) == (1, 1)
+    world.delete_entity(zone)
+    world.step()
+    assert len(world.contacts.end) == 2
+    assert all(is_asleep(world, *boxes))
+
+
+def test_disabling_the_contact_of_sleepers_wakes_them():
+    class Trapdoor(System):
+        phase = Phase.NARROW
+        open = False
+
+        def process(self, dt):
+            if self.open:
+                self.world.contacts.enabled[:] = False
+
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    trapdoor = Trapdoor()
+    world.add_system(trapdoor)
+    sleep(world, *boxes)
+    trapdoor.open = True
+    world.step()
+    assert is_asleep(world, *boxes) == [False]
+    for _ in range(30):
+        world.step()
+    assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
+    assert is_asleep(world, *boxes) == [False]
+
+
+def test_one_way_platforms_that_look_at_velocities_hold_sleepers():
+    class OneWay(System):
+        phase = Phase.NARROW
+
+        def process(self, dt):
+            contacts, bodies = self.world.contacts, self.world.bodies
+            rows = [bodies.row_of(entity) for entity in contacts.entity_b.tolist()]
+            contacts.enabled[:] = bodies.linear_velocity[rows, 1] < 0.0
+
+    world = sleepy_world()
+    tower(world, 0.0, 1)
+    world.add_system(OneWay())
+    heights = [world.step() or world.bodies.dynamic.position[0, 1] for _ in range(100)]
+    assert min(heights) > 0.49
+
+
+def test_what_is_held_apart_by_disabled_contacts_does_not_sleep():
+    class Off(System):
+        phase = Phase.NARROW
+
+        def process(self, dt):
+            self.world.contacts.enabled[:] = False
+
+    world = make_world(2, 0.0, sleeping=True)
+    pair = ball(world, 0.0), ball(world, 0.9)
+    off = Off()
+    world.add_system(off)
+    for _ in range(60):
+        world.step()
+    assert not any(is_asleep(world, *pair))
+    world.remove_system(off)
+    world.step()
+    assert len(world.contacts.begin) == 1
+
+
+class WakeWithinTheStep(System):
+    """Wakes an entity after the flight, when it is known already which bodies are awake in the step."""
+
+    phase = Phase.INTEGRATION
+
+    def __init__(self, entity, when):
+        self.entity, self.when = entity, when
+
+    def process(self, dt):
+        if self.world.step_count == self.when:
+            self.world.wake(self.entity)
+
+
+@pytest.mark.parametrize(("balls", "search"), [(3, SEEKERS), (MOST_SEEKERS, SEEKERS), (MOST_SEEKERS + 1, UNIFORM_GRID)])
+def test_a_few_balls_above_a_sleeping_crowd_are_tested_alone(balls, search):
+    """The search for pairs costs work for the few that are awake; what they do is the same as where nothing sleeps."""
+    places = []
+    for sleeping in (True, False):
+        with World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=Settings(sleeping=sleeping)) as world:
+            world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(1000.0, 0.5)))
+            x = np.arange(300) * 1.5
+            world.create_entities(
+                300, Transform.many(np.stack([x, np.full(300, 0.5)], axis=1)), RigidBody.many(mass=1.0),
+                AABBCollider.many(half_extents=(0.5, 0.5)),
+            )  # fmt: skip
+            flyers = world.create_entities(
+                balls, Transform.many(np.stack([x[:balls], np.full(balls, 9.0)], axis=1)),
+                RigidBody.many(mass=1.0, gravity_scale=0.0, linear_velocity=(0.5, 0.0)),
+                SphereCollider.many(radius=0.5, restitution=1.0),
+            )  # fmt: skip
+            for _ in range(120):
+                world.step()
+            if sleeping:
+                assert world.bodies.asleep.sum() == 300
+                assert world.physics.state.pair_search == search
+            for _ in range(120):
+                world.step()
+            places.append([world.component_for_entity(entity, Transform).position.copy() for entity in flyers])
+    assert np.array_equal(places[0], places[1])
+
+
+def test_a_body_that_is_woken_within_a_step_finds_what_it_touches():
+    """All bodies look for others in that step, not only those that were awake when it began."""
+    with World(Physics(dimensions=2, gravity=(0.0, -9.81)), settings=Settings(sleeping=True)) as world:
+        world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(50.0, 0.5)))
+        places = [(3.0 * k, 0.5 + h) for k in range(3) for h in range(2)]
+        boxes = world.create_entities(
+            6, Transform.many(places), RigidBody.many(mass=1.0), AABBCollider.many(half_extents=(0.5, 0.5))
+        )
+        world.create_entity(
+            Transform((0.0, 30.0)), RigidBody(mass=1.0, gravity_scale=0.0, linear_velocity=(0.1, 0.0)),
+            SphereCollider(radius=0.5),
+        )  # fmt: skip
+        world.add_system(WakeWithinTheStep(boxes[0], 200))
+        for _ in range(200):
+            world.step()
+        assert is_asleep(world, *boxes) == [True] * 6
+        contacts = len(world.contacts)
+        world.step()
+        assert is_asleep(world, *boxes) == [False, False, True, True, True, True]
+        assert len(world.contacts) == contacts

@@ -1,0 +1,336 @@
+"""Columns that have no memory while every row holds the default: to users they are like any other."""
+
+from __future__ import annotations
+
+import copy
+from operator import attrgetter
+
+import numpy as np
+import pytest
+from worlds import make_world
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Component, ForceSystem, Phase, StepError, System
+from carom.framework.data.columns import column
+
+COUNT = 30
+ON_DEMAND = {
+    "rotation", "constant_force", "gravity_scale", "linear_damping", "max_linear_speed", "ccd", "applied_force",
+    "applied_frame", "step_force", "force", "sphere_collider.offset", "sphere_collider.restitution",
+    "sphere_collider.friction", "sphere_collider.sensor", "sphere_collider.layer", "sphere_collider.mask",
+}  # fmt: skip
+# Another value of each field that a handle or a constructor takes.
+BODY = {"constant_force": 2.0, "gravity_scale": 0.5, "linear_damping": 0.25, "max_linear_speed": 3.0, "ccd": True}
+BALL = {"offset": 0.1, "restitution": 0.5, "friction": 0.25, "sensor": True, "layer": 2, "mask": 6}
+OTHERS = {**{name: (RigidBody, value) for name, value in BODY.items()},
+          **{name: (SphereCollider, value) for name, value in BALL.items()}}  # fmt: skip
+
+
+def crowd(dimensions=2, gravity=0.0, **settings):
+    """Balls in a row, not touching, on their way; every field of theirs is at its default."""
+    world = make_world(dimensions, gravity=gravity, **settings)
+    places, speeds = np.zeros((COUNT, dimensions)), np.zeros((COUNT, dimensions))
+    places[:, 0], speeds[:, 0] = 1.5 * np.arange(COUNT), np.where(np.arange(COUNT) % 2, -1.0, 1.0)
+    entities = world.create_entities(
+        COUNT, Transform.many(places), RigidBody.many(1.0, speeds), SphereCollider.many(radius=0.5)
+    )
+    world.step()
+    return world, entities
+
+
+def made(world):
+    """The columns on demand that have memory, as the plan tells."""
+    return {c.column for c in world.plan().columns if c.of == "body" and c.group != "going back"} & ON_DEMAND
+
+
+def with_memory(world):
+    """Let every column have its memory, without another value anywhere."""
+    for name in sorted(ON_DEMAND):
+        attrgetter(name)(world.bodies)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_at_first_there_are_none(dimensions):
+    world, entities = crowd(dimensions)
+    for _ in range(30):
+        world.step()
+    assert world.stats().totals.counters["contacts"] > 0
+    assert made(world) == set()
+    ball = world.component_for_entity(entities[3], RigidBody)
+    assert (ball.gravity_scale, ball.ccd, ball.max_linear_speed, ball.linear_damping) == (1.0, False, None, 0.0)
+    assert "gravity_scale=1.0" in repr(ball)
+    copy.copy(ball)
+    world.state_hash()
+    world.potential_energy()
+    world.snapshot()
+    assert made(world) == set()
+    assert set(dir(world.bodies)) >= {name for name in ON_DEMAND if "." not in name}
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_with_and_without_memory_are_the_same_to_the_bit(dimensions):
+    hashes = []
+    for asked in (False, True):
+        for gravity in (0.0, 9.81):
+            world, _ = crowd(dimensions, gravity, integrator="velocity_verlet")
+            floor = np.zeros(dimensions)
+            floor[1] = -2.0
+            world.create_entity(
+                Transform(floor), AABBCollider(np.full(dimensions, 1.0) * (100.0, 1.0, 100.0)[:dimensions])
+            )
+            if asked:
+                with_memory(world)
+                assert made(world) == ON_DEMAND
+            for _ in range(60):
+                world.step()
+            hashes.append((world.state_hash(), world.contacts.point.tobytes(), world.contacts.normal_impulse.tobytes()))
+            assert gravity == 0.0 or len(world.contacts) > COUNT // 2
+    assert hashes[:2] == hashes[2:]
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_value_by_handle_column_or_constructor_is_the_same(name, dimensions):
+    component, value = OTHERS[name]
+    hashes, flat = set(), component is RigidBody
+    for way in ("handle", "column", "constructor", "in place"):
+        world, entities = crowd(dimensions)
+        handle = world.component_for_entity(entities[5], component)
+        where = world.bodies if flat else world.bodies.sphere_collider
+        if way == "handle":
+            setattr(handle, name, value)
+        elif way == "column":
+            getattr(where, name)[5] = value
+        elif way == "in place" and np.ndim(getattr(handle, name)):
+            getattr(handle, name)[:] = value
+        elif way == "in place":
+            rest = getattr(where, name).copy()
+            rest[5] = value
+            setattr(where, name, rest)
+        else:
+            own = {"linear_velocity": handle.linear_velocity} if flat else {"radius": 0.5}
+            world.add_component(entities[5], component(**own, **{name: value}))
+        world.step()
+        key = name if flat else f"sphere_collider.{name}"
+        assert key in made(world)
+        assert np.all(world.component_for_entity(entities[5], component).__getattribute__(name) == value)
+        others = np.delete(np.arange(COUNT), 5)
+        default = component.columns[name].default
+        values = getattr(world.bodies if flat else world.bodies.sphere_collider, name)[others]
+        assert np.isnan(values).all() if default is None else (values == default).all()
+        for _ in range(30):
+            world.step()
+        hashes.add(world.state_hash())
+    assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_view_is_the_column(dimensions):
+    world, entities = crowd(dimensions)
+    view, handle = world.bodies.constant_force, world.component_for_entity(entities[2], RigidBody)
+    handle.constant_force = 3.0
+    assert (view[2] == 3.0).all()
+    view[2] = 4.0
+    assert (handle.constant_force == 4.0).all()
+    before = handle.linear_velocity.copy()
+    world.step()
+    assert (handle.linear_velocity > before).all()
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_rotation(dimensions):
+    world, entities = crowd(dimensions)
+    place = world.component_for_entity(entities[4], Transform)
+    turned = 0.5 if dimensions == 2 else np.array([0.6, 0.8, 0.0, 0.0])
+    assert np.all(place.rotation == (0.0 if dimensions == 2 else [1.0, 0.0, 0.0, 0.0]))
+    place.rotation = turned
+    world.step()
+    assert np.allclose(place.rotation, turned)
+    assert np.all(world.bodies.rotation[5] == (0.0 if dimensions == 2 else [1.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_forces_for_a_frame_and_for_a_step(dimensions):
+    class Push(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            if self.world.step_count == 3:
+                self.world.component_for_entity(entities[1], RigidBody).apply_force(np.ones(dimensions))
+
+    world, entities = crowd(dimensions)
+    world.component_for_entity(entities[0], RigidBody).apply_force(60.0 * np.ones(dimensions))
+    world.step()
+    assert np.allclose(world.bodies.linear_velocity[0][1:], 60.0 * world.settings.dt)
+    assert not world.bodies.applied_force.any()
+    world.add_system(Push())
+    world.step()
+    world.step()
+    assert np.allclose(world.bodies.linear_velocity[1][1:], world.settings.dt)
+    assert not world.bodies.step_force.any()
+
+
+def test_a_force_after_the_forces_were_summed():
+    class Late(System):
+        phase = Phase.FORCES
+
+        def process(self, dt):
+            self.world.component_for_entity(entities[0], RigidBody).apply_force((0.0, 6.0))
+
+    world, entities = crowd()
+    world.add_system(Late())
+    world.step()
+    assert world.bodies.linear_velocity[0, 1] == pytest.approx(6.0 * world.settings.dt)
+
+
+@pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4"])
+def test_force_systems(integrator):
+    class Wind(ForceSystem):
+        def add_forces(self, bodies, time):
+            bodies.force += [0.0, 2.0]
+
+    world, _ = crowd(integrator=integrator)
+    world.add_system(Wind())
+    world.step()
+    assert np.allclose(world.bodies.linear_velocity[:, 1], 2.0 * world.settings.dt)
+
+
+class Marked(Component):
+    strength = column(0.0)
+
+
+def test_force_systems_for_some_bodies_see_defaults_that_cannot_be_written():
+    class Pull(ForceSystem):
+        requires = (Marked,)
+
+        def add_forces(self, bodies, time):
+            assert (bodies.gravity_scale == 1.0).all()
+            with pytest.raises(ValueError, match="read-only"):
+                bodies.linear_damping[0] = 1.0
+            bodies.force[:, 1] += 3.0
+
+    world, entities = crowd()
+    world.add_component(entities[7], Marked())
+    world.add_system(Pull())
+    world.step()
+    assert np.flatnonzero(world.bodies.linear_velocity[:, 1]).tolist() == [7]
+    assert "gravity_scale" not in made(world)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_snapshot_from_before_has_the_defaults(dimensions):
+    world, entities = crowd(dimensions)
+    before, hashed = world.snapshot(), world.state_hash()
+    world.bodies.constant_force[4] = 5.0
+    world.bodies.sphere_collider.layer[4] = 0
+    world.component_for_entity(entities[2], RigidBody).linear_damping = 1.0
+    after, changed = world.snapshot(), world.state_hash()
+    world.step()
+    world.restore(before)
+    assert world.state_hash() == hashed
+    assert not world.bodies.constant_force.any()
+    assert (world.bodies.sphere_collider.layer == 1).all()
+    world.restore(after)
+    assert world.state_hash() == changed
+    assert (world.bodies.constant_force[4] == 5.0).all()
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_failed_step_takes_back_what_was_written_in_it(dimensions):
+    class Fail(System):
+        phase = Phase.NARROW
+        on = True
+
+        def process(self, dt):
+            if self.on:
+                self.world.bodies.constant_force[3] = 7.0
+                self.world.bodies.sphere_collider.friction[3] = 0.5
+                self.world.bodies.ccd[3] = True
+                raise RuntimeError("on purpose")
+
+    world, _ = crowd(dimensions)
+    twin, _ = crowd(dimensions)
+    fail = Fail()
+    world.add_system(fail)
+    hashed = world.state_hash()
+    with pytest.raises(StepError, match="on purpose"):
+        world.step()
+    assert world.state_hash() == hashed
+    fail.on = False
+    for _ in range(30):
+        world.step()
+        twin.step()
+    assert world.state_hash() == twin.state_hash()
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_bodies_that_come_and_go(dimensions):
+    world, entities = crowd(dimensions)
+    damped = {entities[6]: 0.5}
+    world.component_for_entity(entities[6], RigidBody).linear_damping = 0.5
+    for entity in entities[:4]:
+        world.delete_entity(entity)
+    handle = world.component_for_entity(entities[4], RigidBody)
+    far = np.full(dimensions, 50.0)
+    for k in range(200):  # more than there is room for
+        body = RigidBody(linear_damping=0.25 if k == 9 else 0.0)
+        entity = world.create_entity(Transform(far + 2.0 * k), body, SphereCollider(0.5))
+        if k == 9:
+            damped[entity] = 0.25
+    world.step()
+    for entity in world.bodies.entity.tolist():
+        assert world.component_for_entity(entity, RigidBody).linear_damping == damped.get(entity, 0.0)
+    assert made(world) == {"linear_damping"}
+    world.delete_entity(entities[6], immediate=True)
+    world.step()
+    assert (handle.linear_damping, handle.gravity_scale) == (0.0, 1.0)
+    gone = world.remove_component(entities[5], RigidBody)
+    world.step()
+    assert (gone.gravity_scale, gone.constant_force.tolist()) == (1.0, [0.0] * dimensions)
+    gone.constant_force = 2.0
+    assert "constant_force" not in made(world)
+
+
+def test_negative_zero_is_kept():
+    world = make_world()
+    entity = world.create_entity(Transform((0.0, 0.0)), RigidBody(constant_force=(-0.0, 0.0)))
+    world.step()
+    assert np.signbit(world.component_for_entity(entity, RigidBody).constant_force[0])
+
+
+def test_static_bodies_are_read_only_as_ever():
+    world, _ = crowd()
+    wall = world.create_entity(Transform((0.0, -9.0)), AABBCollider((1.0, 1.0)))
+    world.step()
+    with pytest.raises(ValueError, match="read-only"):
+        world.component_for_entity(wall, AABBCollider).offset[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        world.bodies.static.aabb_collider.layer[:] = 2
+    world.component_for_entity(wall, AABBCollider).layer = 2
+    assert world.bodies.static.aabb_collider.layer.tolist() == [2]
+
+
+def test_a_second_type_of_collider_shares_the_field():
+    world, entities = crowd()
+    world.component_for_entity(entities[1], SphereCollider).restitution = 0.5
+    box = world.create_entity(Transform((0.0, 40.0)), RigidBody(), AABBCollider((0.5, 0.5)))
+    world.step()
+    assert world.component_for_entity(entities[1], SphereCollider).restitution == 0.5
+    assert world.component_for_entity(box, AABBCollider).restitution == 0.0
+    world.component_for_entity(box, AABBCollider).layer = 4
+    assert (world.bodies.sphere_collider.layer[world.bodies.has(SphereCollider)] == 1).all()
+    assert world.component_for_entity(box, AABBCollider).layer == 4
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_layers_friction_and_sensors_given_later_act(dimensions):
+    world, entities = crowd(dimensions)
+    world.component_for_entity(entities[0], SphereCollider).mask = 0
+    world.component_for_entity(entities[2], SphereCollider).sensor = True
+    for _ in range(40):
+        world.step()
+    met = set(world.contacts.entity_a.tolist()) | set(world.contacts.entity_b.tolist())
+    assert entities[0] not in met
+    speeds = world.bodies.linear_velocity
+    assert (speeds[0][0], speeds[2][0]) == (1.0, 1.0)
+    assert speeds[4][0] != 1.0

@@ -1,0 +1,171 @@
+"""The package as shipped: listed packages, contents of a wheel, and imports between packages."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+from helpers_folders import FLOORS, ROOT, package_of
+
+import carom
+
+OUTSIDE = ("studies", "tests", "examples")  # not installed: nothing that is may import them
+
+
+def python_files(folder: str) -> list[Path]:
+    """The modules that are installed."""
+    files = sorted((ROOT / folder).rglob("*.py"))
+    return [path for path in files if "__pycache__" not in path.parts]
+
+
+def test_the_root_package_holds_names_and_links():
+    root = ROOT / "src" / "carom"
+    files = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
+    assert {path.name for path in root.iterdir() if path.name != "__pycache__"} == files | set(FLOORS)
+    for floor in FLOORS:
+        assert (root / floor).resolve() == ROOT / floor
+
+
+def test_every_folder_with_modules_is_a_package():
+    for folder in {path.parent for floor in FLOORS for path in python_files(floor)}:
+        assert (folder / "__init__.py").is_file(), f"{folder} lacks __init__.py"
+
+
+def test_each_name_of_carom_is_one_of_its_module_and_of_the_stub():
+    stub = {}
+    for node in ast.parse((ROOT / "src" / "carom" / "__init__.pyi").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            module = importlib.import_module(f"carom.{node.module}")
+            names = [alias.name for alias in node.names]
+            stub.update(dict.fromkeys(module.__all__ if names == ["*"] else names, module))
+    assert set(carom.__all__) == set(stub) <= set(dir(carom))
+    for name in carom.__all__:
+        assert getattr(carom, name) is getattr(stub[name], name)
+    with pytest.raises(AttributeError, match="module 'carom' has no attribute 'Wrold'"):
+        carom.Wrold  # noqa: B018
+
+
+def run_elsewhere(code: str, folder: Path, place: Path) -> str:
+    """What Python prints in a folder, with carom from a place."""
+    environment = {**os.environ, "PYTHONPATH": str(place)}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+def test_importing_carom_loads_none_of_its_parts():
+    code = "import sys, carom; print([name for name in sys.modules if name.startswith(('carom.', 'numpy', 'numba'))])"
+    assert run_elsewhere(code, ROOT, ROOT / "src").strip() == "[]"
+
+
+def imported_floors(path: Path) -> set[str]:
+    """The floors that a module imports from, for any form of import."""
+    package = package_of(path.parent).split(".")
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            targets = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) + 1 - node.level] if node.level else []
+            base = base + (node.module.split(".") if node.module else [])
+            targets = [[*base, alias.name] for alias in node.names]
+        else:
+            continue
+        for target in targets:
+            assert target[0] not in FLOORS, f"{path} imports {'.'.join(target)}: only carom.* is a package"
+            assert target[0] not in OUTSIDE, f"{path} imports {'.'.join(target)}, which is not installed"
+            if target[0] == "carom" and len(target) > 1 and target[1] in FLOORS:
+                found.add(target[1])
+    return found
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_each_floor_imports_only_from_the_floors_below(floor):
+    allowed = set(FLOORS[: FLOORS.index(floor) + 1])
+    for path in python_files(floor):
+        if path.name == "__main__.py":  # the only one that imports upwards, from the command line
+            continue
+        above = imported_floors(path) - allowed
+        assert not above, f"{path.relative_to(ROOT)} imports from {sorted(above)}"
+
+
+def test_importing_physics_imports_no_drawing_and_no_command_line():
+    code = "import sys, carom.plugins; print('\\n'.join(sys.modules))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    modules = result.stdout.split()
+    unwanted = ("click", "rich", "matplotlib", "carom.lab", "carom.scenes")
+    assert "carom.plugins" in modules
+    assert not [m for m in modules if m in unwanted or m.startswith(tuple(f"{name}." for name in unwanted))]
+
+
+@pytest.fixture(scope="module")
+def source_copy(tmp_path_factory) -> Path:
+    """The sources alone, so that building leaves nothing behind in the checkout."""
+    copy = tmp_path_factory.mktemp("source") / "carom"  # the name a clone is likely to have
+    hidden = shutil.ignore_patterns(".*", "build", "dist", "out", "*.egg-info", "__pycache__", "uv.lock")
+    shutil.copytree(ROOT, copy, symlinks=True, ignore=hidden)
+    return copy
+
+
+def build(kind: str, source: Path, target: Path) -> Path:
+    """Call setuptools' own build hooks, the ones pip calls: no network, no isolated environment."""
+    code = f"import sys, setuptools.build_meta as b; print(b.build_{kind}(sys.argv[1]))"
+    command = [sys.executable, "-c", code, str(target)]
+    result = subprocess.run(command, cwd=source, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": ""})
+    assert result.returncode == 0, result.stderr
+    return target / result.stdout.strip().splitlines()[-1]
+
+
+def test_a_wheel_holds_exactly_the_packages(source_copy, tmp_path):
+    wheel = build("wheel", source_copy, tmp_path)
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+        metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/entry_points.txt"))
+        entry_points = archive.read(metadata).decode()
+    expected = {"carom/py.typed", *(f"carom/__{name}" for name in ("init__.py", "init__.pyi", "main__.py"))}
+    for floor in FLOORS:
+        for path in python_files(floor):
+            expected.add("/".join((*package_of(path.parent).split("."), path.name)))
+    assert names == expected
+    assert "carom = carom.__main__:main" in entry_points
+
+
+@pytest.mark.parametrize("installed", ["editable", "wheel"])
+def test_a_clone_named_carom_in_the_working_folder_hides_nothing(source_copy, tmp_path, installed):
+    """An editable install puts src on the path; a folder without __init__.py comes after any package of its name."""
+    place = ROOT / "src"
+    if installed == "wheel":
+        place = tmp_path
+        with zipfile.ZipFile(build("wheel", source_copy, tmp_path)) as archive:
+            archive.extractall(place)
+    code = "import carom; from carom import Physics, World; print(carom.__file__, World(Physics()))"
+    assert run_elsewhere(code, source_copy.parent, place).startswith(str(place / "carom" / "__init__.py"))
+
+
+def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
+    archive = build("sdist", source_copy, tmp_path)
+    with tarfile.open(archive) as tar:
+        names = {name.partition("/")[2] for name in tar.getnames()}
+    assert {
+        "tests/docs/test_packaging.py",
+        "studies/runner.py",
+        "LICENSE",
+        "README.md",
+        "src/carom/py.typed",
+        "src/carom/lab/cli/main.py",
+    } <= names
+
+
+@pytest.mark.parametrize("code", ["import carom.framework, carom.plugins, carom.scenes", "import carom.lab.cli.main"])
+def test_the_compiler_is_not_loaded_by_an_import(code):
+    """numba and llvmlite take longer than all the rest; a program that asks for help or lists scenes needs neither."""
+    check = f"{code}, sys; print([name for name in ('numba', 'llvmlite') if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

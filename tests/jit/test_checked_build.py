@@ -1,0 +1,70 @@
+"""The build that checks every index (CAROM_CHECK=1): the bits are the same, and no kernel leaves its arrays.
+
+Its kernels are compiled once for all tests of this file, in a folder that is empty at first.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from helpers_determinism import Facade, mixed_scene, settled
+from helpers_processes import run_python
+
+pytestmark = [pytest.mark.slow, pytest.mark.early]  # compiles everything
+
+MIXED = """
+from helpers_determinism import Facade, mixed_scene, settled
+world = settled()
+for _ in mixed_scene(world, Facade(world)): pass
+from carom.framework.compilation import log
+print(world.state_hash(), len(log.compiled), log.loaded)
+"""
+POISON = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
+EXTREMES = (
+    "laws/test_grains", "laws/test_bounded", "laws/test_bullets_in_rooms", "contacts/test_caught",
+    "impacts/test_continuous_extremes", "impacts/test_impact_oracle", "world/test_extremes_numbers",
+    "world/test_determinism_histories",
+)  # fmt: skip
+TESTS = """
+import pytest, sys
+bare = ["--quiet", "--noconftest", "-p", "no:xdist", "-p", "no:cacheprovider", "-m", "not slow and not long"]
+sys.exit(pytest.main([*bare, *sys.argv[1:]]))
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("kernels")
+
+
+def run_checked(folder, code, *arguments, seed="0"):
+    """What the program prints, in a new Python with the checked build."""
+    optimised = {"NUMBA_OPT": "1"}  # a little, as most of the time goes to compiling
+    environment = {"CAROM_CACHE_DIR": str(folder), "CAROM_CHECK": "1", "PYTHONHASHSEED": seed, **optimised}
+    result = run_python(code, *arguments, **environment, PYTHONPATH=str(Path(__file__).parents[1]))
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_other_processes_with_a_cold_and_a_warm_cache_get_the_same_bits(folder):
+    """And the same as without checks, in this process."""
+    cold, warm = (run_checked(folder, MIXED, seed=seed).split() for seed in ("1", "2"))
+    assert int(cold[1]) > 5
+    assert int(warm[1]) == 0  # every kernel came from the disk
+    assert int(warm[2]) >= int(cold[1])
+    world = settled()
+    for _ in mixed_scene(world, Facade(world)):
+        pass
+    assert cold[0] == warm[0] == world.state_hash()
+
+
+def test_no_kernel_leaves_its_arrays(folder):
+    """Whatever stands in any column of some bodies of each scene."""
+    assert run_checked(folder, POISON, 14) == ""
+
+
+def test_extremes_and_random_worlds_stay_in_their_arrays(folder):
+    """Gravity, masses, sizes and speeds far apart, caught bodies, bodies that come and go, scattered shapes."""
+    files = [Path(__file__).parents[1] / f"{name}.py" for name in EXTREMES]
+    assert " passed" in run_checked(folder, TESTS, *files)

@@ -1,0 +1,131 @@
+"""What files and plugins of the user may do to the ``carom`` command: exits, modules beside them; and Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+
+import helpers_cli
+import pytest
+from helpers_cli import FALLING_BALL, refusal
+from helpers_cli_plugins import offer
+
+from carom import scenes
+
+carom = helpers_cli.carom  # a fixture
+
+
+# -- plugins and Ctrl-C ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["import sys\nsys.exit(3)\n", "def plugin():\n    raise SystemExit\n"])
+def test_a_plugin_that_exits_is_named(carom, tmp_path, monkeypatch, text):
+    name = f"quits_{len(text)}"
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / f"{name}.py").write_text(text)
+    offer(tmp_path / "site", "quitpack", {"quitter": f"{name}:plugin"}, monkeypatch)
+    listed = carom("plugins")
+    assert listed.exit_code == 0
+    assert "quitter" in listed.stdout
+    assert "SystemExit" in listed.stdout
+    assert "SystemExit" in refusal(carom("run", "jump", "--steps", "1", "--no-pictures", "--plugin", "quitter"))
+
+
+def test_ctrl_c_while_importing_is_one_line():
+    code = """
+    import runpy, sys
+
+    class Interrupts:
+        def find_spec(self, name, path=None, target=None):
+            if name == "numpy":
+                raise KeyboardInterrupt
+
+    sys.meta_path.insert(0, Interrupts())
+    runpy.run_module("carom", run_name="__main__")
+    """
+    result = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "carom: stopped\n")
+
+
+@pytest.mark.compiled
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes")
+def test_ctrl_c_while_compiling_is_one_line(tmp_path):
+    """Also of the processes that compile beside the first one."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "carom", "run", "jump", "--no-pictures"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True, env={**os.environ, "CAROM_CACHE_DIR": str(tmp_path / "cache")},
+    )  # fmt: skip
+    with process:
+        first = process.stderr.readline()
+        assert "compiling" in first
+        for _ in range(20):  # the compiler swallows one now and then
+            try:
+                process.wait(1.5)  # by then both are at work
+                break
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGINT)
+        output = process.communicate(timeout=60)[1]
+    assert process.returncode == 130, output
+    assert "Traceback" not in output
+    assert output.splitlines()[-1] == "carom: stopped"
+
+
+# -- modules beside a file ------------------------------------------------------------------------
+
+SIBLING = FALLING_BALL.replace("def build", "import params\n\ndef build").replace("(seed, 10)", "(0, params.HEIGHT)")
+LATE = FALLING_BALL.replace(
+    "    world = World", "    import params\n    from tools.more import twice\n    world = World"
+).replace("(seed, 10)", "(0, twice(params.HEIGHT))")
+
+
+@pytest.mark.parametrize(("text", "factor"), [(SIBLING, 1), (LATE, 2)], ids=["at the top", "inside build"])
+def test_files_of_different_folders_have_their_own_siblings(tmp_path, text, factor):
+    """``import params`` and packages, in the file and in its functions; nothing of it is left behind."""
+    from carom.lab.cli.loading import load
+
+    for number in (3, 7):
+        folder = tmp_path / str(number)
+        (folder / "tools").mkdir(parents=True)
+        (folder / "tools" / "__init__.py").write_text("")
+        (folder / "tools" / "more.py").write_text("def twice(x):\n    return 2 * x\n")
+        (folder / "params.py").write_text(f"HEIGHT = {number}.0\n")
+        (folder / "scene.py").write_text(text)
+    before = [*sys.path], {name for name in sys.modules if not name.startswith("carom_file_")}
+    loaded = [load(str(tmp_path / str(number) / "scene.py")) for number in (3, 7)]
+    for number, scene in [*zip((3, 7), loaded, strict=True), (3, loaded[0])]:
+        world = scene.build(None, {}, 0)
+        assert world.bodies.dynamic.position[0, 1] == factor * number
+        world.close()
+    left = {name for name in sys.modules if not name.startswith(("carom_file_", "carom."))}
+    assert sys.path == before[0]
+    assert not {"params", "tools", "tools.more"} & left
+
+
+# -- settings -------------------------------------------------------------------------------------
+
+
+def test_a_build_that_ignores_its_settings_is_refused(carom, tmp_path):
+    (tmp_path / "deaf.py").write_text(FALLING_BALL.replace("settings=settings or Settings.balanced()", "settings=None"))
+    arguments = ("run", "deaf.py", "--steps", "1", "--no-pictures")
+    assert carom(*arguments).exit_code == 0
+    line = refusal(carom(*arguments, "--set", "dt=1/120"))
+    assert "deaf.py: build ignores its settings, so --set dt=0.00833" in line
+    line = refusal(carom(*arguments, "--settings", "fast"))
+    assert "deaf.py: build ignores its settings, so --settings has no effect" in line
+
+
+def test_set_builds_once(carom, tmp_path):
+    (tmp_path / "loud.py").write_text(FALLING_BALL.replace("    world = ", "    print('built')\n    world = ", 1))
+    result = carom("run", "loud.py", "--steps", "1", "--no-pictures", "--set", "dt=1/120")
+    assert result.exit_code == 0
+    assert result.stderr.count("built") == 1
+
+
+@pytest.mark.parametrize("name", scenes.names())
+def test_scenes_name_the_settings_that_they_take(name):
+    world = scenes.get(name).build()
+    assert world.settings == scenes.get(name).settings
+    world.close()

@@ -1,0 +1,222 @@
+"""The scene library: the protocol, the published generator, and the behaviour of each scene."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from carom import scenes
+from carom.components import Transform
+from carom.framework import Settings, World
+from carom.scenes import conveyor, gas, jump, player
+from carom.scenes.random_numbers import uniform
+
+WITHOUT_CHANCE = {  # any seed gives the same world
+    "few", "jump", "pyramid", "stack", "lift", "cradle", "galperin", "shots",
+    "spring", "orbit", "bouncing", "oblique", "drops",
+}  # fmt: skip
+
+
+def published_generator(count: int, seed: int = 12345) -> list[float]:
+    """One number after the other, by definition."""
+    x, numbers = seed, []
+    for _ in range(count):
+        x = (1664525 * x + 1013904223) % 2**32
+        numbers.append((x >> 8) / 2**24)
+    return numbers
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 1000, 4097])
+def test_random_numbers_are_the_published_sequence(count):
+    assert uniform(count).tolist() == published_generator(count)
+
+
+def test_another_seed_is_another_sequence():
+    assert uniform(5, seed=7).tolist() == published_generator(5, 12345 + 7)
+
+
+@pytest.mark.parametrize(("n", "dimensions", "cells"), [(1000, 2, 32), (1000, 3, 10), (10_000, 3, 22), (1, 2, 1)])
+def test_gas_is_drawn_body_by_body_position_before_velocity(n, dimensions, cells):
+    positions, velocities = gas.initial_state(n, dimensions)
+    side = math.sqrt(n * math.pi) if dimensions == 2 else (n * (math.pi / 6) / 0.1) ** (1 / 3)
+    s = side / cells
+    a = 0.45 * (s - 1)
+    u = iter(published_generator(2 * dimensions * min(n, 200)))
+    for k in range(min(n, 200)):
+        cell = [k % cells, k // cells % cells, k // cells**2][:dimensions]
+        expected = [(c + 0.5) * s + a * (2 * next(u) - 1) for c in cell]
+        np.testing.assert_allclose(positions[k], expected, rtol=1e-14)
+        np.testing.assert_allclose(velocities[k], [-5 + 10 * next(u) for _ in range(dimensions)], rtol=1e-14)
+
+
+def test_gas_starts_without_overlap_and_fills_what_it_says():
+    positions, _ = gas.initial_state(1000, 2)
+    distance = np.linalg.norm(positions[:, None] - positions, axis=2) + 9 * np.eye(1000)
+    assert distance.min() > 1.0
+    assert positions.min() > 0.5
+    assert positions.max() < gas.side(1000, 2) - 0.5
+    assert 1000 * math.pi / 4 / gas.side(1000, 2) ** 2 == pytest.approx(0.25)
+    assert 1000 * math.pi / 6 / gas.side(1000, 3) ** 3 == pytest.approx(0.1)
+
+
+def test_names_and_get():
+    assert {"jump", "asteroids", "billiards", "gas2d", "gas3d", "player"} | WITHOUT_CHANCE < set(scenes.names())
+    with pytest.raises(KeyError, match=r"no scene named 'moon'.*gas2d"):
+        scenes.get("moon")
+
+
+def test_every_scene_has_a_row_in_the_manual_with_its_bodies():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "scenes.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| ([\d,]+) \|", page, re.MULTILINE)
+    assert [name for name, _ in rows] == list(scenes.names())
+    for name, count in rows:
+        with scenes.get(name).build() as world:
+            bodies = conveyor.CRATES if name == "conveyor" else len(world.bodies.dynamic)
+            assert int(count.replace(",", "")) == bodies
+
+
+@pytest.mark.parametrize("name", scenes.names())
+class TestEveryScene:
+    def test_keeps_the_protocol(self, name):
+        scene = scenes.get(name)
+        settings = Settings.balanced().replace(substeps=3)
+        first, again, other = (
+            scene.build(settings, seed=5),
+            scene.build(settings, seed=5),
+            scene.build(settings, seed=6),
+        )
+        assert isinstance(first, World)
+        assert first.settings == settings
+        assert first.dimensions == scene.dimensions
+        if name == "conveyor":  # empty at the start: the first crate is a body from the second step on
+            for world in (first, again, other):
+                world.step()
+                world.step()
+        np.testing.assert_array_equal(first.bodies.position, again.bodies.position)
+        np.testing.assert_array_equal(first.bodies.linear_velocity, again.bodies.linear_velocity)
+        same = np.array_equal(first.bodies.position, other.bodies.position) and np.array_equal(
+            first.bodies.linear_velocity, other.bodies.linear_velocity
+        )
+        assert same == (name in WITHOUT_CHANCE)
+        for world in (first, again, other):
+            world.close()
+
+    def test_describes_itself(self, name):
+        scene = scenes.get(name)
+        assert scene.name == name
+        assert 0 < len(scene.description) < 90
+        assert "\n" not in scene.description
+        assert scene.seconds > 0
+
+    def test_bodies_start_and_stay_in_view(self, name):
+        scene = scenes.get(name)
+        world = scene.build()
+        lower, upper = np.array(scene.view)
+        for _ in range({"fastgas": 1, "shots": 6}.get(name, 20)):  # bodies leave the box in fastgas
+            positions = world.bodies.dynamic.position
+            assert np.all((positions > lower) & (positions < upper))
+            world.step()
+        world.close()
+
+
+@pytest.mark.parametrize(
+    ("integrator", "hertz", "apex"),
+    [
+        ("explicit_euler", 60, 66),
+        ("semi_implicit_euler", 60, 62),
+        ("velocity_verlet", 60, 64),
+        ("rk4", 60, 64),
+        ("explicit_euler", 30, 68),
+        ("semi_implicit_euler", 30, 60),
+        ("velocity_verlet", 30, 64),
+        ("explicit_euler", 20, 70.125),
+        ("semi_implicit_euler", 20, 58.125),
+        ("velocity_verlet", 20, 63.9375),
+    ],
+)
+def test_jump_reaches_the_apex_of_its_integrator(integrator, hertz, apex):
+    """x_n = v0 t - g t^2 / 2 with the integrator's own error of -+ g dt t / 2; the apex is the highest x_n.
+
+    The wall in the scene is three tiles high; all these arcs clear it, so they are free flight.
+    """
+    world = scenes.get("jump").build(Settings.balanced().replace(integrator=integrator, dt=1 / hertz))
+    heights = []
+    for _ in range(round(0.8 * hertz)):
+        world.step()
+        heights.append(float(world.bodies.dynamic.position[0, 1]) - jump.HALF_HEIGHT)
+    assert max(heights) == pytest.approx(apex, rel=1e-12)
+    world.close()
+
+
+def test_the_hero_lands_six_tiles_further_on_the_ground():
+    world = scenes.get("jump").build()
+    while world.time < 1.2:
+        world.step()
+    x, y = world.bodies.dynamic.position[0]
+    assert y == pytest.approx(jump.HALF_HEIGHT, abs=0.05 * jump.TILE)
+    assert x == pytest.approx(jump.RUN_SPEED * world.time, rel=1e-9)  # nothing on the way, no friction
+    world.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [("asteroids", 300), ("gas2d", 120), ("gas3d", 30), ("mixed2d", 120), ("maze", 120), ("static_world", 120)],
+)
+def test_elastic_scenes_keep_their_energy(name, steps):
+    """In gas3d a wall has more impacts in a step than the cap of a body: walls have no cap."""
+    world = scenes.get(name).build()
+    before, impacts = world.kinetic_energy(), 0
+    for _ in range(steps):
+        world.step()
+        impacts += len(world.contacts.impacts)
+    assert impacts > 50
+    assert world.kinetic_energy() == pytest.approx(before, rel=1e-11)
+    world.close()
+
+
+def test_the_break_hands_the_cue_balls_motion_on():
+    world = scenes.get("billiards").build()
+    before = world.kinetic_energy()
+    while world.time < 0.5:
+        world.step()
+    speeds = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1)
+    assert (speeds > 0.05).sum() >= 12
+    assert 0.2 * before < world.kinetic_energy() < before
+    world.close()
+
+
+def test_the_player_sees_what_brute_force_sees_and_pushes_what_it_meets():
+    world = scenes.get("player").build()
+    radar = next(system for system in world.systems if isinstance(system, player.Radar))
+    assert len(world.bodies.dynamic) == player.OBJECTS + 1
+    while world.time < 1.5:
+        world.step()
+    ids = np.asarray(world.bodies.entity)
+    centre = world.component_for_entity(radar.player, Transform).position
+    half_or_radius = 0.6  # the largest object's
+    distance = np.linalg.norm(world.bodies.position - centre, axis=1)
+    surely_near = set(ids[distance < player.RADAR_RADIUS].tolist())
+    perhaps_near = set(ids[distance < player.RADAR_RADIUS + math.sqrt(2) * half_or_radius].tolist())
+    walls = set(world.bodies.static.entity.tolist())
+    assert surely_near <= set(radar.near) <= perhaps_near | walls
+    pushed = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1) > 0.1
+    assert 1 < pushed.sum() < 2000
+    world.close()
+
+
+def test_settings_of_a_scene_can_be_replaced():
+    world = scenes.get("billiards").build()
+    assert dataclasses.replace(world.settings, dt=1 / 60) == Settings.balanced()
+    world.close()
+
+
+def test_every_scene_is_a_module_with_build():
+    for name in scenes.names():
+        world = getattr(scenes, name).build(Settings(), seed=1)
+        assert isinstance(world, World)
+        world.close()

@@ -1,0 +1,374 @@
+"""What ``world.prepare`` guarantees, and what is there before the first step without it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import esper
+import numpy as np
+import pytest
+from helpers_processes import run_python
+from worlds import ball, floor, make_world, run
+
+from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
+from carom.framework import CaromError, ForceSystem, Plugin, System, UnhandledPairError, World, column
+from carom.framework.compilation import log
+from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
+from carom.plugins.springs import Springs
+
+# A whole game in a separate process: kernels already loaded would hide what prepare has missed.
+GAME = '''
+import logging
+import sys
+import numpy as np
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Component, ForceSystem, Phase, Settings, World, column
+from carom.framework.compilation import kernel, log
+from carom.plugins import Physics
+
+logging.basicConfig()
+logging.getLogger("carom").setLevel(logging.DEBUG)  # who failed says what it loaded last
+d = int(sys.argv[1])
+
+
+class Charge(Component):
+    value = column(default=0.0)
+
+
+@kernel
+def push(force, charge):
+    for i in range(len(force)):
+        force[i, 0] += charge[i]
+
+
+class Field(ForceSystem):
+    requires = (RigidBody, Charge)
+
+    def add_forces(self, bodies, time):
+        push(bodies.force, bodies.charge.value)
+
+
+def at(x, y=0.0):
+    return (x, y, 0.0)[:d]
+
+
+def play(integrator):
+    world = World(Physics(dimensions=d, gravity=at(0.0, -9.81)), settings=Settings(integrator=integrator))
+    world.add_system(Field())
+    world.create_entity(Transform(at(-500)), RigidBody(), Charge(1.0))
+    world.prepare(SphereCollider, AABBCollider)
+    ready = len(log.compiled), log.loaded
+
+    def check(after):
+        assert (len(log.compiled), log.loaded) == ready, (integrator, after, log.compiled[ready[0]:], log.loaded)
+
+    world.step()
+    check("no colliders")
+    floor = world.create_entity(Transform(at(0, -0.5)), AABBCollider(tuple(0.5 if k == 1 else 1e3 for k in range(d))))
+    world.step()
+    check("boxes only")
+    half, turn = (0.5,) * d, 0.3 if d == 2 else (0.9, 0.1, 0.1, 0.1)
+    balls = [
+        world.create_entity(Transform(at(2 * k, 0.4)), RigidBody(), SphereCollider(0.5, restitution=0.8 * (k % 2)))
+        for k in range(5)
+    ]
+    for k in range(4):
+        world.create_entity(Transform(at(20, 0.5 + k)), RigidBody(), AABBCollider(half, friction=0.3))
+    world.create_entity(Transform(at(20, 8), turn), RigidBody(), AABBCollider(half))
+    lift = RigidBody(kind="kinematic", linear_velocity=at(0, -1.0))
+    world.create_entity(Transform(at(30, 3)), lift, AABBCollider(half))
+    world.create_entity(Transform(at(30, 1)), RigidBody(), SphereCollider(0.5, sensor=True))
+    limited = RigidBody(max_linear_speed=2.0, linear_damping=0.1, linear_velocity=at(3))
+    world.create_entity(Transform(at(40, 3)), limited, SphereCollider(1.0), AABBCollider(half))  # two levels
+    bullet = RigidBody(linear_velocity=at(300), ccd=True)
+    world.create_entity(Transform(at(50, 3)), bullet, SphereCollider(0.1, restitution=0.5))
+    world.create_entity(Transform(at(60, 3)), AABBCollider(half))
+    told = []
+    for event in ("contact_begin", "contact_stay", "contact_end", "impact"):
+        world.on(event, told.append)
+    for _ in range(20):
+        world.step()
+        check("a few bodies")
+    world.restore(world.snapshot())
+    n = 300
+    places, velocities = np.zeros((n, d)), np.zeros((n, d))
+    places[:, 0], places[:, 1] = 3.0 * np.arange(n), 30.0 + np.arange(n) % 3
+    velocities[:, 1] = -np.geomspace(0.01, 1000.0, n)
+    radii, halves = np.geomspace(0.05, 5, n), np.full((n, d), 0.4)
+    world.create_entities(
+        n, Transform.many(places), RigidBody.many(linear_velocity=velocities), SphereCollider.many(radius=radii)
+    )
+    world.create_entities(n, Transform.many(places - 20.0), AABBCollider.many(half_extents=halves))
+    for _ in range(20):
+        world.step()
+        check("hundreds of bodies")
+    origin, ahead = np.array(at(0, 2)), np.array(at(1))
+    points = np.array([origin, ahead])
+    world.query_point(origin), world.query_sphere(origin, 3), world.query_aabb(origin, origin + 3)
+    check("a query")
+    world.query_spheres(points, 3), world.query_aabbs(points, points + 3)
+    check("many queries")
+    world.neighbours(2.0), world.neighbours(2.0, of=balls)
+    check("neighbours")
+    world.query_nearest(origin), world.query_nearest(origin, max_distance=3, exclude=floor)
+    world.query_nearests(points)
+    check("nearest")
+    world.ray_cast(origin, ahead), world.ray_cast(origin, ahead, 10, only_nearest=True)
+    world.ray_casts(points, ahead), world.ray_casts(points, points - 9, np.array([3.0, 4.0]), exclude=[floor, -1])
+    check("rays")
+    for shape in (SphereCollider(1.0), AABBCollider(half)):
+        world.shape_cast(shape, origin, ahead), world.shape_cast(shape, origin, ahead, only_nearest=True)
+        world.shape_casts(shape, points, ahead)
+    world.shape_casts(AABBCollider.many(half_extents=halves[:2]), points, points)
+    check("moving shapes")
+    world.settings = world.settings.replace(geometry="bounds", substeps=2, debug=True)
+    world.advance(0.1)
+    check("other settings")
+    for entity in world.bodies.entity[world.bodies.has(SphereCollider)].tolist():
+        world.delete_entity(entity)
+    for phase in Phase:
+        world.run(phase)
+    world.advance(0.1)
+    check("no more balls")
+    assert told
+    world.close()
+
+
+for integrator in ("semi_implicit_euler", "yoshida4", "rk4", "velocity_verlet", "explicit_euler"):
+    play(integrator)
+'''
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_after_prepare_nothing_compiles_and_nothing_loads(d):
+    """Every integrator; few bodies and hundreds, impacts and rest, levels, sensors, platforms, all queries, a user
+    force system; also deleting the last body of a shape."""
+    result = run_python(GAME, d)
+    assert result.returncode == 0, result.stderr[-3000:]
+
+
+# Two processes: the first prepares, and the second plays without; both with the same world.
+LATER = """
+import sys
+import numpy as np
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import System, World
+from carom.framework.compilation import log
+from carom.plugins import Physics
+
+d = int(sys.argv[1])
+
+
+def at(x, y=0.0):
+    return (x, y, 0.0)[:d]
+
+
+world = World(Physics(dimensions=d, gravity=at(0.0, -9.81)))
+world.create_entity(Transform(at(0, -1)), AABBCollider(tuple(1.0 if k == 1 else 1e3 for k in range(d))))
+world.create_entity(Transform(at(0, 3)), RigidBody(), SphereCollider(0.5, restitution=0.5))
+if sys.argv[2] == "prepare":
+    world.prepare()
+    sys.exit()
+world.step()
+ready = list(log.compiled), log.loaded
+assert not log.compiled, log.compiled
+
+
+def check(after):
+    assert (log.compiled, log.loaded) == ready, (after, log.compiled, log.loaded, ready)
+
+
+for _ in range(200):
+    world.step()
+    check("bounce and rest")
+
+
+class Idle(System):
+    def process(self, dt):
+        pass
+
+
+world.add_system(Idle())
+world.on("contact_begin", lambda contact: None)
+half = (0.4,) * d
+for k in range(200):
+    size, velocity = 0.02 * 1.03**k, at(0, -4.0 ** (k % 6))
+    world.create_entity(Transform(at(20 * k, 30)), RigidBody(linear_velocity=velocity), SphereCollider(size))
+world.create_entity(Transform(at(-20, 30)), RigidBody(), SphereCollider(1.0), AABBCollider(half, friction=0.5))
+for _ in range(100):
+    world.step()
+    check("the 193rd body, levels")
+for k in range(250):
+    world.create_entity(Transform(at(-10 - 3 * k, 50)), AABBCollider(half))
+world.create_entity(
+    Transform(at(-5, 2)), RigidBody(linear_velocity=at(400, -50), ccd=True), SphereCollider(0.1, restitution=1)
+)
+origin, ahead, points = at(0, 2), at(0, -1), np.array([at(0, 2), at(9, 9)])
+for step in range(300):
+    world.step()
+    check("a swept body")
+    if step % 100 == 5:
+        world.ray_cast(origin, ahead), world.ray_cast(origin, ahead, only_nearest=True)
+        check("rays")
+        for shape in (SphereCollider(1.0), AABBCollider(half)):
+            world.shape_cast(shape, origin, ahead), world.shape_casts(shape, points, ahead)
+        check("moving shapes")
+        world.query_sphere(origin, 3), world.query_aabb(origin, points[1]), world.query_point(origin)
+        world.query_spheres(points, 3.0), world.query_nearest(origin), world.neighbours(2.0)
+        check("queries")
+assert world.physics.state.sweeps_ready
+"""
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_all_that_is_kept_is_there_before_the_first_step(d):
+    """What another process has prepared: later steps and queries of a world that has not compile and load nothing."""
+    for what in ("prepare", "play"):
+        result = run_python(LATER, d, what)
+        assert result.returncode == 0, result.stderr[-3000:]
+
+
+README_LOOP = """
+import re
+import sys
+from carom.framework import World
+from carom.framework.compilation import log
+
+code = next(block for block in re.findall("```python\\n(.*?)```", open(sys.argv[1]).read(), re.S) if "advance" in block)
+counts, advance = [], World.advance
+
+
+def counted(world, seconds):
+    advance(world, seconds)
+    if world.step_count:
+        counts.append((len(log.compiled), log.loaded))
+
+
+World.advance = counted
+exec(code)
+assert len(counts) > 500 and len(set(counts)) == 1, sorted(set(counts))
+"""
+
+
+def test_the_game_of_the_readme_waits_for_nothing_after_its_first_frame():
+    readme = Path(__file__).parents[2] / "README.md"
+    result = run_python(README_LOOP, readme)
+    assert result.returncode == 0, result.stderr[-3000:]
+
+
+# -- other guarantees --------------------------------------------------------------------------------------
+
+
+def test_prepare_changes_nothing_that_can_be_seen():
+    worlds = make_world(gravity=9.81), make_world(gravity=9.81)
+    for world in worlds:
+        floor(world)
+        ball(world, (0, 2), restitution=0.5)
+        run(world, 3)
+    before, force = worlds[0].state_hash(), worlds[0].bodies.force.copy()
+    context, kept = esper.current_world, set(esper.list_worlds())
+    worlds[0].prepare(AABBCollider)
+    assert worlds[0].state_hash() == before
+    np.testing.assert_array_equal(worlds[0].bodies.force, force)
+    assert (worlds[0].step_count, len(worlds[0].bodies), worlds[0].faults) == (3, 2, [])
+    assert (esper.current_world, set(esper.list_worlds())) == (context, kept)
+    for world in worlds:
+        run(world, 60)
+    assert worlds[0].state_hash() == worlds[1].state_hash()
+    assert worlds[0].stats().counters == worlds[1].stats().counters
+
+
+def test_worlds_with_every_plugin_can_be_prepared_and_no_system_is_made_or_run():
+    """Springs are an object of one world, and so are systems of the game: prepare makes no second ones."""
+    made, updates = [], []
+
+    class Counting(System):
+        def __init__(self):
+            made.append(self)
+
+        def process(self, dt):
+            updates.append(dt)
+
+    game = Plugin("game")
+    game.system(Counting)
+    springs = Springs()
+    shapes = [module.plugin for module in (capsule, convex_polygon, half_space, one_way_segment, tile_grid)]
+    world = World(Physics(dimensions=2), game, springs, *shapes)
+    world.add_system(Counting())
+    springs.connect(ball(world, (0, 0)), ball(world, (3, 0)), stiffness=10.0)
+    world.create_entity(Transform((0.0, -5.0)), half_space.HalfSpaceCollider(normal=(0.0, 1.0)))
+    world.prepare()
+    assert (len(made), updates) == (2, [])
+    ready = list(log.compiled), log.loaded
+    world.step()
+    assert (log.compiled, log.loaded) == ready
+    assert len(updates) == 2
+
+
+def test_one_may_prepare_more_and_more():
+    world = make_world()
+    world.prepare()
+    ball(world, 0)
+    world.step()
+    world.prepare(AABBCollider)
+    world.prepare(AABBCollider)
+    world.step()
+    assert {shape.component for shape in world.physics.scene.linked.shapes} == {SphereCollider, AABBCollider}
+
+
+def test_force_systems_are_called_for_the_present_bodies():
+    seen = []
+
+    class Watch(ForceSystem):
+        requires = (RigidBody, SphereCollider)
+
+        def add_forces(self, bodies, time):
+            seen.append(len(bodies))
+            bodies.force[:] += 1e6
+
+    world = make_world()
+    world.add_system(Watch())
+    world.prepare()
+    assert seen == []  # no bodies, no calls
+    ball(world, 0)
+    world.create_entity(Transform((9, 9)), RigidBody())
+    world.prepare()
+    assert set(seen) == {1}
+    assert not world.bodies.force.any()
+    assert world.stats().counters["force_evaluations"] == 0
+
+
+def test_what_cannot_be_prepared():
+    world = make_world()
+    for wrong in (SphereCollider(1.0), int, "SphereCollider"):
+        with pytest.raises(TypeError, match="prepare takes component types"):
+            world.prepare(wrong)
+
+    class StrangeCollider(Collider):
+        radius = column(positive=True)
+
+    with pytest.raises(UnhandledPairError, match="StrangeCollider"):
+        world.prepare(StrangeCollider)
+    world.step()  # and nothing of it is left
+
+    class InMidStep(System):
+        def process(self, dt):
+            self.world.prepare()
+
+    world.add_system(InMidStep())
+    with pytest.raises(CaromError, match="between steps"):
+        world.step()
+
+
+def test_shapes_prepared_for_an_empty_world_have_room():
+    """What all bodies of a world have left behind, and what is prepared, has columns as long as the table."""
+    world = make_world()
+    entity = ball(world, (0.0, 0.0))
+    world.step()
+    world.delete_entity(entity, immediate=True)
+    world.prepare(SphereCollider, AABBCollider)
+    world.step()
+    ball(world, (0.0, 0.0), (1.0, 0.0))
+    world.step()
+    bodies = world.physics.state.bodies
+    assert bodies.level_offsets.shape[1] == bodies.offset.shape[0] == bodies.levels.shape[1]

@@ -1,0 +1,164 @@
+"""How faults are told, and the table of faults in docs/faults.md against the texts in the code."""
+
+from __future__ import annotations
+
+import ast
+import logging
+import warnings
+from pathlib import Path
+
+import esper
+import numpy as np
+import pytest
+from worlds import make_world
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import FaultError, PhysicsWarning
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDERS = ("framework", "components", "systems", "plugins")
+
+
+def text_of(node):
+    """A text with dots where it has values; None if it is made elsewhere."""
+    if isinstance(node, ast.Constant):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(part.value if isinstance(part, ast.Constant) else "..." for part in node.values)
+    return None
+
+
+def faults_in_code():
+    for folder in FOLDERS:
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "report_fault":
+                    yield f"{path.relative_to(ROOT)}:{node.lineno}", text_of(node.args[0])
+
+
+def faults_in_docs():
+    page = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
+    table = page.split("<!-- faults -->")[1].split("<!-- end of faults -->")[0]
+    rows = [line for line in table.splitlines() if line.startswith("| `")]
+    assert all(len(row.strip("| ").split(" | ")) == 3 for row in rows)
+    return {row.split("`")[1] for row in rows}
+
+
+def test_every_fault_stands_in_the_table():
+    found = dict(faults_in_code())
+    assert None not in found.values(), f"write the text where it is reported: {found}"
+    assert set(found.values()) == faults_in_docs()
+
+
+def fast_body(world, x):
+    """So fast that a discrete world may miss what it passes."""
+    return world.create_entity(Transform((x, 0.0)), RigidBody(linear_velocity=(0.0, 1e5)), SphereCollider(0.1))
+
+
+def crowded(on_fault):
+    """More impacts than one body may have in a step, in each step."""
+    world = make_world(2, collision="continuous", max_impacts_per_step=1, on_fault=on_fault)
+    for k in range(10):
+        world.create_entity(
+            Transform((0.25 * k + 0.001 * k * k, 0.0)), RigidBody(linear_velocity=(40.0 * (5 - k), 0.0)),
+            SphereCollider(0.1, restitution=1.0),
+        )  # fmt: skip
+    return world
+
+
+def warnings_of(act):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        act()
+    assert all(warning.category is PhysicsWarning for warning in told)
+    return told
+
+
+def test_each_kind_of_fault_is_told_once_for_each_body():
+    """Where the game calls, and nothing more while the same goes on, nor if a mended body breaks again."""
+    world = make_world(2)
+    bodies = [world.create_entity(Transform((x, 0)), RigidBody()) for x in (0, 5)]
+    world.step()
+    assert not warnings_of(world.step)
+    world.bodies.linear_velocity[0] = np.nan
+    (told,) = warnings_of(lambda: [world.step() for _ in range(3)])
+    assert f"entity {bodies[0]}: linear_velocity is" in str(told.message)
+    assert told.filename == __file__
+    world.faults.clear()
+    world.bodies.linear_velocity[0] = 0.0
+    world.step()
+    world.bodies.linear_velocity[0] = np.nan
+    assert not warnings_of(world.step)
+    assert world.faults
+    world.bodies.mass[1] = -1.0
+    assert [f"entity {bodies[1]}: mass is -1.0" in str(w.message) for w in warnings_of(world.step)] == [True]
+
+
+def test_a_limit_reached_in_every_step_is_told_once_and_says_what_to_do():
+    world = crowded("warn")
+    told = warnings_of(lambda: [world.step() for _ in range(3)])
+    assert len(told) == 1
+    assert len(world.faults) == 1
+    assert world.faults[0].endswith(" (3 times)")
+    assert "raise Settings.max_impacts_per_step or use smaller steps; the rest was solved as contact at rest" in str(
+        told[0].message
+    )
+
+
+def test_a_world_that_breaks_as_a_whole_does_not_fill_the_screen():
+    world = make_world(2)
+    world.create_entities(1000, Transform.many(np.zeros((1000, 2))), RigidBody.many())
+    world.bodies.linear_velocity[:] = np.nan
+    told = warnings_of(world.step)
+    assert len(told) == 10
+    assert "991 more faults" in str(told[-1].message)
+
+
+def test_the_logger_gets_a_line(caplog):
+    world = crowded("warn")
+    with caplog.at_level(logging.WARNING, "carom"), pytest.warns(PhysicsWarning):
+        world.step()
+    assert [record.name for record in caplog.records if "impacts beyond" in record.message] == ["carom"]
+
+
+@pytest.mark.parametrize("how", ["step", "advance", "esper"])
+def test_raise_comes_at_the_end_of_a_step_that_is_complete(how):
+    """The state is that of a world that ignores its faults, and the world goes on with the steps that were left."""
+    loud, quiet = crowded("raise"), crowded("ignore")
+    dt = loud.settings.dt
+
+    def esper_step():
+        with loud:
+            esper.process(dt)
+
+    act = {"step": loud.step, "advance": lambda: loud.advance(3.5 * dt), "esper": esper_step}[how]
+    assert not warnings_of(quiet.step)
+    with pytest.raises(FaultError, match=r"step 0 of world .* impacts beyond 1 of a body in one step"):
+        act()
+    assert (loud.step_count, loud.time, loud.state_hash()) == (1, quiet.time, quiet.state_hash())
+    assert loud.faults == quiet.faults
+    if how == "advance":
+        assert loud.clock.gathered == pytest.approx(2.5 * dt)
+    loud.settings = loud.settings.replace(on_fault="ignore")
+    loud.step()
+    quiet.step()
+    assert loud.state_hash() == quiet.state_hash()
+
+
+def test_a_fault_that_is_an_error_by_a_filter_leaves_the_step_complete():
+    world = make_world(2)
+    fast_body(world, 0.0)
+    fast_body(world, 5.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(PhysicsWarning, match="set its ccd"):
+            world.step()
+    assert world.step_count == 1
+
+
+def test_systems_report_faults_of_their_own():
+    world = make_world(2)
+    world.report_fault("the map has a hole", kind="map")
+    world.report_fault("the map has two holes", kind="map")
+    assert [str(warning.message) for warning in warnings_of(world.step)] == ["the map has a hole"]
+    assert world.faults == ["the map has two holes (2 times)"]

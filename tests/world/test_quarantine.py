@@ -1,0 +1,332 @@
+"""Bodies with values that cannot be: named once, taken out, and all others go on to the bit as if they were deleted."""
+
+from __future__ import annotations
+
+import math
+
+import esper
+import numpy as np
+import pytest
+from helpers_poison import column_of, rest_of, told
+from worlds import ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
+
+from carom.components import RigidBody, SphereCollider, Transform
+from carom.framework import ForceSystem, Phase, StepError, System
+
+pytestmark = pytest.mark.plain
+
+MODES = ("discrete", "continuous", "event_driven")
+each_mode = pytest.mark.parametrize("mode", MODES)
+METHODS = ("explicit_euler", "velocity_verlet", "rk4", "yoshida4")
+WRONG = {
+    "position": math.nan, "linear_velocity": math.inf, "mass": -1.0, "rotation": math.nan, "constant_force": math.inf,
+    "gravity_scale": math.nan, "linear_damping": -1.0, "max_linear_speed": -1.0, "step_force": -math.inf,
+    "sphere_collider.radius": math.nan, "sphere_collider.restitution": math.nan, "sphere_collider.friction": -1.0,
+    "sphere_collider.offset": math.inf,
+}  # fmt: skip
+
+
+def pile(d=2, mode="discrete", gravity=9.81, restitution=0.4, **settings):
+    """Balls and boxes that lie on each other, a few of which still move; entity 7 is a ball in their middle."""
+    world = make_world(d, gravity, collision=mode, **settings)
+    up = 1 if d > 1 else 0
+    ground = [0.0] * d
+    ground[up] = -0.5
+    box(world, tuple(ground), half=(9.0, 0.5, 9.0)[:d], kind="static", friction=0.5)
+    for k in range(12):
+        place = np.array((0.98 * (k % 4), 0.5 + 0.98 * (k // 4), 0.01 * k)[:d])
+        speed = np.array((0.5 - 0.1 * k, 0.2 * (k % 3), 0.05)[:d])
+        make = ball if k % 2 else box
+        make(world, tuple(place), tuple(speed), mass=1.0 + k % 3, restitution=restitution, friction=0.3)
+    return world
+
+
+VICTIM = 7
+
+
+def write(world, name, value, entity=VICTIM):
+    column_of(world, name)[world.bodies.row_of(entity)] = value
+
+
+def assert_like_deleted(broken, healthy, steps=8, entity=VICTIM):
+    healthy.delete_entity(entity)
+    for step in range(steps):
+        broken.step()
+        healthy.step()
+        assert rest_of(broken, entity) == rest_of(healthy, entity), f"step {step}"
+
+
+# -- all others go on ----------------------------------------------------------------------------
+
+
+@mostly_2d
+@each_mode
+@pytest.mark.compiled
+def test_others_go_on_as_if_it_was_deleted(d, mode):
+    """Wherever the value stands, and whatever it is; the fault names entity and field, once."""
+    healthy, expected = pile(d, mode), []
+    run(healthy, 10)
+    healthy.delete_entity(VICTIM)
+    for _ in range(6):
+        healthy.step()
+        expected.append(rest_of(healthy, VICTIM))
+    for name, value in WRONG.items():
+        broken, found = pile(d, mode), []
+        run(broken, 10)
+        write(broken, name, value)
+        for _ in range(6):
+            broken.step()
+            found.append(rest_of(broken, VICTIM))
+        assert found == expected, name
+        (fault,) = told(broken)
+        assert fault.startswith(f"entity {VICTIM}: {name} is ")
+        assert all(np.isfinite(np.frombuffer(part)).all() for part in found[-1])
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+@pytest.mark.compiled
+def test_with_every_integrator_and_without_forces(method, gravity):
+    """A field that decides what a step computes for all bodies says nothing while its body is out."""
+    for name in ("constant_force", "linear_damping", "max_linear_speed", "rotation", "mass"):
+        broken, healthy = (pile(gravity=gravity, integrator=method) for _ in range(2))
+        run(broken, 3)
+        run(healthy, 3)
+        write(broken, name, WRONG[name])
+        assert_like_deleted(broken, healthy)
+
+
+@pytest.mark.compiled
+def test_the_only_body_that_bounces():
+    """Whether anything bounces is asked of all bodies."""
+    broken, healthy = pile(restitution=0.0), pile(restitution=0.0)
+    run(broken, 3)
+    run(healthy, 3)
+    write(broken, "sphere_collider.restitution", math.nan)
+    assert_like_deleted(broken, healthy)
+
+
+@both_dimensions
+@each_mode
+@pytest.mark.compiled
+def test_a_sum_of_forces_that_is_infinite(d, mode):
+    """Found only within the step: the body touches nobody in it. Without the force it takes part again."""
+
+    class Push(ForceSystem):
+        force = 0.0
+
+        def add_forces(self, bodies, time):
+            if self.force:
+                bodies.force[bodies.row_of(VICTIM)] += self.force
+
+    broken, healthy = pile(d, mode), pile(d, mode)
+    push = Push()
+    broken.add_system(push)
+    healthy.add_system(Push())
+    run(broken, 10)
+    run(healthy, 10)
+    before, push.force = position(broken, VICTIM).copy(), math.inf
+    assert_like_deleted(broken, healthy)
+    (fault,) = told(broken)
+    assert fault.startswith(f"entity {VICTIM}: force is [inf")
+    np.testing.assert_array_equal(position(broken, VICTIM), before)
+    push.force = 0.0
+    run(broken, 3)
+    assert (position(broken, VICTIM) != before).any()
+
+
+@each_mode
+@pytest.mark.compiled
+def test_what_a_system_of_the_game_writes(mode):
+    """Within the step too: START comes after the look at all columns."""
+
+    class Spoil(System):
+        phase = Phase.START
+        field = ""
+
+        def process(self, dt):
+            if self.field:
+                write(self.world, self.field, WRONG[self.field])
+
+    for name in ("mass", "linear_velocity", "sphere_collider.restitution", "sphere_collider.radius"):
+        broken, healthy = pile(mode=mode), pile(mode=mode)
+        spoils = Spoil(), Spoil()
+        for world, spoil in zip((broken, healthy), spoils, strict=True):
+            world.add_system(spoil)
+            run(world, 6)
+        spoils[0].field = name
+        assert_like_deleted(broken, healthy)
+        assert len(told(broken)) == 1
+
+
+@pytest.mark.compiled
+def test_static_and_kinematic_bodies():
+    for kind in ("static", "kinematic"):
+        for name in ("position", "aabb_collider.half_extents", "aabb_collider.restitution"):
+            broken, healthy = pile(), pile()
+            for world in (broken, healthy):
+                block = box(world, (1.0, 4.0), kind=kind)
+                ball(world, (1.2, 5.0))
+                run(world, 5)
+            write(broken, name, math.nan, block)
+            assert_like_deleted(broken, healthy, entity=block)
+            assert told(broken)[0].startswith(f"entity {block}: {name} is ")
+
+
+@pytest.mark.compiled
+def test_many_among_many():
+    """More than a list of faults holds, in a world with a grid: each is named, once."""
+    random = np.random.default_rng(3)
+    worlds = [make_world(), make_world()]
+    places, speeds = random.uniform(-30, 30, (400, 2)), random.normal(size=(400, 2))
+    for world in worlds:
+        world.create_entities(
+            400, Transform.many(places), RigidBody.many(linear_velocity=speeds),
+            SphereCollider.many(radius=0.5, restitution=1.0),
+        )  # fmt: skip
+        run(world, 2)
+    broken, healthy = worlds
+    gone = broken.bodies.entity[::3].copy()
+    broken.bodies.mass[::3] = -1.0
+    for entity in gone.tolist():
+        healthy.delete_entity(entity)
+    named = set()
+    for _ in range(5):
+        run(broken, 1)
+        run(healthy, 1)
+        named.update(told(broken))
+        broken.faults.clear()
+    assert len(named) == 100  # as many as are kept: each was named in the first step, none again
+    stay = ~np.isin(broken.bodies.entity, gone)
+    np.testing.assert_array_equal(broken.bodies.position[stay], healthy.bodies.position)
+
+
+# -- in and out ----------------------------------------------------------------------------------
+
+
+def test_it_stands_still_until_it_is_mended():
+    world = make_world(gravity=9.81)
+    box(world, (0.0, -0.5), half=(9.0, 0.5), kind="static")
+    a = ball(world, (0.0, 3.0), (1.0, 0.0))
+    run(world, 2)
+    before, speed = position(world, a).copy(), velocity(world, a).copy()
+    for _ in range(2):
+        world.bodies.mass[world.bodies.row_of(a)] = -1.0
+        run(world, 30)
+        np.testing.assert_array_equal(position(world, a), before)
+        np.testing.assert_array_equal(velocity(world, a), speed)
+        assert world.query_nearest(before, max_distance=1.0) is None
+        assert len(told(world)) == 1
+        world.bodies.mass[world.bodies.row_of(a)] = 1.0
+        run(world, 1)
+        assert (position(world, a) != before).any()
+        before, speed = position(world, a).copy(), velocity(world, a).copy()
+    run(world, 200)
+    assert position(world, a)[1] == pytest.approx(0.5, abs=1e-2)  # it lies on the floor
+    world.faults.clear()
+    world.bodies.mass[world.bodies.row_of(a)] = math.nan
+    run(world, 3)
+    assert len(told(world)) == 1  # it is told anew after it was right
+
+
+@pytest.mark.compiled
+def test_bodies_that_come_and_go_meanwhile():
+    """Rows move; who is out stays out."""
+    broken, healthy = pile(), pile()
+    for world in (broken, healthy):
+        run(world, 3)
+    write(broken, "sphere_collider.radius", math.nan)
+    healthy.delete_entity(VICTIM)
+    run(broken, 2)
+    run(healthy, 2)
+    for world in (broken, healthy):
+        world.delete_entity(3)
+    broken.create_entity(Transform((20.0, 0.0)))  # the same ids in both
+    healthy.create_entity(Transform((20.0, 0.0)))
+    for world in (broken, healthy):
+        ball(world, (1.0, 6.0), (0.0, -3.0))
+        run(world, 40)
+    assert rest_of(broken, VICTIM) == rest_of(healthy, VICTIM)
+    assert len(told(broken)) == 1
+    broken.delete_entity(VICTIM)
+    run(broken, 2)
+    assert not broken.physics.quarantine.told
+
+
+def test_ids_that_mean_other_entities():
+    """After esper.clear_database() the ids begin again: the new body is none of those that were out."""
+    world = make_world()
+    for named in (1, 2):
+        a = ball(world, 0.0, 1.0)
+        run(world, 2)
+        world.bodies.mass[:] = -1.0
+        run(world, 2)
+        assert len(told(world)) == 1
+        assert "quarantined" in {column.column for column in world.plan().columns}
+        world.faults.clear()
+        if named == 1:
+            with world:
+                esper.clear_database()
+            b = ball(world, 0.0, 1.0)
+            assert b == a
+            run(world, 3)
+            assert told(world) == []
+            assert position(world, b)[0] > 0.0
+            world.delete_entity(b)
+
+
+@pytest.mark.compiled
+def test_a_failed_step_and_a_snapshot():
+    class Failing(System):
+        fails = False
+
+        def process(self, dt):
+            if self.fails:
+                raise RuntimeError
+
+    broken, healthy = pile(), pile()
+    failing = Failing()
+    broken.add_system(failing)
+    healthy.add_system(Failing())
+    run(broken, 3)
+    run(healthy, 3)
+    sound = broken.snapshot()
+    write(broken, "mass", -1.0)
+    failing.fails = True
+    with pytest.raises(StepError, match="RuntimeError"):
+        broken.step()
+    failing.fails = False
+    assert_like_deleted(broken, healthy, 4)
+    broken.restore(sound)
+    other = pile()
+    other.add_system(Failing())
+    run(other, 3)
+    for world in (broken, other):
+        run(world, 4)
+    assert broken.state_hash() == other.state_hash()
+
+
+# -- far away ------------------------------------------------------------------------------------
+
+
+@both_dimensions
+@each_mode
+def test_too_far_from_the_origin_to_move(d, mode):
+    """At 1e15 m numbers are 0.125 m apart, and a step of 1 m/s is 0.017 m: told once, for each axis that is lost."""
+    world = make_world(d, collision=mode)
+    still = ball(world, (1e15, 5.0, 0.0)[:d])
+    lost = ball(world, (1e15, 0.0, 0.0)[:d], (1.0, 2.0, 0.0)[:d])
+    near = ball(world, (1e9, 0.0, 0.0)[:d], (1.0, 0.0, 0.0)[:d])
+    slow = ball(world, (5.0, 0.0, 0.0)[:d], (1e-18, 0.0, 0.0)[:d])  # does not move either, and should not by much
+    fast = ball(world, (1e15, 50.0, 0.0)[:d], (100.0, 0.0, 0.0)[:d])
+    for _ in range(5):
+        world.step()
+    (fault,) = told(world)
+    assert fault.startswith(f"entity {lost}: too far from the origin to move: at [1000000000000000.0, ")
+    assert "0.125 m apart" in fault
+    assert position(world, lost)[0] == 1e15
+    assert position(world, lost)[1] > 0.1
+    assert position(world, fast)[0] > 1e15
+    assert position(world, near)[0] > 1e9
+    assert position(world, slow)[0] == 5.0
+    assert position(world, still)[0] == 1e15
