@@ -11,38 +11,21 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .inputs import Inputs
     from .limits.step_length import step_limits, suggest_dt
+    from .trading.answer import Target
     from .trading.records import Trade
     from .trading.trade import Only, trade
-    from .tuning.check import check
-    from .tuning.search import NothingMeetsError, Tuning, search, tune
 
 _MODULES = {
-    "NothingMeetsError": "tuning.search",
     "Inputs": "inputs",
     "Only": "trading.trade",
+    "Target": "trading.answer",
     "Trade": "trading.records",
-    "Tuning": "tuning.search",
-    "check": "tuning.check",
-    "search": "tuning.search",
     "step_limits": "limits.step_length",
     "suggest_dt": "limits.step_length",
     "trade": "trading.trade",
-    "tune": "tuning.search",
 }
 
-__all__ = [
-    "Inputs",
-    "NothingMeetsError",
-    "Only",
-    "Trade",
-    "Tuning",
-    "check",
-    "search",
-    "step_limits",
-    "suggest_dt",
-    "trade",
-    "tune",
-]
+__all__ = ["Inputs", "Only", "Target", "Trade", "step_limits", "suggest_dt", "trade"]
 
 
 def __getattr__(name: str) -> Any:

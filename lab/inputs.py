@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 from bisect import bisect_right
 from collections.abc import Iterable
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Self
 ROUNDING = 1e-9  # s: times are sums of steps
 
 _read: dict[str, str] = {}  # the files that have been read: what is measured depends on them
+_asked: weakref.WeakSet[Inputs] = weakref.WeakSet()  # those that a game has played back since forget_asked()
 
 
 class Inputs:
@@ -58,6 +60,7 @@ class Inputs:
 
     def held(self, time: float, dt: float = 0.0) -> frozenset[str]:
         """What is held at ``time``, or at any moment of the step that begins then: a longer step misses no key."""
+        _asked.add(self)
         first = max(bisect_right(self._times, time + ROUNDING) - 1, 0)
         last = bisect_right(self._times, time + max(dt - ROUNDING, ROUNDING))
         if last == 0:
@@ -68,3 +71,13 @@ class Inputs:
 def texts_read() -> str:
     """The contents of all files of inputs that have been read."""
     return "".join(_read[path] for path in sorted(_read))
+
+
+def forget_asked() -> None:
+    """Begin to note which inputs a game plays back."""
+    _asked.clear()
+
+
+def times_asked(seconds: float) -> tuple[float, ...]:
+    """The times, after 0 and before ``seconds``, at which the inputs change that have been played back."""
+    return tuple(sorted({time for inputs in _asked for time in inputs._times if ROUNDING < time < seconds - ROUNDING}))

@@ -62,7 +62,7 @@ def build(settings, seed=0):
 
 
 def compared(world):
-    """What carom trade and tune compare."""
+    """What carom trade compares."""
     ((_, (_, hero)),) = world.get_components(Player, Transform)
     coins = world.get_processor(Coins)
     return {

@@ -54,7 +54,7 @@ def build(settings, seed=0, balls=6):
 
 
 def compared(world):
-    """What carom trade and tune compare: the balls by their numbers; None is a ball that is potted."""
+    """What carom trade compares: the balls by their numbers; None is a ball that is potted."""
     potted = world.get_processor(Pockets).potted
     found = {f"ball {ball.number}": place.position for _, (ball, place) in world.get_components(Ball, Transform)}
     return {"potted": len(potted), **{f"ball {number}": None for number in potted}, **found}

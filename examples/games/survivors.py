@@ -106,6 +106,6 @@ def build(settings, seed=0, enemies=ENEMIES):
 
 
 def compared(world):
-    """What carom trade and tune compare."""
+    """What carom trade compares."""
     game = world.get_processor(Game)
     return {"kills": game.kills, "hits": game.hits}

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..cli.usage_errors import Problem
+from ..engines.cost import work_of
 from ..measure.norms import MEAN, NORMS, OF_KIND, check_norm, norm_of
 from ..measure.observation import Seen
 from ..measure.survey import Each, Survey, one_by_one, survey
@@ -27,15 +28,28 @@ FINER = 8  # own references use steps this many times smaller than the smallest 
 FEWEST_STEPS = 3  # per run
 MOST_REFINED = 2  # refinements of a reference at most
 
-# Of the efforts before the last, which has everything: repeats; steps around the scene's own, down to own / a and up to
-# own * b; how many times smaller the steps of own references are; runs of each reference of a chaotic scene.
-EFFORTS = 3
-LESS_REPEATS = (1, 8)
-STEPS_AROUND = ((4, 2), (16, 4))
+OBSERVED = 2e-4  # s: what a step takes with its observation, besides the work that is counted
+FOR_REFERENCES = 0.4  # of the seconds of an effort
 FEWEST = 3  # repeats of a game: keys that were recorded in steps fit the first start phase too well
-LESS_FINE = (2, 4)
-FEWER_SEEDS = (2, 8)
 ENSEMBLE = 40  # runs of each of the two own references of a chaotic scene
+DENSE = 0.5  # changes of the inputs per step: longer steps would be split too often to be judged
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What quick mode measures of a case; it depends on the scene alone, not on the clock.
+
+    repeats, at most; steps down to the scene's own / ``down`` and up to own * ``up``; seconds: of one processor, by
+    counts of work, for references and runs together.
+    """
+
+    repeats: int
+    down: int
+    up: int
+    seconds: float
+
+
+FIRST, QUICK = Effort(1, 4, 2, 5.0), Effort(8, 16, 4, 25.0)
 
 
 @dataclass(frozen=True)
@@ -147,28 +161,41 @@ class Case:
     def replace(self, **changes: Any) -> Case:
         return dataclasses.replace(self, **changes)
 
-    def at(self, effort: int) -> Case:
-        """The case as it is measured with that effort, from 0 to EFFORTS - 1."""
-        if effort >= EFFORTS - 1:
-            return self
-        own, (down, up) = self.survey.settings.dt, STEPS_AROUND[effort]
-        steps = self.steps
+    def seconds_of(self, cell: Cell) -> float:
+        """About how long a run takes, by the work of the trial run: the same on every machine."""
+        counts = self.survey.trial.counts
+        return self.seconds / cell.dt * (OBSERVED + 1e-9 * work_of(counts) / counts["steps"])
+
+    def at(self, effort: Effort) -> Case:
+        """The case as quick mode measures it with that effort."""
+        own, allowed = self.survey.settings.dt, FOR_REFERENCES * effort.seconds
+        least = FEWEST if self.subject.names else 1
+        repeats = self.repeats if "repeats" in self.given else min(self.repeats, max(least, effort.repeats))
+        case = self.replace(repeats=repeats, refinements=1)
+        if self.reference_cells and self.kind == CHAOTIC:
+            fine = max(self.reference_cells[0].dt, own / 2)
+            cells = tuple(dataclasses.replace(cell, dt=fine) for cell in self.reference_cells)
+            runs = int(allowed / sum(map(self.seconds_of, cells)))
+            case = case.replace(reference_cells=cells, ensemble=min(self.ensemble, max(runs, 2)))
+        steps, fine = self.steps, 0.0
+        finest = steps[-1] if "steps" in self.given else own / effort.down
+        if self.reference_cells and self.kind != CHAOTIC:
+            fine = own / 2
+            while fine > finest / FINER and self._seconds_of_references(fine / 2) <= allowed:
+                fine /= 2
         if "steps" not in self.given:
-            near = [dt for dt in steps if 0.99 * own / down < dt < 1.01 * own * up]
+            finest = max(finest, 2 * fine)
+            near = [dt for dt in steps if 0.99 * finest < dt < 1.01 * own * effort.up]
             fits = own <= steps[0]
             steps = tuple(sorted({*near, *[own] * fits}, reverse=True)) or steps[:2]
-        least = FEWEST if self.subject.names else 1
-        repeats = self.repeats if "repeats" in self.given else min(self.repeats, max(least, LESS_REPEATS[effort]))
-        case = self.replace(
-            steps=steps, repeats=repeats, refinements=effort, fineness=min(self.fineness, LESS_FINE[effort]),
-            ensemble=min(self.ensemble, FEWER_SEEDS[effort]),
-        )  # fmt: skip
-        if self.reference_cells and self.kind == CHAOTIC:
-            fine = max(self.reference_cells[0].dt, own / (effort + 1 + bool(self.subject.names)))
-            return case.replace(reference_cells=tuple(
-                dataclasses.replace(cell, dt=fine) for cell in self.reference_cells
-            ))  # fmt: skip
-        return case._with_reference_step(steps[-1] / case.fineness)
+        case = case.replace(steps=steps)
+        if not fine:
+            return case
+        fineness = max(round(steps[-1] / fine), 2)
+        return case.replace(fineness=fineness)._with_reference_step(steps[-1] / fineness)
+
+    def _seconds_of_references(self, dt: float) -> float:
+        return sum(map(self.seconds_of, self._with_reference_step(dt).reference_cells))
 
     def _with_reference_step(self, dt: float) -> Case:
         """The case with other steps in its own references; those of chaotic scenes do not change."""
@@ -222,7 +249,7 @@ def case_of(
         asked, chosen = chosen, _statistics(subject, chosen, facts)
         left = [name for name in asked if not {name, MEAN + name} & {*chosen}]
         why += f"; places have no mean: {', '.join(left)}" if left else ""
-    ladder = _fitting(steps or known.steps or grids.steps_for(facts), duration)
+    ladder = _fitting(steps or known.steps or _unsplit(grids.steps_for(facts), facts, duration), duration)
     form, reference = _closed_form(subject, duration, kind, chosen)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
@@ -284,6 +311,12 @@ def _fitting(steps: Sequence[float], seconds: float) -> tuple[float, ...]:
     if not fitting:
         raise Problem(f"a run of {seconds:g} s has no room for steps of {min(steps):g} s: at most {largest:g} s")
     return fitting
+
+
+def _unsplit(steps: Sequence[float], facts: Survey, seconds: float) -> list[float]:
+    """The steps without those, longer than the scene's own, in which the inputs change too often."""
+    own, changes = facts.settings.dt, len(facts.inputs)
+    return [dt for dt in steps if dt <= own * (1 + 1e-9) or changes * dt <= DENSE * seconds]
 
 
 def _repeats(kind: str, norms: Sequence[str]) -> int:

@@ -51,7 +51,7 @@ class Loaded:
     def build(
         self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
     ) -> World:
-        """A world with ``settings`` (None: the scene's own; for a file the default ones) and with additional plugins;
+        """A world with ``settings`` (None: those that the scene or the file has itself) and with additional plugins;
         Problem if it fails."""
         chosen = settings
         if settings is None:
@@ -60,7 +60,7 @@ class Loaded:
         late = {field: value for field, value in changes.items() if value in brought}
         early = {field: value for field, value in changes.items() if field not in late}
         if early:
-            settings = apply(settings or Settings(), early)
+            settings = apply(settings or self._own_settings(seed), early)
         world = self._call(settings, seed)
         ignored = _what_is_ignored(world.settings, chosen, early)
         if ignored is not None:
@@ -82,12 +82,26 @@ class Loaded:
 
     def _call(self, settings: Settings | None, seed: int) -> World:
         with self.attribute_errors(), stdout_kept_clean():
-            world = self.function(settings, seed=seed)
+            world = self._own_world(seed) if settings is None else self.function(settings, seed=seed)
         if not isinstance(world, World):
             raise Problem(f"{self.name}: build returned {_a(world)}, not a World")
         if world.dimensions is None:
             raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
         return world
+
+    def _own_settings(self, seed: int) -> Settings:
+        with contextlib.closing(self._call(None, seed)) as world:
+            return world.settings
+
+    def _own_world(self, seed: int) -> Any:
+        """With the settings that ``build`` has by default, or makes of None; Settings() if it cannot take None."""
+        first = next(iter(inspect.signature(self.function).parameters.values()))
+        if first.default is not first.empty:
+            return self.function(seed=seed)
+        try:
+            return self.function(None, seed=seed)
+        except (AttributeError, TypeError):
+            return self.function(Settings(), seed=seed)
 
     def values_of(self, world: World) -> dict[str, list[float]]:
         """What the game compares, now: numbers as lists of one (NaN for None), places as lists of coordinates."""
@@ -196,7 +210,9 @@ def _load_file(path: Path) -> Loaded:
     compared = getattr(module, "compared", None)
     if compared is not None and not callable(compared):
         raise Problem(f"{path.name}: compared must be a function, compared(world) -> dict, not {compared!r}")
-    return Loaded(path.name, function, path.resolve(), seconds, view, Settings(), siblings, compared)
+    settings = getattr(module, "settings", getattr(module, "SETTINGS", None))
+    own = settings if isinstance(settings, Settings) else None
+    return Loaded(path.name, function, path.resolve(), seconds, view, own, siblings, compared)
 
 
 def _check_source(path: Path) -> None:

@@ -21,15 +21,17 @@ COMMANDS = {
     "plugins": LateCommand("plugins.command:plugins_command", "List plugins, or check one."),
     "run": LateCommand("cli.run:run_command", "Run a scene or a file and show what happened."),
     "scenes": LateCommand("cli.scenes:scenes_command", "List the scenes of the library."),
-    "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, measured."),
-    "tune": LateCommand("tuning.command:tune_command", "The cheapest settings that keep an error."),
+    "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, and which settings to use."),
     "warm-up": LateCommand("cli.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
 }
+
+GONE = {"tune": "carom trade FILE --max-error E finds the cheapest settings that keep an error"}
 
 
 @click.group(
     cls=LateCommands,
     late=COMMANDS,
+    gone=GONE,
     context_settings={"help_option_names": ["-h", "--help"]},
     invoke_without_command=True,
 )

@@ -233,13 +233,9 @@ only_options = together(
 
 # -- execution of runs ------------------------------------------------------------------------------------------
 
-budget_option = click.option(
-    "--budget", type=float, metavar="S", default=60.0, show_default=True,
-    callback=above_zero("--budget", "seconds above 0"), help="Seconds to spend; what is known by then is the answer.",
-)  # fmt: skip
+thorough_option = click.option("--thorough", is_flag=True, help="All steps and all repeats: minutes to hours.")
 runs_options = together(
-    budget_option,
-    click.option("--thorough", is_flag=True, help="Everything, however long it takes."),
+    thorough_option,
     click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Processes (default: one a core)."),
     click.option("--cluster", metavar="ADDRESS", help="Run on the workers of this dask.distributed scheduler."),
     click.option(

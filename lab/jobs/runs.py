@@ -1,15 +1,13 @@
-"""Runs tasks on all cores, within the time there is, and keeps their results, so that no run is repeated."""
+"""Runs of tasks on all cores, whose results are kept, and what they show: references and points of the grid."""
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import math
 import statistics
-import time
 import weakref
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from ..cases.case import Case
@@ -20,95 +18,44 @@ from ..measure.norms import NORMS, OF_KIND, conserves, errors_of, failure_of, no
 from ..measure.observation import Seen, mean_of
 from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..trading.records import CHAOTIC, CUT, Cell, ErrorBar, Point, Reference
+from ..trading.records import CHAOTIC, Cell, ErrorBar, Point, Reference
 from .result_store import Store
 from .tasks import Task, perform, stopped
 from .workers import Lost, Pool, in_parallel
 
 FEW_SECONDS = 4.0  # of work in all: less takes not much longer than starting workers
-PACE = 1e-4  # s per step, until runs have shown a better figure
 WORTH_IT = 4.0  # required improvement of the agreement with steps 8 times smaller; less is rounding or chance
 
 
-OUT_OF_TIME, STOPPED = "time is up", "stopped"
-
-
-class OutOfTimeError(Exception):
-    """The budget is spent, or the user has stopped the study; what is finished is kept."""
-
-
 class Runs:
-    """Performs tasks with ``workers`` processes, or those of a Pool; finished runs are kept in the store.
-
-    until
-        on ``time.monotonic``: afterwards nothing runs, and :meth:`all` raises OutOfTimeError; so it does after Ctrl-C
-        if the study is ``stoppable``, and the reason is in ``stopped``
-    listener
-        called after each finished run
-    """
+    """Performs tasks with ``workers`` processes, or those of a Pool; finished runs are kept in the store."""
 
     def __init__(
-        self, workers: int | Pool | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
-        until: float = math.inf, stoppable: bool = False,
-    ) -> None:  # fmt: skip
+        self, workers: int | Pool | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS
+    ) -> None:
         self._pool = workers if isinstance(workers, Pool) else Pool()
         if isinstance(workers, Pool):
             workers = max(getattr(workers, "size", 0), 2)
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
-        self.workers, self.progress, self.until, self.stoppable = workers, progress, until, stoppable
-        self.listener: Callable[[], None] | None = None
-        self.stopped = ""
+        self.workers, self.progress = workers, progress
         self._store = Store() if store is None else store
-        self._pace = PACE
-        self._spent = self._steps = 0.0
         weakref.finalize(self, self._pool.end)
 
-    def get(self, task: Task) -> Seen | None:
-        """What a task showed that has been performed, or None."""
-        record = self._store.get(task.key)
-        return None if record is None else Seen.from_dict(record)
-
     def all(self, tasks: Iterable[Task], what: str) -> list[Seen]:
-        """What all tasks showed, in order. OutOfTimeError if time is up before all are finished."""
+        """What all tasks showed, in order; those of which the store has the result are not run."""
         tasks = list(tasks)
-        until = self.until - time.monotonic() + time.time()
-        missing = [dataclasses.replace(task, until=until) for task in self._missing(tasks)]
-        total = sum(task.cost for task in tasks)
-        left = sum(task.cost for task in missing)
+        missing = [task for key, task in {task.key: task for task in tasks}.items() if key not in self._store]
+        total, left = (sum(task.steps for task in some) for some in (tasks, missing))
         self.progress.begin(total, total - left)
         self.progress.say(what)
-        if self.until == math.inf:
-            missing.sort(key=lambda task: -task.cost)  # longest first, so that no core is idle at the end
-        few = left * self._pace < FEW_SECONDS
-        if missing and (self.stopped or time.monotonic() > self.until):
-            self._stop("")
-        began = time.monotonic()
-        try:
-            with contextlib.closing(self._results(missing, few)) as results:
-                for task, record in results:
-                    self._keep(task, _lost(task, record) if isinstance(record, Lost) else record)
-        except TimeoutError:
-            self._stop("")
-        except KeyboardInterrupt:
-            if not self.stoppable:
-                raise
-            self._stop(STOPPED)
-        finally:
-            self._spent += time.monotonic() - began
-        return [seen for task in tasks if (seen := self.get(task)) is not None]
-
-    def _results(self, tasks: Sequence[Task], few: bool) -> Generator[tuple[Task, Any], None, None]:
-        return in_parallel(perform, tasks, 1 if few else self.workers, self._pool, self.until)
-
-    def seconds_for(self, tasks: Iterable[Task]) -> float:
-        """About how long those that are missing will take, by the time that others took; inf if none has finished."""
-        if not self._steps:
-            return math.inf
-        return sum(task.cost for task in self._missing(tasks)) * self._spent / self._steps
-
-    def _missing(self, tasks: Iterable[Task]) -> list[Task]:
-        return [task for task in tasks if task.key not in self._store]
+        missing.sort(key=lambda task: -task.steps)  # longest first, so that no core is idle at the end
+        few = sum(task.case.seconds_of(task.cell) for task in missing) < FEW_SECONDS
+        with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers, self._pool)) as results:
+            for task, record in results:
+                self._store.add(task.key, _lost(task, record) if isinstance(record, Lost) else record)
+                self.progress.advance(task.steps)
+        return [Seen.from_dict(self._store.get(task.key) or {}) for task in tasks]
 
     def each(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> list[Any]:
         """The function's result for each task, in order. Problem for one that ends its process."""
@@ -120,21 +67,6 @@ class Runs:
                     raise Problem(f"a trial run was lost: {result.reason}")
                 found[id(task)] = result
         return [found[id(task)] for task in tasks]
-
-    def _stop(self, why: str) -> None:
-        self.stopped = self.stopped or why or OUT_OF_TIME
-        raise OutOfTimeError(self.stopped)
-
-    def _keep(self, task: Task, record: dict) -> None:
-        if record["failure"] == CUT:
-            self._stop("")
-        self._steps += task.cost
-        self._store.add(task.key, record)
-        self.progress.advance(task.cost)
-        if record["milliseconds"]:
-            self._pace = max(1e-3 * record["milliseconds"] * task.cell.dt + PACE, PACE)
-        if self.listener is not None:
-            self.listener()
 
 
 def _lost(task: Task, lost: Lost) -> dict:
@@ -188,10 +120,7 @@ def refined_reference(
         if finer is None:
             return with_own, reference, False
         before, case = agreement, finer
-        try:
-            with_own, reference = with_reference(case, runs)
-        except OutOfTimeError:
-            return with_own, reference, False
+        with_own, reference = with_reference(case, runs)
 
 
 def reference_tasks(case: Case) -> list[Task]:
@@ -239,23 +168,25 @@ def _words(cell: Cell) -> str:
     return cell.collision if cell.collision == "event_driven" else f"{cell.integrator}, {cell.collision}"
 
 
-def run_tasks(case: Case, cells: Iterable[Cell]) -> list[Task]:
-    """One task for every repeat of every cell."""
-    return [Task(case, cell, repeat) for cell in cells for repeat in range(case.repeats)]
+def measure(case: Case, cells: Iterable[Cell], runs: Runs, bare: bool = False) -> list[Point]:
+    """The points of the cells over all repeats of the case, which has its reference; bare: timed without observation
+    too."""
+    cells, repeats = list(cells), range(case.repeats)
+    tasks = [Task(case, cell, repeat, bare=bare and not repeat) for repeat in repeats for cell in cells]
+    seens = runs.all(tasks, f"{case.subject.name}: {len(cells)} settings, {case.repeats_text}")
+    return [point_of(case, cell, seens[number :: len(cells)]) for number, cell in enumerate(cells)]
 
 
-def known_points(case: Case, cells: Iterable[Cell], runs: Runs) -> list[Point]:
-    """The points of the cells of which there are finished runs, over those repeats."""
-    if case.reference is None:
-        return []
-    seens = {cell: [seen for task in run_tasks(case, [cell]) if (seen := runs.get(task)) is not None] for cell in cells}
-    return [point_of(case, cell, found) for cell, found in seens.items() if found]
-
-
-def points_of(case: Case, cells: Sequence[Cell], runs: Runs, what: str) -> list[Point]:
-    """The points of all cells, over all repeats."""
-    runs.all(run_tasks(case, cells), what)
-    return known_points(case, cells, runs)
+def inputs_late(case: Case, cell: Cell, runs: Runs) -> dict[str, float]:
+    """The effects of inputs that act in whole steps, as in the game, against the same runs in which they act in time;
+    none if there are no inputs, or if a run failed."""
+    if not case.survey.inputs or case.kind == CHAOTIC:
+        return {}
+    tasks = [Task(case, cell, repeat, sampled=sampled) for sampled in (False, True) for repeat in range(case.repeats)]
+    seens = runs.all(tasks, f"{case.subject.name}: inputs in whole steps")
+    pairs = zip(seens[: case.repeats], seens[case.repeats :], strict=True)
+    good = [(right, late) for right, late in pairs if not (right.failure or late.failure)]
+    return at_worst([effects_of(late, right, case.kind) for right, late in good])
 
 
 def point_of(case: Case, cell: Cell, seens: Sequence[Seen]) -> Point:

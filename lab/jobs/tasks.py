@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import hashlib
 import math
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,13 +30,18 @@ FIRST_REFERENCE_SEED = 1000  # own references of chaotic scenes use other seeds 
 
 @dataclass(frozen=True)
 class Task:
-    """One run. reference: it is one of the case's own references; until: when it is cut off, on ``time.time``."""
+    """One run.
+
+    reference: it is one of the case's own references; sampled: inputs act in whole steps, as in the game; bare: it is
+    timed without observation too.
+    """
 
     case: Case
     cell: Cell
     repeat: int
     reference: bool = False
-    until: float = math.inf
+    sampled: bool = False
+    bare: bool = False
 
     @property
     def key(self) -> str:
@@ -45,13 +49,13 @@ class Task:
         case = self.case
         facts = (
             case.subject.mark, case.seconds, case.kind, repr(case.survey.settings), case.survey.walled, self.reference,
-            self.cell.key, self.repeat,
+            self.cell.key, self.repeat, self.sampled, case.survey.inputs,
         )  # fmt: skip
         return hashlib.sha256(repr(facts).encode()).hexdigest()[:24]
 
     @property
-    def cost(self) -> float:
-        """Steps, for the progress bar."""
+    def steps(self) -> float:
+        """For the progress bar."""
         return self.case.seconds / self.cell.dt
 
 
@@ -72,7 +76,7 @@ def stopped(task: Task, why: str) -> Seen:
 
 
 def _run(task: Task) -> Seen:
-    cost = None if task.repeat or task.reference or task.cell.engine == PYMUNK else bare_cost(task)
+    cost = bare_cost(task) if task.bare and task.cell.engine != PYMUNK else None
     seen = _observed(task)
     return seen if cost is None else dataclasses.replace(seen, milliseconds=cost)
 
@@ -111,8 +115,8 @@ def _observed(task: Task) -> Seen:
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled
             far = math.inf if case.kind == CHAOTIC else FAR * case.survey.trial.reach or math.inf
-            until, values = task.until - time.time() + time.monotonic(), case.subject.values_of
-            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, until, values)
+            inputs, values = () if task.sampled else case.survey.inputs, case.subject.values_of
+            return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, inputs, values)
     finally:
         engine.close()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +15,9 @@ from rich.console import Console
 from ...framework import Settings, World
 from ..cases.subjects import load_once
 from ..cli.loading import Loaded, stdout_kept_clean
-from ..cli.options import above_zero, budget_option, traceback_option, world_options
+from ..cli.options import above_zero, thorough_option, traceback_option, world_options
 from ..cli.usage_errors import Problem
+from ..jobs.runs import Runs
 from ..plain import jsonable
 from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
@@ -42,7 +42,7 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
     help="How far a body may be from where it should (default: 1 % of the smallest one's size).",
 )  # fmt: skip
 @world_options
-@budget_option
+@thorough_option
 @traceback_option
 def limits_command(
     target: str,
@@ -53,14 +53,13 @@ def limits_command(
     changes: dict[str, Any],
     seed: int,
     plugins: tuple[str, ...],
-    budget: float,
+    thorough: bool,
 ) -> None:
     """How long the step of a scene, or of a file that defines build(settings, seed=0), may be, and what limits it.
 
     The scene runs with longer and shorter steps until a player would notice the difference, and its forces and speeds
     are examined on the way.
     """
-    began = time.monotonic()
     scene = Asked(target, settings, tuple(changes.items()), plugins)
     loaded = load_once(target)
     if way is not None and loaded.compared is not None:
@@ -70,7 +69,7 @@ def limits_command(
     with Bar(Console(stderr=True)) as bar:
         with closing(scene(None, seed)) as world:
             found = _watched(loaded, world, seconds, bar)
-        outcome = outcome_of_steps(scene, seed, seconds, began, budget, bar, way)
+        outcome = outcome_of_steps(scene, seed, seconds, Runs(progress=bar), thorough, way)
     _show(loaded.name, found, outcome, as_json)
 
 

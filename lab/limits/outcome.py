@@ -7,21 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...framework import World
-from ..cases.case import case_of
+from ..cases.case import QUICK, case_of
 from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
 from ..measure.effects import SHARE, in_words, names_told, noticed
 from ..plain import Plain, jsonable
-from ..reporting.progress import Progress
-from ..trading.answer import more_budget, rough_text
-from ..trading.records import CaseTrade, Point, known_well
+from ..trading.records import CaseTrade, Cell, Point, known_well
 from ..trading.report import failures
-from ..trading.trade import RUNNING, Only, Study
+from ..trading.trade import measured
 from ..wording import counted, metres, number
 
 STEPS = (8, 4, 2, 1, 1 / 2, 1 / 4, 1 / 8)  # of the scene's own, as long as they are steps of a game
 LONGEST = 1 / 10  # s
-EFFORTS = (0, 1)
 
 
 @dataclass
@@ -79,27 +76,18 @@ class StepOutcome(Plain):
 
 
 def outcome_of_steps(
-    build: Callable[..., World],
-    seed: int,
-    seconds: float,
-    began: float,
-    budget: float,
-    progress: Progress,
-    way: float | None = None,
+    build: Callable[..., World], seed: int, seconds: float, runs: Runs, thorough: bool = False, way: float | None = None
 ) -> StepOutcome:
-    """Run the scene with its own settings and several steps, until ``budget`` s after ``began`` on
-    ``time.monotonic``; way: see :class:`StepOutcome`."""
+    """Run the scene with its own settings and several steps; way: see :class:`StepOutcome`."""
     if not seconds:
         return StepOutcome(refused="it was not run")
     try:
-        runs = Runs(None, None, progress, began + RUNNING * budget, stoppable=True)
         case = case_of(build, seconds=seconds, seed=seed, each=runs.each)
         own = case.survey.settings
         longest = min(LONGEST, seconds / 3)
         steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)
         case = case.replace(steps=steps, given=("steps",))
-        only = Only((own.integrator,), (own.collision,), (own.substeps,), (own.geometry,))
-        return _outcome(Study(case, only, False, False, runs, None, began).measured(EFFORTS), way)
+        return _outcome(measured(case, None if thorough else QUICK, [Cell.of(own).method], None, False, runs), way)
     except Problem as problem:
         return StepOutcome(refused=problem.message)
 
@@ -107,23 +95,15 @@ def outcome_of_steps(
 def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
     points = known_well(case.points)
     points.sort(key=lambda point: point.cell.dt)
-    if not points:
-        return StepOutcome(refused=f"there was no time: {more_budget(case)} tells more")
     size = next((point.effects["size"] for point in points if point.effects), 1.0)
     found = StepOutcome(0.0, points[0].cell.dt, size, way, compared=names_told(points[0].effects))
     runs = sum(point.repeats for point in points)
     found.known = f"from {counted(runs, 'run')} of {number(case.seconds)} s with {counted(len(points), 'step')}"
-    if case.rough:
-        found.known += f"; {rough_text(case)}"
-    elif case.missing or len(points) < len(case.points):
-        found.known += "; others did not fit into the budget"
     for point in points:
         if point.failed or noticed(point.effects, way):
             found.link, found.beyond = _link(point, way), point.cell.dt
             break
         found.longest = point.cell.dt
-    if case.rough and not found.longest:  # no step can be blamed by a run that is no more exact than it
-        return StepOutcome(refused=f"there was no time for references: {more_budget(case)} tells more")
     return found
 
 

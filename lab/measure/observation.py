@@ -1,14 +1,16 @@
 """One run observed from outside: the figures that norms need, for any engine.
 
 A run of T seconds takes a first step of a fraction of dt (its start phase), then whole steps, then the remainder. So it
-ends at exactly T for any dt, and the phase sets where in a step events happen.
+ends at exactly T for any dt, and the phase sets where in a step events happen. Recorded inputs change between steps, at
+the same times in every run: no error is the age of a key.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-import time
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,7 +20,7 @@ import numpy as np
 from ...framework import World
 from ..engines.adapters import Engine, carried
 from ..plain import Plain
-from ..trading.records import BLEW_UP, CUT, ESCAPED, NOT_FINITE
+from ..trading.records import BLEW_UP, ESCAPED, NOT_FINITE
 from .body_shapes import Floats
 
 SETTLED = 0.5  # fraction of the run after which contacts at rest are measured
@@ -26,6 +28,7 @@ EARLY = 0.2  # fraction of the run after which statistics begin
 MOST_TIMES = 200  # impacts whose times are kept
 SAMPLES = 200  # of the overlaps
 LOOKS = 2000  # at the state of a run, at most: a look may cost more than a step
+NEAR = 0.05  # of a step: an end of a step that close to a change of the inputs moves there
 
 
 @dataclass
@@ -115,17 +118,17 @@ def observe(
     whole_steps: bool = False,
     walled: bool = True,
     far: float = math.inf,
-    until: float = math.inf,
+    inputs: Sequence[float] = (),
     values: Callable[[World], dict[str, list[float]]] | None = None,
 ) -> Seen:
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:
-    a body outside the walls around all bodies has escaped. far: m from its start, a body there has blown up. until: on
-    ``time.monotonic``, the moment at which the run is cut off. values: what a game compares, read at the end.
+    a body outside the walls around all bodies has escaped. far: m from its start, a body there has blown up. inputs:
+    when they change, s; there a step ends. values: what a game compares, read at the end.
     """
     watch = _Watch(engine, seconds, walled, far)
-    steps = _steps(seconds, dt, phase, whole_steps)
+    steps = step_lengths(seconds, dt, phase, whole_steps, inputs)
     every = -(-len(steps) // LOOKS)
     with np.errstate(over="ignore", invalid="ignore"):
         for done, step in enumerate(steps, 1):
@@ -133,8 +136,6 @@ def observe(
             watch.count()
             if done % every == 0 or done == len(steps):
                 watch.look()
-            if watch.seen.failure is None and time.monotonic() > until:
-                watch.seen.failure = CUT
             if watch.seen.failure:
                 break
         seen = watch.finished()
@@ -154,13 +155,30 @@ def mean_of(seens: Sequence[Seen], names: Iterable[str]) -> Seen:
     return dataclasses.replace(seens[0], **means, values=values, spread=spread, runs=len(seens))
 
 
-def _steps(seconds: float, dt: float, phase: float, whole_steps: bool) -> list[float]:
+def step_lengths(
+    seconds: float, dt: float, phase: float, whole_steps: bool = False, inputs: Sequence[float] = ()
+) -> list[float]:
     """The step lengths. A remainder below a millionth of a step is rounding, and omitted."""
     first = min(phase * dt, seconds)
     rest = seconds - first
     whole = int(rest / dt * (1 + 1e-12) + 1e-9)
     last = rest - whole * dt
-    return [first, *[dt] * whole, *([last] if last > 1e-6 * dt and not whole_steps else [])]
+    lengths = [first, *[dt] * whole, *([last] if last > 1e-6 * dt and not whole_steps else [])]
+    if not inputs:
+        return lengths
+    ends = list(itertools.accumulate(lengths))
+    changes = set(inputs)
+    for change in inputs:
+        k = bisect_left(ends, change)
+        if k == len(ends):
+            break
+        near = [j for j in (k - 1, k) if 0 <= j < len(ends) - 1 and abs(ends[j] - change) < NEAR * dt]
+        if near and ends[near[0]] not in changes:
+            ends[near[0]] = change
+        elif ends[k] != change:
+            ends.insert(k, change)
+    found = [end - before for before, end in itertools.pairwise([0.0, *ends])]
+    return [dt if math.isclose(length, dt, rel_tol=1e-9) else length for length in found]
 
 
 class _Watch:

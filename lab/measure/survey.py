@@ -20,6 +20,7 @@ from ...framework import Settings, World
 from ..cases.subjects import Subject
 from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine
+from ..inputs import forget_asked, times_asked
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 from .norms import distances
 from .observation import Seen, mean_of, observe
@@ -54,6 +55,8 @@ class Survey:
         the observation of the run with all impacts at their true times; of a chaotic game the mean of some
     nudge
         sizes of a body by which repeats of a chaotic scene without seeds differ
+    inputs
+        times at which the recorded inputs change that the game plays back, s
     """
 
     settings: Settings
@@ -71,6 +74,7 @@ class Survey:
     walled: bool
     trial: Seen
     nudge: float = 1e3 * NUDGE
+    inputs: tuple[float, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -110,7 +114,6 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
         facts = _facts(subject.name, recommended)
     seeded = _seeded(subject, settings, start)
     exact = settings.replace(collision="event_driven")
-    run = functools.partial(_twin, subject, exact, seconds)
     known: dict[tuple[float, bool], Seen] = {}  # by how far the start is nudged, and whether walls hold all
 
     def seen(nudged: float, walled: bool = False) -> Seen:
@@ -120,8 +123,11 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
         return known[start]
 
     with closing(_obedient(subject, exact.replace(dt=settings.dt / 2, substeps=settings.substeps + 1))) as other:
+        forget_asked()
         with subject.attribute_errors():
             each_step = _time_of_step(other)
+        inputs = times_asked(seconds)
+        run = functools.partial(_twin, subject, exact, seconds, inputs)
         if 2 * seconds / settings.dt * each_step > LONG:
             starts = (0.0, True), (SEEN if subject.names else NUDGE, False)
             known.update(zip(starts, each(run, starts), strict=True))
@@ -150,6 +156,7 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
         levels=levels,
         trial=first,
         nudge=SEEN if growth == math.inf else 1e3 * NUDGE,
+        inputs=inputs,
         **facts,
     )
 
@@ -196,14 +203,16 @@ def nudge(world: World, size: float, seed: int = 0) -> None:
 
 
 @faults_in_results()
-def _twin(subject: Subject, settings: Settings, seconds: float, start: tuple[float, bool]) -> Seen:
+def _twin(
+    subject: Subject, settings: Settings, seconds: float, inputs: tuple[float, ...], start: tuple[float, bool]
+) -> Seen:
     nudged, walled = start
     engine = CaromEngine(_obedient(subject, settings))
     if nudged:
         nudge(engine.world, nudged * engine.size)
     try:
         with subject.attribute_errors():
-            seen = observe(engine, seconds, settings.dt, walled=walled, values=subject.values_of)
+            seen = observe(engine, seconds, settings.dt, walled=walled, inputs=inputs, values=subject.values_of)
         if seen.failure not in (None, ESCAPED):
             raise Problem(
                 f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed after {seen.simulated:.4g} s: "

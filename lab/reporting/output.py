@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,17 +34,6 @@ class Output:
         if as_json and as_markdown:
             raise Problem("--json and --markdown exclude each other")
         return Output(as_json, as_markdown)
-
-    def as_it_comes(self, answer: Callable[[Any], list[str]]) -> Callable[[Any], None]:
-        """Prints what is known so far, with the seconds that it took, for a person; nothing for others."""
-        began = time.monotonic()
-
-        def show(known: Any) -> None:
-            if self.plain:
-                first, *lines = answer(known)
-                click.echo("\n".join([f"after {time.monotonic() - began:.0f} s: {first}", *lines, ""]))
-
-        return show
 
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
         """Print the result."""

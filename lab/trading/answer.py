@@ -1,87 +1,234 @@
-"""The answer of a trade in words: the settings to paste, their cost and error, and what would be noticed."""
+"""The answer of a trade: the settings to use, and at most five lines that say why.
+
+It depends on the points alone. Choices are made by counts of work, which are the same on every machine and in every
+call; the times of this machine are told.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+from ..cases.case import Case
 from ..measure.effects import in_words, severity, told
-from ..wording import counted, metres
-from .records import CAROM, CHAOTIC, RESTING, CaseTrade, Cell, Point, known_well
+from ..wording import compact, counted, metres
+from .records import RESTING, TRUSTED, CaseTrade, Cell, Point, Reference
 from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
 CLEARLY = 4.0  # times; start phases differ by less
 MOST_TOLD = 5  # values of a game
-HARDLY = 1.25  # times the cost: no reason to change settings
+HARDLY = 1.25  # times the cost: less than measured times scatter, so costs within it are the same
 CHEAPER = 1 / HARDLY
+SEEN = 1.0  # of what a player would notice (1 % of the smallest body): a gain below it is none
 
 
-def answer(case: CaseTrade) -> list[str]:
-    """Lines for one scene: the settings to paste, and what the next cheaper and the next better choice would change."""
-    if case.refused:
-        return [f"{case.scene}: not measured: {case.refused}"]
-    points = _points(case)
-    usable = [point for point in points if not point.failed and case.norm in point.errors]
-    if not usable:
-        failed = "; ".join(dict.fromkeys(failures(point) for point in points if point.failed))
-        return [f"{case.scene}: nothing that was tried can be used{f': {failed}' if failed else ' yet'}"]
-    usable = known_well(usable)
-    chosen = recommended(case, usable)
+@dataclass(frozen=True)
+class Target:
+    """What is asked for: the largest error, in the main norm, relative to its scale or ``absolute`` in the scene's
+    units; or the largest cost, ms per frame of 1/60 s. ValueError for anything but a number above 0."""
+
+    max_error: float | None = None
+    max_cost: float | None = None
+    absolute: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("max_error", "max_cost"):
+            value = getattr(self, name)
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if value is not None and not (number and math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be a number above 0, got {value!r}")
+
+    def error_of(self, case: CaseTrade) -> float:
+        """The largest error, relative to the scale of the norm."""
+        assert self.max_error is not None
+        return self.max_error / case.scale if self.absolute else self.max_error
+
+    def is_known_by(self, case: Case, reference: Reference) -> bool:
+        """True if that reference is exact enough to tell errors of that size."""
+        norm = case.norms[0]
+        if self.max_error is None or norm not in reference.agreement:
+            return False
+        error = self.max_error / case.scale(norm) if self.absolute else self.max_error
+        return error >= TRUSTED * reference.agreement[norm]
+
+    def is_unknowable(self, case: CaseTrade) -> bool:
+        """True if the reference of the case cannot tell errors of that size."""
+        if self.max_error is None or case.reference.is_statistic(case.norm):
+            return False
+        return not case.reference.trusts(case.norm, self.error_of(case))
+
+    def meets(self, case: CaseTrade, point: Point) -> bool:
+        """True for a point that keeps within it in all repeats, with the reference's own error."""
+        if self.max_error is not None and error_of(case, point) > self.error_of(case):
+            return False
+        return self.max_cost is None or (point.milliseconds is not None and _frame(point) <= self.max_cost)
+
+
+def error_of(case: CaseTrade, point: Point) -> float:
+    """The error in the main norm at the worst of all repeats, with the reference's own."""
+    return point.errors[case.norm].high + case.reference.agreement.get(case.norm, 0.0)
+
+
+def recommended(case: CaseTrade, target: Target | None = None) -> Point | None:
+    """The point to use; None if nothing can be used, or if nothing meets the target.
+
+    Without a target: the cheapest of which nothing would be noticed, or hardly more than with the best of all. The
+    scene's own settings if the others cost hardly less, and if a player would not see what they gain. With a target the
+    cheapest that meets its error; with its cost only, the one of which least is noticed. Of several that cost nearly
+    the same, the one that changes least.
+    """
+    points = case.usable
+    if target is not None:
+        points = [point for point in points if target.meets(case, point) and not target.is_unknowable(case)]
+    if not points:
+        return None
     now = next((point for point in points if point.cell == case.own), None)
-    name = " (as it has now)" if chosen is now else ""
-    lines = [f"{case.scene}: use {chosen.line}{name}"]
-    lines.append(f"  cost     {cost_text(chosen)}")
-    lines.append(f"  error    {_error(case, chosen)}")
-    lines.append(f"  noticed  {noticed_text(chosen)}")
-    best = front(usable)
-    cheaper = [point for point in best if point is not now and price(point) < CHEAPER * price(chosen)]
-    better = [
-        point for point in best
-        if point is not now and price(point) > price(chosen)
-        and severity(point.effects) * FACTOR <= severity(chosen.effects)
-        and (case.kind != RESTING or _sink(point) < _sink(chosen))
-    ] if _can_be_better(case, chosen) else []  # fmt: skip
-    if now is not None and now is not chosen:
-        lines.append(f"  now      {_compared(case, now, chosen)}")
-    if cheaper:
-        lines.append(f"  cheaper  {_compared(case, cheaper[-1], chosen)}")
-    if better:
-        lines.append(f"  better   {_compared(case, better[0], chosen)}")
-    if case.kind == CHAOTIC:
-        lines.append(f"  judged   by means over seeds, because {case.why}")
-    lines.append(f"  known    {_known(case, points, chosen.repeats)}")
-    return lines
+    if target is not None and target.max_error is None:
+        best = min(points, key=lambda point: (max(severity(point.effects), SEEN), price(point)))
+        return now if now is not None and _gain(now, best) <= SEEN else best
+    if target is not None:
+        cheapest = _nearest(case, points)
+        return now if now is not None and not _is_cheaper(cheapest, now) else cheapest
+    least = max(min(severity(point.effects) for point in points), SEEN)
+    good = [point for point in points if severity(point.effects) <= (HARDLY * least if least > SEEN else SEEN)]
+    cheapest = _nearest(case, good)
+    if now is None or _is_cheaper(cheapest, now) or _gain(now, cheapest) > SEEN:
+        return cheapest
+    return now
 
 
-def recommended(case: CaseTrade, usable: Sequence[Point]) -> Point:
-    """The cheapest of which nothing would be noticed, or hardly more than with the best of all; the scene's own
-    settings if they cost hardly more."""
-    least = max(min(severity(point.effects) for point in usable), 1.0)
-    good = [point for point in usable if severity(point.effects) <= (HARDLY * least if least > 1.0 else 1.0)]
-    cheapest = min(good, key=price)
-    own = [point for point in good if point.cell == case.own and price(point) < HARDLY * price(cheapest)]
-    return own[0] if own else cheapest
+def _nearest(case: CaseTrade, points: Sequence[Point]) -> Point:
+    """Of the cheapest, and those that cost hardly more, the one with the fewest changes of the scene's own settings."""
+    least = min(map(price, points))
+    own = case.own or points[0].cell
+
+    def changes(point: Point) -> int:
+        names = ("integrator", "collision", "substeps", "geometry")
+        return sum(getattr(point.cell, name) != getattr(own, name) for name in names)
+
+    alike = [point for point in points if price(point) <= HARDLY * least]
+    return min(alike, key=lambda point: (changes(point), price(point), severity(point.effects), point.cell.key))
 
 
-def _sink(point: Point) -> float:
-    return point.effects.get("sink", 0.0)
+def _gain(now: Point, other: Point) -> float:
+    """How much less would be noticed, in limits of what is noticed."""
+    return severity(now.effects) - severity(other.effects)
 
 
-def _can_be_better(case: CaseTrade, chosen: Point) -> bool:
-    """True if something is known of its errors that others could improve; of games that is what would be noticed."""
-    improves = severity(chosen.effects) > 1.0 or not told(chosen.effects)
-    return improves and case.reference.trusts(case.norm, chosen.errors[case.norm].mean)
-
-
-def _points(case: CaseTrade) -> list[Point]:
-    return [point for point in case.points if point.cell.engine == CAROM]
+def _is_cheaper(point: Point, now: Point) -> bool:
+    return HARDLY * price(point) < price(now)
 
 
 def price(point: Point) -> float:
-    """Milliseconds per simulated second; work where nothing is timed."""
-    return point.milliseconds.median if point.milliseconds else point.work
+    """What a point costs, by the counts that are the same in every run."""
+    return point.work
+
+
+def answer(case: CaseTrade, target: Target | None = None) -> list[str]:
+    """At most five lines: the settings to paste and why, their cost, their error, the next choice, and the inputs."""
+    if case.refused:
+        return [f"{case.scene}: not measured: {case.refused}"]
+    usable = case.usable
+    if not usable:
+        failed = "; ".join(dict.fromkeys(failures(point) for point in case.points if point.failed))
+        return [f"{case.scene}: nothing that was tried can be used{f': {failed}' if failed else ''}"]
+    chosen = recommended(case, target)
+    if chosen is None:
+        assert target is not None
+        return [f"{case.scene}: {_none_meets(case, target)}"]
+    lines = [f"{case.scene}: use {chosen.line}{_why(case, chosen, target)}", f"  cost     {cost_text(chosen)}"]
+    asked = ""
+    if target is not None and target.max_error is not None:
+        error, allowed = (in_unit(case, value) for value in (error_of(case, chosen), target.error_of(case)))
+        asked = f"{error} of the {allowed} allowed, in {case.norm}; "
+    lines.append(f"  error    {asked}{_error(case, chosen)}; noticed: {noticed_text(chosen)}")
+    return [*lines, *_next_choice(case, chosen, target), *_inputs(case)]
+
+
+def _why(case: CaseTrade, chosen: Point, target: Target | None) -> str:
+    """Why this and not what the scene has now."""
+    if chosen.cell == case.own:
+        return " (as it has now)"
+    now = next((point for point in case.points if point.cell == case.own), None)
+    if now is None:
+        return ""
+    if now.failed or target is not None:
+        why = f"which {failures(now)}" if now.failed else ""
+        if target is not None and not target.meets(case, now):
+            why = why or "which does not keep what you ask for"
+        return f", {_ratio(chosen, now)} times the cost of {now.line} now{f', {why}' if why else ''}"
+    text = f", {_ratio(chosen, now)} times the cost of {now.line} now"
+    if price(chosen) <= price(now):
+        same = noticed_text(now) == noticed_text(chosen) == "nothing"
+        return f"{text}; nothing is noticed with either" if same else f"{text}; noticed with that: {noticed_text(now)}"
+    return f"{text}, because a player sees the difference: with that {noticed_text(now)}"
+
+
+def _next_choice(case: CaseTrade, chosen: Point, target: Target | None) -> list[str]:
+    """A line about the next better choice, if something is noticed with the chosen one; else about the next cheaper."""
+    best = front(case.usable)
+    better = [
+        point for point in best
+        if price(point) > price(chosen) and severity(point.effects) * FACTOR <= severity(chosen.effects)
+        and _gain(chosen, point) > SEEN
+    ]  # fmt: skip
+    if better and case.reference.trusts(case.norm, chosen.errors[case.norm].mean):
+        return [f"  better   {_compared(case, better[0], chosen, target)}"]
+    cheaper = [point for point in best if price(point) < CHEAPER * price(chosen)]
+    return [f"  cheaper  {_compared(case, cheaper[-1], chosen, target)}"] if cheaper else []
+
+
+def _compared(case: CaseTrade, point: Point, chosen: Point, target: Target | None) -> str:
+    asked = target is not None and target.max_error is not None
+    error = f"; error {in_unit(case, error_of(case, point))}" if asked else ""
+    return f"{point.line}: {_ratio(point, chosen)} times the cost; noticed: {noticed_text(point)}{error}"
+
+
+def _ratio(point: Point, other: Point) -> str:
+    """The cost of one in units of the other's: of times where both are known, else of work."""
+    if point.milliseconds and other.milliseconds:
+        return f"{point.milliseconds.median / other.milliseconds.median:.2g}"
+    return f"{point.work / other.work:.2g}"
+
+
+def _inputs(case: CaseTrade) -> list[str]:
+    """What it costs that a game reads its inputs once a step, which is in none of the errors."""
+    if not case.inputs:
+        return []
+    words = []
+    for dt, effects in case.inputs.items():
+        late = "; ".join(in_words(effects)[:2]) or "nothing is noticed"
+        words.append(f"{1e3 * float(dt):.3g} ms{' now' * (len(case.inputs) > 1 and not words)}: {late}")
+    return [f"  inputs   read once a step, which is in no error above: {'; '.join(words)}"]
+
+
+def _none_meets(case: CaseTrade, target: Target) -> str:
+    """Why nothing meets the target, and the best that there is."""
+    if target.max_error is None:
+        least = min(case.usable, key=price)
+        wanted = f"{target.max_cost:g} ms a frame or less"
+        return f"nothing that was tried costs {wanted}: the cheapest, {least.line}, {cost_text(least)}"
+    wanted = target.error_of(case)
+    if target.is_unknowable(case):
+        apart = case.reference.agreement[case.norm]
+        return (
+            f"no reference is exact enough for a {case.norm} error of {wanted:.3g}: {case.reference.text} agree to "
+            f"{apart:.2g} only; take a larger error, a shorter time or --thorough"
+        )
+    best = min(case.usable, key=lambda point: error_of(case, point))
+    cost = f" at {target.max_cost:g} ms a frame" if target.max_cost is not None else ""
+    return (
+        f"no settings keep the {case.norm} error below {wanted:.3g}{cost}: the best of "
+        f"{counted(len(case.usable), 'setting')} has {error_of(case, best):.3g}, {best.line}"
+    )
+
+
+def in_unit(case: CaseTrade, error: float) -> str:
+    """An error in metres if the norm is one of place, else as a share."""
+    return metres(error * case.scale) if case.norm in ("position", "apex") else f"{compact(100 * error, 2)} %"
 
 
 def clearly_worse(points: Sequence[Point]) -> set[Cell]:
@@ -92,7 +239,7 @@ def clearly_worse(points: Sequence[Point]) -> set[Cell]:
         return math.inf if point.failed else severity(point.effects)
 
     return {
-        point.cell for point in points if harm(point) > 1.0 and any(
+        point.cell for point in points if harm(point) > SEEN and any(
             CHEAPER * price(other) <= price(point) and CLEARLY * harm(other) <= harm(point)
             for other in points if not other.failed
         )
@@ -108,10 +255,15 @@ def front(usable: Sequence[Point]) -> list[Point]:
     return found
 
 
+def _frame(point: Point) -> float:
+    """ms per frame of 1/60 s."""
+    return point.milliseconds.median * FRAME if point.milliseconds else math.nan
+
+
 def cost_text(point: Point) -> str:
     if point.milliseconds is None:
         return f"work {point.work:.3g} per simulated second (not timed)"
-    frame = point.milliseconds.median * FRAME
+    frame = _frame(point)
     text = f"{1e3 * frame:.3g} us" if frame < 1 else f"{frame:.3g} ms"
     return f"{text} per frame of 1/60 s on this machine, {100 * frame / (1e3 * FRAME):.2g} % of it"
 
@@ -123,44 +275,11 @@ def _error(case: CaseTrade, point: Point) -> str:
         return "; ".join(of_game[:MOST_TOLD])
     if case.kind == RESTING and "sink" in effects:
         return f"{metres(effects['sink'])}: how deep what rests sinks into what it rests on"
-    if case.kind not in (CHAOTIC, RESTING) and "place" in effects:
+    if "place" in effects:
         return f"{metres(effects['place'])}: how far a body ends from where it should after {case.seconds:g} s"
-    bar = point.errors[case.norm]
-    return f"{100 * bar.high:.2g} % in {case.norm} ({case.norms[case.norm].partition(';')[0]})"
+    return f"{100 * point.errors[case.norm].high:.2g} % in {case.norm} ({case.norms[case.norm].partition(';')[0]})"
 
 
 def noticed_text(point: Point) -> str:
     words = [failures(point)] * point.failed + in_words(point.effects)
     return "; ".join(words) or "nothing"
-
-
-def _compared(case: CaseTrade, point: Point, chosen: Point) -> str:
-    ratio = price(point) / price(chosen)
-    words = noticed_text(point)
-    if words == "nothing" and case.norm in point.errors and not point.failed and not told(point.effects):
-        words = f"nothing; error {_error(case, point).partition(':')[0]}"
-    return f"{point.line}: {ratio:.2g} times the cost; noticed: {words}"
-
-
-def _known(case: CaseTrade, points: Sequence[Point], repeats: int) -> str:
-    runs = sum(point.repeats for point in points)
-    text = f"from {counted(runs, 'run')} of {case.seconds:g} s with {counted(len(points), 'setting')}"
-    if repeats < case.whole:
-        text += f", {repeats} of {case.whole} {case.repeated} with these"
-    if case.missing:
-        text += f"; {counted(case.missing, 'setting')} not tried yet"
-    if case.rough:
-        return f"{text}; {rough_text(case)}"
-    short = repeats < case.whole or case.missing
-    return text + ("; the same command goes on, --thorough does it all" if short else "")
-
-
-def rough_text(case: CaseTrade) -> str:
-    """What to think of errors without references, and what it takes to have some."""
-    more = f": {more_budget(case)} tells more" if case.needed else ""
-    return f"rough, against {case.reference.text} only{more}"
-
-
-def more_budget(case: CaseTrade) -> str:
-    """The budget with which there are references, as far as that is known."""
-    return f"--budget {math.ceil(case.needed / 10) * 10}" if case.needed else "a larger --budget"

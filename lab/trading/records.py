@@ -20,7 +20,6 @@ CAROM, PYMUNK = "carom", "pymunk"
 SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  # kinds of scenes
 
 NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
-CUT = "cut off"  # of runs that time ended: these are no results
 FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: ended by an error
 ENOUGH = 2  # settings with this many times fewer runs than others are not told of
 TRUSTED = 10.0  # an error counts as measured if the references agree better by this factor
@@ -181,19 +180,16 @@ class CaseTrade(Plain):
     kind
         SMOOTH, IMPACTS, RESTING or CHAOTIC; ``why``: how it was determined
     norms
-        quantity and scale, by name; charts and tuning use the first one
+        quantity and scale, by name; charts and answers use the first one
     repeated
         what differs between repeats: "start phases" or "seeds"
     refused
         why nothing was measured, else ""
-    whole
-        number of repeats needed to trust their worst; a first effort has fewer
     own
-        the settings that the scene has
-    missing
-        number of settings that there was no time for
-    rough
-        there are no references yet; needed: about the budget, s, with which there are some, 0 if it is not known
+        the settings that the scene has; scale: what the main norm is relative to, in the scene's units
+    inputs
+        the effects of recorded inputs that act in whole steps, by the length of the step in s: that of the scene's own
+        settings and that of the answer; none without inputs
     """
 
     scene: str
@@ -208,11 +204,9 @@ class CaseTrade(Plain):
     reference: Reference
     curves: list[Curve]
     refused: str = ""
-    whole: int = 0
     own: Cell | None = None
-    missing: int = 0
-    rough: bool = False
-    needed: float = 0.0
+    scale: float = 1.0
+    inputs: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def norm(self) -> str:
@@ -223,15 +217,20 @@ class CaseTrade(Plain):
         """Those of all curves."""
         return [point for curve in self.curves for point in curve.points]
 
+    @property
+    def usable(self) -> list[Point]:
+        """carom's points without failures, of which enough runs are known."""
+        points = [point for point in self.points if point.cell.engine == CAROM]
+        return known_well(point for point in points if not point.failed and self.norm in point.errors)
+
 
 @dataclass
 class Trade(Plain):
-    """All cases of one call, on one machine; ``command`` reproduces it. stopped: why it ended early, else ""."""
+    """All cases of one call, on one machine; ``command`` reproduces it."""
 
     machine: dict[str, str]
     command: str
     cases: list[CaseTrade]
-    stopped: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON, which cannot represent infinity: an inf order of theory becomes the string "exact"."""

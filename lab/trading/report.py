@@ -188,11 +188,6 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
         return [*lines, f"not measured: {case.refused}"]
     repeated = f", {case.repeats} {case.repeated}" if case.repeats > 1 else ""
     lines.append(f"{number(case.seconds)} s simulated{repeated}")
-    if case.repeats < case.whole:
-        lines.append(
-            f"a look at {case.repeats} of {case.whole} {case.repeated}: others may be worse, and what is exact here "
-            "may not be; --thorough knows"
-        )
     lines.append(f"{norm}: {case.norms[norm]}")
     lines.append(f"reference: {reference_line(case, norm)}")
     doubted = untrusted(case, norm)

@@ -4,46 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..bench.results import machine
 from ..cases import grid as grids
-from ..cases.case import EFFORTS, Case, case_of, check_arguments
+from ..cases.case import FIRST, FOR_REFERENCES, QUICK, Case, Effort, case_of, check_arguments
 from ..cases.subjects import subject_of
 from ..cli.usage_errors import Problem
 from ..jobs.result_store import Store
-from ..jobs.runs import (
-    OUT_OF_TIME,
-    OutOfTimeError,
-    Runs,
-    known_points,
-    reference_tasks,
-    refined_reference,
-    run_tasks,
-)
+from ..jobs.runs import Runs, inputs_late, measure, refined_reference
 from ..jobs.tasks import Task, bare_cost, engine_of
 from ..jobs.workers import Pool
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..wording import counted
-from .answer import clearly_worse, front
+from .answer import Target, clearly_worse, front, recommended
 from .code_line import python_line
-from .records import CAROM, CHAOTIC, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
+from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
 ROUNDING = 1e-12  # smaller errors are rounding, which has no order
 SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
-RUNNING, TIMING = 0.86, 0.95  # of the budget; until then runs, and timing what is told of again; then tables and charts
 TURNS, MOST_TIMED = 3, 6  # of the settings timed again
-FIRST_LOOK = 4.0  # s: then what is known is shown, if something is
-
-TRIAL = Reference("a first run with all impacts at their true times")
 
 Show = Callable[[CaseTrade], None]
 
@@ -87,11 +74,12 @@ def trade(
     repeats: int | None = None,
     steps: Sequence[float] = (),
     only: Only | None = None,
+    target: Target | None = None,
     against_pymunk: bool = False,
     timing: bool = True,
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
-    budget: float | None = None,
+    quick: bool = False,
     workers: int | Pool | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
@@ -102,177 +90,123 @@ def trade(
 
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
-    follow from the scene. budget: s for all together, spent on more and more exact looks; None: as long as it takes.
-    workers: processes at most, None for all cores (small amounts of work use none), or a Cluster; store: finished runs,
-    to be continued. show: called with what is known of a scene, first after FIRST_LOOK s or earlier; then Ctrl-C ends
-    the study with what is known. Of several scenes, one that cannot be measured is in the result with the reason.
-    ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
+    follow from the scene. target: the error or cost asked for. quick: only what fits into a minute, the same each time;
+    show is called with a first part of it. workers: processes at most, None for all cores (small amounts of work use
+    none), or a Cluster; store: finished runs, to be continued. Of several scenes, one that cannot be measured is in the
+    result with the reason. ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
     """
     check_arguments(norms, seconds, repeats, steps)
-    subjects = [subject_of(target, options, seed) for target in targets]
+    subjects = [subject_of(scene, options, seed) for scene in targets]
     for name in norms:
         check_norm(name, () if name in NORMS else [own for subject in subjects for own in subject.names])
-    began = time.monotonic()
-    runs = Runs(workers, store, progress, stoppable=show is not None)
+    runs = Runs(workers, store, progress)
     result = Trade({**machine(), "clock": CLOCK}, command, [])
-    for number, target in enumerate(targets, 1):
-        name = target if isinstance(target, str) else getattr(target, "__name__", "scene")
-        if budget is not None:
-            runs.until = began + RUNNING * budget * number / len(targets)
-        if runs.stopped not in ("", OUT_OF_TIME):
-            break
-        runs.stopped = ""
+    for scene in targets:
+        name = scene if isinstance(scene, str) else getattr(scene, "__name__", "scene")
         progress.say(f"{name}: survey")
         try:
             case = case_of(
-                target, norms=norms, seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed,
+                scene, norms=norms, seconds=seconds, repeats=repeats, steps=steps, options=options, seed=seed,
                 each=runs.each,
             )  # fmt: skip
-            study = Study(case, only or Only(), against_pymunk, timing, runs, show, began)
-            result.cases.append(study.measured(range(EFFORTS) if budget is not None else (EFFORTS - 1,)))
+            methods = (only or Only()).of(case) + _peers(case, against_pymunk)
+            if quick and show is not None:
+                show(measured(case, FIRST, methods, target, timing, runs))
+            result.cases.append(measured(case, QUICK if quick else None, methods, target, timing, runs))
         except Problem as problem:
             if len(targets) == 1:
                 raise
             result.cases.append(_refused(name, problem.message))
-        result.stopped = runs.stopped
     return result
 
 
-class Study:
-    """One scene: its references and its grid, measured with more and more effort."""
+def _peers(case: Case, wanted: bool) -> tuple[Cell, ...]:
+    """pymunk's methods; Problem, with the reason, if it cannot represent the scene."""
+    peers = grids.peer_methods() if wanted else ()
+    if peers:
+        engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()
+    return peers
 
-    def __init__(
-        self, case: Case, only: Only, against_pymunk: bool, timing: bool, runs: Runs, show: Show | None, began: float
-    ) -> None:
-        self.whole, self.timing, self.runs, self.show = case, timing, runs, show
-        self.curves = only.of(case)
-        peers = grids.peer_methods() if against_pymunk else ()
-        if peers:
-            engine_of(case, dataclasses.replace(peers[0], dt=case.steps[0]), 0).close()  # raises, with the reason
-        self.curves += peers
-        self.own = Cell.of(case.survey.settings)
-        self.began = began
-        self.costs: dict[Cell, float] = {}  # ms per simulated second, timed again
-        self.cells = self._nearest()
-        self.looked, self.needed = False, 0.0
-        self.rough = case.reference is None  # until there is a better one than the trial run
-        self.case, self.reference = case.at(0), Reference(f"closed form: {case.form}")
-        if self.rough:
-            self.case = self.case.replace(reference=case.survey.trial)
-            self.reference = TRIAL
 
-    def measured(self, efforts: Sequence[int] = range(EFFORTS)) -> CaseTrade:
-        """What is known when time is up, or when all is done."""
-        for effort in efforts:
-            case = self.whole.at(effort)
-            try:
-                self._measure(case)
-            except OutOfTimeError:
-                if self.rough:
-                    self.needed = self._time_needed(case)
-                break
-            if self.show is not None and effort < efforts[-1]:
-                self.show(self._known())
-        if self.timing and self.runs.until < math.inf and self.runs.stopped in ("", OUT_OF_TIME):
-            self._time_again()
-        return self._known()
+def measured(
+    whole: Case, effort: Effort | None, methods: Sequence[Cell], target: Target | None, timing: bool, runs: Runs
+) -> CaseTrade:
+    """One scene with that effort; None: all of it."""
+    case = whole if effort is None else whole.at(effort)
 
-    def _time_again(self) -> None:
-        """Time what the answer may tell of, in turns and with nothing else running: the first times were taken beside
-        other runs."""
-        told, _ = self._told_and_worse()
-        tasks = [Task(self.case, cell, 0) for cell in sorted(told, key=self._distance)[:MOST_TIMED]]
-        last = self.runs.until + (TIMING / RUNNING - 1) * (self.runs.until - self.began)
-        for _ in range(TURNS):
-            for task in tasks:
-                if time.monotonic() > last:
-                    return
-                cost = bare_cost(task)
-                if cost is not None:
-                    self.costs[task.cell] = min(cost, self.costs.get(task.cell, math.inf))
+    def is_enough(known: Case, found: Reference) -> bool:
+        apart = max(found.agreement.values(), default=0.0)
+        return apart <= SURE or (target is not None and target.is_known_by(known, found))
 
-    def _measure(self, case: Case) -> None:
-        runs, name = self.runs, case.subject.name
-        if not self.looked and (self.show is not None or runs.until < math.inf):
-            self._look(case)
-        case, reference, _ = refined_reference(
-            case, runs, lambda _, found: max(found.agreement.values(), default=0.0) <= SURE
-        )
-        self.case, self.reference, self.rough = case, reference, False
-        self.cells = grids.grid(self.curves, case.steps)
-        tasks = sorted(run_tasks(case, self.cells), key=self._later)
-        what = f"{name}: {len(self.cells)} settings, {case.repeats_text}"
-        if runs.until < math.inf and case.repeats > 1:
-            told, _ = self._told_and_worse()
-            runs.all([task for task in tasks if task.cell in told], what)
-            runs.all([task for task in tasks if task.repeat == 0], what)
-            told, worse = self._told_and_worse()
-            runs.all([task for task in tasks if task.cell in told], what)
-            tasks = [task for task in tasks if task.cell not in worse]
-        runs.all(tasks, what)
+    case, reference, _ = refined_reference(case, runs, is_enough)
+    own = Cell.of(case.survey.settings)
+    cells = grids.grid(methods, case.steps)
+    if effort is None:
+        points = measure(case, cells, runs, bare=timing)
+    else:
+        points = _measured_quickly(case, effort, sorted(cells, key=lambda cell: _distance(cell, own)), own, runs)
+    for point in points:
+        point.line = python_line(point.cell, case.survey.settings)
+        point.milliseconds = point.milliseconds if timing else None
+    found = dataclasses.replace(summed_up(case, reference, points), own=own, scale=case.scale(case.norms[0]))
+    if not found.usable:
+        return found
+    chosen = recommended(found, target)
+    if timing:
+        answers = [*([] if chosen is None else [chosen]), *front(found.usable)]
+        _time_again(case, list(dict.fromkeys([own, *[point.cell for point in answers]])), points)
+    if chosen is None:
+        return found
+    case = case.replace(repeats=chosen.repeats)
+    steps = dict.fromkeys((own, chosen.cell) if own.dt <= case.steps[0] else (chosen.cell,))
+    late = {repr(cell.dt): inputs_late(case, cell, runs) for cell in steps}
+    return dataclasses.replace(found, inputs={dt: effects for dt, effects in late.items() if effects})
 
-    def _look(self, case: Case) -> None:
-        """What can be known before there is a reference; shown when it is all there, or after FIRST_LOOK."""
-        self.looked, self.runs.listener = True, self._show_first
-        self.runs.all(run_tasks(case, self.cells), f"{case.subject.name}: as it is")
-        self._show_first(at_once=self.runs.until < math.inf)
 
-    def _show_first(self, at_once: bool = False) -> None:
-        if self.runs.listener is not None and (at_once or time.monotonic() > self.began + FIRST_LOOK):
-            self.runs.listener = None
-            if self.show is not None:
-                self.show(self._known())
+def _measured_quickly(case: Case, effort: Effort, cells: Sequence[Cell], own: Cell, runs: Runs) -> list[Point]:
+    """The nearest settings once, in half of the time; those that the answer may be about as often as fits in the rest.
+    """
+    half = (1 - FOR_REFERENCES) / 2 * effort.seconds
+    fitting, spent = [], 0.0
+    for cell in cells:
+        spent += case.seconds_of(cell)
+        if spent <= half or not fitting:
+            fitting.append(cell)
+    once = measure(case.replace(repeats=1), fitting, runs)
+    worse = clearly_worse(once) - {own}
+    again = [cell for cell in fitting if cell not in worse]
+    most = int(half / sum(map(case.seconds_of, again))) + 1
+    repeats = max(min(case.repeats, most), min(case.repeats, 2))
+    points = measure(case.replace(repeats=repeats), again, runs)
+    return points + [point for point in once if point.cell in worse]
 
-    def _time_needed(self, case: Case) -> float:
-        """About how long it takes to the first results against references, s, from the beginning; 0: not known."""
-        tasks = [*reference_tasks(case.coarse_reference()), *run_tasks(case, grids.grid(self.curves, case.steps))]
-        left = self.runs.seconds_for(tasks)
-        return (time.monotonic() - self.began + left) / RUNNING if left < math.inf else 0.0
 
-    def _told_and_worse(self) -> tuple[set[Cell], set[Cell]]:
-        """By what is known: the settings that the answer may tell of, and those of which more runs tell nothing."""
-        points = known_points(self.case.replace(repeats=1), self.cells, self.runs)
-        best = front([point for point in points if not point.failed])
-        worse = clearly_worse(points) - {self.own}
-        return {self.own, *(point.cell for point in best)} - worse, worse
+def _time_again(case: Case, cells: Sequence[Cell], points: Iterable[Point]) -> None:
+    """Time what the answer may be about in turns, with nothing else running: the first times were taken beside other
+    runs."""
+    passes: dict[Cell, list[float]] = {cell: [] for cell in cells[:MOST_TIMED]}
+    for _ in range(TURNS):
+        for cell, found in passes.items():
+            cost = bare_cost(Task(case, cell, 0))
+            found += [] if cost is None else [cost]
+    for point in points:
+        if passes.get(point.cell):
+            point.milliseconds = Spread.of(passes[point.cell])
 
-    def _nearest(self) -> tuple[Cell, ...]:
-        """The scene's own settings, and with twice and half the step: known before there is a reference."""
-        steps = [self.own.dt * factor for factor in (1, 2, 0.5)]
-        return tuple(dataclasses.replace(self.own, dt=dt) for dt in steps if dt <= self.whole.steps[0])
 
-    def _later(self, task: Task) -> tuple[float, float]:
-        """Tasks run in this order: all settings once, the nearest first; of a chaotic scene, of which one run tells
-        little, the nearest are repeated before the farthest are tried."""
-        distance = self._distance(task.cell)
-        return (task.repeat + distance, distance) if task.case.kind == CHAOTIC else (task.repeat, distance)
-
-    def _distance(self, cell: Cell) -> float:
-        """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
-        steps are farther, because they cost more."""
-        fields = ("integrator", "collision", "substeps", "geometry")
-        own = grids.with_own_flight(dataclasses.replace(self.own, collision=cell.collision))
-        differ = sum(getattr(cell, name) != getattr(own, name) for name in fields)
-        differ += cell.collision != self.own.collision
-        halvings = math.log2(self.own.dt / cell.dt)
-        return differ + (1.5 * halvings if halvings > 0 else -halvings)
-
-    def _known(self) -> CaseTrade:
-        points = known_points(self.case, self.cells, self.runs)
-        for point in points:
-            point.line = python_line(point.cell, self.case.survey.settings)
-            if point.cell in self.costs:
-                point.milliseconds = Spread.of([self.costs[point.cell]])
-            point.milliseconds = point.milliseconds if self.timing else None
-        found = summed_up(self.case, self.reference, points)
-        missing = len(self.cells) - len(points)
-        return dataclasses.replace(
-            found, whole=self.whole.repeats, own=self.own, missing=missing, rough=self.rough, needed=self.needed
-        )
+def _distance(cell: Cell, own: Cell) -> float:
+    """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
+    steps are farther, because they cost more."""
+    fields = ("integrator", "collision", "substeps", "geometry")
+    alike = grids.with_own_flight(dataclasses.replace(own, collision=cell.collision))
+    differ = sum(getattr(cell, name) != getattr(alike, name) for name in fields) + (cell.collision != own.collision)
+    halvings = math.log2(own.dt / cell.dt)
+    return differ + (1.5 * halvings if halvings > 0 else -halvings)
 
 
 def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> CaseTrade:
     """The record of a case."""
+    points = list(points)
     methods = by_method(points)
     curves = []
     for method, found in methods.items():
@@ -289,7 +223,7 @@ def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> Case
         case.why,
         {norm: norm_of(norm).text for norm in case.norms},
         case.seconds,
-        case.repeats,
+        max((point.repeats for point in points), default=case.repeats),
         case.repeated,
         reference,
         curves,

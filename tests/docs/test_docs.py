@@ -119,7 +119,7 @@ def namespace(monkeypatch, tmp_path):
 
 # Each compiles for a quarter of a minute or more where the cache is empty, or is a study of many runs.
 SLOW = (
-    "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md", "trade.md", "tune.md",
+    "write-a-shape.md", "tile_grid.md", "capsule.md", "convex_polygon.md", "one_way_segment.md", "trade.md",
     "integrators.md", "collisions.md",
 )  # fmt: skip
 RUN = [

@@ -12,7 +12,7 @@ from helpers_trade_scenes import BALL, scene_file
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, System, World
-from carom.lab import Only, suggest_dt
+from carom.lab import Only, suggest_dt, trade
 from carom.lab.cases.case import case_of
 from carom.lab.cases.subjects import subject_of
 from carom.lab.cli.usage_errors import Problem
@@ -24,7 +24,6 @@ from carom.lab.measure.norms import NORMS
 from carom.lab.measure.observation import Seen, observe
 from carom.lab.measure.survey import survey
 from carom.lab.trading.records import CHAOTIC, IMPACTS, RESTING, SMOOTH, Cell
-from carom.lab.tuning.search import search
 from carom.plugins import Physics
 from carom.scenes import orbit
 
@@ -145,7 +144,6 @@ def test_a_closed_form_is_used_for_what_it_knows_only():
 
 
 def test_steps_that_a_run_has_no_room_for_are_left_out():
-    """A search cannot return a step that it has never taken whole."""
     assert max(case_of("spring", seconds=0.1).steps) <= 0.1 / 3
     with pytest.raises(Problem, match="no room"):
         case_of("spring", seconds=0.1, steps=(0.1,))
@@ -214,30 +212,6 @@ def test_a_reference_of_a_spring_against_a_wall_knows_how_good_it_is():
     assert true < 20 * reference.agreement["position"]
 
 
-@pytest.mark.slow
-def test_a_search_walks_back_where_it_has_jumped_too_far():
-    """A damped spring: theory gives no order. Its choice costs at most 1.3 times the cheapest step that holds,
-    found here among the halvings of the ladder."""
-
-    def build(settings, seed=0):
-        world = world_of(settings, 0.0)
-        world.create_entity(Transform((1, 0)), RigidBody(linear_damping=0.2))
-
-        class Pull(ForceSystem):
-            def add_forces(self, bodies, time):
-                bodies.force[:] -= 400.0 * bodies.position
-
-        world.add_system(Pull())
-        return world
-
-    found = search(build, 1e-3, seconds=2.0, workers=1)
-    assert found.choice is not None
-    larger = [trial for trial in found.trials if trial.met and trial.work < found.choice.work / 1.3]
-    assert not [trial for trial in larger if trial.repeats > 1]
-    own = [trial.cell.dt for trial in found.trials if trial.cell.method == found.choice.cell.method]
-    assert min(dt for dt in own if dt > found.choice.cell.dt) <= 2 * found.choice.cell.dt * (1 + 1e-9)
-
-
 def trap(settings, seed=0):
     """Nine elastic discs swing around the origin and meet; there are no static bodies and there is no height."""
 
@@ -258,7 +232,7 @@ def trap(settings, seed=0):
 def test_what_is_0_throughout_is_no_error_of_0(norm):
     """Without walls there is no pressure, without gravity no height: every setting would meet every target."""
     with pytest.raises(Problem, match=rf"trap: {norm} is 0 throughout.* position, energy, impact_time, count"):
-        search(trap, 0.1, norm, seconds=1.0, steps=(1 / 30, 1 / 60), workers=1)
+        trade(trap, norms=(norm,), seconds=1.0, steps=(1 / 30, 1 / 60), workers=1)
 
 
 def test_a_norm_that_the_closed_form_does_not_tell_has_own_references():
@@ -328,16 +302,9 @@ def planet(settings, seed=0):
     return world
 
 
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        ({"max_error": 1e-15}, "planet: a position error of 1e-15 is below rounding.*take 1e-13 or more"),
-        ({"only": Only(integrators=("rk5",))}, r"integrator must be one of .*'rk5' \(did you mean 'rk4'"),
-    ],
-)
-def test_a_search_that_cannot_end_does_not_begin(options, reason):
-    with pytest.raises(Problem, match=reason):
-        search(planet, seconds=1.0, steps=(1 / 30, 1 / 60), workers=1, **options)
+def test_an_integrator_that_there_is_not_is_refused_before_anything_runs():
+    with pytest.raises(Problem, match=r"integrator must be one of .*'rk5' \(did you mean 'rk4'"):
+        trade(planet, only=Only(integrators=("rk5",)), seconds=1.0, steps=(1 / 30, 1 / 60), workers=1)
 
 
 @pytest.mark.parametrize("field", ["integrators", "collisions", "substeps", "geometries"])

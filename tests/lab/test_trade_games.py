@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, Phase, System, World
+from carom.framework import Component, Phase, Settings, System, World
 from carom.lab import Inputs, Only, trade
 from carom.lab.cases import case
 from carom.lab.cases.subjects import subject_of
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.effects import NEVER, at_worst, effects_of, in_words, noticed, told
 from carom.lab.measure.norms import errors_of, norm_of, other_touches
-from carom.lab.measure.observation import Seen, mean_of
-from carom.lab.trading.answer import answer
-from carom.lab.trading.records import CHAOTIC, IMPACTS
+from carom.lab.measure.observation import Seen, mean_of, step_lengths
+from carom.lab.trading.answer import answer, recommended
+from carom.lab.trading.records import CHAOTIC, IMPACTS, Cell
 from carom.plugins import Physics
 
 ROOT = Path(__file__).parents[2]
@@ -206,6 +206,66 @@ def test_inputs_are_played_back_with_steps_of_any_length(tmp_path):
     (tmp_path / "b.keys").write_text("0.0 right\nleft 0.5\n")
     with pytest.raises(ValueError, match=r"b.keys, line 2"):
         Inputs.read(tmp_path / "b.keys")
+
+
+def runner(settings=None, seed=0):
+    """5 m/s to the right from 0.31 s to 0.72 s: 2.05 m, in steps of any length."""
+    keys = Inputs([(0.31, "right"), (0.72, "")])
+
+    class Control(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            self.world.bodies.linear_velocity[0, 0] = 5.0 * ("right" in keys.held(self.world.time, dt))
+
+    world = World(Physics(dimensions=2), settings=settings or Settings(substeps=8))
+    world.add_system(Control())
+    world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(0.5))
+    return world
+
+
+runner.compared = lambda world: {"hero": world.bodies.position[0]}
+
+
+def test_inputs_act_at_their_times_in_every_run_and_their_age_is_told_apart():
+    """A key acts up to a step early and ends up to a step late, each of which is 5 m/s times the step."""
+    plan = {"seconds": 1.0, "repeats": 4, "timing": False, "only": Only(integrators=("semi_implicit_euler",))}
+    found = trade(runner, steps=(1 / 15, 1 / 30, 1 / 60), **plan).cases[0]
+    assert [point.effects["value at hero"] < 1e-9 for point in found.points] == [True] * 3
+    chosen = recommended(found)
+    assert chosen is not None
+    late = {float(dt): effects["value at hero"] for dt, effects in found.inputs.items()}
+    assert late.keys() == {1 / 60, chosen.cell.dt}
+    for dt, metres in late.items():
+        assert 0.5 * 5 * dt < metres <= 2 * 5 * dt
+        again = []
+        for phase in (1.0, 0.5, 0.75, 0.25):  # in whole steps, with nothing but a world
+            with runner(Settings(dt=phase * dt)) as world:
+                while world.time < 1.0:
+                    world.step()
+                    world.settings = world.settings.replace(dt=dt)
+                again.append(abs(world.bodies.position[0, 0] - 2.05))
+        assert max(again) / 2 <= metres <= 2 * max(again)
+    assert "inputs   read once a step" in answer(found)[-1]
+    assert found.own == Cell(1 / 60, substeps=8)  # what the build makes of None
+    assert trade(runner, steps=(1 / 30, 1 / 60), **plan).cases[0].points[-1].line == "Settings(substeps=8)"
+
+
+def test_steps_end_where_inputs_change():
+    assert step_lengths(1.0, 0.25, 1.0, inputs=(0.5, 0.6)) == pytest.approx([0.25, 0.25, 0.1, 0.15, 0.25])
+    assert step_lengths(1.0, 0.25, 0.5, inputs=(0.38, 2.0)) == pytest.approx([0.125, 0.255, 0.245, 0.25, 0.125])
+    assert step_lengths(1.0, 0.25, 1.0) == step_lengths(1.0, 0.25, 1.0, inputs=(0.25, 0.75)) == [0.25] * 4
+    dense = Inputs([(k / 60, str(k)) for k in range(60)])
+
+    def watched(settings, seed=0):
+        world = shots(settings, seed)
+        watches = System()
+        watches.process = lambda dt: dense.held(world.time, dt)
+        world.add_system(watches)
+        return world
+
+    steps = case.case_of(watched, seconds=1.0).steps
+    assert max(steps) <= 1 / 60 * (1 + 1e-9)  # longer ones would be cut into pieces too often to be judged
 
 
 @pytest.mark.parametrize(("returned", "words"), [
