@@ -95,11 +95,9 @@ class Loaded:
 
     def _own_world(self, seed: int) -> Any:
         """With the settings that ``build`` has by default, or makes of None; Settings() if it cannot take None."""
-        first = next(iter(inspect.signature(self.function).parameters.values()))
-        if first.default is not first.empty:
-            return self.function(seed=seed)
+        own = next(iter(inspect.signature(self.function).parameters.values())).default
         try:
-            return self.function(None, seed=seed)
+            return self.function(own if isinstance(own, Settings) else None, seed=seed)
         except (AttributeError, TypeError):
             return self.function(Settings(), seed=seed)
 

@@ -100,6 +100,21 @@ def test_a_file_gets_settings_to_change(carom, ball):
     assert report["settings"]["dt"] == 1 / 30
 
 
+@pytest.mark.parametrize(("old", "new"), [
+    ("settings or Settings.balanced()", "settings or Settings(substeps=8)"),
+    ("def build(settings=None", "def build(settings=Settings(substeps=8)"),
+    ("def build", "SETTINGS = Settings(substeps=8)\n\ndef build"),
+])  # fmt: skip
+def test_the_settings_that_a_file_has_itself(carom, ball, old, new):
+    """They are what the command line changes."""
+    text = ball.read_text()
+    assert old in text
+    ball.write_text(text.replace(old, new))
+    for changes, dt in ((), 1 / 60), (("--set", "dt=1/90"), 1 / 90):
+        report = report_of(carom("run", "ball.py", "--steps", "1", "--json", "--no-pictures", *changes))
+        assert (report["settings"]["substeps"], report["settings"]["dt"]) == (8, dt)
+
+
 def test_a_file_without_build_is_not_executed(carom, tmp_path):
     (tmp_path / "game.py").write_text("open('played', 'w').close()\nwhile True: pass\n")
     assert "defines no build" in refusal(carom("run", "game.py"))
