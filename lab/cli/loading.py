@@ -89,15 +89,23 @@ class Loaded:
             raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
         return world
 
+    @property
+    def _default(self) -> Settings | None:
+        """The default of the parameter of ``build``, if it has one."""
+        default = next(iter(inspect.signature(self.function).parameters.values())).default
+        return default if isinstance(default, Settings) else None
+
     def _own_settings(self, seed: int) -> Settings:
+        """Those to be changed: of a build that makes its own of None, of a world that it has built."""
+        if self._default is not None:
+            return self._default
         with contextlib.closing(self._call(None, seed)) as world:
             return world.settings
 
     def _own_world(self, seed: int) -> Any:
         """With the settings that ``build`` has by default, or makes of None; Settings() if it cannot take None."""
-        own = next(iter(inspect.signature(self.function).parameters.values())).default
         try:
-            return self.function(own if isinstance(own, Settings) else None, seed=seed)
+            return self.function(self._default, seed=seed)
         except (AttributeError, TypeError):
             return self.function(Settings(), seed=seed)
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import logging
-import math
 import multiprocessing
 import os
 import pickle
 import signal
 import sys
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import (
@@ -34,15 +32,12 @@ from ..cli.usage_errors import Problem, one_line
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-TRIES = 2  # attempts at a task whose worker dies
-GRACE = 2.0  # s that tasks have to end by themselves when time is up
-
 logger = logging.getLogger("carom")
 
 
 @dataclass(frozen=True)
 class Lost:
-    """The result of a task that ended its worker process at every attempt."""
+    """The result of a task that ended its worker process at both attempts."""
 
     task: Any
     reason: str
@@ -70,32 +65,33 @@ def process_pool(workers: int) -> Executor:
     return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(announcing,))
 
 
-class Pool:
-    """An executor that is made when it is needed, and kept until it is ended.
+class Workers:
+    """An executor for ``size`` tasks at a time, made when it is needed and kept until :meth:`end`.
 
-    executor
-        makes one for a number of workers
+    lost
+        what it raises for a task whose workers have died, after tries of its own
     """
 
-    def __init__(self, executor: Callable[[int], Executor] = process_pool) -> None:
-        self._make = executor
+    def __init__(
+        self, size: int, executor: Callable[[int], Executor] = process_pool, lost: tuple[type[Exception], ...] = ()
+    ) -> None:
+        self.size, self._make, self.lost = size, executor, lost
         self._executor: Executor | None = None
-        self.lost: tuple[type[Exception], ...] = ()  # raised for a task whose workers have died, after all tries
         self._others: set[Any] = set()
 
-    def submit(self, workers: int, message: bytes) -> Future[Any]:
+    def submit(self, message: bytes) -> Future[Any]:
         """Hand a task to a worker."""
         if self._executor is None:
             self._others = set(multiprocessing.active_children())
-            self._executor = self._make(workers)
+            self._executor = self._make(self.size)
         with _interrupts_held_back(), _main_hidden():
-            return self._executor.submit(run_message, message)
+            return self._executor.submit(run_message, message, os.getcwd())
 
     def end(self) -> None:
-        """Kill the processes at once."""
+        """End the processes at once."""
         if self._executor is None:
             return
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False)
         self._executor = None
         for child in set(multiprocessing.active_children()) - self._others:
             child.kill()
@@ -103,98 +99,101 @@ class Pool:
 
 
 def in_parallel(
-    function: Callable[[Task], Result], tasks: Iterable[Task], workers: int | None = None, pool: Pool | None = None,
-    until: float = math.inf,
-) -> Generator[tuple[Task, Result | Lost], None, None]:  # fmt: skip
-    """``(task, function(task))`` for each task, as they finish, from ``workers`` processes (None: all cores).
+    function: Callable[[Task], Result], tasks: Iterable[Task], workers: int | Workers | None = None
+) -> Generator[tuple[Task, Result | Lost], None, None]:
+    """``(task, function(task))`` for each task, as they finish, from so many processes (None: all cores) or from
+    Workers, which are kept for later calls if all went well.
 
-    If a worker dies (killed, out of memory, a crash), the tasks that were running are tried once more, one at a time;
-    one that ends its worker again has :class:`Lost` as its result. No task is finished twice.
+    If a worker dies (killed, out of memory, a crash), the tasks that were running are tried once more, each in a
+    process of its own; one that ends it again has :class:`Lost` as its result. No task is finished twice.
 
-    The tasks run in this process instead, one after the other and in order, with ``workers=1``, inside a worker, and if
+    The tasks run in this process instead, one after the other and in order, with one worker, inside a worker, and if
     ``function`` cannot be pickled (a lambda, a function inside another). So does a task that a worker cannot load:
     workers never run the script that was started, and its own functions and classes are unknown to them.
 
     An exception of ``function`` stops everything and is raised here. Closing the generator and Ctrl-C end the workers
-    at once and silently; so does the death of this process. pool: kept for later calls if all went well; None: one for
-    this call.
-
-    until: on ``time.monotonic``; TimeoutError if tasks in other processes have not ended GRACE s later. Problem if a
-    cluster is gone. ValueError for fewer than one worker.
+    at once and silently; so does the death of this process. Problem if a cluster is gone. ValueError for fewer than one
+    worker.
     """
     tasks = list(tasks)
-    if workers is None:
-        workers = available_cores()
-    if not isinstance(workers, int) or isinstance(workers, bool) or workers < 1:
+    size = workers.size if isinstance(workers, Workers) else available_cores() if workers is None else workers
+    if not isinstance(size, int) or isinstance(size, bool) or size < 1:
         raise ValueError(f"workers must be a whole number of at least 1, not {workers!r}")
-    alone = workers == 1 or multiprocessing.parent_process() is not None
-    if alone or not tasks or _pickled(function) is None:
+    shared = isinstance(workers, Workers) or size > 1
+    if not shared or not tasks or multiprocessing.parent_process() is not None or _pickled(function) is None:
         return ((task, function(task)) for task in tasks)
-    return _shared_out(function, tasks, workers, Pool() if pool is None else pool, pool is not None, until)
+    pool = workers if isinstance(workers, Workers) else Workers(size)
+    return _shared_out(function, tasks, pool, pool is workers)
 
 
 def _shared_out(
-    function: Callable[[Task], Result], tasks: Sequence[Task], most: int, pool: Pool, kept: bool, until: float
+    function: Callable[[Task], Result], tasks: Sequence[Task], pool: Workers, kept: bool
 ) -> Generator[tuple[Task, Result | Lost], None, None]:
-    waiting, suspects = deque(range(len(tasks))), deque[int]()  # suspects were running when a worker died
-    tries = [0] * len(tasks)
+    waiting, suspects = deque(range(len(tasks))), list[int]()  # suspects were running when a worker died
     running: dict[Future[Any], int] = {}
     finished = False
     try:
-        while waiting or suspects or running:
-            broken = False
-            on_trial = any(tries[index] for index in running.values())
-            room = 0 if on_trial else most - len(running)
-            if suspects:
-                room = 0 if running else 1
-            while room > 0 and (suspects or waiting):
-                index = (suspects or waiting).popleft()
-                message = _pickled((function, tasks[index]))
-                if message is None:
-                    yield tasks[index], function(tasks[index])
-                    continue
+        while waiting or running:
+            try:
+                while waiting and len(running) < pool.size and not suspects:
+                    message = _pickled((function, tasks[waiting[0]]))
+                    if message is None:
+                        index = waiting.popleft()
+                        yield tasks[index], function(tasks[index])
+                        continue
+                    running[pool.submit(message)] = waiting[0]
+                    waiting.popleft()
+            except BrokenExecutor:  # a worker has died meanwhile
+                suspects += running.values()
+            for future in wait(running, return_when=FIRST_COMPLETED).done if running else ():
+                index = running[future]
                 try:
-                    running[pool.submit(most, message)] = index
-                except BrokenExecutor:  # a worker has died meanwhile: the tasks that were running will tell
-                    waiting.appendleft(index)
-                    broken = True
-                    break
-                room -= 1
-            patience = None if until == math.inf else max(until + GRACE - time.monotonic(), 0.0)
-            done, _ = wait(running, patience, FIRST_COMPLETED)
-            if running and not done:
-                raise TimeoutError
-            for future in done:
-                index = running.pop(future)
-                try:
-                    result = future.result()
+                    result = _result(future, function, tasks[index], pool)
                 except BrokenExecutor:
-                    broken = True
-                    tries[index] += 1
-                    if tries[index] < TRIES:
-                        suspects.append(index)
-                    else:
-                        yield tasks[index], Lost(tasks[index], f"its process ended {TRIES} times")
-                    continue
-                except CancelledError as error:
-                    raise Problem("the connection to the workers is lost") from error
-                except pool.lost as error:
-                    yield tasks[index], Lost(tasks[index], one_line(error))
-                    continue
-                if isinstance(result, Unknown):
-                    logger.info("no worker can load task %d, it runs here: %s", index, result.reason)
-                    result = function(tasks[index])
-                yield tasks[index], result
-            if broken:
-                for index in running.values():
-                    tries[index] += 1
                     suspects.append(index)
+                    continue
+                del running[future]
+                yield tasks[index], result
+            if suspects:
+                suspects = sorted({*suspects, *running.values()})
                 running.clear()
                 pool.end()
+                for index in suspects:
+                    yield tasks[index], _once_more(function, tasks[index])
+                suspects = []
         finished = True
     finally:
+        for future in running:
+            future.cancel()
         if not (finished and kept):
             pool.end()
+
+
+def _result(future: Future[Any], function: Callable[[Task], Result], task: Task, pool: Workers) -> Result | Lost:
+    """What a worker has made of a task."""
+    try:
+        result = future.result()
+    except CancelledError as error:
+        raise Problem("the connection to the workers is lost") from error
+    except pool.lost as error:
+        return Lost(task, one_line(error))
+    if isinstance(result, Unknown):
+        logger.info("no worker can load a task, it runs here: %s", result.reason)
+        return function(task)
+    return result
+
+
+def _once_more(function: Callable[[Task], Result], task: Task) -> Result | Lost:
+    """The task in a process of its own."""
+    pool = Workers(1)
+    try:
+        message = _pickled((function, task))
+        assert message is not None
+        return _result(pool.submit(message), function, task, pool)
+    except BrokenExecutor:
+        return Lost(task, "its process ended 2 times")
+    finally:
+        pool.end()
 
 
 def _pickled(thing: Any) -> bytes | None:
@@ -206,10 +205,9 @@ def _pickled(thing: Any) -> bytes | None:
         return None
 
 
-def run_message(message: bytes, folder: str | None = None) -> Any:
+def run_message(message: bytes, folder: str) -> Any:
     """In a worker: one task. folder: the one in which its files are found."""
-    if folder is not None:
-        os.chdir(folder)
+    os.chdir(folder)
     try:
         function, task = pickle.loads(message)
     except (Exception, SystemExit) as error:  # imports user modules, which may raise anything

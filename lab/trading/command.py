@@ -29,7 +29,7 @@ from ..cli.options import (
 )
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
-from ..jobs.cluster import Cluster
+from ..jobs import cluster as clusters
 from ..jobs.result_store import Store
 from ..reporting.output import Output, drawing_module
 from ..reporting.progress import Bar
@@ -134,7 +134,7 @@ def performing(workers: int | None, cluster: str | None, kept: Path) -> Iterator
     """The keywords of what performs and keeps the runs; Ctrl-C ends the command and says what is kept."""
     if workers is not None and cluster is not None:
         raise Problem("--workers and --cluster exclude each other")
-    pool = contextlib.nullcontext(workers) if cluster is None else Cluster(cluster)
+    pool = contextlib.nullcontext(workers) if cluster is None else clusters.cluster(cluster)
     with Store(kept) as store, pool as performs, Bar(Console(stderr=True)) as bar:
         try:
             yield {"workers": performs, "store": store, "progress": bar}

@@ -16,7 +16,7 @@ from ..cli.usage_errors import Problem
 from ..jobs.result_store import Store
 from ..jobs.runs import Runs, inputs_late, measure, refined_reference
 from ..jobs.tasks import Task, bare_cost, engine_of
-from ..jobs.workers import Pool
+from ..jobs.workers import Workers
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
@@ -80,7 +80,7 @@ def trade(
     options: Mapping[str, Any] | None = None,
     seed: int = 0,
     quick: bool = False,
-    workers: int | Pool | None = None,
+    workers: int | Workers | None = None,
     store: Store | None = None,
     progress: Progress = NO_PROGRESS,
     command: str = "",
@@ -92,8 +92,9 @@ def trade(
     seconds of each run; repeats of each setting (start phases, or seeds of chaotic scenes); steps s. Values not given
     follow from the scene. target: the error or cost asked for. quick: only what fits into a minute, the same each time;
     show is called with a first part of it. workers: processes at most, None for all cores (small amounts of work use
-    none), or a Cluster; store: finished runs, to be continued. Of several scenes, one that cannot be measured is in the
-    result with the reason. ValueError or Problem for wrong arguments, and for a single scene that cannot be measured.
+    none), or those of a cluster; store: finished runs, to be continued. Of several scenes, one that cannot be measured
+    is in the result with the reason. ValueError or Problem for wrong arguments, and for a single scene that cannot be
+    measured.
     """
     check_arguments(norms, seconds, repeats, steps)
     subjects = [subject_of(scene, options, seed) for scene in targets]

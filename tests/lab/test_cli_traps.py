@@ -117,8 +117,10 @@ def test_a_build_that_ignores_its_settings_is_refused(carom, tmp_path):
     assert "deaf.py: build ignores its settings, so --settings has no effect" in line
 
 
-def test_set_builds_once(carom, tmp_path):
-    (tmp_path / "loud.py").write_text(FALLING_BALL.replace("    world = ", "    print('built')\n    world = ", 1))
+def test_set_builds_once_where_the_file_tells_its_settings(carom, tmp_path):
+    """Else a first world tells what the build makes of None."""
+    loud = FALLING_BALL.replace("    world = ", "    print('built')\n    world = ", 1)
+    (tmp_path / "loud.py").write_text(f"{loud}\nSETTINGS = Settings(substeps=8)\n")
     result = carom("run", "loud.py", "--steps", "1", "--no-pictures", "--set", "dt=1/120")
     assert result.exit_code == 0
     assert result.stderr.count("built") == 1

@@ -55,7 +55,7 @@ def test_without_dask_it_says_what_to_install(monkeypatch):
 def test_two_workers_of_a_cluster_give_the_same_bits(tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     from carom.lab.jobs import runs
-    from carom.lab.jobs.cluster import Cluster
+    from carom.lab.jobs.cluster import cluster
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(runs, "FEW_SECONDS", 0.0)
@@ -63,8 +63,8 @@ def test_two_workers_of_a_cluster_give_the_same_bits(tmp_path, monkeypatch):
     with distributed.LocalCluster(n_workers=2, **PROCESSES) as local:
         address = local.scheduler_address
         there = carom_command("trade", "mine.py", *SHORT, "--cluster", address, "--runs", "there.sqlite", "--json")
-        with Cluster(address) as cluster:
-            assert cluster.size == 2
+        with cluster(address) as workers:
+            assert workers.size == 2
     here = carom_command("trade", "mine.py", *SHORT, "--workers", "1", "--runs", "here.sqlite", "--json")
     assert (there.exit_code, here.exit_code) == (0, 0), there.stderr
     assert kept("there.sqlite") == kept("here.sqlite")
@@ -80,23 +80,23 @@ def test_a_cluster_that_would_give_other_results_is_refused(monkeypatch):
     from carom.lab.jobs import cluster
 
     monkeypatch.setattr(cluster, "PATIENCE", 1.0)
-    with pytest.raises(Problem, match=r"--cluster tcp://127.0.0.1:1"):
-        cluster.Cluster("tcp://127.0.0.1:1")
+    with pytest.raises(Problem, match=r"--cluster tcp://127.0.0.1:1"), cluster.cluster("tcp://127.0.0.1:1"):
+        pass
     local = distributed.LocalCluster(1, threads_per_worker=2, processes=False, dashboard_address=None)
-    with local, pytest.raises(Problem, match="has 2 threads"):
-        cluster.Cluster(local.scheduler_address)
+    with local, pytest.raises(Problem, match="has 2 threads"), cluster.cluster(local.scheduler_address):
+        pass
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="there are no signals of this kind")
 def test_a_worker_that_dies_costs_its_run_a_retry(tmp_path):
     distributed = pytest.importorskip("distributed")
-    from carom.lab.jobs.cluster import Cluster
+    from carom.lab.jobs.cluster import cluster
 
     what = ("square", "killed_once", "square", "square")
     tasks = [Task(name, str(tmp_path), number) for number, name in enumerate(what)]
-    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local, Cluster(local.scheduler_address) as cluster:
-        results = list(in_parallel(perform, tasks, 2, cluster))
+    with distributed.LocalCluster(n_workers=2, **PROCESSES) as local, cluster(local.scheduler_address) as workers:
+        results = list(in_parallel(perform, tasks, workers))
     assert sorted(number for _, number in results) == [0, 1, 4, 9]
     assert marks(tmp_path) == ["0", "1", "1 again", "2", "3"]
 
