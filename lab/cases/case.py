@@ -49,7 +49,7 @@ class Effort:
     seconds: float
 
 
-FIRST, QUICK = Effort(1, 4, 2, 5.0), Effort(8, 16, 4, 25.0)
+FIRST, QUICK = Effort(1, 4, 2, 5.0), Effort(8, 16, 4, 20.0)
 
 
 @dataclass(frozen=True)
@@ -251,7 +251,7 @@ def case_of(
         why += f"; places have no mean: {', '.join(left)}" if left else ""
     ladder = _fitting(steps or known.steps or _unsplit(grids.steps_for(facts), facts, duration), duration)
     form, reference = _closed_form(subject, duration, kind, chosen)
-    if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]):
+    if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]) and facts.trial.reach <= facts.trial.size:
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
     times = repeats or known.repeats or _repeats(kind, chosen)
     found = Case(

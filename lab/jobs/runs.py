@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import math
 import statistics
 import weakref
@@ -14,7 +15,7 @@ from ..cases.case import Case
 from ..cli.usage_errors import Problem
 from ..engines.cost import work_of
 from ..measure.effects import at_worst, effects_of
-from ..measure.norms import NORMS, OF_KIND, conserves, errors_of, failure_of, norm_of
+from ..measure.norms import NORMS, OF_KIND, conserves, distances, errors_of, failure_of, norm_of
 from ..measure.observation import Seen, mean_of
 from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
@@ -96,6 +97,7 @@ def with_reference(case: Case, runs: Runs) -> tuple[Case, Reference]:
         raise Problem(f"{case.subject.name} has no reference: {failed[0]}")
     first, *others = seens
     case = _with_usable_norms(case, first)
+    first = dataclasses.replace(first, doubt=max(float(distances(one, first)[0].max(initial=0.0)) for one in others))
     names = (*NORMS, *case.norms)
     apart = [errors_of(other, first, names) for other in others]
     agreement = {name: max(abs(errors[name]) for errors in apart) for name in names}

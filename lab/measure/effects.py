@@ -4,7 +4,7 @@
 point is; ``contact`` s, how much later the first impact; ``impacts``, how many more there are; ``sink`` m, the deepest
 overlap of what rests; ``jitter`` m/s, the fastest body at rest; ``energy``, the share gained in a minute where energy
 is kept; ``touches``, how many pairs touch in another order than they should, in one of the runs only or not at all;
-``size`` m, the smallest extent of the bodies.
+``size`` m, the smallest extent of the bodies; ``doubt`` m, how far the references differ: less is not noticed.
 
 Of what a game compares, by ``(what, name)`` in one word: ``value``, the difference; ``right``; ``limit``, from which on
 it is noticed; of a game that is chaotic ``mean``, the difference of the means over ``runs`` seeds, with ``spread`` from
@@ -52,6 +52,8 @@ def effects_of(seen: Seen, reference: Seen, kind: str) -> dict[str, float]:
         found["place"] = float(apart[worst])
         if len(ids):
             found["body"] = float(ids[worst])
+        found |= {"doubt": reference.doubt} if reference.doubt else {}
+    if "place" in found and reference.doubt <= SHARE * seen.size:
         if reference.apex > 0:
             found["apex"] = seen.apex - reference.apex
         if seen.times and reference.times:
@@ -124,8 +126,9 @@ def severity(effects: Mapping[str, float]) -> float:
 def _times_the_limit(effects: Mapping[str, float], way: float | None = None) -> dict[str, float]:
     size = effects.get("size", 1.0)
     way = SHARE * size if way is None else way
+    place = max(way, effects.get("doubt", 0.0))
     limits = {
-        "place": way, "apex": way, "contact": LATE, "impacts": 0.5, "sink": way, "jitter": SPEED * size,
+        "place": place, "apex": way, "contact": LATE, "impacts": 0.5, "sink": way, "jitter": SPEED * size,
         "energy": SHARE, "touches": 0.5,
     }  # fmt: skip
     for word in effects:

@@ -69,6 +69,8 @@ class Seen(Plain):
     values
         what a game compares, see ``Subject.values_of``; spread: standard deviations from game to game, where these are
         means over that many ``runs``
+    doubt
+        m, of a reference: how far another one has a body elsewhere in the end
     """
 
     position: Floats
@@ -104,6 +106,7 @@ class Seen(Plain):
     values: dict[str, list[float]] = field(default_factory=dict)
     spread: dict[str, float] = field(default_factory=dict)
     runs: int = 1
+    doubt: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

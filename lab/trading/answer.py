@@ -1,7 +1,7 @@
 """The answer of a trade: the settings to use, and at most five lines that say why.
 
 It depends on the points alone. Choices are made by counts of work, which are the same on every machine and in every
-call; the times of this machine are told.
+call; the times of this machine are told, and refuse a choice that they do not show to be cheaper.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ FRAME = 1 / 60  # s: the frame of a game whose cost is told
 FACTOR = 2.0  # a better choice is better by this
 CLEARLY = 4.0  # times; start phases differ by less
 MOST_TOLD = 5  # values of a game
-HARDLY = 1.25  # times the cost: less than measured times scatter, so costs within it are the same
+HARDLY = 1.25  # times the cost: within it, costs are the same
 CHEAPER = 1 / HARDLY
+SAVES = 0.7  # of the measured time, at most, for what is cheaper by work: far from what halving a step or nothing saves
 SEEN = 1.0  # of what a player would notice (1 % of the smallest body): a gain below it is none
 
 
@@ -89,6 +90,10 @@ def recommended(case: CaseTrade, target: Target | None = None) -> Point | None:
     if target is not None and target.max_error is None:
         best = min(points, key=lambda point: (max(severity(point.effects), SEEN), price(point)))
         return now if now is not None and _gain(now, best) <= SEEN else best
+    points = [
+        point for point in points
+        if now is None or not _is_cheaper_by_work_only(point, now) or _gain(now, point) > SEEN
+    ]  # fmt: skip
     if target is not None:
         cheapest = _nearest(case, points)
         return now if now is not None and not _is_cheaper(cheapest, now) else cheapest
@@ -122,6 +127,13 @@ def _is_cheaper(point: Point, now: Point) -> bool:
     return HARDLY * price(point) < price(now)
 
 
+def _is_cheaper_by_work_only(point: Point, now: Point) -> bool:
+    """True if the clock does not show what the counts say."""
+    if not (point.alone and now.alone and point.milliseconds and now.milliseconds) or price(point) >= price(now):
+        return False
+    return point.milliseconds.low > SAVES * now.milliseconds.low
+
+
 def price(point: Point) -> float:
     """What a point costs, by the counts that are the same in every run."""
     return point.work
@@ -145,7 +157,10 @@ def answer(case: CaseTrade, target: Target | None = None) -> list[str]:
         error, allowed = (in_unit(case, value) for value in (error_of(case, chosen), target.error_of(case)))
         asked = f"{error} of the {allowed} allowed, in {case.norm}; "
     lines.append(f"  error    {asked}{_error(case, chosen)}; noticed: {noticed_text(chosen)}")
-    return [*lines, *_next_choice(case, chosen, target), *_inputs(case)]
+    found = next_choice(case, chosen)
+    if found is not None:
+        lines.append(f"  {found[0]:8} {_compared(case, found[1], chosen, target)}")
+    return [*lines, *_inputs(case)]
 
 
 def _why(case: CaseTrade, chosen: Point, target: Target | None) -> str:
@@ -167,18 +182,16 @@ def _why(case: CaseTrade, chosen: Point, target: Target | None) -> str:
     return f"{text}, because a player sees the difference: with that {noticed_text(now)}"
 
 
-def _next_choice(case: CaseTrade, chosen: Point, target: Target | None) -> list[str]:
-    """A line about the next better choice, if something is noticed with the chosen one; else about the next cheaper."""
+def next_choice(case: CaseTrade, chosen: Point) -> tuple[str, Point] | None:
+    """The next better choice, if something is noticed with the chosen one; else the next cheaper one."""
     best = front(case.usable)
-    better = [
-        point for point in best
-        if price(point) > price(chosen) and severity(point.effects) * FACTOR <= severity(chosen.effects)
-        and _gain(chosen, point) > SEEN
-    ]  # fmt: skip
-    if better and case.reference.trusts(case.norm, chosen.errors[case.norm].mean):
-        return [f"  better   {_compared(case, better[0], chosen, target)}"]
+    for point in best if case.reference.trusts(case.norm, chosen.errors[case.norm].mean) else ():
+        twice = severity(point.effects) * FACTOR <= severity(chosen.effects)
+        if price(point) > price(chosen) and twice and _gain(chosen, point) > SEEN:
+            return "better", point
     cheaper = [point for point in best if price(point) < CHEAPER * price(chosen)]
-    return [f"  cheaper  {_compared(case, cheaper[-1], chosen, target)}"] if cheaper else []
+    cheaper = [point for point in cheaper if not _is_cheaper_by_work_only(point, chosen)]
+    return ("cheaper", cheaper[-1]) if cheaper else None
 
 
 def _compared(case: CaseTrade, point: Point, chosen: Point, target: Target | None) -> str:

@@ -106,6 +106,8 @@ class Point(Plain):
         what could be noticed, each at its worst of all repeats, see :mod:`carom.lab.measure.effects`
     line
         the code that sets the settings
+    alone
+        timed in turns with others of the answer, and nothing else running
     """
 
     cell: Cell
@@ -117,6 +119,7 @@ class Point(Plain):
     milliseconds: Spread | None = None
     effects: dict[str, float] = field(default_factory=dict)
     line: str = ""
+    alone: bool = False
 
     @property
     def failed(self) -> bool:

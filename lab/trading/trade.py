@@ -21,7 +21,7 @@ from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..wording import counted
-from .answer import Target, clearly_worse, front, recommended
+from .answer import Target, clearly_worse, next_choice, price, recommended
 from .code_line import python_line
 from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
 
@@ -30,7 +30,7 @@ SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
-TURNS, MOST_TIMED = 3, 6  # of the settings timed again
+TURNS, MOST_ROUNDS = 3, 4  # of the settings timed again; of choices that the clock may refuse
 
 Show = Callable[[CaseTrade], None]
 
@@ -153,9 +153,9 @@ def measured(
     if not found.usable:
         return found
     chosen = recommended(found, target)
-    if timing:
-        answers = [*([] if chosen is None else [chosen]), *front(found.usable)]
-        _time_again(case, list(dict.fromkeys([own, *[point.cell for point in answers]])), points)
+    for _ in range(MOST_ROUNDS if timing else 0):
+        _time_alone(case, [point for point in _answers(found, chosen) if not point.alone])
+        chosen = recommended(found, target)
     if chosen is None:
         return found
     case = case.replace(repeats=chosen.repeats)
@@ -182,17 +182,23 @@ def _measured_quickly(case: Case, effort: Effort, cells: Sequence[Cell], own: Ce
     return points + [point for point in once if point.cell in worse]
 
 
-def _time_again(case: Case, cells: Sequence[Cell], points: Iterable[Point]) -> None:
-    """Time what the answer may be about in turns, with nothing else running: the first times were taken beside other
-    runs."""
-    passes: dict[Cell, list[float]] = {cell: [] for cell in cells[:MOST_TIMED]}
+def _answers(case: CaseTrade, chosen: Point | None) -> list[Point]:
+    """Those whose times the answer tells: the chosen one, the next one, and what the scene has now."""
+    known = chosen or min(case.usable, key=price)
+    _, other = next_choice(case, known) or ("", known)
+    now = [point for point in case.usable if point.cell == case.own]
+    return list({point.cell: point for point in (*now, known, other)}.values())
+
+
+def _time_alone(case: Case, points: Sequence[Point]) -> None:
+    """In turns, with nothing else running: the first times were taken beside other runs."""
+    passes: list[list[float]] = [[] for _ in points]
     for _ in range(TURNS):
-        for cell, found in passes.items():
-            cost = bare_cost(Task(case, cell, 0))
+        for point, found in zip(points, passes, strict=True):
+            cost = bare_cost(Task(case, point.cell, 0))
             found += [] if cost is None else [cost]
-    for point in points:
-        if passes.get(point.cell):
-            point.milliseconds = Spread.of(passes[point.cell])
+    for point, found in zip(points, passes, strict=True):
+        point.milliseconds, point.alone = Spread.of(found) if found else point.milliseconds, True
 
 
 def _distance(cell: Cell, own: Cell) -> float:

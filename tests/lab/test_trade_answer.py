@@ -63,7 +63,11 @@ def test_the_scenes_own_settings_stay_if_others_save_little(case):
     assert with_points(case, other, own) == (own, "orbit: use Settings(dt=0.01667) (as it has now)")
     other.work = 0.79 * own.work
     assert recommended(case) is other
-    other.milliseconds = Spread.of([1e9])  # the clock decides nothing
+    own.milliseconds, other.milliseconds = Spread.of([1.0]), Spread.of([0.9])  # taken beside other runs
+    assert recommended(case) is other
+    own.alone = other.alone = True
+    assert with_points(case, other, own) == (own, "orbit: use Settings(dt=0.01667) (as it has now)")
+    other.milliseconds = Spread.of([0.6])
     assert recommended(case) is other
 
 
