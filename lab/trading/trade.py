@@ -30,6 +30,7 @@ SURE = 1e-10  # a reference with a better agreement needs no refinement
 SMALL = 0.1  # relative errors above this are too large for asymptotic orders
 CLEAR = 4.0  # a statistic's error must exceed its own noise by this factor to count for the order
 ASYMPTOTIC = 4  # number of finest points used for the order
+INPUT_PHASES = 8  # start phases, at least, that show how late inputs act
 TURNS, MOST_ROUNDS = 3, 4  # of the settings timed again; of choices that the clock may refuse
 
 Show = Callable[[CaseTrade], None]
@@ -158,7 +159,7 @@ def measured(
         chosen = recommended(found, target)
     if chosen is None:
         return found
-    case = case.replace(repeats=chosen.repeats)
+    case = case.replace(repeats=max(chosen.repeats, INPUT_PHASES))
     steps = dict.fromkeys((own, chosen.cell) if own.dt <= case.steps[0] else (chosen.cell,))
     late = {repr(cell.dt): inputs_late(case, cell, runs) for cell in steps}
     return dataclasses.replace(found, inputs={dt: effects for dt, effects in late.items() if effects})
