@@ -234,7 +234,7 @@ def where(number):
 @needs_signals
 def test_a_script_without_a_guard_whose_modules_are_found_by_pythonpath(tmp_path):
     """Workers find carom and the user's modules where the script does, never run the script, and leave stdout alone."""
-    root = Path(workers.__file__).parent.parent
+    root = Path(str(carom.__file__)).parent
     package = tmp_path / "path" / "carom"
     package.mkdir(parents=True)
     (package / "__init__.py").write_bytes(Path(str(carom.__file__)).read_bytes())
