@@ -9,9 +9,11 @@ taken back.
 
 from __future__ import annotations
 
-from ....framework.compilation import packed, part
+from ....framework.compilation import inlined, packed, part
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import NEED_COLUMNS, OK
+from ...shapes.tolerances import smaller_extent
+from ..constants import EXCESS
 from .warm_start import find_rows, scale_to
 
 
@@ -34,18 +36,27 @@ def mark_disabled(state):
             memory.off[m] = True
 
 
+@inlined
+def forced_change(state, i):
+    """How much forces have changed the velocity of body i, m/s."""
+    return length(sub(state.bodies.support_change[i], state.bodies.start_velocity[i])) if i < state.moving else 0.0
+
+
 @part
-def bound_changes(state):
-    """``most_support``: how much the remembered impulses may change the velocity of a body, m/s."""
+def bound_changes(state, dt):
+    """``most_support``: how much the remembered impulses may change the velocity of a body, m/s. What parts faster than
+    forces could make it is ``off``: the impulse was a blow."""
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
     velocity, most = bodies.linear_velocity, bodies.most_support
     for i in range(state.moving):
         bodies.support_change[i] = velocity[i]  # of all, so that no branch asks which are supported
-        most[i] = length(sub(velocity[i], bodies.start_velocity[i]))
+        most[i] = forced_change(state, i)
     for m in range(memory.counts[now]):
         if not memory.off[m]:
             a, b, push = memory.first[now, m], memory.second[now, m], memory.push[now, m]
             closing = dot(push, sub(velocity[a], velocity[b])) / length(push)
+            parting = max(forced_change(state, a), forced_change(state, b)) + EXCESS * smaller_extent(bodies, a, b) / dt
+            memory.off[m] = closing < -parting
             if a < state.moving and closing > most[a]:
                 most[a] = closing
             if b < state.moving and closing > most[b]:
@@ -96,7 +107,7 @@ def predict_rest(state, dt):
     state.any_support = True
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
-    bound_changes(state)
+    bound_changes(state, dt)
     apply_remembered(state)
     travels = state.force_travels
     for i in range(state.moving):
