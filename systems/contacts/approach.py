@@ -30,13 +30,17 @@ def meets_at_corner(state, a, b, d, slop):
 
 @part
 def leg_start(state, a, b):
-    """From a's centre to b's where the last stretch of their way begins: at the later of their last impacts."""
+    """From a's centre to b's where the last stretch of their way begins: at the later of their last impacts if they are
+    apart there, else at the start of the step. Nothing holds what rests between two impacts.
+    """
     bodies = state.bodies
-    d = between_at_start(bodies, a, b)
+    start = between_at_start(bodies, a, b)
     if state.impacts.sweeps and (bodies.impact_count[a] > 0 or bodies.impact_count[b] > 0):
         since = max(0.0, bodies.last_impact[a], bodies.last_impact[b])
         d = along(relative_path(state, a, b), since)
-    return d
+        if meet(state, a, b, d)[1] <= slop_of(state, a, b):
+            return d
+    return start
 
 
 @part

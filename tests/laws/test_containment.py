@@ -74,3 +74,22 @@ def test_what_is_swept_stays_inside(seed, mode):
 def test_discrete_bodies_stay_inside_or_are_called_too_fast(seed):
     found = room(seed, "discrete")
     assert found.out == 0 or too_fast(found), found.faults[-1:]
+
+
+@pytest.mark.parametrize("mode", SWEPT)
+@pytest.mark.parametrize("seed", seeds(20, 1000))
+def test_what_is_swept_stays_inside_under_any_pull(seed, mode):
+    """Ten to thirty bodies of 1 m behind walls of 5 cm: gravity moves them by .03 to 3 m in a step from rest, so far
+    that between two impacts within a step they fall through what they lie on."""
+    random = np.random.default_rng([seed, 16])
+    dt, maker, half, wall = 1 / 60, (ball, box)[random.integers(2)], 6.0, 0.05
+    pull, speed = 10 ** random.uniform(-1.5, 0.5), 10 ** random.uniform(-1.5, 1.5)
+    with make_world(2, pull / dt**2, collision=mode, on_fault="ignore") as world:
+        walls(world, half, wall, restitution=1.0)
+        cells = random.permutation(36)[: random.integers(10, 31)]
+        for place in 2.0 * np.stack(np.unravel_index(cells, (6, 6)), axis=1) - 5.0:
+            way = random.normal(size=2)
+            maker(world, place, speed / dt * way / np.linalg.norm(way), restitution=float(random.choice([0.3, 1.0])))
+        for _ in range(60):
+            world.step()
+            assert beyond(world, half + wall) == 0, (world.step_count, world.faults[-1:])
