@@ -86,7 +86,7 @@ PREDICTED = Section(
     "body", "collisions", RESTED,
     supported=flags(default=False),  # the resting prediction has changed its velocity
     support_change=vectors(),
-    most_support=floats(),  # m/s, that the resting prediction may change
+    to_hold=vectors(),  # m/s, at which it closes on what pushes it
 )  # fmt: skip
 HELD = Section(
     "body", "collisions", RESTED,

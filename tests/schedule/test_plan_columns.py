@@ -66,7 +66,7 @@ def touching(world, *components):
 STEP = {"start_velocity", "levels", "kept_previous", "kept_velocity"}
 COLLISIONS = {"path_velocity", "origin", "min_extent", "collider_slot", "force_speed_change", "lower", "upper", "rank"}
 COLLISIONS |= {"level_offsets", "impact_count", "counted_impacts", "half_extents"}
-RESTING = {"held", "place", "supported", "support_change", "most_support"}
+RESTING = {"held", "place", "supported", "support_change", "to_hold"}
 CURVES = {"path_second", "path_third"}
 SWEPT = {"search_margin", "search_lower", "search_upper", "caught", "last_impact"}
 SWEPT |= {"cluster_root", "cluster_next", "cluster_tail", "cluster_inverse_mass", "cluster_holder"}

@@ -2,18 +2,17 @@
 
 Free flight lets a resting body fall by g dt. For a ball that bounces on such a body the ground would give way. So the
 impulses of the last step act on the prediction once more, but change no velocity by more than there is to hold: the
-change by forces, or the speed at which the body closes on something. What a light body between heavy ones has of these
-impulses is a small difference of large ones, and no measure of it. Where no contact holds the body after all, they are
-taken back.
+change by forces, or what the game has added to the speed at which the body closes on what pushes it that way. What a
+light body between heavy ones has of these impulses is a small difference of large ones, and no measure of it. Where no
+contact holds the body after all, they are taken back.
 """
 
 from __future__ import annotations
 
-from ....framework.compilation import inlined, packed, part
+from ....framework.compilation import packed, part
+from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import NEED_COLUMNS, OK
-from ...shapes.tolerances import smaller_extent
-from ..constants import EXCESS
 from .warm_start import find_rows, scale_to
 
 
@@ -36,31 +35,23 @@ def mark_disabled(state):
             memory.off[m] = True
 
 
-@inlined
-def forced_change(state, i):
-    """How much forces have changed the velocity of body i, m/s."""
-    return length(sub(state.bodies.support_change[i], state.bodies.start_velocity[i])) if i < state.moving else 0.0
-
-
 @part
-def bound_changes(state, dt):
-    """``most_support``: how much the remembered impulses may change the velocity of a body, m/s. What parts faster than
-    forces could make it is ``off``: the impulse was a blow."""
+def find_closing(state):
+    """``to_hold``: how much faster than when the last step ended each body closes on what pushed it, along the push of
+    the remembered contact where that is most, m/s."""
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
-    velocity, most = bodies.linear_velocity, bodies.most_support
+    velocity, to_hold, nothing = bodies.linear_velocity, bodies.to_hold, zero_of(state)
     for i in range(state.moving):
         bodies.support_change[i] = velocity[i]  # of all, so that no branch asks which are supported
-        most[i] = forced_change(state, i)
+        to_hold[i] = nothing
     for m in range(memory.counts[now]):
         if not memory.off[m]:
             a, b, push = memory.first[now, m], memory.second[now, m], memory.push[now, m]
-            closing = dot(push, sub(velocity[a], velocity[b])) / length(push)
-            parting = max(forced_change(state, a), forced_change(state, b)) + EXCESS * smaller_extent(bodies, a, b) / dt
-            memory.off[m] = closing < -parting
-            if a < state.moving and closing > most[a]:
-                most[a] = closing
-            if b < state.moving and closing > most[b]:
-                most[b] = closing
+            closing = dot(push, sub(velocity[a], velocity[b])) / length(push) - memory.closing[now, m]
+            if a < state.moving and closing > length(to_hold[a]):
+                to_hold[a] = scale(push, -closing / length(push))
+            if b < state.moving and closing > length(to_hold[b]):
+                to_hold[b] = scale(push, closing / length(push))
 
 
 @part
@@ -107,14 +98,15 @@ def predict_rest(state, dt):
     state.any_support = True
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
-    bound_changes(state, dt)
+    find_closing(state)
     apply_remembered(state)
     travels = state.force_travels
     for i in range(state.moving):
         if bodies.supported[i]:
             before = bodies.support_change[i]
             dv = sub(bodies.linear_velocity[i], before)
-            given, most = length(dv), bodies.most_support[i]
+            given, forced = length(dv), length(sub(before, bodies.start_velocity[i]))
+            most = max(forced, dot(dv, bodies.to_hold[i]) / given if given > 0.0 else 0.0)
             if given > most:
                 dv = scale(dv, most / given)
                 bodies.linear_velocity[i] = add(before, dv)

@@ -106,7 +106,8 @@ WARM_START = Schema(
     normal=vectors(stacked=True),
     impulse=floats(stacked=True),  # N s of the last substep, as if the step were one,
     tangent=vectors(stacked=True),  # and along the surface
-    push=vectors(stacked=True),  # what it gave in the step, with its friction
+    push=vectors(stacked=True),  # what it gave in the step, with its friction,
+    closing=floats(stacked=True),  # m/s at which the two closed along that in the end
     first=ints("int32", stacked=True),  # rows of the pairs, for ``rows_version``
     second=ints("int32", stacked=True),
     rows_version=ints(),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ....framework.compilation import part
 from ....framework.data.row_moves import place_of
 from ....framework.jit.records.record_type import zero_of
-from ....framework.vectors import add_scaled, dot, scale
+from ....framework.vectors import add_scaled, dot, length, scale, sub
 from ...codes import NEED_WARM_START, OK
 from ..constants import EXCESS, MOST_LOAD, OPEN, TURNED
 from .guard import excess_speed, island_of
@@ -101,6 +101,7 @@ def find_squeezed(solver, dt):
 def store_warm_start(state, dt):
     """Keep the contacts that pushed, for the next step; the memory until now stays, for a step that is undone."""
     solver, memory, pairs, entity = state.solver, state.warm_start, state.pairs, state.bodies.entity
+    velocity = state.bodies.linear_velocity
     if state.response_idle or (solver.contacts == 0 and memory.counts[memory.now] == 0):
         return OK
     if solver.contacts > len(memory.off):
@@ -122,6 +123,7 @@ def store_warm_start(state, dt):
         if last > 0.0 and solver.friction[k] != 0.0:
             push = add_scaled(push, solver.tangent[k], min(1.0, total / last))
         memory.push[new, count] = push
+        memory.closing[new, count] = dot(push, sub(velocity[a], velocity[b])) / length(push)
         kept = most / last if last > most else 1.0
         memory.impulse[new, count], memory.tangent[new, count] = kept * last, scale(solver.tangent[k], kept)
         memory.normal[new, count] = solver.normal[k]
