@@ -6,7 +6,7 @@ import copy
 import dataclasses
 import re
 from collections.abc import Mapping
-from typing import Any, ClassVar, Self, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Self, dataclass_transform
 
 import numpy as np
 
@@ -64,6 +64,9 @@ class Component:
             object.__setattr__(field, "key", cls.prefix + name)
             setattr(cls, name, field)
             fields[name] = field
+        for word in (word for field in fields.values() for word in field.also):
+            if not hasattr(cls, word):
+                setattr(cls, word, _OtherWord(word))
         cls.columns = fields
         cls.fields = tuple((name, field.key) for name, field in fields.items())
         if "__slots__" not in vars(cls):
@@ -74,6 +77,19 @@ class Component:
         cls._required = tuple(name for name, field in cls._arguments.items() if field.default is REQUIRED)
         cls._pooled = tuple(field for field in fields.values() if isinstance(field, ArrayColumn))
         cls._defaults = {name: field.stored_default for name, field in fields.items()}  # ValueError for a wrong one
+
+    if not TYPE_CHECKING:  # checkers of types would take any name
+
+        def __getattr__(self, name: str) -> Any:
+            """AttributeError; for what it does not have only."""
+            near = ""
+            if not name.startswith("_"):
+                also = {word: known for known, field in self.columns.items() for word in field.also}
+                near = did_you_mean(name, [word for word in dir(self) if word[0] != "_"], also)
+            raise AttributeError(f"{type(self).__name__} has no attribute {name!r}{near}")
+
+    def __dir__(self) -> list[str]:
+        return [name for name in super().__dir__() if not isinstance(vars(type(self)).get(name), _OtherWord)]
 
     def __init__(self, *args: Any, **values: Any) -> None:
         self._fill({**self._named(args, values), **values} if args else values)
@@ -287,6 +303,19 @@ class RowStore:
 
     def written(self, column: Column, row: int) -> None:
         pass
+
+
+class _OtherWord:
+    """A word that other engines have for a field; it can neither be read nor set, and the error names the field."""
+
+    def __init__(self, word: str) -> None:
+        self._word = word
+
+    def __get__(self, component: Component | None, owner: type[Component]) -> Any:
+        raise AttributeError(f"{owner.__name__} has no attribute {self._word!r}")  # Component.__getattr__ says more
+
+    def __set__(self, component: Component, value: Any) -> None:
+        getattr(component, self._word)
 
 
 def _unpickled(component: type[Component], values: dict[str, Any]) -> Component:
