@@ -60,7 +60,10 @@ class Collider(Component, abstract=True):
     )
     friction: float | None = special_column(default=None, optional=True, minimum=0.0, kw_only=True, on_demand=True)
     sensor: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("trigger",))
-    layer: int = special_column(default=1, dtype=int, kw_only=True, on_demand=True, also=("category", "group"))
+    layer: int = special_column(
+        default=1, dtype=int, kw_only=True, on_demand=True, also=("category", "group"),
+        nonzero="in no layer it meets nothing; mask=0 says so",
+    )  # fmt: skip
     mask: int = special_column(default=ALL_LAYERS, dtype=int, kw_only=True, on_demand=True, also=("collides_with",))
 
     rotates: ClassVar[bool] = False  # True if its functions need the body's axes in the world, as ``shape.axes``

@@ -28,6 +28,7 @@ class Column:
     dtype: Any = float
     positive: bool = False
     minimum: float | None = None
+    nonzero: str = ""  # why 0 is refused
     largest: float = LARGEST  # magnitude
     optional: bool = False  # None is allowed and stored as nan
     choices: tuple[str, ...] = ()  # stored as the index into it
@@ -110,7 +111,8 @@ class Column:
         if kind is float or kind is int:
             if self.dtype is np.int64:
                 bounded = self.positive or self.minimum is not None
-                return value if kind is int and abs(value) < 2**63 and not bounded else None
+                refused = bounded or (self.nonzero and value == 0)
+                return value if kind is int and abs(value) < 2**63 and not refused else None
             if -self.largest <= value <= self.largest and self._within(value):
                 return float(value)
         elif self.item == "vector" and (kind is tuple or kind is list) and len(value) in (2, 3):
@@ -183,13 +185,15 @@ class Column:
 
     def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
         """Finite and within the field's bounds; ``shown`` is what the message quotes (None: the first bad row)."""
-        if self.item != "rotation" and array.size and self._all_within(array.min(), array.max()):
+        usual = self.item != "rotation" and array.size and self._all_within(array.min(), array.max())
+        if usual and (not self.nonzero or np.all(array)):
             return
         for bad, rule in (
             (~np.isfinite(array), "must be finite"),
             (array <= 0 if self.positive else None, "must be positive"),
             (array < SMALLEST_WITH_INVERSE if self.positive else None, "must not be so small that 1 / value overflows"),
             (array < self.minimum if self.minimum is not None else None, f"must be at least {self.minimum}"),
+            (array == 0 if self.nonzero else None, f"must not be 0: {self.nonzero}"),
             (abs(array) > self.largest, f"must be at most {self.largest:g} along each axis"),
         ):
             if bad is not None and np.any(bad):
@@ -341,11 +345,13 @@ def special_column(
     on_demand: bool = False,
     on_write: Callable[[Any, int], None] | None = None,
     largest: float = LARGEST,
+    nonzero: str = "",
     also: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
     """A column with what only the built-in components use, see :class:`Column`; ``init``: ``Column.constructor``."""
     return replace(
         column(default, kw_only=kw_only, **options),
-        constructor=init, on_demand=on_demand, on_write=on_write, largest=largest, also=also,
+        constructor=init, on_demand=on_demand, on_write=on_write, largest=largest, nonzero=nonzero,
+        also=also,
     )  # fmt: skip

@@ -46,7 +46,7 @@ def game(d=2, seed=3):
     for k in range(4):
         world.create_entity(
             Transform(np.full(d, 100.0 + 3 * k)), RigidBody(linear_velocity=np.full(d, 1.0)),
-            SphereCollider(0.5, layer=0),
+            SphereCollider(0.5, mask=0),
         )  # fmt: skip
     return world
 

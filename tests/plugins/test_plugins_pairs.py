@@ -83,7 +83,7 @@ def test_what_stands_still_never_meets():
     alone = world.create_entity(Transform((50, 0)), RigidBody(), lonely(1.0))
     with pytest.raises(UnhandledPairError, match=r"(Lonely|Sphere)Collider and \w+ can meet"):
         world.step()
-    world.component_for_entity(alone, lonely).layer = 0
+    world.component_for_entity(alone, lonely).mask = 0
     world.step()
     world.close()
 
