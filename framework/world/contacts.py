@@ -80,6 +80,13 @@ class ContactsBetween(NamedTuple):
     b: np.ndarray
 
 
+def _check_types(verb: str, *components: Any) -> None:
+    """TypeError for what is no component type: nothing would match it."""
+    for component in components:
+        if not isinstance(component, type):
+            raise TypeError(f"{verb} takes component types, got {component!r}")
+
+
 class ContactRows:
     """Columns of contacts or contact events, rows ordered by (entity_a, entity_b), entity_a < entity_b.
 
@@ -126,8 +133,13 @@ class ContactRows:
         """(a, b, contact) for contacts of an entity that has ``first`` with one that has ``second``.
 
         The contact is oriented from a to b. Entities that have been deleted meanwhile are skipped, also those deleted
-        while iterating; so are contacts that are not enabled. :meth:`between` gives the same as columns.
+        while iterating; so are contacts that are not enabled. :meth:`between` gives the same as columns. TypeError if
+        one of the two is no type.
         """
+        _check_types("pairs", first, second)
+        return self._pairs(first, second)
+
+    def _pairs(self, first: type[Any], second: type[Any]) -> Iterator[tuple[int, int, Contact]]:
         seen, start = ContactRows(self._columns, self._membership), 0  # its columns stay when the loop takes a step
         made: Iterator[tuple[int, Contact | None]] = iter(())
         if len(seen) >= VECTORIZED_MIN:  # find and make at once what matches now
@@ -166,6 +178,7 @@ class ContactRows:
 
     def between(self, first: type[Any], second: type[Any]) -> ContactsBetween:
         """The contacts that :meth:`pairs` would yield now, as columns: rows, a and b (k,), in the same order."""
+        _check_types("between", first, second)
         a, b, enabled = self.entity_a, self.entity_b, self._columns.get("enabled")
         rows = np.arange(len(a)) if enabled is None else np.flatnonzero(enabled)
         if len(rows):
