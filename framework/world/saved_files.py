@@ -7,12 +7,15 @@ them and their fields.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import io
 import json
 import os
+import secrets
+import time
 import zipfile
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -28,6 +31,8 @@ from .snapshots import Snapshot
 FORMAT = 1  # of the files; a reader refuses others
 KEPT = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
 ARRAY = "#array"
+PART = ".carom-part-"  # and a random number: a file that is being written
+LEFT_ALONE = 3600  # s, after which nobody writes it any more
 DAMAGE = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)  # by what is not as written
 
 
@@ -52,11 +57,29 @@ def write(path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, 
     plain = _plain(contents, arrays)
     plain["kept"] = {name: _kept_by(name, kept, arrays) for name, kept in snapshot.kept.items()}
     arrays["carom"] = np.frombuffer(json.dumps(plain).encode(), np.uint8)
-    path = Path(path)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    with whole_file(path) as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+
+
+@contextlib.contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """A file to write, which takes the place of the one at that path in the end, with its mode, or not at all.
+
+    A link stays, and what it leads to is replaced. CaromError for what is no ordinary file.
+    """
+    path = Path(os.path.realpath(path))
+    if path.exists() and not path.is_file():
+        raise CaromError(f"{path} is no file that can be replaced")
+    for left in path.parent.glob(f"{PART}*"):  # by a process that was killed
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > LEFT_ALONE:
+                left.unlink()
+    part = path.with_name(f"{PART}{secrets.token_hex(8)}")
     try:
-        with part.open("wb") as file:
-            np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+        with part.open("xb") as file:
+            yield file
+        if path.exists():
+            part.chmod(path.stat().st_mode)
         part.replace(path)
     except BaseException:
         part.unlink(missing_ok=True)
