@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from ..errors import FaultError, PhysicsWarning
 from ..settings import Settings
+from .clock import Clock
 
 KEPT = 100  # different texts
 TOLD_AT_ONCE = 10  # in one step; a world that breaks as a whole does not fill the screen
@@ -21,17 +22,17 @@ class Faults:
     """The faults of one world.
 
     texts
-        the last 100 that differ; one for each kind and body, the newest, with how often it was reported
+        the last 100 that differ; one for each kind and body, the newest, with how often and in which steps
     pending
         those that the step has found and that are to be told at its end
     """
 
-    def __init__(self, settings: Callable[[], Settings]) -> None:
+    def __init__(self, settings: Callable[[], Settings], clock: Clock) -> None:
         self.texts: list[str] = []
         self.pending: list[str] = []
-        self._settings = settings
+        self._settings, self._clock = settings, clock
         self._told: set[tuple[str, int | None]] = set()  # kinds and bodies
-        self._lines: dict[tuple[str, int | None], tuple[str, int]] = {}  # newest text, count
+        self._lines: dict[tuple[str, int | None], tuple[str, int, int]] = {}  # newest text, count, first step
 
     def report(self, text: str, kind: str | None, entity: int | None) -> None:
         """Note a fault; ``kind`` and ``entity`` say which others it is like (None: only those with the same text)."""
@@ -45,17 +46,19 @@ class Faults:
 
     def _add_line(self, text: str, key: tuple[str, int | None], counts: bool) -> None:
         """The text, in place of what was reported of its kind and body until now."""
-        old, count = self._lines.get(key, ("", 0)) if counts else ("", 0)
+        step = self._clock.step_count
+        old, count, first = self._lines.get(key, ("", 0, step)) if counts else ("", 0, step)
         if old in self.texts:
             self.texts.remove(old)
-        line = text if count == 0 else f"{text} ({count + 1} times)"
+        when = f"steps {first} to {step}" if step != first else f"step {step}"
+        line = f"{text} ({count + 1} times, {when})" if count else text
         if line not in self.texts:
             self.texts.append(line)
         del self.texts[:-KEPT]
         if counts:
             if len(self._lines) >= REMEMBERED:
                 self._lines.clear()
-            self._lines[key] = line, count + 1
+            self._lines[key] = line, count + 1, first
 
     @property
     def stopping(self) -> bool:

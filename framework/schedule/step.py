@@ -18,6 +18,7 @@ from .profiler import Profiler
 from .stages import PythonPart, Segment, merged
 from .system_order import SystemOrder
 
+LONG_FRAME = 2.0  # s: two such frames in a row that lose steps were meant as something else
 
 class Pipeline(esper.Processor):
     """Owns the order of a world's systems and its clock, and takes its steps.
@@ -31,9 +32,10 @@ class Pipeline(esper.Processor):
         self.order = SystemOrder(world, self)
         self.in_step = False
         self.profiler = Profiler(self)
-        self.faults = Faults(lambda: world.settings)
+        self.faults = Faults(lambda: world.settings, self.clock)
         self._events = world.events
         self._in_window = False
+        self._was_too_long = False  # the frame before
         self._parts: list[Any] = []  # what a step runs, in order
         self._parts_order = self._parts_physics = -1  # versions that the parts were made of
         self._at = ""  # the system at work
@@ -61,7 +63,16 @@ class Pipeline(esper.Processor):
 
     def advance(self, seconds: float) -> int:
         self.must_be_between_steps("advance can be called")
+        dropped = self.clock.dropped_steps
         steps = self.clock.gather(seconds, self.world.settings.max_steps_per_advance)
+        too_long = seconds >= LONG_FRAME and self.clock.dropped_steps > dropped
+        if too_long and self._was_too_long:
+            self.world.report_fault(
+                f"advance takes seconds, and frame after frame was given more than it may step, now {seconds:g}: "
+                f"milliseconds, as pygame's clock gives them, are advance(milliseconds / 1000)",
+                kind="frames",
+            )  # fmt: skip
+        self._was_too_long = too_long
         before = self.clock.step_count
         try:
             self._take(steps)

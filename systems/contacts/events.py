@@ -244,33 +244,33 @@ class ContactEvents(StagedSystem):
             )  # fmt: skip
         if solver.squeezed:
             self.world.report_fault(
-                f"step {self.world.step_count}: no room for {solver.squeezed} squeezed bodies, the first is entity "
+                f"no room for {solver.squeezed} squeezed bodies, the first is entity "
                 f"{entity[solver.squeezed_row]}: stop earlier what squeezes them, or use masses that differ less",
                 kind="squeezed",
             )
         if solver.overloaded:
             self.world.report_fault(
-                f"step {self.world.step_count}: {solver.overloaded} bodies are too heavy for what they lie on, the "
+                f"{solver.overloaded} bodies are too heavy for what they lie on, the "
                 f"first is entity {entity[solver.overloaded_row]}: their contacts take them as lighter; use masses "
                 f"that differ less, or smaller steps",
                 kind="overloaded",
             )
         if solver.restrained:
             self.world.report_fault(
-                f"step {self.world.step_count}: contacts of {solver.restrained} islands would have given them much "
+                f"contacts of {solver.restrained} islands would have given them much "
                 f"energy, and were held back, the first with entity {entity[solver.restrained_row]}: use smaller "
                 f"steps, more substeps, or masses that differ less",
                 kind="restrained",
             )
         if impacts.halted:
             self.world.report_fault(
-                f"step {self.world.step_count}: too many impacts for a step: {impacts.halted} bodies stood still for "
+                f"too many impacts for a step: {impacts.halted} bodies stood still for "
                 f"the rest of it, the first is entity {entity[impacts.halted_row]}: use smaller steps",
                 kind="halted",
             )
         if impacts.capped:
             self.world.report_fault(
-                f"step {self.world.step_count}: {impacts.capped} impacts beyond {self._settings().impact_cap} "
+                f"{impacts.capped} impacts beyond {self._settings().impact_cap} "
                 f"of a body in one step: raise Settings.max_impacts_per_step or use smaller steps; the rest was solved "
                 f"as contact at rest",
                 kind="impacts",

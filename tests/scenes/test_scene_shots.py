@@ -85,4 +85,4 @@ def test_beyond_the_cap_a_ball_loses_the_rest_of_its_steps():
     )
     np.testing.assert_allclose(lanes[shots.FREE], [(FLOWN, shots.FREE)], rtol=0, atol=ROUNDING)
     (fault,) = world.faults
-    assert fault.endswith(f"({STEPS} times)")
+    assert fault.endswith(f"({STEPS} times, steps 0 to {STEPS - 1})")

@@ -99,7 +99,7 @@ def test_a_limit_reached_in_every_step_is_told_once_and_says_what_to_do():
     told = warnings_of(lambda: [world.step() for _ in range(3)])
     assert len(told) == 1
     assert len(world.faults) == 1
-    assert world.faults[0].endswith(" (3 times)")
+    assert world.faults[0].endswith(" (3 times, steps 0 to 2)")
     assert "raise Settings.max_impacts_per_step or use smaller steps; the rest was solved as contact at rest" in str(
         told[0].message
     )
@@ -161,4 +161,4 @@ def test_systems_report_faults_of_their_own():
     world.report_fault("the map has a hole", kind="map")
     world.report_fault("the map has two holes", kind="map")
     assert [str(warning.message) for warning in warnings_of(world.step)] == ["the map has a hole"]
-    assert world.faults == ["the map has two holes (2 times)"]
+    assert world.faults == ["the map has two holes (2 times, step 0)"]
