@@ -162,7 +162,7 @@ class Springs(Plugin):
 
     def install(self, world: World) -> None:
         if world.physics is None:
-            raise NoPhysicsError("no physics in this world: World(Physics(...), springs)")
+            raise NoPhysicsError("springs need physics before them: World(Physics(...), springs)")
         if self.world is not None and not self.world.closed:
             raise ValueError(f"these springs belong to world {self.world.name!r}: each world takes its own Springs()")
         self.world = world

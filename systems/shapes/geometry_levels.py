@@ -36,9 +36,12 @@ def in_order(registry: Registry, colliders: Iterable[type[Component]]) -> list[t
     colliders = list(colliders)
     for collider in colliders:
         if collider not in registry.shapes:
+            room, _, shipped = collider.__module__.partition("carom.plugins.")
+            cure = "register it with @plugin.shape(cost=...) and give the plugin to the world"
+            if shipped and not room:
+                cure = f"World(Physics(...), {shipped.partition('.')[0]}.plugin), with carom.plugins"
             raise UnhandledPairError(
-                f"{collider.__name__} is a collider that no plugin of this world has registered: "
-                f"register it with @plugin.shape(cost=...) and give the plugin to the world"
+                f"{collider.__name__} is a collider that no plugin of this world has registered: {cure}"
             )
     return sorted(colliders, key=lambda c: (registry.shapes[c].cost, c.__name__))
 
