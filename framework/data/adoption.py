@@ -102,9 +102,10 @@ class Adoption:
             self.table.add_component_type(component)
 
     def release(self) -> None:
-        """Let all handles go: the world closes, they keep their last values."""
+        """Let all handles go: the world closes, they keep their last values, and so do arrays of columns."""
         for component, members in self._members.items():
-            self._let_go(component, set(members))
+            entities = set(members)
+            self._let_go(component, entities, entities)
 
     # -- going back to what was -------------------------------------------------------------------
 

@@ -121,7 +121,7 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
     def close(self) -> None:
         """Give the esper context back; the world cannot be used afterwards. Closing twice is fine.
 
-        Handles of its components keep their last values.
+        Handles of its components, and arrays of columns, keep their last values.
         """
         if self.closed:
             return
