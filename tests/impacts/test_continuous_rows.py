@@ -25,7 +25,7 @@ G = 10.0
 @pytest.mark.parametrize(("mode", "gap", "speed"), pairwise(SWEPT, (0.0, 0.01, 0.5), (10.0, 30.0, 300.0)))
 def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
     """Five plastic balls are pushed along: none ends up behind it, their order is kept, each is as fast as the ram; or
-    faster where the solver for contacts at rest takes the impact (up to a quarter in rows, docs/limitations.md), or a
+    faster where the solver for contacts at rest takes the impact (up to a quarter in rows, docs/limits.md), or a
     little slower while it closes a gap of less than the margin of contacts, a hundredth of it in each step."""
     world = mode_world(mode, max_impacts_per_step=64)
     row = [bullet(world, k * (0.2 + gap), 0.0, radius=0.1) for k in range(5)]
