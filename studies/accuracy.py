@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -16,7 +17,7 @@ from carom.lab.reporting.progress import Bar
 from carom.lab.reporting.text_tables import TextTable
 from carom.lab.trading.charts import draw
 from carom.lab.trading.records import PYMUNK, CaseTrade, Cell, Curve, ErrorBar, Point
-from carom.lab.trading.report import TARGETS, cheapest, choice_lines, failures, order, remarks, target_text
+from carom.lab.trading.report import TARGETS, cheapest, failures, order, remarks, target_text
 from carom.lab.trading.trade import trade
 from carom.lab.wording import NOTHING, compact, number
 
@@ -41,8 +42,7 @@ def accuracy_command(
         result = trade(scene, against_pymunk=against == PYMUNK, store=store, progress=bar, command=command)
     (case,) = result.cases
     others = published(case.scene, case.norm)
-    pasted = [f"{case.scene}, {target}: {line}" for target, line in choice_lines(case)]
-    output.show(result, [summary(case), cheapest(case)], [*remarks(result), *[SOURCE] * bool(others), *pasted])
+    output.show(result, [summary(case), met(cheapest(case))], [*remarks(result), *[SOURCE] * bool(others)])
     case.curves += others
     if out is not None:
         for path in draw(result, out):
@@ -54,22 +54,30 @@ def accuracy_command(
 
 def summary(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
     """By method: the observed order of each norm with the theoretical one; for each target the largest step that meets
-    it in all repeats, with its work per simulated second; the best error; and the failures."""
+    it in all repeats, with its work per simulated second; the best error; and the failures. Methods with the
+    same figures share a row."""
     norm = case.norm
     trusted = [target for target in targets if case.reference.trusts(norm, target)]
     headings = ["method", *(f"{name}, order" for name in case.norms), *(target_text(t, norm) for t in trusted), "best"]
     failing = any(point.failed for curve in case.curves for point in curve.points)
-    rows = []
+    labels: dict[tuple[str, ...], list[str]] = {}
     for curve in case.curves:
-        row = [curve.label, *(order(curve, name) for name in case.norms)]
+        row = [order(curve, name) for name in case.norms]
         row += [_step(curve, norm, target) for target in trusted]
         row += [_best(curve, norm), *[_failed(curve)] * failing]
-        rows.append(tuple(row))
+        labels.setdefault(tuple(row), []).append(curve.label)
+    rows = [("; ".join(methods), *row) for row, methods in labels.items()]
     title = (
         f"{case.scene}: orders observed (and in theory); the largest step, s, that keeps {norm} below the target, and "
         f"its work per simulated second"
     )
     return TextTable(title, (*headings, *["failed"] * failing), rows)
+
+
+def met(table: TextTable) -> TextTable:
+    """The rows of the cheapest choices in which there is one: they have a step."""
+    step = table.headings.index("step, s")
+    return replace(table, rows=[row for row in table.rows if row[step] != NOTHING])
 
 
 def _step(curve: Curve, norm: str, target: float) -> str:
