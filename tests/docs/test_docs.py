@@ -173,7 +173,7 @@ def test_the_commands_of_the_collision_page_draw_its_pictures(monkeypatch, tmp_p
 
     page = ROOT / "docs" / "collisions.md"
     blocks, _ = split(page.read_text(encoding="utf-8"), name_of(page))
-    commands = [block.text.split() for block in blocks if block.info == ["sh"]]
+    commands = [line.split() for block in blocks if block.info == ["sh"] for line in block.text.splitlines()]
     monkeypatch.chdir(tmp_path)
     for command in commands:
         assert command[0] == "carom"
