@@ -38,10 +38,11 @@ class PageOutput(Output):
         return cls(**vars(Output.checked(as_json, as_markdown)), mark=mark, into=into)
 
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
-        """Print the result, and write the tables into the page."""
+        """Print the result, and write the tables into the page, the remarks as a list."""
         super().show(result, tables, remarks)
         if self.into is not None:
-            replace_between_marks(self.into, self.mark, as_markdown(tables, remarks))
+            listed = ["\n".join(f"- {remark}" for remark in remarks)] if remarks else []
+            replace_between_marks(self.into, self.mark, as_markdown(tables, listed))
             click.echo(f"tables: {self.into}", err=True)
 
 
