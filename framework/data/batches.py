@@ -119,5 +119,10 @@ class Batches:
         at = number - batch.first
         return batch if at < batch.count and batch.inside[at] else None
 
+    def around(self, entities: list[int]) -> list[Batch]:
+        """The batches that may have some of these ids inside, ascending."""
+        places = {bisect_right(self._firsts, entity) - 1 for entity in entities}
+        return [self.all[place] for place in sorted(places) if place >= 0]
+
     def clear(self) -> None:
         self.all, self._firsts, self.stop = [], [], 0

@@ -77,6 +77,16 @@ class Bodies:
         """The row of that entity among all bodies; KeyError if it is no body."""
         return self._table.find(entity)
 
+    def rows_of(self, entities: Any) -> np.ndarray:
+        """(n,) the rows of these entities (n,) among all bodies; KeyError names the first that is no body."""
+        ids = np.asarray(entities)
+        if ids.ndim != 1 or (ids.size and ids.dtype.kind not in "iu"):
+            raise TypeError(f"rows_of takes the ids of entities, got {entities!r}")
+        rows = self._table.rows_of(ids.astype(np.int64))
+        if rows.min(initial=0) < 0:
+            raise KeyError(ids.item(int(rows.argmin())))
+        return rows
+
     def __len__(self) -> int:
         rows = self.rows
         return rows.stop - rows.start

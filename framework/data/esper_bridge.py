@@ -228,9 +228,9 @@ def clear_dead() -> None:
     own = [entity for entity in dead if dict.__contains__(entities, entity)]
     entities.note(own)
     if len(own) < len(dead) and entities.batches:
-        ids = np.array([int(entity) for entity in dead if hasattr(entity, "__index__")], np.int64)
-        for batch in entities.batches.all:
-            deleted = batch.take_out_many(ids)
+        ids = [int(entity) for entity in dead if hasattr(entity, "__index__")]
+        for batch in entities.batches.around(ids):
+            deleted = batch.take_out_many(np.array(ids, np.int64))
             if len(deleted) and batch.make_handle is not None:
                 log.deleted.append(deleted)
                 log.dirty = True

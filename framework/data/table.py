@@ -19,7 +19,8 @@ from .row_moves import MovedColumns, RowPlan
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
-RESERVED = ("asleep", "column_names", "dynamic", "has", "kinematic", "row_of", "rows", "static")  # attributes of Bodies
+# Attributes of Bodies:
+RESERVED = ("asleep", "column_names", "dynamic", "has", "kinematic", "row_of", "rows", "rows_of", "static")
 
 
 class Table:
@@ -279,7 +280,7 @@ class Table:
         raise KeyError(entity)
 
     def rows_of(self, entities: np.ndarray) -> np.ndarray:
-        """The rows of entities that all have one, vectorised."""
+        """The rows of entities, -1 for what has none, vectorised."""
         rows = np.full(len(entities), -1, np.int64) if len(entities) else entities
         start = 0
         for stop in self.stops if len(entities) else ():

@@ -76,6 +76,14 @@ class EntityVerbs:
             esper.delete_entity(entity, immediate=True)
             esper_bridge.forget_death(entity)
 
+    def delete_entities(self, entities: Iterable[int]) -> None:
+        """Delete all these at the start of the next step; KeyError, and none is deleted, if one does not exist."""
+        contents, ids = self._contents(), list(entities)
+        for entity in ids:
+            if entity not in contents.entities:
+                raise KeyError(f"no entity {entity!r} in this world")
+        contents.dead.update(map(int, ids))
+
     def entity_exists(self, entity: int) -> bool:
         """False for unknown entities and those marked for deletion."""
         contents = self._contents()
