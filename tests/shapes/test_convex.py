@@ -374,3 +374,27 @@ def grid_directions(d):
 
 
 DIRECTIONS = {d: grid_directions(d) for d in (2, 3)}
+
+
+def least_depth(axes, offsets):
+    """Of ellipsoids with these semi-axes (2, n, 3): descent from both ends of each axis, an upper bound."""
+    least = np.full(len(offsets), np.inf)
+    for end in np.vstack([np.eye(3), -np.eye(3)]):
+        way = np.tile(end + 1e-3, (len(offsets), 1))
+        for _ in range(400):
+            way /= np.linalg.norm(way, axis=1, keepdims=True)
+            point = sum(a * a * way / np.linalg.norm(a * way, axis=1, keepdims=True) for a in axes) - offsets
+            depth = (way * point).sum(axis=1)
+            least = np.minimum(least, depth)
+            way = way - 0.4 * (point - depth[:, None] * way)
+    return least
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_ellipsoids_at_one_place_leave_each_other_on_the_shortest_way(seed):
+    """They have several ways out that are nearly as short as each other."""
+    random, count = np.random.default_rng(seed), 3000
+    axes = np.exp(random.uniform(np.log(0.2), 0.0, (2, count, 3)))
+    offsets = random.normal(size=(count, 3)) * 10 ** random.uniform(-6, -1, (count, 1))
+    a, b = (shapes(np.zeros((count, 1, 3)), semi_axes=each) for each in axes)
+    assert (meet(a, b, offsets).depth - least_depth(axes, offsets)).max() <= 2e-6

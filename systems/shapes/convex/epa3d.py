@@ -16,6 +16,7 @@ from .gjk import ROUNDING, corner, cross, edge, face_normal, norm, refine_direct
 CORNERS = 64
 FACES = 128  # a closed surface of triangles has twice as many faces as corners, less 4
 EDGES = 192
+SAME_WAY = 0.9  # cosine: from faces that look the same way a search ends in the same minimum
 
 
 @inlined
@@ -97,6 +98,28 @@ def witness_point(of_a, of_b, faces, heights, count, outward, depth, d):
     return witness
 
 
+@inlined
+def refine_smooth(pair, d, surface, count, best, depth, size):
+    """(normal, depth) at the least of the minima of smooth shapes near the best direction so far and near the lowest
+    faces that look elsewhere."""
+    _, normals, _, waiting = surface
+    start, lowest = best, 0.0
+    while lowest < depth:
+        found, least = refine_direction(pair, d, start, math.inf, size)
+        if least < depth:
+            best, depth = found, least
+        lowest = math.inf
+        for f in range(count):
+            normal = row(normals, f, d)
+            if max(dot(normal, start), dot(normal, found)) > SAME_WAY:
+                waiting[f] = math.inf
+            lowest = min(lowest, waiting[f])
+        for f in range(count):
+            if waiting[f] == lowest:
+                start = row(normals, f, d)
+    return best, depth
+
+
 @part
 def polytope_depth(pair, d, of_a, of_b, size):
     """(normal from a to b, depth, point of a) for a tetrahedron in the difference that holds the origin.
@@ -127,7 +150,7 @@ def polytope_depth(pair, d, of_a, of_b, size):
             break
         outward = row(normals, top, d)
         if used == CORNERS:
-            best, depth = refine_direction(pair, d, best, depth, size)
+            best, depth = refine_smooth(pair, d, surface, count, best, depth, size)
             break
         point_a, point_b = support_points(pair, negative(outward))
         store(of_a, used, point_a)
