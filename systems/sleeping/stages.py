@@ -32,6 +32,7 @@ RATTLE_SHARE = 0.9  # the same of what rattles in its place, as one disc of ten 
 RATTLE_ROOM = 0.01
 REST_SIZES = 0.002  # of the extent, per step: what is faster is not at rest, however strong the forces
 UNMOVED_SIZES = 1e-6  # of the extent, per step: what is slower is, without forces and contacts
+GOES_ON = 0.5  # of the way at its speed: what goes farther slides and is not held, what rattles or leans is
 LOOK_EVERY = 4  # steps; islands need not be joined in each
 FIRST_SHARE = 0.05  # of what forces change: they may differ by it when its velocity has become 0
 THROW = 3.0  # times the highest speed there is: what an impact may make of a body within the step
@@ -241,6 +242,14 @@ def is_unmoved(state, i, dt):
 
 
 @part
+def goes_on(state, i, dt):
+    """Whether a body has gone the way that its velocity leads, at that speed or faster, since its rest began."""
+    bodies = state.bodies
+    v, way = bodies.linear_velocity[i], sub(bodies.position[i], bodies.rest_position[i])
+    return dot(way, v) > GOES_ON * dot(v, v) * (bodies.rest_steps[i] - 1) * dt and not is_unmoved(state, i, dt)
+
+
+@part
 def is_at_rest(state, i, dt):
     """Whether an awake body is slow, or rattles about where its rest began, and nothing has struck it.
 
@@ -283,8 +292,8 @@ def count_rest(state, dt, needed):
 def join_islands(state, dt, needed):
     """Islands of dynamic bodies that are awake, each known by its first row; restless[row] tells which stay awake.
 
-    Those do of which a body has not been at rest for long enough, or has nothing that holds it, or stands on something
-    that moves, or that a system disables the contact with.
+    Those do of which a body has not been at rest for long enough, or has nothing that holds it, or slides on and on, or
+    stands on something that moves, or that a system disables the contact with.
     """
     bodies, pairs, root, restless = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.restless
     still = bodies.still
@@ -295,7 +304,7 @@ def join_islands(state, dt, needed):
         if pairs.is_solid[c] and pairs.near_contact[c]:
             for i in (a, b):
                 if i < state.dynamic and bodies.rest_steps[i] >= needed:
-                    restless[i] = False
+                    restless[i] = goes_on(state, i, dt)
     for c in range(pairs.count):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
