@@ -121,7 +121,7 @@ REFUSED = {
     "truncated": (lambda path: written(path, lambda data: data[: len(data) // 2]), {}, "damaged or not complete"),
     "damaged": (lambda path: written(path, lambda d: d[:2000] + b"\x00\x01\x02" + d[2003:]), {}, "damaged"),
     "a part is missing": (lambda path: with_entry(path, lambda c: c.pop("table")), {}, "damaged"),
-    "newer": (lambda path: with_entry(path, lambda c: c.update(format=2)), {}, "by a newer carom, in format 2; .* 1$"),
+    "newer": (lambda path: with_entry(path, lambda c: c.update(format=99)), {}, "by a newer carom, in format 99; .*"),
     "setting": (lambda path: with_entry(path, lambda c: c["settings"].update(colour=1)), {}, "no field 'colour'"),
     "missing plugin": (None, {"plugins": GOOD}, r"needs plugin 'springs' 1\.0"),
     "older plugin": (None, {"plugins": [*GOOD, OldSprings()]}, r"plugin 'springs' 1\.0, this one is 0\.9"),
