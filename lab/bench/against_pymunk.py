@@ -21,11 +21,9 @@ from ... import scenes
 from ...framework import Settings, World
 from ...framework.compilation import log
 from ..cli.usage_errors import Problem
-from ..engines.body_arrays import moving_and_fixed
 from ..engines.pymunk_space import INDEXES, PymunkSpace
 from ..engines.quality import Quality
-from ..measure.body_shapes import Floats
-from ..measure.escape import Enclosure
+from ..measure.body_shapes import Floats, shapes_of
 from ..measure.run import plain_settings
 from ..measure.timing import Spread, no_garbage_collection, timed
 from ..reporting.progress import NO_PROGRESS, Progress
@@ -130,12 +128,15 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
     with contextlib.closing(case.build(repeat)) as world:
         engines: Engines = {CAROM: CaromWorld(world)}
         case.bodies = len(world.bodies.dynamic)
-        indexes = [] if not peer else [case.peer] if case.peer else _indexes(world)
+        indexes = [] if not peer else [case.peer] if case.peer else list(INDEXES)
+        if shapes_of(world).static.all():  # nothing to search for
+            indexes = indexes[:1]
         for index in indexes:
             engines[index] = PymunkSpace(world, index)
         before = progress.done
         if case.subject.windows:
-            _run_windows(case, world, engines, progress)
+            with contextlib.closing(case.build(repeat)) as other:
+                _run_windows(case, other, engines, progress)
         else:
             _run_queries(case, world, engines, repeat)
         progress.advance(case.effort() - (progress.done - before))
@@ -144,15 +145,9 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
     case.compile_seconds += log.waited - waited
 
 
-def _indexes(world: World) -> list[str]:
-    """The pymunk indexes that can affect the time of this world."""
-    return list(INDEXES if moving_and_fixed(world)[0].shaped.any() else INDEXES[:1])
-
-
-def _run_windows(case: Case, world: World, engines: Engines, progress: Progress) -> None:
-    moving, fixed = moving_and_fixed(world)
-    enclosure = Enclosure.around(world)
-    quality = {name: Quality(moving, fixed, enclosure) for name in engines}
+def _run_windows(case: Case, other: World, engines: Engines, progress: Progress) -> None:
+    """other: a world like carom's that takes no steps, in which overlaps are measured."""
+    quality = {name: Quality(other) for name in engines}
     taken = 0
     whole = case.subject.windows[-1].shortened(case.bodies).last
     for window in case.subject.windows:

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..measure.body_shapes import Floats, sensor_entities, shapes_of
+from ..measure.body_shapes import Floats, overlaps_of, sensor_entities, shapes_of
 from ..measure.escape import Enclosure
 from ..measure.timing import timed
 from ..trading.records import PYMUNK
-from .body_arrays import moving_and_fixed
 from .cost import counts_of
 from .pymunk_space import PymunkSpace
-from .quality import overlaps
 
 MOST_TOUCHES = 400  # pairs whose first contact is kept
 
@@ -122,13 +120,8 @@ class CaromEngine(Engine):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
+        self._bodies = np.array(world.bodies.entity)
         self._sensors = sensor_entities(world)  # all that there were: what is touched may be deleted
-
-    def follow(self) -> None:
-        known = self._rows_then
-        super().follow()
-        if self._rows_then is not known:
-            self._sensors = np.union1d(self._sensors, sensor_entities(self.world))
 
     def step(self, dt: float) -> None:
         world = self.world
@@ -136,8 +129,15 @@ class CaromEngine(Engine):
             world.settings = world.settings.replace(dt=dt)
         before = world.time
         self._timed(world.step, dt)
+        self.take_in(before)
+
+    def take_in(self, before: float) -> None:
+        """What the world's last step has done, which began at that time."""
         self.follow()
-        contacts = world.contacts
+        if not np.array_equal(self._bodies, bodies := self.world.bodies.entity):
+            self._bodies = np.array(bodies)
+            self._sensors = np.union1d(self._sensors, sensor_entities(self.world))
+        contacts = self.world.contacts
         self._note_touches(before)
         self.impulse, self.times = 0.0, []
         if len(contacts):
@@ -178,10 +178,14 @@ class CaromEngine(Engine):
         contacts = self.world.contacts
         return ~(np.isin(contacts.entity_a, self._sensors) | np.isin(contacts.entity_b, self._sensors))
 
-    def overlaps(self) -> Floats:
-        contacts, sizes = self.world.contacts, self.sizes
+    def deep(self) -> np.ndarray:
+        """True for the contacts in which solid bodies overlap."""
+        contacts = self.world.contacts
         moves = np.isin(contacts.entity_a, self.ids) | np.isin(contacts.entity_b, self.ids)  # platforms pass walls
-        deep = (contacts.depth > 0) & moves & self._solid()
+        return (contacts.depth > 0) & moves & self._solid()
+
+    def overlaps(self) -> Floats:
+        contacts, sizes, deep = self.world.contacts, self.sizes, self.deep()
         pairs = zip(contacts.entity_a[deep].tolist(), contacts.entity_b[deep].tolist(), strict=True)
         smaller = [min(sizes.get(a, math.inf), sizes.get(b, math.inf)) for a, b in pairs]
         return np.asarray(contacts.depth)[deep] / np.array(smaller, float)
@@ -199,7 +203,6 @@ class PymunkEngine(Engine):
 
     def __init__(self, world: World, iterations: int) -> None:
         super().__init__(world)
-        self._plain = moving_and_fixed(world)
         self.space = PymunkSpace(world)
         self.space.space.iterations = iterations
         self._iterations = iterations
@@ -242,8 +245,7 @@ class PymunkEngine(Engine):
         self._mirror()
 
     def overlaps(self) -> Floats:
-        moving, fixed = self._plain
-        return overlaps(moving, self.position, fixed)
+        return overlaps_of(self.world)[2]
 
     def _push(self) -> None:
         """Apply the forces of the force systems at this state for one step; pymunk applies gravity itself."""

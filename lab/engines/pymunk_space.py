@@ -8,19 +8,83 @@ from __future__ import annotations
 import importlib
 import math
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...components import AABBCollider, SphereCollider
 from ...framework import World
 from ..cli.usage_errors import Problem
 from ..measure.body_shapes import Floats
-from .body_arrays import BodyArrays, NotPlainError, moving_and_fixed
 
 INDEXES = ("tree", "hash")  # pymunk's two broad phases: a tree of bounding boxes, or a spatial hash
 ITERATIONS = 10
 HASH_CELL = 2.0  # cell size over the largest moving body's size; measured: 1.5 times as fast as 1.0 (gas2d 10k)
 HASH_CELLS_PER_BODY = 2  # measured: as fast as the 10 of pymunk's manual
+
+
+class NotPlainError(ValueError):
+    """A world has something that cannot be translated."""
+
+
+class Bodies(NamedTuple):
+    """One row per body, ascending by entity id.
+
+    ``half (n, 2)`` half extents, the radius in both for a disc; ``round (n,)`` true for discs, ``shaped (n,)`` false
+    without a collider; ``restitution`` and ``friction (n,)``, NaN: the other body's.
+    """
+
+    position: Floats
+    velocity: Floats
+    mass: Floats
+    half: Floats
+    round: np.ndarray
+    shaped: np.ndarray
+    restitution: Floats
+    friction: Floats
+
+
+def moving_and_fixed(world: World) -> tuple[Bodies, Bodies]:
+    """The dynamic and the static bodies of ``world`` in their present state; NotPlainError if not representable."""
+    if world.dimensions != 2:
+        raise NotPlainError(f"a world of {world.dimensions} dimensions, not 2")
+    _refuse("kinematic bodies", len(world.bodies.kinematic))
+    dynamic = world.bodies.dynamic
+    moving = _plain(dynamic)
+    order = np.argsort(dynamic.entity, kind="stable")
+    _refuse("offsets of moving bodies' colliders", moving.position != dynamic.position[order])
+    return moving, _plain(world.bodies.static)
+
+
+def _plain(bodies: Any) -> Bodies:
+    count = len(bodies)
+    position, half = np.array(bodies.position), np.zeros((count, 2))
+    friction, restitution = np.full(count, np.nan), np.zeros(count)
+    rounds, boxes = (np.asarray(bodies.has(collider), bool) for collider in (SphereCollider, AABBCollider))
+    for has, name in ((rounds, "sphere_collider"), (boxes, "aabb_collider")):
+        if not has.any():
+            continue
+        columns = getattr(bodies, name)
+        half[has] = columns.radius[has, None] if has is rounds else columns.half_extents[has]
+        friction[has], restitution[has] = columns.friction[has], columns.restitution[has]
+        position[has] += columns.offset[has]
+        _refuse("sensors", columns.sensor[has])
+        _refuse("layers and masks", (columns.layer[has] != 1) | (columns.mask[has] & 1 == 0))
+    _refuse("bodies with two colliders", rounds & boxes)
+    _refuse("turned boxes", bodies.rotation[boxes])
+    _refuse("damping", bodies.linear_damping)
+    _refuse("constant forces", bodies.constant_force)
+    _refuse("a gravity scale", bodies.gravity_scale != 1)
+    _refuse("limits of speed", ~np.isnan(bodies.max_linear_speed))
+    order, shaped = np.argsort(bodies.entity, kind="stable"), rounds | boxes
+    velocity, mass = np.array(bodies.linear_velocity), np.array(bodies.mass)
+    rows: tuple[Any, ...] = (position, velocity, mass, half, rounds, shaped, restitution, friction)
+    return Bodies(*(column[order] for column in rows))
+
+
+def _refuse(what: str, found: Any) -> None:
+    if np.any(found):
+        raise NotPlainError(what)
 
 
 def pymunk_module() -> ModuleType:
@@ -47,7 +111,7 @@ class PymunkSpace:
         self.space.gravity = tuple(map(float, world.gravity))
         self.dt = world.settings.dt
         self.bodies: list[Any] = []
-        for k in range(len(moving)):
+        for k in range(len(moving.mass)):
             body = pymunk.Body(float(moving.mass[k]), float("inf"))
             body.position = tuple(map(float, moving.position[k]))
             body.velocity = tuple(map(float, moving.velocity[k]))
@@ -60,10 +124,10 @@ class PymunkSpace:
             self._add_shape(pymunk, self.space.static_body, fixed, k, place, restitution, float(fixed_friction[k]))
         if index == "hash":
             size = HASH_CELL * 2 * float(moving.half.max())
-            self.space.use_spatial_hash(size, HASH_CELLS_PER_BODY * (len(moving) + len(fixed)))
+            self.space.use_spatial_hash(size, HASH_CELLS_PER_BODY * (len(moving.mass) + len(fixed.mass)))
 
     def _add_shape(
-        self, pymunk: ModuleType, body: Any, rows: BodyArrays, k: int, offset: tuple[float, ...], e: float, f: float
+        self, pymunk: ModuleType, body: Any, rows: Bodies, k: int, offset: tuple[float, ...], e: float, f: float
     ) -> None:
         if rows.round[k]:
             shape = pymunk.Circle(body, float(rows.half[k, 0]), offset)
@@ -81,9 +145,9 @@ class PymunkSpace:
 
     def state(self) -> tuple[Floats, Floats]:
         """Positions and velocities, (n, 2) each, in the order of the world's entity ids."""
-        position = np.array([tuple(body.position) for body in self.bodies], float).reshape(-1, 2)
-        velocity = np.array([tuple(body.velocity) for body in self.bodies], float).reshape(-1, 2)
-        return position, velocity
+        both = [(*body.position, *body.velocity) for body in self.bodies]
+        state = np.array(both, float).reshape(-1, 4)
+        return state[:, :2], state[:, 2:]
 
     def settings(self) -> dict[str, Any]:
         """The settings of the space."""
@@ -119,7 +183,7 @@ class PymunkSpace:
         return np.array([1.0 if hit is None else hit.alpha for hit in hits])
 
 
-def _materials(world: World, moving: BodyArrays, fixed: BodyArrays) -> tuple[float, Floats, Floats]:
+def _materials(world: World, moving: Bodies, fixed: Bodies) -> tuple[float, Floats, Floats]:
     """One restitution for all shapes and the friction of each, chosen so that pymunk's products match carom's rules."""
     shaped, fixed_shaped = moving.restitution[moving.shaped], fixed.restitution[fixed.shaped]
     largest = float(shaped.max(initial=0.0))

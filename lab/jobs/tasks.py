@@ -15,7 +15,7 @@ from ...framework import World
 from ..cases.case import Case
 from ..cli.usage_errors import Problem
 from ..engines.adapters import CaromEngine, Engine, engine_for
-from ..engines.body_arrays import NotPlainError
+from ..engines.pymunk_space import NotPlainError
 from ..measure.norms import FAR
 from ..measure.observation import Seen, observe
 from ..measure.survey import nudge

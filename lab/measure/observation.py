@@ -130,7 +130,7 @@ def observe(
     a body outside the walls around all bodies has escaped. far: m from its start, a body there has blown up. inputs:
     when they change, s; there a step ends. values: what a game compares, read at the end.
     """
-    watch = _Watch(engine, seconds, walled, far)
+    watch = Observer(engine, seconds, walled, far)
     steps = step_lengths(seconds, dt, phase, whole_steps, inputs)
     every = -(-len(steps) // LOOKS)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -184,16 +184,19 @@ def step_lengths(
     return [dt if math.isclose(length, dt, rel_tol=1e-9) else length for length in found]
 
 
-class _Watch:
-    """Observes the engine after each step; ``seen`` is what it has shown so far."""
+class Observer:
+    """Observes the engine after its steps; ``seen`` is what it has shown so far.
 
-    def __init__(self, engine: Engine, seconds: float, walled: bool, far: float) -> None:
+    ``energies``: kinetic and whole energy, J, at the start and at each look.
+    """
+
+    def __init__(self, engine: Engine, seconds: float, walled: bool = True, far: float = math.inf) -> None:
         self.engine, self.walled, self.far = engine, walled, far
         self.start = self.settled = engine.position
         self.ids = engine.ids
-        kinetic, energy = engine.energies
-        self.seen = Seen(self.start, energy_start=energy, energy_scale=kinetic, seconds=seconds)
-        self.looks, self.squares, self.impulse, self.late_impacts = 0, 0.0, 0.0, 0
+        self.energies = [engine.energies]
+        self.seen = Seen(self.start, seconds=seconds)
+        self.impulse, self.late_impacts = 0.0, 0
         self.mean_overlaps = [0.0]
         self.next_sample = SETTLED * seconds
         gravity = np.asarray(engine.world.gravity, float)
@@ -214,19 +217,14 @@ class _Watch:
         """Now and then: places and energy."""
         engine, seen = self.engine, self.seen
         position = self._followed()
-        kinetic, energy = engine.energies
-        self.looks += 1
-        if not (np.isfinite(position).all() and math.isfinite(kinetic)):
+        self.energies.append(engine.energies)
+        if not (np.isfinite(position).all() and math.isfinite(self.energies[-1][0])):
             seen.failure = NOT_FINITE
             return
         way = position - self.start
         seen.reach = max(seen.reach, float(np.sqrt((way * way).sum(axis=1).max(initial=0.0))))
         if self.up is not None and len(way):
             seen.apex = max(seen.apex, float((way @ self.up).max()))
-        departure = abs(energy - seen.energy_start)
-        seen.energy_worst = max(seen.energy_worst, departure)
-        self.squares += departure * departure
-        seen.energy_scale = max(seen.energy_scale, kinetic)
         if engine.time <= SETTLED * seen.seconds:
             self.settled = position
         if engine.time >= self.next_sample and engine.fixed:  # sizes are known of those of the start
@@ -255,7 +253,11 @@ class _Watch:
         position, velocity = self._followed(), engine.velocity
         seen.position, seen.entities = position, engine.ids.tolist()
         seen.kinetic, seen.energy = engine.energies
-        seen.energy_square = self.squares / max(self.looks, 1)
+        known = np.array([both for both in self.energies if math.isfinite(both[0])] or [(0.0, 0.0)])
+        departures = np.abs(known[1:, 1] - known[0, 1])
+        seen.energy_start, seen.energy_scale = float(known[0, 1]), float(known[:, 0].max())
+        seen.energy_worst = float(departures.max(initial=0.0))
+        seen.energy_square = float((departures**2).sum() / max(len(self.energies) - 1, 1))
         seen.times = sorted(seen.times)[:MOST_TIMES]
         late = (1 - EARLY) * seen.seconds
         seen.pressure, seen.rate = self.impulse / late, self.late_impacts / late

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import itertools
 import math
 import time
 from collections.abc import Callable
@@ -18,15 +17,14 @@ from ...components import AABBCollider, SphereCollider
 from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
+from ..engines.adapters import CaromEngine
 from ..plain import jsonable
-from .body_shapes import dimensions_of, sensor_entities
-from .escape import Enclosure
-from .impacts import PathImpact, path_impacts, with_corners
+from .body_shapes import QUIET, dimensions_of
+from .observation import Observer
+from .paths import Recorder, Traces
 
 TRACED_BODIES = 200  # in a picture
-CANDIDATES = 12_000  # bodies that are recorded, to choose from
 KEPT = 1e-3  # of the energy: one that has never changed by more is kept
-QUIET = np.errstate(over="ignore", invalid="ignore")  # bodies out of range are reported without warnings
 SAMPLES = 600  # of the energy, at most; of paths too if there are many
 FEW_STEPS, FEW_BODIES = 12, 60  # up to this size a run is shown step by step, with all its impacts
 PATH_POINTS = 80_000  # of all paths together: up to this number every step is sampled, so that corners are visible
@@ -85,86 +83,6 @@ class RunReport:
 
 
 @dataclass
-class Traces:
-    """Paths: ``positions`` (samples, bodies, d), NaN where no body was; ``entities`` (bodies,), ascending.
-
-    ``impacts``: the impacts of the run, if all steps are shown, else None.
-    """
-
-    entities: NDArray[np.int64]
-    samples: list[NDArray[np.float32]] = field(default_factory=list)
-    moved: int = 0  # number of all bodies that moved, including these
-    impacts: list[PathImpact] | None = None
-
-    @property
-    def places(self) -> NDArray[np.float64]:
-        """All finite points of all paths, (n, d)."""
-        points = self.positions.reshape(-1, self.samples[0].shape[1])
-        return points[np.isfinite(points).all(axis=1)]
-
-    @property
-    def positions(self) -> NDArray[np.float64]:
-        return np.array(self.samples, np.float64)
-
-    @property
-    def corners(self) -> NDArray[np.float64]:
-        """The positions, with additional samples at the impacts."""
-        return with_corners(self.entities, self.positions, self.impacts or [])
-
-    @QUIET
-    def farthest(self, count: int) -> Traces:
-        """The ``count`` bodies that travelled farthest; ``moved`` does not change."""
-        travelled = np.zeros(len(self.entities))
-        for before, after in itertools.pairwise(self.corners if self.impacts else self.samples):
-            travelled += np.nan_to_num(np.linalg.norm(after - before, axis=1))
-        moved = int((travelled > 0).sum())
-        chosen = np.sort(np.argsort(-travelled, kind="stable")[: min(count, moved)])
-        samples = [sample[chosen] for sample in self.samples]
-        return Traces(self.entities[chosen], samples, moved, self.impacts)
-
-
-class Recorder:
-    """Records moving bodies, including those created during the run, up to CANDIDATES bodies."""
-
-    def __init__(self, world: World, step_by_step: bool = False) -> None:
-        self.world = world
-        self.impacts: list[PathImpact] | None = [] if step_by_step else None
-        self.entities: NDArray[np.int64] = np.empty(0, np.int64)  # in the order they appeared
-        self.samples: list[NDArray[np.float32]] = []  # positions of the entities known at that time
-
-    @QUIET
-    def record(self) -> None:
-        """Add a sample."""
-        if self.impacts is not None and self.samples:
-            self.impacts += path_impacts(self.world, len(self.samples))
-        bodies = self.world.bodies
-        ids = np.asarray(bodies.entity)
-        moving = np.concatenate([bodies.dynamic.entity, bodies.kinematic.entity])
-        new = np.setdiff1d(moving, self.entities)
-        room = CANDIDATES - len(self.entities)
-        if len(new) > room:
-            new = np.sort(np.random.default_rng(0).choice(new, room, replace=False))
-        self.entities = np.concatenate([self.entities, new])
-        sample = np.full((len(self.entities), dimensions_of(self.world)), np.nan, np.float32)
-        if len(ids):
-            order = np.argsort(ids, kind="stable")
-            row = order[np.minimum(np.searchsorted(ids, self.entities, sorter=order), len(ids) - 1)]
-            there = ids[row] == self.entities
-            sample[there] = bodies.position[row[there]]
-        self.samples.append(sample)
-
-    def traces(self) -> Traces:
-        """The recorded paths, NaN where a body did not exist."""
-        order = np.argsort(self.entities, kind="stable")
-        filled = []
-        for sample in self.samples:
-            whole = np.full((len(self.entities), sample.shape[1]), np.nan, np.float32)
-            whole[: len(sample)] = sample
-            filled.append(whole[order])
-        return Traces(self.entities[order], filled, impacts=self.impacts)
-
-
-@dataclass
 class Run:
     """A finished run: the report, the paths, the world in its final state, and the profile if one was requested."""
 
@@ -175,48 +93,44 @@ class Run:
 
 
 class Meter:
-    """Observes a world between its steps, outside the measured time."""
+    """Takes the steps of a world, times them, and looks at it between them, outside the measured time."""
 
     def __init__(self, world: World, every: int, path_every: int, step_by_step: bool) -> None:
         self.world, self.every, self.path_every = world, every, path_every
-        self.recorder = Recorder(world, step_by_step)
-        self.came_or_went = False
-        self._entities = np.sort(np.asarray(world.bodies.entity))
-        self.enclosure = Enclosure.around(world)
         self.step_seconds: list[float] = []
         self.contact_counts: list[int] = []
-        self.impacts = 0
         self.deepest, self.deepest_step = 0.0, None
-        self._sensors = set(sensor_entities(world).tolist())  # all that there were: what is touched may be deleted
-        self.energies: list[float] = []
-        self.kinetic_most = 0.0
         self.momenta: list[NDArray[np.float64]] = []
         self.momentum_scale = 0.0
         self.measured = Totals()  # of the steps in step_seconds
         self._kernels_seen = _kernels()
         started = time.perf_counter()
+        self.recorder = Recorder(world, step_by_step)
         self.recorder.record()
-        self.sample()
+        self.engine = CaromEngine(world)
+        self.observer = Observer(self.engine, math.inf)
+        self._note_momentum()
         self.compile_seconds = time.perf_counter() - started if _kernels() != self._kernels_seen else 0.0
         self._kernels_seen = _kernels()
 
     @QUIET
-    def sample(self) -> None:
-        """Sample energy and momentum, every few steps."""
-        world = self.world
-        self.came_or_went |= not np.array_equal(np.sort(np.asarray(world.bodies.entity)), self._entities)
-        kinetic = float(world.kinetic_energy())
-        self.kinetic_most = max(self.kinetic_most, kinetic)
-        self.energies.append(kinetic + float(world.potential_energy()))
-        self.momenta.append(np.array(world.momentum(), float))
-        dynamic = world.bodies.dynamic
+    def _note_momentum(self) -> None:
+        self.momenta.append(np.array(self.world.momentum(), float))
+        dynamic = self.world.bodies.dynamic
         speed = np.linalg.norm(dynamic.linear_velocity, axis=1)
         self.momentum_scale = max(self.momentum_scale, float(np.dot(np.asarray(dynamic.mass), speed)))
 
+    @QUIET
+    def sample(self) -> None:
+        """Sample energy and momentum, every few steps."""
+        self.observer.look()
+        self._note_momentum()
+
+    @QUIET
     def step(self) -> None:
         """Take one step, timed; then record what is needed after every step."""
         world = self.world
-        before = world.stats().totals
+        totals, before = world.stats().totals, world.time
         started = time.perf_counter()
         world.step()
         seconds = time.perf_counter() - started
@@ -225,13 +139,13 @@ class Meter:
             self.compile_seconds += seconds
         else:
             self.step_seconds.append(seconds)
-            self.measured += world.stats().totals - before
-        self._sensors.update(sensor_entities(world).tolist())
+            self.measured += world.stats().totals - totals
+        self.engine.take_in(before)
+        self.observer.count()
         depth = np.asarray(world.contacts.depth)
         self.contact_counts.append(len(depth))
-        self.impacts += len(world.contacts.impacts)
-        if len(depth) and float(depth.max()) > self.deepest:
-            deepest = self._deepest_of_solids(depth)
+        if depth.max(initial=0.0) > self.deepest:
+            deepest = float(depth[self.engine.deep()].max(initial=0.0))
             if deepest > self.deepest:
                 self.deepest, self.deepest_step = deepest, world.step_count
         if world.step_count % self.path_every == 0:
@@ -246,42 +160,30 @@ class Meter:
         report.compile_seconds = self.compile_seconds
         report.steps, report.simulated_seconds = world.step_count, world.time
         bodies = world.bodies
-        report.bodies = {
-            "total": len(bodies),
-            "dynamic": len(bodies.dynamic),
-            "kinematic": len(bodies.kinematic),
-            "static": len(bodies.static),
-        }
-        counts = self.contact_counts or [0]
-        report.contacts = {
-            "end": counts[-1],
-            "mean": round(float(np.mean(counts)), 3),
-            "most": max(counts),
-            "impacts": self.impacts,
-        }
+        kinds = {kind: len(getattr(bodies, kind)) for kind in ("dynamic", "kinematic", "static")}
+        report.bodies = {"total": len(bodies), **kinds}
+        counts, impacts = self.contact_counts or [0], self.observer.seen.impacts
+        mean = round(float(np.mean(counts)), 3)
+        report.contacts = {"end": counts[-1], "mean": mean, "most": max(counts), "impacts": impacts}
         if self.step_seconds:
             report.step_milliseconds = 1e3 * float(np.median(self.step_seconds))
             report.step_milliseconds_mean = 1e3 * float(np.mean(self.step_seconds))
-        stats = self.stats()
-        report.system_milliseconds = {
-            name: mean if self.step_seconds else math.nan for name, mean in stats.milliseconds.items()
-        }
-        energies = np.array(self.energies)
-        report.energy = _drift(energies, self.kinetic_most)  # the zero of a potential is arbitrary
-        report.energy_changes = self._energy_changes(energies)
+        means = self.stats().milliseconds
+        report.system_milliseconds = means if self.step_seconds else dict.fromkeys(means, math.nan)
+        kinetic, energies = np.array(self.observer.energies).T
+        largest = float(kinetic.max())
+        report.energy = _drift(energies, largest)  # the zero of a potential is arbitrary
+        report.energy_changes = self._energy_changes(energies, largest)
         report.momentum = _drift(np.array(self.momenta), self.momentum_scale)
-        report.momentum_conserved = not (
-            len(bodies.static) or len(bodies.kinematic) or np.any(world.gravity) or world.force_systems
-        )
+        outer = kinds["static"] or kinds["kinematic"] or np.any(world.gravity) or world.force_systems
+        report.momentum_conserved = not outer
         report.deepest_overlap, report.deepest_overlap_step = self.deepest, self.deepest_step
         positions = np.asarray(bodies.dynamic.position)
         finite = np.isfinite(positions).all(axis=1) & np.isfinite(bodies.dynamic.linear_velocity).all(axis=1)
         if world.physics is not None:
             finite &= ~world.physics.taken_out()[bodies.dynamic.rows]
-        report.escaped = {
-            "outside": self.enclosure.outside(positions[finite]),
-            "non_finite": int((~finite).sum()),
-        }
+        outside = self.engine.enclosure.outside(positions[finite])
+        report.escaped = {"outside": outside, "non_finite": int((~finite).sum())}
         report.counters = dict(world.stats().counters)
         report.faults = list(world.faults)
         report.state_hash = world.state_hash()
@@ -290,23 +192,16 @@ class Meter:
         """Statistics of the steps that neither compiled nor loaded kernels."""
         return Stats(self.measured, self.measured, self.world.stats().units)
 
-    def _deepest_of_solids(self, depth: NDArray[np.float64]) -> float:
-        """The deepest overlap of a dynamic body, without sensors."""
-        contacts, sensors, dynamic = self.world.contacts, list(self._sensors), self.world.bodies.dynamic.entity
-        a, b = contacts.entity_a, contacts.entity_b
-        counts = (np.isin(a, dynamic) | np.isin(b, dynamic)) & ~(np.isin(a, sensors) | np.isin(b, sensors))
-        return float(depth[counts].max(initial=0.0))
-
-    def _energy_changes(self, energies: NDArray[np.float64]) -> list[str]:
+    def _energy_changes(self, energies: NDArray[np.float64], kinetic: float) -> list[str]:
         """What in the present world may have added or removed energy; nothing if it was kept."""
-        noise = KEPT * max(self.kinetic_most, float(np.abs(energies).max()))
+        noise = KEPT * max(kinetic, float(np.abs(energies).max()))
         if np.ptp(energies) <= noise:
             return []
         bodies = self.world.bodies
         dynamic, reasons = bodies.dynamic, []
         any_pair = self.world.settings.restitution_mixing != "max"  # "max": a pair has at least a body's own value
         touched = bodies if any_pair else dynamic
-        met = self.impacts > 0 or max(self.contact_counts, default=0) > 0
+        met = self.observer.seen.impacts > 0 or max(self.contact_counts, default=0) > 0
         fell = (np.maximum.accumulate(energies) - energies).max() > noise  # an impact never adds any
         if met and fell and (_restitutions(touched) < 1).any():
             reasons.append("restitution below 1")
@@ -319,7 +214,7 @@ class Meter:
             reasons.append("systems of the game")
         if np.any(bodies.kinematic.linear_velocity):
             reasons.append("kinematic bodies that move")
-        if self.came_or_went:
+        if not self.engine.fixed:
             reasons.append("bodies that came or went")
         return reasons
 

@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image
 
 from ...framework import World
-from ..measure.body_shapes import Shapes, shapes_of
-from ..measure.run import QUIET, Run
+from ..measure.body_shapes import QUIET, Shapes, shapes_of
+from ..measure.run import Run
 from . import canvas
 from .canvas import Sheet
 from .marks import draw_bodies, draw_walls

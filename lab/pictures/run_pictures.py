@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgba_array
 
-from ..measure.body_shapes import Floats, Shapes, shapes_of
-from ..measure.run import QUIET, Run, RunReport, Traces
+from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
+from ..measure.paths import Traces
+from ..measure.run import Run, RunReport
 from ..wording import counted
 from . import canvas
 from .canvas import Panel, Sheet
@@ -87,7 +88,7 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
     shapes, moving = still.shapes, still.shapes.where(still.moving)
     d = shapes.centre.shape[1]
     lows, highs = [moving.lower], [moving.upper]
-    if len(traces.samples):
+    if traces.positions.size:
         paths = traces.places
         size = moving.half.max(axis=0) if len(moving.entity) else np.zeros(d)
         lows.append(paths - size)
@@ -124,7 +125,7 @@ def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas
         *zip(np.maximum(near.lower, projection.lower), np.minimum(near.upper, projection.upper), strict=True),
     ]
     points = [corners(low, high) for low, high in boxes]
-    if len(traces.samples):
+    if traces.positions.size:
         points.append(traces.places)
     lower, upper = projection.frame(np.concatenate(points) if points else None)
     margin = 0.06 * (upper - lower).max()
@@ -190,7 +191,7 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
         draw_bodies(panel, others, faint, projection, zorder=2)
     palette = to_rgba_array(canvas.BODY_COLOURS)
     colours = palette[np.arange(count) * 5 % len(palette)]  # bodies with consecutive ids get different colours
-    if count and len(traces.samples) > 1:
+    if count and len(traces.positions) > 1:
         draw_paths(panel, traces.corners, colours, projection)
     own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
     if 0 < count <= SOME:
@@ -238,7 +239,7 @@ def _draw_ghosts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats
         places = places[np.isfinite(places).all(axis=1)]
         repeated = np.tile(colours[row], (len(places), 1))
         repeated[:, 3] = np.linspace(0.12, 0.4, len(places))
-        draw_bodies(panel, followed.row(row).at(places), repeated, projection, zorder=2.7)
+        draw_bodies(panel, followed.where(np.array([row])).at(places), repeated, projection, zorder=2.7)
 
 
 def _magnified(bodies: Shapes, projection: Projection) -> tuple[Floats, Floats] | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...framework import Contact, Phase, System, World
 from ...framework.typing import Integers
-from ..measure.body_shapes import Floats, shapes_of
+from ..measure.body_shapes import Floats, overlaps_of, shapes_of
 
 
 class Conserved:
@@ -287,36 +287,11 @@ def assert_no_overlap(world: World, sizes: float = 0.01) -> None:
 
     Pairs that layers keep apart are included; pairs of two immovable bodies are not.
     """
-    shapes = shapes_of(world)
-    solid = shapes.where(~shapes.sensor)
-    order = np.flatnonzero(~solid.static).tolist()
-    for index in order:
-        one = solid.row(index)
-        for other_index in range(len(solid.entity)):
-            if other_index == index or (other_index < index and other_index in order):
-                continue
-            other = solid.row(other_index)
-            if (one.lower > other.upper).any() or (other.lower > one.upper).any():
-                continue
-            depth = _overlap(one, other)
-            assert depth <= sizes, (
-                f"step {world.step_count}: {int(one.entity[0])} and {int(other.entity[0])} overlap by {depth:.3g} of "
-                f"the smaller one's size, limit {sizes:.3g}"
-            )
-
-
-def _overlap(one: Any, other: Any) -> float:
-    a, b = ((s.centre[0], s.half[0], bool(s.round[0])) for s in (one, other))
-    between = np.abs(b[0] - a[0])
-    if a[2] and b[2]:
-        depth = a[1][0] + b[1][0] - np.linalg.norm(between)
-    elif a[2] or b[2]:
-        radius, half = (a[1][0], b[1]) if a[2] else (b[1][0], a[1])
-        outside = float(np.linalg.norm(np.maximum(between - half, 0.0)))
-        depth = radius - outside if outside > 0 else radius + (half - between).min()
-    else:
-        depth = (a[1] + b[1] - between).min()
-    return float(depth / (2 * min(a[1].min(), b[1].min())))
+    for one, other, depth in zip(*overlaps_of(world), strict=True):
+        assert depth <= sizes, (
+            f"step {world.step_count}: {one} and {other} overlap by {depth:.3g} of the smaller one's size, "
+            f"limit {sizes:.3g}"
+        )
 
 
 # -- the same bits ----------------------------------------------------------------------------------
