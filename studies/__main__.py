@@ -14,7 +14,7 @@ from carom.lab.cli.main import in_command
 from carom.lab.cli.options import out_option, traceback_option, writable_folder
 from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Bar
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable
 
 from . import ladder, limits, scaling, settings, startup
 from .accuracy import accuracy_command

@@ -14,12 +14,11 @@ from carom.lab.cli.options import WORDS, KeepsWords, out_option
 from carom.lab.jobs.result_store import Store
 from carom.lab.measure.timing import Spread
 from carom.lab.reporting.progress import Bar
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import NOTHING, TextTable, compact, number
 from carom.lab.trading.charts import draw
 from carom.lab.trading.records import PYMUNK, CaseTrade, Cell, Curve, ErrorBar, Point
 from carom.lab.trading.report import TARGETS, cheapest, failures, order, remarks, target_text
 from carom.lab.trading.trade import trade
-from carom.lab.wording import NOTHING, compact, number
 
 from .page import PageOutput, shown_options
 

@@ -15,9 +15,8 @@ import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, System, World
-from carom.lab.bench.report import digits, span
 from carom.lab.measure.timing import Spread
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable, compact, span
 from carom.plugins import Physics
 from carom.scenes import gas
 
@@ -172,7 +171,7 @@ def report(result: Result) -> tuple[list[TextTable], list[str]]:
             kernels = [name for name in kernels if name not in other.facts["kernels"]]
             spread = extra(sample, other)
             more = f"{spread.median:+.1f}", span(spread)
-        ns = digits(sample.figures["ns"].median)
+        ns = compact(sample.figures["ns"].median)
         cells.append((sample.value, beside, ", ".join(kernels), ns, *more, str(sample.facts["bytes"])))
     title = (
         f"ns per body per step of {line.of}, and how much that is above the scene beside it; "

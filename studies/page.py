@@ -15,7 +15,7 @@ from carom.lab.cli.options import shown_options as printed_options
 from carom.lab.cli.options import together
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.output import Output, as_markdown
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable
 
 into_option = click.option(
     "--into", type=click.Path(path_type=Path, dir_okay=False), help="Put the tables between the marks of this page."

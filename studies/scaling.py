@@ -12,9 +12,8 @@ from typing import Any
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import World
-from carom.lab.bench.report import digits, span
 from carom.lab.measure.timing import timed
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable, compact, span
 from carom.plugins import Physics
 from carom.scenes import gas
 
@@ -92,8 +91,8 @@ def report(result: Result) -> tuple[list[TextTable], list[str]]:
     for sample in samples:
         n, of = sample.value, ns[sample.value]
         cells.append((
-            f"{n:,}", digits(of.median), span(of), digits(of.median * n * 1e-6),
-            f"{of.median / ns[samples[0].value].median:.2f}", digits(sample.figures["set up"].median),
+            f"{n:,}", compact(of.median), span(of), compact(of.median * n * 1e-6),
+            f"{of.median / ns[samples[0].value].median:.2f}", compact(sample.figures["set up"].median),
             f"{sample.facts['memory']:.0f}",
         ))  # fmt: skip
     title = f"{SCENE}: ns per body per step, medians of {result.repeats}"

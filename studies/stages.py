@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from carom.framework.schedule.stages import Stage
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable
 from carom.systems.stage_list import CLOSING, ON_DEMAND, OPENING, SYSTEMS
 
 from .page import into_option, replace_between_marks

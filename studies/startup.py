@@ -12,9 +12,8 @@ from collections.abc import Sequence
 
 from carom import scenes
 from carom.framework.jit.cache import CACHE_FOLDER_VARIABLE
-from carom.lab.bench.report import digits, span
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable, compact, span
 
 from .runner import Axis, Result
 
@@ -118,13 +117,13 @@ def report(result: Result) -> tuple[list[TextTable], list[str]]:
     for line in result.lines:
         found = [(sample.value, sample.figures) for sample in line.samples]
         if line.axis == COMMANDS_AXIS:
-            rows = [(name, digits(of["seconds"].median), span(of["seconds"])) for name, of in found]
+            rows = [(name, compact(of["seconds"].median), span(of["seconds"])) for name, of in found]
             tables.append(TextTable("commands that need no kernel", ("command", "CPU s", "from .. to"), rows))
             continue
         cells += [
             (
-                line.axis, kernels, f"{of['compiled'].median:.0f}", digits(of["seconds"].median), span(of["seconds"]),
-                digits(of["imports"].median), digits(of["first"].median), digits(of["worst"].median * 1e3),
+                line.axis, kernels, f"{of['compiled'].median:.0f}", compact(of["seconds"].median), span(of["seconds"]),
+                compact(of["imports"].median), compact(of["first"].median), compact(of["worst"].median * 1e3),
             )
             for kernels, of in found
         ]  # fmt: skip

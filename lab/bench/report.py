@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from ..measure.timing import Spread
-from ..reporting.text_tables import TextTable
-from ..wording import NOTHING, number
+from ..reporting.text import NOTHING, TextTable, compact, number, span
 from .results import Result, Row, machine_line
 
 CAROM_SETTINGS = ("dt", "integrator", "collision", "substeps")
@@ -31,20 +29,18 @@ def tables(result: Result) -> list[TextTable]:
 
 def times(rows: list[Row], repeats: int) -> TextTable:
     """Milliseconds and ratios."""
+
+    def median(spread: Spread | None) -> str:
+        return compact(spread.median) if spread else NOTHING
+
     cells = [
         (
-            row.label,
-            digits(row.carom_ms.median),
-            digits(row.carom_fast_ms.median),
-            digits(row.peer_ms.median) if row.peer_ms else NOTHING,
-            digits(row.peer_fast_ms.median) if row.peer_fast_ms else NOTHING,
-            row.peer_index or NOTHING,
-            digits(row.ratio.median) if row.ratio else NOTHING,
-            span(row.ratio) if row.ratio else NOTHING,
+            row.label, *map(median, (row.carom_ms, row.carom_fast_ms, row.peer_ms, row.peer_fast_ms)),
+            row.peer_index or NOTHING, median(row.ratio), span(row.ratio) if row.ratio else NOTHING,
             f"{row.target:.3g}" if row.target else NOTHING,
         )
         for row in rows
-    ]
+    ]  # fmt: skip
     what = "ms per 1,000 queries" if rows and all(row.unit != "step" for row in rows) else "ms per step"
     if len({row.unit for row in rows}) > 1:
         what = "ms per step, of player_query per 1,000 queries"
@@ -54,39 +50,39 @@ def times(rows: list[Row], repeats: int) -> TextTable:
     return TextTable(title, headings, cells)
 
 
+def of_both(row: Row, name: str, scale: float = 1.0, digits: int = 3) -> str:
+    """That figure of both engines in one cell."""
+    return " / ".join(compact(scale * figures[name], digits) for figures in row.quality.values())
+
+
 def quality(rows: list[Row]) -> TextTable:
     """Quality of the states reached in the timed steps, carom first."""
-    engines = list(rows[0].quality)
     cells = []
     for row in rows:
-        of = [row.quality[engine] for engine in engines]
-        overlap = [[percent(one[name]) for one in of] for name in ("overlap_mean", "overlap_max")]
-        escaped = [f"{one['escaped']:.0f}" for one in of]
-        cells.append((row.label, energy(row.energy, of), *map(both, (*overlap, escaped))))
-    title = f"quality, {' / '.join(engines)}: kinetic energy kept or left, overlaps in % of a diameter, bodies escaped"
+        kept = [f"{100 * one['kinetic_end'] / one['kinetic_start']:.3f}" for one in row.quality.values()]
+        energy = f"{' / '.join(kept)} %" if row.energy == "kept" else f"{of_both(row, 'kinetic_end')} J"
+        overlaps = (of_both(row, name, 100, 2) for name in ("overlap_mean", "overlap_max"))
+        escaped = " / ".join(f"{one['escaped']:.0f}" for one in row.quality.values())
+        cells.append((row.label, energy, *overlaps, escaped))
+    engines = " / ".join(rows[0].quality)
+    title = f"quality, {engines}: kinetic energy kept or left, overlaps in % of a diameter, bodies escaped"
     return TextTable(title, ("scene", "kinetic energy", "mean overlap", "deepest", "escaped"), cells)
 
 
 def motion(rows: list[Row]) -> TextTable:
     """The largest displacement of bodies that should come to rest."""
-    engines = list(rows[0].quality)
-    cells = [
-        (row.label, *(both([digits(row.quality[engine][name]) for engine in engines]) for name in ("drift", "sink")))
-        for row in rows
-    ]
-    title = f"farthest way from the start, {' / '.join(engines)}: sideways and downwards, in m"
+    cells = [(row.label, of_both(row, "drift"), of_both(row, "sink")) for row in rows]
+    title = f"farthest way from the start, {' / '.join(rows[0].quality)}: sideways and downwards, in m"
     return TextTable(title, ("scene", "sideways", "downwards"), cells)
 
 
 def answers(rows: list[Row]) -> TextTable:
     """The figures of the queries, which show that both engines ran the same ones."""
-    engines = list(rows[0].quality)
     cells = []
     for row in rows:
-        figure = next(iter(row.quality[engines[0]]))
-        values = [f"{row.quality[engine][figure]:,.6g}" for engine in engines]
-        cells.append((row.label, figure, *values))
-    return TextTable("answers to 1,000 queries", ("scene", "what", *engines), cells, words=2)
+        ((figure, _), *_) = next(iter(row.quality.values())).items()
+        cells.append((row.label, figure, *(f"{of[figure]:,.6g}" for of in row.quality.values())))
+    return TextTable("answers to 1,000 queries", ("scene", "what", *rows[0].quality), cells, words=2)
 
 
 def remarks(result: Result) -> list[str]:
@@ -114,38 +110,6 @@ def _other_settings(rows: list[Row]) -> dict[str, str]:
         for row in rows
         if row.settings
     }
-
-
-def energy(kind: str, of: list[dict[str, float]]) -> str:
-    """Kinetic energy: a percentage of the start's if it must be kept, joules if it must be dissipated."""
-    if kind == "kept":
-        return both([f"{100 * one['kinetic_end'] / one['kinetic_start']:.3f}" for one in of]) + " %"
-    return both([digits(one["kinetic_end"]) for one in of]) + " J"
-
-
-def both(cells: list[str]) -> str:
-    """Both engines' figures in one cell."""
-    return " / ".join(cells)
-
-
-def span(spread: Spread) -> str:
-    """The range from least to largest."""
-    return f"{digits(spread.low)} .. {digits(spread.high)}"
-
-
-def digits(value: float) -> str:
-    """Three significant digits, without an exponent where that is short."""
-    if value == 0 or not math.isfinite(value):
-        return f"{value:g}"
-    places = 2 - math.floor(math.log10(abs(value)))
-    if places > 6:
-        return f"{value:.2g}"
-    return f"{value:,.{max(places, 0)}f}"
-
-
-def percent(value: float) -> str:
-    """A percentage of a diameter, two digits."""
-    return f"{100 * value:.2g}" if value < 1 else f"{100 * value:.0f}"
 
 
 def _value(value: Any) -> str:

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import click
 from rich.console import Console
-from rich.table import Table
 
 from ... import scenes
 from ...components import AABBCollider, SphereCollider
@@ -21,6 +20,7 @@ from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from ..reporting.progress import Bar
+from ..reporting.text import TextTable
 from .loading import Loaded, load, stdout_kept_clean
 from .options import traceback_option
 from .portable import compile_portable, copy_used
@@ -146,13 +146,8 @@ def _clear(folder: Path, as_json: bool) -> None:
 
 def _print(rows: list[Row], folder: Path, before: tuple[int, int], after: tuple[int, int]) -> None:
     console = Console()
-    table = Table(box=None, pad_edge=False)
-    table.add_column("needed by", style="bold")
-    for heading in ("compiled", "in the cache already", "seconds"):
-        table.add_column(heading, justify="right")
-    for row in rows:
-        table.add_row(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}")
-    console.print(table)
+    cells = [(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}") for row in rows]
+    TextTable("", ("needed by", "compiled", "in the cache already", "seconds"), cells).show()
     variants: dict[str, list[float]] = {}  # seconds by kernel name: variants differ in shapes and dimensions
     for kernel, seconds in (item for row in rows for item in row.compiled):
         variants.setdefault(kernel, []).append(seconds)

@@ -21,7 +21,7 @@ from ..jobs.runs import Runs
 from ..plain import jsonable
 from ..plugins.installed import plugin_named
 from ..reporting.progress import Bar, Progress
-from ..wording import number
+from ..reporting.text import number
 from .outcome import StepOutcome, outcome_of_steps
 from .step_length import StepLimits, step_limits
 

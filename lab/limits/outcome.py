@@ -12,10 +12,10 @@ from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
 from ..measure.effects import SHARE, in_words, names_told, noticed
 from ..plain import Plain, jsonable
+from ..reporting.text import counted, metres, number
 from ..trading.records import CaseTrade, Cell, Point, known_well
 from ..trading.report import failures
 from ..trading.trade import measured
-from ..wording import counted, metres, number
 
 STEPS = (8, 4, 2, 1, 1 / 2, 1 / 4, 1 / 8)  # of the scene's own, as long as they are steps of a game
 LONGEST = 1 / 10  # s

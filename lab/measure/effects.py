@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from ..reporting.text import metres
 from ..trading.records import CHAOTIC, RESTING
-from ..wording import metres
 from .norms import conserves, difference, distances, energy_scale, other_touches
 from .observation import Seen
 

@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgba_array
 from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
 from ..measure.paths import Traces
 from ..measure.run import Run, RunReport
-from ..wording import counted
+from ..reporting.text import counted
 from . import canvas
 from .canvas import Panel, Sheet
 from .marks import MOST_CONTACTS_3D, draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import click
 from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
 from ...framework import Plugin
 from ...framework.plugins.discovery import offers
@@ -13,7 +11,7 @@ from ..cli.group import Commands
 from ..cli.loading import stdout_kept_clean
 from ..cli.options import traceback_option
 from ..reporting.progress import Bar
-from ..wording import counted
+from ..reporting.text import TextTable, counted
 from .check import check_plugin
 from .findings import Report, Subject
 from .installed import needed_by, plugins_of
@@ -33,18 +31,14 @@ def plugins_command(context: click.Context) -> None:
     if not on_offer:
         click.echo("no installed package offers a plugin")
         return
-    table = Table(box=None, pad_edge=False)
-    for title, style in (("plugin", "bold"), ("version", ""), ("package", ""), ("adds", "")):
-        table.add_column(title, style=style, no_wrap=title in ("plugin", "version"))
+    rows = []
     for offer in on_offer:
         version, adds = offer.version, f"broken: {offer.problem}"
         if offer.plugin is not None:
             version = offer.plugin.version or offer.version
-            adds = _adds(offer.plugin)
-        if offer.plugin is not None and offer.problem:
-            adds = f"{offer.problem}; {adds}"
-        table.add_row(*map(escape, (offer.name, version, offer.package, adds)))
-    Console().print(table)
+            adds = f"{offer.problem}; {_adds(offer.plugin)}" if offer.problem else _adds(offer.plugin)
+        rows.append((offer.name, version, offer.package, adds))
+    TextTable("", ("plugin", "version", "package", "adds"), rows, words=4, left=(0,)).show()
 
 
 @plugins_command.command("check", short_help="Try a plugin with thousands of random and extreme inputs.")
@@ -72,19 +66,12 @@ def _adds(plugin: Plugin) -> str:
 
 
 def _print(report: Report, console: Console) -> None:
-    table = Table(box=None, pad_edge=False, title=f"plugin {escape(report.plugin)}", title_justify="left")
-    table.add_column("checked")
-    table.add_column("", justify="right")
-    table.add_column("inputs", justify="right")
-    table.add_column("result")
-    for subject in report.subjects:
-        table.add_row(
-            escape(f"{subject.kind} {subject.name}"),
-            f"{subject.dimensions}D" if subject.dimensions else "",
-            f"{subject.inputs:,}" if subject.inputs else "",
-            escape(_result(subject)),
-        )
-    console.print(table)
+    rows = [
+        (f"{subject.kind} {subject.name}", f"{subject.dimensions}D" if subject.dimensions else "",
+         f"{subject.inputs:,}" if subject.inputs else "", _result(subject))
+        for subject in report.subjects
+    ]  # fmt: skip
+    TextTable(f"plugin {report.plugin}", ("checked", "", "inputs", "result"), rows, left=(3,)).show()
     number = 0
     for subject in report.subjects:
         for finding in subject.findings:

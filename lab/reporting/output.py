@@ -13,7 +13,7 @@ from rich.console import Console
 
 from ..cli.options import writable_folder
 from ..cli.usage_errors import Problem
-from .text_tables import TextTable
+from .text import TextTable
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ class Output:
         else:
             console = Console()
             for table in tables:
-                table.show(console)
+                table.show()
+                console.print()
             for remark in remarks:
                 console.print(remark, style="dim", highlight=False)
 

@@ -7,27 +7,25 @@ import re
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from ...framework.schedule.profile_report import Stats
 from ..measure.run import Drift, RunReport
-from ..wording import counted, number
+from .text import NOTHING, TextTable, counted, number
 
-GOOD, WARNING = "green", "bold yellow"
+WARNING = "bold yellow"
 FAULTS_SHOWN = 3
 AT_REST = 1e-2  # of the energy: a smaller kinetic energy is no scale for a drift
 
 
 def print_report(report: RunReport, console: Console, profile: Stats | None = None) -> None:
     """Print the tables: settings, cost by system, the profile by kernel if there is one, and accuracy."""
+    console.print(f"\n{summary(report)}\n", highlight=False, markup=False)
+    cost(report).show()
     console.print()
-    console.print(summary(report))
-    console.print(cost(report))
     if profile is not None:
         console.print(f"{profile}\n", highlight=False, markup=False, soft_wrap=True)
         console.print(f"not in it: {report.compile_seconds:.3g} s for the steps that compiled or loaded kernels\n")
-    console.print(quality(report))
+    quality(report).show()
     for line in fault_lines(report.faults):
         console.print(f"! {line}", style=WARNING, highlight=False)
 
@@ -47,76 +45,59 @@ def fault_lines(faults: list[str]) -> list[str]:
     return [*lines, f"and {counted(others, 'other fault')}"] if others else lines
 
 
-def summary(report: RunReport) -> Text:
+def summary(report: RunReport) -> str:
+    """Bodies, steps, times and the choice of settings, in three lines."""
     kinds = [f"{report.bodies[kind]:,} {kind}" for kind in ("dynamic", "kinematic", "static") if report.bodies[kind]]
-    choice = {k: report.settings[k] for k in ("integrator", "collision", "substeps") if k in report.settings}
-    text = Text()
-    text.append(report.scene, style="bold")
-    text.append(f"  {report.dimensions}D, {', '.join(kinds) or 'no bodies'}\n")
-    text.append(
-        f"{counted(report.steps, 'step')} of {number(report.settings['dt'])} s = {report.simulated_seconds:.4g} s"
-        f" in {report.wall_seconds:.3g} s"
-    )
-    if report.kernels_compiled:
-        text.append(f" ({report.compile_seconds:.3g} s of it compiling {counted(report.kernels_compiled, 'kernel')})")
-    elif report.kernels_loaded:
-        text.append(f" ({report.compile_seconds:.3g} s of it loading {counted(report.kernels_loaded, 'kernel')})")
-    text.append(f"\n{', '.join(f'{name} {value}' for name, value in choice.items())}, seed {report.seed}\n")
-    return text
+    choice = [f"{name} {report.settings[name]}" for name in ("integrator", "collision", "substeps")]
+    took = f"{report.simulated_seconds:.4g} s in {report.wall_seconds:.3g} s"
+    kernels = report.kernels_compiled or report.kernels_loaded
+    if kernels:
+        doing = "compiling" if report.kernels_compiled else "loading"
+        took += f" ({report.compile_seconds:.3g} s of it {doing} {counted(kernels, 'kernel')})"
+    return "\n".join([
+        f"{report.scene}  {report.dimensions}D, {', '.join(kinds) or 'no bodies'}",
+        f"{counted(report.steps, 'step')} of {number(report.settings['dt'])} s = {took}",
+        f"{', '.join(choice)}, seed {report.seed}",
+    ])  # fmt: skip
 
 
-def milliseconds(value: float) -> str:
-    """A dash for a value that was not measured, because every step compiled or loaded kernels."""
-    return f"{max(value, 0.0):.4f}" if math.isfinite(value) else "-"
-
-
-def cost(report: RunReport) -> Table:
-    """Milliseconds per step by system."""
-    table = Table(title="time per step", title_justify="left", title_style="bold")
-    table.add_column("system")
-    table.add_column("ms per step", justify="right")
-    table.add_column("share", justify="right")
+def cost(report: RunReport) -> TextTable:
+    """Milliseconds per step by system; a dash where every step compiled or loaded kernels."""
     total = report.step_milliseconds_mean
     rest = total - sum(report.system_milliseconds.values())
-    for name, mean in {**report.system_milliseconds, "everything else": rest}.items():
+    rows = []
+    for name, mean in {**report.system_milliseconds, "everything else": rest, "whole step (mean)": total}.items():
         share = f"{100 * mean / total:.0f} %" if total > 0 else ""
-        table.add_row(name, milliseconds(mean), share)
-    table.add_section()
-    table.add_row("whole step (mean)", milliseconds(total), "", style="bold")
-    return table
+        rows.append((name, f"{max(mean, 0.0):.4f}" if math.isfinite(mean) else NOTHING, share))
+    return TextTable("time per step", ("system", "ms per step", "share"), rows)
 
 
-def quality(report: RunReport) -> Table:
+def quality(report: RunReport) -> TextTable:
     """Contacts, drift, overlap, escapes."""
-    table = Table(title="what happened", title_justify="left", title_style="bold", show_header=False)
-    table.add_column("quantity")
-    table.add_column("value", justify="right")
-    table.add_column("remark", style="dim")
     contacts = report.contacts
-    table.add_row("bodies", f"{report.bodies['total']:,}", "")
-    table.add_row(
-        "contacts",
-        f"{contacts['end']:,}",
-        f"at the end; {contacts['mean']:.4g} per step, at most {contacts['most']:,}",
-    )
+    per_step = f"at the end; {contacts['mean']:.4g} per step, at most {contacts['most']:,}"
     bounced = "in all" if contacts["impacts"] or not contacts["most"] else "nothing bounced"
-    table.add_row("impacts", f"{contacts['impacts']:,}", bounced)
+    rows = [
+        ("bodies", f"{report.bodies['total']:,}", ""),
+        ("contacts", f"{contacts['end']:,}", per_step),
+        ("impacts", f"{contacts['impacts']:,}", bounced),
+    ]
     if report.energy:
-        table.add_row(*_energy_row(report.energy, report.energy_changes))
+        rows.append(_energy_row(report.energy, report.energy_changes))
     if report.momentum and not math.isfinite(report.momentum.relative):
-        table.add_row("momentum drift", "not representable", "momentum overflows")
+        rows.append(("momentum drift", "not representable", "momentum overflows"))
     elif report.momentum and report.momentum_conserved:
         remark = _drift_remark(report.momentum, "all mass times speed")
-        table.add_row("momentum drift", f"{100 * report.momentum.relative:.3g} %", remark)
+        rows.append(("momentum drift", f"{100 * report.momentum.relative:.3g} %", remark))
     step = f"in step {report.deepest_overlap_step:,}" if report.deepest_overlap_step else ""
-    table.add_row("deepest overlap", f"{report.deepest_overlap:.4g}", step)
+    rows.append(("deepest overlap", f"{report.deepest_overlap:.4g}", step))
     outside, broken = report.escaped["outside"], report.escaped["non_finite"]
     parts = [f"{outside:,} beyond the walls"] * bool(outside) + [f"{broken:,} not finite"] * bool(broken)
-    table.add_row("escaped bodies", f"{outside + broken:,}", ", ".join(parts), style=WARNING if parts else GOOD)
+    rows.append(("escaped bodies", f"{outside + broken:,}", ", ".join(parts)))
     for name, values in report.compared.items():
         place = ", ".join(f"{value:.4g}" for value in values)
-        table.add_row(name, "none" if any(map(math.isnan, values)) else f"({place})" if len(values) > 1 else place, "")
-    return table
+        rows.append((name, "none" if any(map(math.isnan, values)) else f"({place})" if len(values) > 1 else place, ""))
+    return TextTable("what happened", ("", "", ""), rows, left=(2,))
 
 
 def _energy_row(energy: Drift, changes: list[str]) -> tuple[str, str, str]:

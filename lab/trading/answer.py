@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from ..cases.case import Case
 from ..measure.effects import in_words, severity, told
-from ..wording import compact, counted, metres
+from ..reporting.text import compact, counted, metres
 from .records import RESTING, TRUSTED, CaseTrade, Cell, Point, Reference
 from .report import failures
 

@@ -21,7 +21,7 @@ from matplotlib.lines import Line2D
 from ..cli.usage_errors import Problem
 from ..pictures import canvas
 from ..pictures.curve_styles import Style, styles
-from ..wording import compact, number
+from ..reporting.text import compact, number
 from .records import FAILURES, NOT_FINITE, TRUSTED, CaseTrade, Curve, ErrorBar, Point, Trade
 from .report import check_norm, error_heading, measured, norm_of, order
 

@@ -33,7 +33,7 @@ from ..jobs import cluster as clusters
 from ..jobs.result_store import Store
 from ..reporting.output import Output, drawing_module
 from ..reporting.progress import Bar
-from ..wording import counted
+from ..reporting.text import counted
 from .answer import Target, answer, recommended
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade

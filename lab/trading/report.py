@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from ..bench.results import machine_line
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
-from ..reporting.text_tables import TextTable
-from ..wording import NOTHING, compact, number
+from ..reporting.text import NOTHING, TextTable, compact, number
 from .code_line import python_line
 from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade, known_well
 

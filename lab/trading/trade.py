@@ -20,7 +20,7 @@ from ..jobs.workers import Workers
 from ..measure.norms import NORMS, check_norm, norm_of
 from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
-from ..wording import counted
+from ..reporting.text import counted
 from .answer import Target, clearly_worse, next_choice, price, recommended
 from .code_line import python_line
 from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order

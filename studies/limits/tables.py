@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from carom.lab.reporting.text_tables import TextTable
-from carom.lab.wording import NOTHING
+from carom.lab.reporting.text import NOTHING, TextTable
 
 from ..runner import Line, Result
 from . import contacts, motion

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from carom.lab.bench.report import digits
 from carom.lab.measure.timing import Spread
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import NOTHING, TextTable, compact
 from carom.lab.trading import code_line
-from carom.lab.wording import NOTHING
 
 from ..runner import Line, Result, Sample
 from .fields import VARIED, Varied
@@ -75,7 +73,7 @@ def meanings(studied: list[tuple[Varied, Line]]) -> TextTable:
         rows.append((
             varied.field,
             varied.scene,
-            digits(1e3 * default_of(line).figures["seconds"].median),
+            compact(1e3 * default_of(line).figures["seconds"].median),
             ", ".join(f"{name}={source(name, of)}" for name, of in varied.others.items()) or NOTHING,
             said.get(varied.words, varied.words),
         ))  # fmt: skip
@@ -86,7 +84,7 @@ def meanings(studied: list[tuple[Varied, Line]]) -> TextTable:
 
 def ratio(of: float) -> str:
     """Two decimals, because ratios are compared with 1."""
-    return f"{of:.2f}" if of < 10 else digits(of)
+    return f"{of:.2f}" if of < 10 else compact(of)
 
 
 def source(field: str, of: Any) -> str:
@@ -95,7 +93,7 @@ def source(field: str, of: Any) -> str:
 
 
 def _amount(amount: float, unit: str) -> str:
-    text = f"{amount:.0f}" if amount == round(amount) and abs(amount) < 1e6 else digits(amount)
+    text = f"{amount:.0f}" if amount == round(amount) and abs(amount) < 1e6 else compact(amount)
     if 0 < abs(amount) < ROUNDING:
         text = f"< {ROUNDING:g}"
     return f"{text} {unit}".strip()

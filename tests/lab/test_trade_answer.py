@@ -9,9 +9,9 @@ import pytest
 
 from carom.lab.measure.effects import in_words, noticed, severity
 from carom.lab.measure.timing import Spread
+from carom.lab.reporting.text import metres
 from carom.lab.trading.answer import answer, clearly_worse, recommended
 from carom.lab.trading.records import Cell, ErrorBar, Point
-from carom.lab.wording import metres
 
 OWN = Cell(1 / 60)
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from carom.framework import Settings
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.reporting.text_tables import TextTable
+from carom.lab.reporting.text import TextTable
 from carom.lab.trading import report as trade_report
 from carom.lab.trading.code_line import python_line, seconds, settings_line
 from carom.lab.trading.files import COLUMNS, write_csv, write_json
