@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import types
-import typing
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
@@ -27,12 +25,11 @@ def preset(name: str) -> Settings:
 def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
     """``["dt=1/120", "substeps=8"]`` as field values of the right types; Problem for anything else."""
     fields = {field.name: field for field in dataclasses.fields(Settings)}
-    hints = typing.get_type_hints(Settings)
     texts = assigned("--set", "field=value", assignments)
     for name in texts:
         if name not in fields:
             raise Problem(f"Settings has no field {name!r}{did_you_mean(name, fields)}")
-    return {name: _parse(name, text, hints[name]) for name, text in texts.items()}
+    return {name: _parse(name, text, str(fields[name].type)) for name, text in texts.items()}
 
 
 def assigned(option: str, form: str, assignments: Iterable[str]) -> dict[str, str]:
@@ -75,40 +72,27 @@ def apply(settings: Settings, values: dict[str, Any]) -> Settings:
         raise Problem(f"--set: {one_line(error)}") from error
 
 
-def _parse(name: str, text: str, hint: Any) -> Any:
-    """``text`` as the first of the hint's types that accepts it."""
-    kinds = _kinds(hint)
-    words: dict[str, Any] = {str(word): word for kind in kinds for word in typing.get_args(kind)}  # of Literals
-    if text in words:
-        return words[text]
-    readers = [READERS[kind] for kind in READERS if kind in kinds]
+def _parse(name: str, text: str, kinds: str) -> Any:
+    """``text`` as the first of the kinds, as in "float | None", that accepts it."""
+    readers = [READERS[kind] for kind in READERS if kind in kinds.split(" | ")]
     for read, _ in readers:
         try:
             return read(text)
         except (ValueError, KeyError, ZeroDivisionError):
             continue
-    if words:
-        raise Problem(f"--set {name}: no choice {text!r}{did_you_mean(text, words)}")
     raise Problem(f"--set {name} takes {' or '.join(what for _, what in readers)}, not {text!r}")
 
 
-def _kinds(hint: Any) -> list[Any]:
-    """The members of a union, flattened."""
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        return [kind for member in typing.get_args(hint) for kind in _kinds(member)]
-    return [hint]
-
-
-def _number(text: str) -> float:
+def real_number(text: str) -> float:
     """1/120 is an exact time step."""
     return float(Fraction(text.replace(" ", ""))) if "/" in text else float(text)
 
 
 # How each type is read, and what it is called; the first that accepts a text has it.
-READERS: dict[Any, tuple[Callable[[str], Any], str]] = {
-    int: (int, "a whole number"),
-    float: (_number, "a number"),
-    bool: (lambda text: BOOLEANS[text.lower()], "true or false"),
-    type(None): (lambda text: {"none": None}[text.lower()], "none"),
-    str: (str, "a word"),
+READERS: dict[str, tuple[Callable[[str], Any], str]] = {
+    "int": (int, "a whole number"),
+    "float": (real_number, "a number"),
+    "bool": (lambda text: BOOLEANS[text.lower()], "true or false"),
+    "None": (lambda text: {"none": None}[text.lower()], "none"),
+    "str": (str, "a word"),
 }

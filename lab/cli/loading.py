@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import dataclasses
 import hashlib
 import importlib.machinery
 import importlib.util
 import inspect
+import symtable
 import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
@@ -56,7 +56,7 @@ class Loaded:
         chosen = settings
         if settings is None:
             settings = self.settings
-        brought = {name for plugin in plugins for name in _names_for_settings(plugin)}
+        brought = {name for each in plugins for name in (*each.integrators, *each.broad_phases, *each.mixing_rules)}
         late = {field: value for field, value in changes.items() if value in brought}
         early = {field: value for field, value in changes.items() if field not in late}
         if early:
@@ -84,7 +84,8 @@ class Loaded:
         with self.attribute_errors(), stdout_kept_clean():
             world = self._own_world(seed) if settings is None else self.function(settings, seed=seed)
         if not isinstance(world, World):
-            raise Problem(f"{self.name}: build returned {_a(world)}, not a World")
+            what = "nothing (None)" if world is None else f"a {type(world).__name__}"
+            raise Problem(f"{self.name}: build returned {what}, not a World")
         if world.dimensions is None:
             raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
         return world
@@ -161,11 +162,6 @@ def _what_is_ignored(found: Settings, chosen: Settings | None, changes: dict[str
     return None
 
 
-def _names_for_settings(plugin: Plugin) -> list[str]:
-    """The names that a world's settings accept once it has the plugin."""
-    return [*plugin.integrators, *plugin.broad_phases, *plugin.mixing_rules]
-
-
 def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:
     """Redirect prints of user code to stderr, so that stdout holds only the result."""
     return contextlib.redirect_stdout(sys.stderr)
@@ -196,7 +192,7 @@ def import_file(path: Path) -> ModuleType:
 
 def _must_exist(path: Path) -> None:
     if not path.exists():
-        siblings = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
+        siblings = [p.name for p in path.parent.glob("*.py")]
         hint = did_you_mean(path.name, siblings) if siblings else ""
         raise Problem(f"no file {str(path)!r}{hint if 'mean' in hint else ''}")
     if not path.is_file():
@@ -224,33 +220,16 @@ def _load_file(path: Path) -> Loaded:
 def _check_source(path: Path) -> None:
     """Problem for a file without a build; such a file is not executed, since it may be a whole game."""
     try:
-        tree = ast.parse(path.read_bytes(), str(path))
+        source = path.read_bytes()
+        module = symtable.symtable(source.decode(errors="replace"), str(path), "exec")
     except SyntaxError as error:
         raise Problem(f"{path.name}, line {error.lineno}: {error.msg}") from error
     except (OSError, ValueError) as error:
         raise Problem(f"{path.name}: {one_line(error)}") from error
-    functions, names = [], set()
-    for node in _top_level(tree.body):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
-            functions.append(node.name)
-        elif isinstance(node, (ast.Import, ast.ImportFrom)):
-            names |= {alias.asname or alias.name for alias in node.names}
-        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
-            names |= {name.id for name in ast.walk(node) if isinstance(name, ast.Name)}
-    if not {"build", "*"} & {*functions, *names}:
-        hint = did_you_mean("build", functions) if functions else ""
+    names = [symbol.get_name() for symbol in module.get_symbols() if symbol.is_assigned() or symbol.is_imported()]
+    if "build" not in names and b"import *" not in source:
+        hint = did_you_mean("build", names) if names else ""
         raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
-
-
-def _top_level(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a module, including those under its ``if``, ``try`` and ``with``."""
-    for node in body:
-        yield node
-        if isinstance(node, (ast.If, ast.Try, ast.With)):
-            inner = [getattr(node, part, []) for part in ("body", "orelse", "finalbody")]
-            inner += [handler.body for handler in getattr(node, "handlers", [])]
-            for part in inner:
-                yield from _top_level(part)
 
 
 def _seconds_of(path: Path, module: Any) -> float | None:
@@ -313,26 +292,13 @@ def _check_signature(path: Path, function: Any) -> None:
 
 
 def _line_in(file: Path | None, error: BaseException) -> str:
-    """`, line 12`: the last line of the user's file in the traceback of the error or its cause; else empty."""
-    if file is None:
-        return ""
-    seen: set[int] = set()
-    chain: list[BaseException] = []
-    step: BaseException | None = error
-    while step is not None and id(step) not in seen:
-        seen.add(id(step))
-        chain.append(step)
-        step = step.__cause__ or step.__context__
-    for link in reversed(chain):  # the first cause is the most precise
-        lines = [
-            frame.lineno
-            for frame in traceback.extract_tb(link.__traceback__)
-            if frame.filename and Path(frame.filename).resolve() == file
-        ]
-        if lines:
-            return f", line {lines[-1]}"
-    return ""
-
-
-def _a(value: Any) -> str:
-    return "nothing (None)" if value is None else f"a {type(value).__name__}"
+    """`, line 12`: the last line of the user's file in the traceback of the error or its first cause; else empty."""
+    links: list[BaseException] = []
+    link: BaseException | None = error
+    while link is not None and link not in links:
+        links.insert(0, link)  # the first cause is the most precise
+        link = link.__cause__ or link.__context__
+    frames = (reversed(traceback.extract_tb(link.__traceback__)) for link in links if file is not None)
+    lines = (frame.lineno for some in frames for frame in some if Path(frame.filename or ".").resolve() == file)
+    line = next(lines, None)
+    return f", line {line}" if line is not None else ""

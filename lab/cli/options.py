@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections.abc import Callable, Iterable
@@ -11,17 +12,13 @@ from typing import Any
 import click
 
 from ..cases.grid import COLLISIONS
-from .choices import assigned, parse_assignments, preset
+from .choices import assigned, parse_assignments, preset, real_number
 from .usage_errors import Problem, did_you_mean
 
 GEOMETRIES = ("precise", "bounds")
 WORDS = "carom.words"  # key for the words of a command line: see KeepsWords
 
 Option = Callable[[Any], Any]
-
-
-class NameProblem(Problem):
-    """An unknown name in a list."""
 
 
 def together(*options: Option) -> Option:
@@ -67,16 +64,14 @@ def above_zero(option: str, what: str = "a number above 0", zero: bool = False) 
 
 def listed(option: str, what: str, read: Callable[[str], Any]) -> Callable[[Any, Any, str | None], Any]:
     """A callback for click that reads "a,b" as a tuple, each value once; Problem for a word that ``read`` refuses by a
-    ValueError or a Problem. what: the values, for the message."""
+    ValueError. what: the values, for the message."""
 
     def values(context: click.Context, parameter: click.Parameter, text: str | None) -> tuple[Any, ...] | None:
         if text is None:
             return None
         try:
             found = tuple(dict.fromkeys(read(word) for part in text.split(",") if (word := part.strip())))
-        except NameProblem:
-            raise
-        except (ValueError, Problem):
+        except (ValueError, ZeroDivisionError):
             found = ()
         if not found:
             raise Problem(f"{option} takes {what} with commas between them, not {text!r}")
@@ -98,7 +93,7 @@ def one_of(option: str, known: Iterable[str]) -> Callable[[str], str]:
 
     def read(word: str) -> str:
         if word not in names:
-            raise NameProblem(f"{option}: no {word!r}{did_you_mean(word, names)}")
+            raise Problem(f"{option}: no {word!r}{did_you_mean(word, names)}")
         return word
 
     return read
@@ -163,7 +158,7 @@ def writable_folder(folder: Path, value: Path | None = None, option: str = "--ou
 
 def _step(text: str) -> float:
     """"1/60" as seconds."""
-    step = float(parse_assignments([f"dt={text}"])["dt"])
+    step = real_number(text)
     if not (math.isfinite(step) and step > 0):
         raise ValueError
     return step
@@ -177,12 +172,10 @@ def _build_options(assignments: tuple[str, ...]) -> dict[str, Any]:
     return {name: _number_or_word(text) for name, text in texts.items()}
 
 
-def _number_or_word(text: str) -> int | float | str:
+def _number_or_word(text: str) -> Any:
     for kind in (int, float):
-        try:
+        with contextlib.suppress(ValueError):
             return kind(text)
-        except ValueError:
-            continue
     return text
 
 

@@ -10,8 +10,9 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 BACKGROUND = "#0d1117"
 PANEL = "#10161f"
@@ -65,7 +66,6 @@ class Sheet:
 
     figure: Figure
     panels: list[Panel]
-    footer: Any
 
     @classmethod
     @styled
@@ -76,19 +76,12 @@ class Sheet:
         ratios = [float(np.clip(span[0] / span[1], 1 / LONGEST_RATIO, LONGEST_RATIO)) for span in spans]
         height = max(SHORTEST, min(long_side, *(long_side / ratio for ratio in ratios)))
         widths = [max(height * ratio, SHORTEST) for ratio in ratios]
-        total_width = sum(widths) + GAP * (len(views) - 1) + 2 * MARGIN
-        total_height = height + HEADER + FOOTER
-        figure = Figure(figsize=(total_width, total_height))
+        size = np.array([sum(widths) + GAP * (len(views) - 1) + 2 * MARGIN, height + HEADER + FOOTER])
+        figure = Figure(figsize=tuple(size))
         FigureCanvasAgg(figure)
-
-        def place(left: float, bottom: float, width: float, height: float) -> Any:
-            """Axes at a position in inches."""
-            scale = np.array([total_width, total_height, total_width, total_height])
-            return figure.add_axes(tuple(np.array([left, bottom, width, height]) / scale))
-
-        panels, left = [], MARGIN
+        sheet, left = cls(figure, []), MARGIN
         for number, ((lower, upper), span, width) in enumerate(zip(views, spans, widths, strict=True)):
-            axes = place(left, FOOTER, width, height)
+            axes = figure.add_axes((left / size[0], FOOTER / size[1], width / size[0], height / size[1]))
             unit = min(width / span[0], height / span[1])  # inches per unit of space
             middle, half = (lower + upper) / 2, np.array([width, height]) / unit / 2
             axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
@@ -96,45 +89,33 @@ class Sheet:
             axes.tick_params(labelsize=7, length=2, pad=2)
             if number or not numbered:
                 axes.tick_params(labelbottom=False, labelleft=False, length=0)
-            panels.append(Panel(axes, 72 * unit))
+            sheet.panels.append(Panel(axes, 72 * unit))
             left += width + GAP
-        header = place(0, total_height - HEADER, total_width, HEADER)
-        footer = place(0, 0, total_width, FOOTER)
-        for strip, strip_height in ((header, HEADER), (footer, FOOTER)):
-            strip.set_axis_off()
-            strip.set_xlim(0, total_width)
-            strip.set_ylim(0, strip_height)
-        header.text(MARGIN, 0.54, title, color=TEXT, fontsize=17, fontweight="bold", va="center")
-        header.text(MARGIN, 0.21, subtitle, color=MUTED, fontsize=9.5, va="center")
-        return cls(figure, panels, footer)
+        sheet.write(MARGIN, size[1] - HEADER + 0.54, title, color=TEXT, fontsize=17, fontweight="bold")
+        sheet.write(MARGIN, size[1] - HEADER + 0.21, subtitle, color=MUTED, fontsize=9.5)
+        return sheet
 
-    @property
-    def width(self) -> float:
-        return float(self.footer.get_xlim()[1])
+    def write(self, x: float, y: float, text: str, **style: Any) -> None:
+        """Text that begins so many inches from the lower left corner."""
+        width, height = self.figure.get_size_inches()
+        self.figure.text(x / width, y / height, text, va="center", **style)
 
+    @styled
     def legend(self, entries: list[tuple[str, str, str]]) -> None:
-        """Entries right-aligned in the footer: (marker, colour, text); a matplotlib marker or '->'."""
-        right = self.width - MARGIN
-        for marker, colour, text in reversed(entries):
-            label = self.footer.text(right, 0.3, text, color=MUTED, fontsize=8.5, ha="right", va="center")
-            box = label.get_window_extent(self.figure.canvas.get_renderer())  # type: ignore[attr-defined]
-            right -= box.width / DPI + 0.13
-            if marker == "->":
-                arrow = {"arrowstyle": "->", "color": colour, "lw": 1.3}
-                self.footer.annotate("", xy=(right + 0.05, 0.3), xytext=(right - 0.22, 0.3), arrowprops=arrow)
-                right -= 0.22
-            else:
-                self.footer.plot([right], [0.3], marker=marker, color=colour, ms=5, mec="none", ls="none")
-            right -= 0.3
+        """Entries at the right of the footer: a matplotlib marker, its colour, a text."""
+        handles = [Line2D([], [], ls="", marker=marker, color=colour, label=text, ms=9 if "$" in marker else 5)
+                   for marker, colour, text in entries]  # fmt: skip
+        self.figure.legend(handles=handles, loc="lower right", ncols=len(handles) or 1, frameon=False, fontsize=8.5,
+                           labelcolor=MUTED, handletextpad=0.2)  # fmt: skip
 
     def speed_scale(self, norm: Normalize) -> None:
         """The colour bar of the speed, at the left of the footer."""
-        width, height = self.width, float(self.figure.get_size_inches()[1])
+        width, height = self.figure.get_size_inches()
         axes: Any = self.figure.add_axes((MARGIN / width, 0.34 / height, 2.0 / width, 0.09 / height))
         bar = self.figure.colorbar(ScalarMappable(norm, SPEED), cax=axes, orientation="horizontal")
         bar.outline.set_visible(False)  # type: ignore[operator]
         axes.tick_params(colors=MUTED, labelsize=7, length=2, pad=1)
-        self.footer.text(MARGIN + 2.12, 0.385, "speed", color=MUTED, fontsize=8.5, va="center")
+        self.write(MARGIN + 2.12, 0.385, "speed", color=MUTED, fontsize=8.5)
 
     def pixels(self, dpi: int) -> np.ndarray:
         """The picture as (height, width, 3) bytes."""
@@ -155,9 +136,8 @@ def speed_norm(speeds: np.ndarray) -> Normalize:
     return Normalize(0.0, top or 1.0, clip=True)
 
 
-def mixed(colours: np.ndarray, other: str, share: np.ndarray) -> np.ndarray:
-    """RGBA ``colours`` (n, 4) moved towards ``other`` by ``share`` (n) between 0 and 1."""
-    target = np.array([int(other[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+def mixed(colours: np.ndarray, other: str, share: Any) -> np.ndarray:
+    """RGBA ``colours`` (..., 4) moved towards ``other`` by ``share`` (...) between 0 and 1."""
     result = np.array(colours, float)
-    result[:, :3] += (target - result[:, :3]) * np.asarray(share)[:, None]
+    result[..., :3] += (np.array(to_rgb(other)) - result[..., :3]) * np.asarray(share)[..., None]
     return result

@@ -50,8 +50,6 @@ def draw_bodies(panel: Panel, bodies: Shapes, colours: Floats, projection: Proje
     outline = 0.7 if bodies.typical_diameter * panel.points > OUTLINED else 0.0
     if projection.flat:
         _draw_flat(panel, bodies, colours, canvas.PANEL, outline, zorder)
-    elif bodies.round.all():
-        _draw_balls(panel, bodies, colours, projection, outline, zorder)
     else:
         _draw_solids(panel, bodies, colours, projection, outline, zorder)
 
@@ -77,35 +75,13 @@ def draw_sensors(panel: Panel, sensors: Shapes, projection: Projection, colour: 
         _lines(panel, segments, colors=edge_colours, **dashed)
 
 
-def _draw_balls(
-    panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
-) -> None:
-    places, magnification, depth = projection.plane(bodies.centre)
-    order = np.argsort(depth, kind="stable")
-    size = bodies.half.max(axis=1) * magnification
-    shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
-    light = canvas.mixed(shade, "#ffffff", np.full(len(shade), 0.35))
-    edge = canvas.mixed(shade, canvas.BACKGROUND, np.full(len(shade), 0.6))
-    # Each ball with its highlight in turn, so that a nearer ball covers both.
-    highlight = places + size[:, None] * (-0.3, 0.33)
-    width = np.stack([2 * size, 0.7 * size], axis=1)[order].reshape(-1)
-    _ellipses(
-        panel,
-        np.stack([places, highlight], axis=1)[order].reshape(-1, 2),
-        width,
-        facecolors=np.stack([shade, light], axis=1)[order].reshape(-1, 4),
-        edgecolors=np.stack([edge, light], axis=1)[order].reshape(-1, 4),
-        linewidths=0.4 if outline else 0.15,
-        zorder=zorder,
-    )
-
-
 def _draw_solids(
     panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
 ) -> None:
-    """Balls and boxes as polygons in one list, painted from far to near."""
+    """Balls and boxes as polygons in one list, painted from far to near; balls with a highlight."""
     places, magnification, depth = projection.plane(bodies.centre)
     shade = canvas.mixed(colours, canvas.BACKGROUND, 0.75 * (1 - depth))
+    light = canvas.mixed(shade, "#ffffff", np.full(len(shade), 0.35))
     circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     polygons, fill, edge = [], [], []
     dark = to_rgba_array(canvas.BACKGROUND)[0]
@@ -113,17 +89,15 @@ def _draw_solids(
         if bodies.round[k]:
             size = bodies.half[k, 0] * magnification[k]
             polygons += [places[k] + size * circle, places[k] + size * (0.35 * circle + (-0.3, 0.33))]
-            light = canvas.mixed(shade[k : k + 1], "#ffffff", np.array([0.35]))[0]
-            fill += [shade[k], light]
-            edge += [dark, light]
+            fill += [shade[k], light[k]]
+            edge += [dark, light[k]]
             continue
         ends, _, _ = projection.plane(corners(bodies.lower[k], bodies.upper[k]))
         for axis, direction, rows in faces():
             seen_from = direction * (projection.camera[axis] - bodies.centre[k, axis])
             if seen_from > bodies.half[k, axis]:  # the camera is on this face's side
                 polygons.append(ends[rows])
-                dimmed = np.array([FACE_SHADE[axis]])
-                fill.append(canvas.mixed(shade[k : k + 1], canvas.BACKGROUND, dimmed)[0])
+                fill.append(canvas.mixed(shade[k], canvas.BACKGROUND, FACE_SHADE[axis]))
                 edge.append(dark)
     style: dict[str, Any] = {"linewidths": 0.6 * outline, "zorder": zorder}
     panel.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))

@@ -154,7 +154,7 @@ def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.Vie
     if part:
         sheet.panels[0].outline(*part)
 
-    legend = [("->", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
+    legend = [(r"$\rightarrow$", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
     if len(still.points) > 0 and (projection.flat or len(still.points) <= MOST_CONTACTS_3D):
         legend.append(("o", canvas.CONTACT, "contact"))
     sheet.legend(legend)

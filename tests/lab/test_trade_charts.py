@@ -9,8 +9,7 @@ import pytest
 
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.timing import Spread
-from carom.lab.pictures.curve_styles import FEW, styles
-from carom.lab.trading.charts import TIME, WORK, draw, figure, legend_text, quantities
+from carom.lab.trading.charts import FEW, TIME, WORK, draw, figure, legend_text, quantities, styles
 from carom.lab.trading.records import PYMUNK, Cell, Curve, ErrorBar, Point
 
 
