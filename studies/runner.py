@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from carom.framework import World
-from carom.lab.bench.results import machine
+from carom.lab.bench.report import machine
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.timing import Spread, no_garbage_collection, timed
 from carom.lab.plain import Plain

@@ -28,7 +28,7 @@ from ..measure.run import plain_settings
 from ..measure.timing import Spread, no_garbage_collection, timed
 from ..reporting.progress import NO_PROGRESS, Progress
 from .queries import Query, time_queries
-from .results import Result, Row, machine
+from .report import Result, Row, machine
 from .suite import Subject, Window, sizes_of
 
 CAROM = "carom"

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..pictures import canvas
-from .results import Result
+from .report import Result
 
 BAR = "#4dabf7"
 SLOWER = "#ff6b6b"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..cli.usage_errors import Problem
-from ..engines.cost import work_of
+from ..engines.adapters import work_of
 from ..measure.norms import MEAN, NORMS, OF_KIND, check_norm, norm_of
 from ..measure.observation import Seen
 from ..measure.survey import Each, Survey, one_by_one, survey

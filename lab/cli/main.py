@@ -20,7 +20,7 @@ COMMANDS = {
     "plan": LateCommand("cli.plan:plan_command", "Show what a step of a scene runs, and why."),
     "plugins": LateCommand("plugins.command:plugins_command", "List plugins, or check one."),
     "run": LateCommand("cli.run:run_command", "Run a scene or a file and show what happened."),
-    "scenes": LateCommand("cli.scenes:scenes_command", "List the scenes of the library."),
+    "scenes": LateCommand("cli.plan:scenes_command", "List the scenes of the library."),
     "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, and which settings to use."),
     "warm-up": LateCommand("cli.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
 }

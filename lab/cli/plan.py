@@ -1,4 +1,4 @@
-"""``carom plan``: the systems and kernels of a scene's step, and why they run."""
+"""``carom plan``: the systems and kernels of a scene's step, and why they run; ``carom scenes``: the library."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import Any
 
 import click
 
+from ... import scenes
 from ...framework import Settings
-from ..plugins.installed import plugin_named
+from ..plugins.command import plugin_named
+from ..reporting.text import TextTable
 from .loading import load, stdout_kept_clean
 from .options import traceback_option, world_options
 
@@ -25,3 +27,11 @@ def plan_command(
     with loaded.attribute_errors(), stdout_kept_clean():
         plan = str(world.plan())
     click.echo(plan)
+
+
+@click.command("scenes", short_help="List the scenes of the library.")
+def scenes_command() -> None:
+    """List the scenes of the library."""
+    known = map(scenes.get, scenes.names())
+    rows = [(scene.name, f"{scene.dimensions}D", f"{scene.seconds:g}", scene.description) for scene in known]
+    TextTable("", ("scene", "", "seconds", "what it is"), rows, left=(3,)).show()

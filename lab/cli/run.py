@@ -12,7 +12,7 @@ from rich.console import Console
 
 from ...framework import Settings
 from ..measure.run import Run, run
-from ..plugins.installed import plugin_named
+from ..plugins.command import plugin_named
 from ..reporting.output import drawing_module
 from ..reporting.progress import Bar
 from ..reporting.run_report import print_report

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import shutil
+import subprocess
+import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,13 +21,13 @@ from ... import scenes
 from ...components import AABBCollider, SphereCollider
 from ...framework import Settings, World
 from ...framework.compilation import log
-from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache
+from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache, used
+from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 from ..reporting.progress import Bar
 from ..reporting.text import TextTable
 from .loading import Loaded, load, stdout_kept_clean
 from .options import traceback_option
-from .portable import compile_portable, copy_used
 from .usage_errors import Problem
 
 # The plugins that ship and bring shapes.
@@ -164,3 +168,37 @@ def _print(rows: list[Row], folder: Path, before: tuple[int, int], after: tuple[
 
 def _megabytes(size: int) -> str:
     return f"{size / 1e6:.1f} MB"
+
+
+COPY = "CAROM_COPY_USED"  # in the environment of the process that compiles: where copies go
+
+
+def compile_portable(folder: Path, arguments: Sequence[str]) -> None:
+    """Put what ``carom warm-up ARGUMENTS`` needs, for any processor, into that folder; replace what it held.
+
+    What the cache folder holds already, made for any processor, is not compiled again.
+    """
+    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / INDEX).exists())):
+        raise Problem(f"{folder} holds other things: name a new folder for the kernels, or one made by --portable")
+    # numba decides for a processor when it is imported: another process.
+    environment = {
+        **os.environ, COPY: str(folder.absolute()), OFF: "0",
+        "NUMBA_CPU_NAME": PORTABLE[0], "NUMBA_CPU_FEATURES": PORTABLE[1],
+    }  # fmt: skip
+    done = subprocess.run([sys.executable, "-m", "carom", "warm-up", *arguments], env=environment)
+    if done.returncode:
+        raise click.exceptions.Exit(done.returncode)
+    write_index(folder, PORTABLE)
+    sizes = [file.stat().st_size for file in folder.iterdir()]
+    size = f"{sum(sizes) / 1e6:.1f} MB"
+    click.echo(f"{folder}: {len(sizes) - 1:,} kernels for any processor of this platform, {size}")
+
+
+def copy_used() -> None:
+    """In the process that compiles: leave copies of all kernels that were needed."""
+    wanted = os.environ.get(COPY)
+    if wanted:
+        shutil.rmtree(wanted, ignore_errors=True)
+        os.makedirs(wanted)
+        for file in sorted(used):
+            shutil.copyfile(file, os.path.join(wanted, file.name))

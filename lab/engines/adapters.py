@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...framework import World
-from ..measure.body_shapes import Floats, overlaps_of, sensor_entities, shapes_of
-from ..measure.escape import Enclosure
+from ..measure.body_shapes import Enclosure, Floats, overlaps_of, sensor_entities, shapes_of
 from ..measure.timing import timed
 from ..trading.records import PYMUNK
-from .cost import counts_of
 from .pymunk_space import PymunkSpace
 
 MOST_TOUCHES = 400  # pairs whose first contact is kept
@@ -284,3 +282,43 @@ def carried(values: Any, old: Any, new: Any, start: Any) -> Any:
 def engine_for(world: World, engine: str, iterations: int) -> Engine:
     """The engine of that name on ``world``, which it will close; iterations: of pymunk's solver."""
     return PymunkEngine(world, iterations) if engine == PYMUNK else CaromEngine(world)
+
+
+# -- cost ------------------------------------------------------------------------------------------------
+
+
+# ns each. A step runs Python code between kernels; an evaluation of forces calls each force system once.
+WEIGHTS: Mapping[str, float] = {
+    "steps": 50_000.0,
+    "force_evaluations": 10_000.0,
+    "body_steps": 10.0,
+    "candidates": 5.0,
+    "pairs": 10.0,
+    "impacts": 1_000.0,
+    "rounds": 50_000.0,
+    "solver_loops": 4.0,
+}
+
+
+def counts_of(world: World) -> dict[str, float]:
+    """The counts of a world since its creation, with the same substeps throughout.
+
+    steps, force_evaluations (sums over all bodies), body_steps, candidates of the broad phase, pairs tested, impacts,
+    rounds: how often candidates were searched again within a step.
+    """
+    counters = world.stats().counters
+    return {
+        "steps": float(world.step_count),
+        "force_evaluations": float(counters.get("force_evaluations", 0)),
+        "body_steps": float(counters.get("bodies", 0)),
+        "candidates": float(counters.get("candidates", 0)),
+        "pairs": float(counters.get("pairs", 0)),
+        "impacts": float(counters.get("impacts", 0)),
+        "rounds": float(counters.get("rounds", 0)),
+        "solver_loops": float(counters.get("resting_contacts", 0) * world.settings.substeps),
+    }
+
+
+def work_of(counts: Mapping[str, float]) -> float:
+    """The weighted sum of counts; per simulated second if the counts are."""
+    return sum(WEIGHTS[name] * count for name, count in counts.items() if name in WEIGHTS)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...framework import World
-from ..measure.body_shapes import Floats, overlaps_of
-from ..measure.escape import Enclosure
+from ..measure.body_shapes import Enclosure, Floats, overlaps_of
 
 
 class Quality:

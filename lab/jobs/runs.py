@@ -13,7 +13,7 @@ from typing import Any
 
 from ..cases.case import Case
 from ..cli.usage_errors import Problem
-from ..engines.cost import work_of
+from ..engines.adapters import work_of
 from ..measure.effects import at_worst, effects_of
 from ..measure.norms import NORMS, OF_KIND, conserves, distances, errors_of, failure_of, norm_of
 from ..measure.observation import Seen, mean_of

@@ -19,8 +19,7 @@ from ..engines.pymunk_space import NotPlainError
 from ..measure.norms import FAR
 from ..measure.observation import Seen, observe
 from ..measure.survey import nudge
-from ..measure.timing import timed
-from ..measure.told_in_results import faults_in_results
+from ..measure.timing import faults_in_results, timed
 from ..trading.records import CHAOTIC, PYMUNK, RESTING, STOPPED, Cell
 
 BRIEF, AWHILE, PASSES = 0.1, 0.2, (2, 12)  # s; passes of a run that is timed, at least and at most

@@ -133,3 +133,48 @@ def _depths(a: Shapes, b: Shapes) -> Floats:
     boxes = (a.half + b.half - apart).min(axis=1)
     depth = np.where(a.round & b.round, balls, np.where(a.round | b.round, ball_and_box, boxes))
     return depth / (2 * np.minimum(a.half, b.half).min(axis=1))
+
+
+# -- bodies that escaped ---------------------------------------------------------------------------------
+
+
+COVERED = 0.5
+ROUNDING = 1e-9  # relative to the coordinates: tolerance for the faces of adjacent walls of different sizes
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """The space inside the walls, up to their outer faces; infinite on a side without a wall."""
+
+    lower: Floats
+    upper: Floats
+
+    @classmethod
+    def around(cls, world: World) -> Enclosure:
+        """The enclosure of the dynamic bodies by the static boxes of ``world`` in its present state."""
+        dimensions = dimensions_of(world)
+        lower, upper = np.full(dimensions, -np.inf), np.full(dimensions, np.inf)
+        shapes = shapes_of(world)
+        bodies, walls = shapes.where(~shapes.static), shapes.where(shapes.static & ~shapes.round & ~shapes.sensor)
+        if len(bodies.entity) and len(walls.entity):
+            for axis in range(dimensions):
+                for sign, bounds in ((-1.0, lower), (1.0, upper)):
+                    inner = sign * walls.centre[:, axis] - walls.half[:, axis]
+                    outer = sign * walls.centre[:, axis] + walls.half[:, axis]
+                    beyond = inner >= (sign * bodies.centre[:, axis]).max()
+                    outermost = outer >= outer.max() - ROUNDING * np.abs(outer).max()
+                    if _covered(bodies, walls.where(beyond & outermost), axis) >= COVERED:
+                        bounds[axis] = sign * outer.max()
+        return cls(lower, upper)
+
+    def outside(self, positions: Floats) -> int:
+        """The number of finite ``positions`` (n, d) outside."""
+        return int(np.any((positions < self.lower) | (positions > self.upper), axis=1).sum())
+
+
+def _covered(bodies: Shapes, walls: Shapes, axis: int) -> float:
+    """The share of the bodies' extent across ``axis`` covered by walls; overlapping walls count twice."""
+    lower, upper = bodies.lower.min(axis=0), bodies.upper.max(axis=0)
+    span = np.minimum(walls.upper, upper) - np.maximum(walls.lower, lower)
+    share = np.clip(span, 0, None) / np.maximum(upper - lower, np.finfo(float).tiny)
+    return float(np.delete(share, axis, axis=1).prod(axis=1).sum())

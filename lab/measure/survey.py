@@ -24,8 +24,7 @@ from ..inputs import forget_asked, times_asked
 from ..trading.records import CHAOTIC, ESCAPED, IMPACTS, RESTING, SMOOTH
 from .norms import distances
 from .observation import Seen, mean_of, observe
-from .timing import now
-from .told_in_results import faults_in_results
+from .timing import faults_in_results, now
 
 NUDGE = 1e-10  # of the smallest body: the difference between the two starts
 SEEN = 0.01  # of the smallest body: where bodies come, what changes with so little cannot be followed

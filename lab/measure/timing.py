@@ -5,11 +5,13 @@ from __future__ import annotations
 import gc
 import statistics
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from ...framework import PhysicsWarning
 from ...framework.compilation import log
 from ..plain import Plain
 
@@ -60,3 +62,11 @@ class Spread(Plain):
     def of(cls, values: Sequence[float]) -> Spread:
         """From at least one value."""
         return cls(statistics.median(values), min(values), max(values), tuple(values))
+
+
+@contextmanager
+def faults_in_results() -> Iterator[None]:
+    """No warnings of faults meanwhile; a decorator, too."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PhysicsWarning)
+        yield

@@ -15,10 +15,9 @@ from ...framework.jit.late import errors
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics
 from ..cli.usage_errors import one_line
-from .findings import Finding, Report, Subject, row_shown
 from .kernels import RaisedError, SupportCode, compiler_message
 from .pair_checks import TOLERANCE, PairChecks
-from .samples import ORDINARY, Rows, directions, poses, rows
+from .samples import ORDINARY, Finding, Report, Rows, Subject, directions, poses, row_shown, rows
 
 BOXES = 400  # boxes given to a broad phase
 STEPS = 3

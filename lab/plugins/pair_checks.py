@@ -12,9 +12,8 @@ import numpy as np
 
 from ...framework.plugins.checks import plain
 from ...framework.plugins.registry import Pair, Shape
-from .findings import Subject, numbers_shown, pose_shown
 from .kernels import PairCode, RaisedError, Results, SupportCode
-from .samples import KINDS, Poses, directions
+from .samples import KINDS, Poses, Subject, directions, numbers_shown, pose_shown
 
 TOLERANCE, GENERIC = 1e-9, 2e-6
 UNIT = 1e-6  # tolerance of a normal's length

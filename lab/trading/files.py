@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..cli.usage_errors import Problem
-from ..engines.cost import WEIGHTS
+from ..engines.adapters import WEIGHTS
 from .records import CaseTrade, Curve, Point, Trade
 
 COLUMNS: dict[str, str] = {

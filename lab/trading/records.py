@@ -10,6 +10,7 @@ import math
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any, Self
 
 from ...framework import Settings
@@ -99,7 +100,7 @@ class Point(Plain):
         per simulated second, means over the repeats, the same on every machine: steps, force_evaluations, candidates,
         pairs, impacts, solver_loops
     work
-        weighted sum of the counts, see :mod:`carom.lab.engines.cost`; per simulated second
+        weighted sum of the counts, see :mod:`carom.lab.engines.adapters`; per simulated second
     milliseconds
         time per simulated second on this machine; None if it was not timed
     effects
@@ -278,3 +279,52 @@ def by_method(points: Iterable[Point]) -> Mapping[Cell, list[Point]]:
     for point in points:
         curves.setdefault(point.cell.method, []).append(point)
     return {method: sorted(found, key=lambda point: -point.cell.dt) for method, found in curves.items()}
+
+
+# -- a point as a line of Python -------------------------------------------------------------------------
+
+
+LARGEST_NUMERATOR = 16  # 2/45 is easy to read, 347/20820 is not
+LARGEST_DENOMINATOR = 1_000_000
+
+
+def settings_line(cell: Cell, base: Settings | None = None) -> str:
+    """The shortest ``Settings(...)`` that is ``cell.settings(base)``, with identical values, bit for bit.
+
+    Fields with their default values are left out. ``base``: Settings() if None. ValueError for another engine's cell,
+    and for values that Settings rejects.
+    """
+    if cell.engine != CAROM:
+        raise ValueError(f"a cell of {cell.engine} has no Settings")
+    chosen, usual = cell.settings(base or Settings()), Settings()
+    parts = []
+    for name in (each.name for each in dataclasses.fields(Settings)):
+        value = getattr(chosen, name)
+        if value != getattr(usual, name):
+            parts.append(f"{name}={seconds(value) if name == 'dt' else quoted(value)}")
+    return f"Settings({', '.join(parts)})"
+
+
+def python_line(cell: Cell, base: Settings | None = None) -> str:
+    """The code that sets ``cell`` in its engine: :func:`settings_line`, or pymunk's two statements in one line."""
+    if cell.engine == CAROM:
+        return settings_line(cell, base)
+    return f"space.iterations = {cell.substeps}; space.step({seconds(cell.dt)})"
+
+
+def seconds(dt: float) -> str:
+    """A step as Python source: an exactly equal small fraction, unless it is longer than the decimal number."""
+    dt = float(dt)
+    plain = repr(dt)
+    fraction = Fraction(dt).limit_denominator(LARGEST_DENOMINATOR)
+    text = f"{fraction.numerator}/{fraction.denominator}"
+    small = 0 < fraction.numerator <= LARGEST_NUMERATOR and fraction.denominator > 1
+    same = small and fraction.numerator / fraction.denominator == dt
+    return text if same and len(text) <= len(plain) else plain
+
+
+def quoted(value: object) -> str:
+    """The Python repr, with the quotation marks used in the documentation."""
+    if isinstance(value, str) and value.isprintable() and '"' not in value and "\\" not in value:
+        return f'"{value}"'
+    return repr(value)

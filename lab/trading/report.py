@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..bench.results import machine_line
+from ..bench.report import machine_line
 from ..cli.usage_errors import Problem, did_you_mean
 from ..measure.norms import MEAN
 from ..reporting.text import NOTHING, TextTable, compact, number
-from .code_line import python_line
-from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade, known_well
+from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade, known_well, python_line
 
 ENERGY_SQUARE, ERROR_UNIT = "energy_square", "J²"  # the norm that has a unit
 DOUBTED = "*"  # marks an error that is too close to the reference's own

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..bench.results import machine
+from ..bench.report import machine
 from ..cases import grid as grids
 from ..cases.case import FIRST, FOR_REFERENCES, QUICK, Case, Effort, case_of, check_arguments
 from ..cases.subjects import subject_of
@@ -22,8 +22,19 @@ from ..measure.timing import CLOCK, Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..reporting.text import counted
 from .answer import Target, clearly_worse, next_choice, price, recommended
-from .code_line import python_line
-from .records import CAROM, PYMUNK, CaseTrade, Cell, Curve, Point, Reference, Trade, by_method, observed_order
+from .records import (
+    CAROM,
+    PYMUNK,
+    CaseTrade,
+    Cell,
+    Curve,
+    Point,
+    Reference,
+    Trade,
+    by_method,
+    observed_order,
+    python_line,
+)
 
 ROUNDING = 1e-12  # smaller errors are rounding, which has no order
 SURE = 1e-10  # a reference with a better agreement needs no refinement

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from carom.lab.pictures import canvas
 
 from ..runner import Line, Result
-from .edges import LEVELS
-from .quantity import Quantity
+from .edges import LEVELS, Quantity
 from .tables import by_quantity
 
 PANEL = (3.4, 2.5)  # inches

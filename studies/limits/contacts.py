@@ -9,8 +9,8 @@ import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 
+from .edges import BY_MODE, BrokenError, Method, Quantity, decades
 from .motion import GRAVITY, SPEED, new_world
-from .quantity import BY_MODE, BrokenError, Method, Quantity, decades
 
 SHOTS = 200  # start phases of a step
 RADIUS, WALL = 0.25, 0.1  # m

@@ -17,7 +17,7 @@ from carom.framework import ForceSystem, World
 from carom.plugins import Physics
 from carom.systems.integration.integrators import STANDARD_INTEGRATORS
 
-from .quantity import BY_MODE, BrokenError, Method, Quantity, by_integrator, decades
+from .edges import BY_MODE, BrokenError, Method, Quantity, by_integrator, decades
 
 GRAVITY = 10.0  # m/s^2
 TAKE_OFF = 5.0  # m/s: a jump of one second

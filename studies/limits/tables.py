@@ -8,8 +8,7 @@ from carom.lab.reporting.text import NOTHING, TextTable
 
 from ..runner import Line, Result
 from . import contacts, motion
-from .edges import BREAKS, DOWN, LEVELS, Edge, edge, home_of
-from .quantity import Quantity
+from .edges import BREAKS, DOWN, LEVELS, Edge, Quantity, edge, home_of
 
 LONGEST = 90  # characters of a reason
 ROUNDING = 1e-9  # smaller errors count as rounding

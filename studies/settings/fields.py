@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any
 
 from carom.framework import Settings, World
-from carom.lab.engines.cost import counts_of, work_of
+from carom.lab.engines.adapters import counts_of, work_of
 from carom.lab.measure.timing import timed
 
 from ..runner import Axis

@@ -18,8 +18,7 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Plugin, Settings, System, World
 from carom.lab.cases.closed_forms import FORMS
 from carom.lab.engines.adapters import CaromEngine
-from carom.lab.measure.body_shapes import Floats
-from carom.lab.measure.escape import Enclosure
+from carom.lab.measure.body_shapes import Enclosure, Floats
 from carom.lab.measure.norms import NORMS
 from carom.lab.measure.observation import Seen, observe
 from carom.plugins import Physics

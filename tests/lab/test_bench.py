@@ -15,7 +15,6 @@ import pytest
 from carom import scenes
 from carom.framework.jit.log import CompilationLog
 from carom.lab.bench import report as bench_report
-from carom.lab.bench import results as bench_results
 from carom.lab.bench.against_pymunk import bench
 from carom.lab.bench.queries import QUERIES
 from carom.lab.bench.suite import LARGE, SUITE, Subject, Window, subjects
@@ -39,7 +38,7 @@ def no_pymunk(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def result() -> bench_results.Result:
+def result() -> bench_report.Result:
     return bench([SHORT_GAS], (30,), repeats=3)
 
 
@@ -76,7 +75,7 @@ def test_settings_of_both_are_stated(result):
 
 
 def test_results_go_through_json_and_back(result):
-    assert bench_results.Result.from_dict(json.loads(json.dumps(result.as_dict()))) == result
+    assert bench_report.Result.from_dict(json.loads(json.dumps(result.as_dict()))) == result
 
 
 def test_tables_have_all_their_cells(result):
@@ -100,7 +99,7 @@ def test_settings_of_a_subject_are_used_kept_and_named():
     assert found.settings["carom"]["collision"] == "discrete"
     assert "collision discrete, substeps 4; fastgas, swept: collision continuous" in bench_report.remarks(found)[2]
     assert [row[-1] for row in bench_report.tables(found)[0].rows] == ["-", "0.333"]
-    assert bench_results.Result.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+    assert bench_report.Result.from_dict(json.loads(json.dumps(found.as_dict()))) == found
 
 
 def test_carom_alone(no_pymunk):
@@ -194,7 +193,7 @@ def tiny(monkeypatch):
 def test_json_is_all_there_is_on_stdout(carom, tiny):
     done = carom(*TINY, "--json")
     assert done.exit_code == 0, done.stderr
-    read = bench_results.Result.from_dict(json.loads(done.stdout))
+    read = bench_report.Result.from_dict(json.loads(done.stdout))
     assert read.rows[0].scene == "fastgas"
 
 

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from studies.limits import axes
-from studies.limits.edges import BREAKS, DOWN, axis_of, edge, measured
-from studies.limits.quantity import BrokenError, Method, Quantity
+from studies.limits.edges import BREAKS, DOWN, BrokenError, Method, Quantity, axis_of, edge, measured
 from studies.limits.tables import QUANTITIES, number, report, table
 from studies.runner import Line, run
 
