@@ -27,14 +27,10 @@ from .stages import stages_command
 class Study:
     """A table of axes and its report.
 
-    axes
-        (quick, long) -> all axes; quick: fewer values, long: more
-    usual
-        names of the axes that run if none is named; empty: all
-    long
-        what ``--long`` adds; empty: nothing
-    draw
-        draws a chart into a folder, and returns its path
+    axes: (quick, long) -> all axes; quick: fewer values, long: more
+    usual: names of the axes that run if none is named; empty: all
+    long: what ``--long`` adds; empty: nothing
+    draw: draws a chart into a folder, and returns its path
     """
 
     what: str

@@ -62,19 +62,13 @@ class Result(Plain):
 class Axis:
     """One quantity that is varied.
 
-    of
-        the scene or the method
-    values
-        measured in each repeat
-    measure
-        (value, repeat) -> figures by name, which may differ between repeats; None: there are no repeats
-    facts
-        value -> what is the same in every repeat
-    rotate
-        True: each repeat begins with another value, so that none is always measured after the same one
-    explore
-        the samples so far, by value -> values to sample; the runner adds each sample before it asks for the next value.
-        None: ``values``
+    of: the scene or the method
+    values: measured in each repeat
+    measure: (value, repeat) -> figures by name, which may differ between repeats; None: there are no repeats
+    facts: value -> what is the same in every repeat
+    rotate: True: each repeat begins with another value, so that none is always measured after the same one
+    explore: the samples so far, by value -> values to sample; the runner adds each sample before it asks for the next
+    value. None: ``values``
     """
 
     name: str

@@ -35,21 +35,14 @@ class Window:
 class Subject:
     """One measured scene.
 
-    ``variant``
-        distinguishes two subjects of one scene; ``options`` are passed to the scene's build
-    ``settings``
-        carom settings that differ from the default
-    ``windows``
-        the timed steps; empty if queries are timed instead
-    ``sizes``
-        the numbers of bodies, if they differ from the requested ones
-    ``energy``
-        "kept": kinetic energy must be conserved, shown as a percentage; "left": it must be dissipated, shown in joules;
-        "": neither
-    ``targets``
-        by (window, bodies); bodies 0 means any number
-    ``effort``
-        approximate time per body and step relative to the gas; used for the remaining time
+    ``variant``: distinguishes two subjects of one scene; ``options`` are passed to the scene's build
+    ``settings``: carom settings that differ from the default
+    ``windows``: the timed steps; empty if queries are timed instead
+    ``sizes``: the numbers of bodies, if they differ from the requested ones
+    ``energy``: "kept": kinetic energy must be conserved, shown as a percentage; "left": it must be dissipated, shown in
+    joules; "": neither
+    ``targets``: by (window, bodies); bodies 0 means any number
+    ``effort``: approximate time per body and step relative to the gas; used for the remaining time
     """
 
     scene: str

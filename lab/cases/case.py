@@ -56,8 +56,8 @@ FIRST, QUICK = Effort(1, 4, 2, 5.0), Effort(8, 16, 4, 20.0)
 class Known:
     """What the library knows about a scene; fields that are None come from the survey.
 
-    orders
-        (integrator, norm, order) of methods with a higher order than theory gives in general, at the end of ``seconds``
+    orders: (integrator, norm, order) of methods with a higher order than theory gives in general, at the end of
+    ``seconds``
     """
 
     seconds: float | None = None
@@ -97,17 +97,12 @@ KNOWN: Mapping[str, Known] = {
 class Case:
     """One scene ready to be measured.
 
-    reference
-        the result of a closed form; None: fine runs of carom are the reference
-    reference_cells
-        of these fine runs: two methods, and unless the scene is chaotic the first one with twice its step
-    orders
-        as in ``Known``
-    refinements
-        of the reference at most; fineness: how many times smaller its steps are; ensemble: runs of each reference of a
-        chaotic scene
-    given
-        what the caller has chosen: "steps", "repeats"
+    reference: the result of a closed form; None: fine runs of carom are the reference
+    reference_cells: of these fine runs: two methods, and unless the scene is chaotic the first one with twice its step
+    orders: as in ``Known``
+    refinements: of the reference at most; fineness: how many times smaller its steps are; ensemble: runs of each
+    reference of a chaotic scene
+    given: what the caller has chosen: "steps", "repeats"
     """
 
     subject: Subject

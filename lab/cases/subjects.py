@@ -29,8 +29,7 @@ DEFAULT_SECONDS = 5.0  # if the subject does not define it
 class Subject:
     """``target``: a scene's name or a file; or ``build``, a function build(settings, seed=0) -> World.
 
-    options
-        keywords for the scene's build besides settings and seed
+    options: keywords for the scene's build besides settings and seed
     """
 
     name: str

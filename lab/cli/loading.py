@@ -33,10 +33,8 @@ Bounds = tuple[tuple[float, ...], tuple[float, ...]]
 class Loaded:
     """Something that builds worlds; ``seconds``, ``view`` and ``compared`` are None if not defined.
 
-    settings
-        those that it recommends; None: not known before a world is built
-    compared
-        compared(world) -> dict: what a game is judged by
+    settings: those that it recommends; None: not known before a world is built
+    compared: compared(world) -> dict: what a game is judged by
     """
 
     name: str

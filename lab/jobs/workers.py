@@ -68,8 +68,7 @@ def process_pool(workers: int) -> Executor:
 class Workers:
     """An executor for ``size`` tasks at a time, made when it is needed and kept until :meth:`end`.
 
-    lost
-        what it raises for a task whose workers have died, after tries of its own
+    lost: what it raises for a task whose workers have died, after tries of its own
     """
 
     def __init__(

@@ -166,21 +166,14 @@ LONGEST = 1 / 10  # s
 class StepOutcome(Plain):
     """What runs with several steps have shown.
 
-    longest
-        s, of those steps from which on all shorter ones change nothing that would be noticed; 0 if there is none, inf
-        if nothing was measured
-    shortest
-        s, of those tried; size: of a body, m
-    way
-        m, how far a body may be from where it should; None: a share of the size
-    link
-        what gives way at the next longer step, ``beyond`` s; "" if none was tried
-    refused
-        why nothing was measured, else ""
-    compared
-        the names of what a game compares
-    known
-        from how many runs, and what to think of them
+    longest: s, of those steps from which on all shorter ones change nothing that would be noticed; 0 if there is none,
+    inf if nothing was measured
+    shortest: s, of those tried; size: of a body, m
+    way: m, how far a body may be from where it should; None: a share of the size
+    link: what gives way at the next longer step, ``beyond`` s; "" if none was tried
+    refused: why nothing was measured, else ""
+    compared: the names of what a game compares
+    known: from how many runs, and what to think of them
     """
 
     longest: float = math.inf

@@ -31,14 +31,10 @@ ROUNDS = 50  # more than needed to find the first pair that tunnels
 class Oscillation:
     """What limits stability: the oscillation x'' = -frequency^2 x - (drag + damping) x' of a body or of several.
 
-    entity
-        the body with the largest amplitude
-    frequency
-        rad/s; 0: drag alone
-    drag, damping
-        1/s, by forces and by linear_damping
-    limit
-        s; 0 if the integrator makes it grow at any step
+    entity: the body with the largest amplitude
+    frequency: rad/s; 0: drag alone
+    drag, damping: 1/s, by forces and by linear_damping
+    limit: s; 0 if the integrator makes it grow at any step
     """
 
     entity: int
@@ -52,12 +48,9 @@ class Oscillation:
 class Passage:
     """The pair that tunnels first: two bodies that are sure to meet while speed * dt <= size.
 
-    speed
-        m/s, the sum of both speeds
-    size
-        m, the sum of both smallest extents: w + 2 r for a ball and a wall
-    limit
-        s
+    speed: m/s, the sum of both speeds
+    size: m, the sum of both smallest extents: w + 2 r for a ball and a wall
+    limit: s
     """
 
     entity: int
@@ -71,10 +64,8 @@ class Passage:
 class StepLimits:
     """What limits the step of a world in its present state; None if nothing does.
 
-    dt
-        s, the present step
-    integrator
-        as in its settings; "flight" if the world is event-driven
+    dt: s, the present step
+    integrator: as in its settings; "flight" if the world is event-driven
     """
 
     dt: float

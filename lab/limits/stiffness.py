@@ -38,14 +38,10 @@ Apply: TypeAlias = Callable[[Floats], Floats]
 class Modes:
     """Oscillators x'' = -stiffness x - (drag + damping) x', each (m,).
 
-    entity
-        the body with the largest amplitude
-    stiffness, drag
-        1/s^2 and 1/s, by forces; complex if forces turn the motion
-    damping
-        1/s, linear_damping
-    coupled
-        (stiffness, drag, damping) of groups of bodies whose stiffness and drag do not commute
+    entity: the body with the largest amplitude
+    stiffness, drag: 1/s^2 and 1/s, by forces; complex if forces turn the motion
+    damping: 1/s, linear_damping
+    coupled: (stiffness, drag, damping) of groups of bodies whose stiffness and drag do not commute
     """
 
     entity: np.ndarray

@@ -35,42 +35,27 @@ NEAR = 0.05  # of a step: an end of a step that close to a change of the inputs 
 class Seen(Plain):
     """What one run showed. Lengths in the scene's units, energies in J, times in s.
 
-    position (n, d)
-        at the end, by entity id
-    reach
-        the largest distance of a body from its start, over the run
-    apex
-        the greatest height that a body gains over its own start, against gravity; 0 without gravity
-    energy, kinetic
-        at the end; energy_start at the start; energy_worst: the largest departure from the start;
-        energy_square: its mean square, J^2; energy_scale: the largest kinetic energy
-    impacts, times
-        their number, and the times of the first ones
-    pressure
-        mean force on static bodies, N, after the first part of the run; rate: impacts per second there
-    overlap, overlap_mean
-        after half of the run, the worst and the mean over samples of the sum per body, in sizes of the smaller body
-    speed
-        the largest at the end, sizes per second; drift: the largest displacement since half of the run, sizes
-    struck (n,)
-        bodies that touched anything
-    failure
-        None, or why the run is unusable
-    seconds
-        planned duration; simulated: the actual one, which is less if the run failed
-    size
-        m, the smallest extent of the bodies
-    milliseconds
-        cost of a simulated second on this machine; None if it is not known
-    entities (n,)
-        the bodies at the end; fixed: they are those of the start; created: how many came; met: something touched
-    touches
-        pairs of entities and the time of their first contact, in order of time
-    values
-        what a game compares, see ``Subject.values_of``; spread: standard deviations from game to game, where these are
-        means over that many ``runs``
-    doubt
-        m, of a reference: how far another one has a body elsewhere in the end
+    position (n, d): at the end, by entity id
+    reach: the largest distance of a body from its start, over the run
+    apex: the greatest height that a body gains over its own start, against gravity; 0 without gravity
+    energy, kinetic: at the end; energy_start at the start; energy_worst: the largest departure from the start;
+    energy_square: its mean square, J^2; energy_scale: the largest kinetic energy
+    impacts, times: their number, and the times of the first ones
+    pressure: mean force on static bodies, N, after the first part of the run; rate: impacts per second there
+    overlap, overlap_mean: after half of the run, the worst and the mean over samples of the sum per body, in sizes of
+    the smaller body
+    speed: the largest at the end, sizes per second; drift: the largest displacement since half of the run, sizes
+    struck (n,): bodies that touched anything
+    failure: None, or why the run is unusable
+    seconds: planned duration; simulated: the actual one, which is less if the run failed
+    size: m, the smallest extent of the bodies
+    milliseconds: cost of a simulated second on this machine; None if it is not known
+    entities (n,): the bodies at the end; fixed: they are those of the start; created: how many came; met: something
+    touched
+    touches: pairs of entities and the time of their first contact, in order of time
+    values: what a game compares, see ``Subject.values_of``; spread: standard deviations from game to game, where these
+    are means over that many ``runs``
+    doubt: m, of a reference: how far another one has a body elsewhere in the end
     """
 
     position: Floats

@@ -40,22 +40,14 @@ Each = Callable[[Callable[[Any], Any], Iterable[Any]], list[Any]]
 class Survey:
     """Facts of a scene.
 
-    settings
-        those it recommends; settings that are not varied keep these values
-    growth
-        of the distance between two nearby starts, over the run
-    speed
-        the largest at the end, sizes per second
-    seeded
-        whether seeds change the start
-    walled
-        whether walls hold all bodies: a body beyond them in another run has escaped
-    trial
-        the observation of the run with all impacts at their true times; of a chaotic game the mean of some
-    nudge
-        sizes of a body by which repeats of a chaotic scene without seeds differ
-    inputs
-        times at which the recorded inputs change that the game plays back, s
+    settings: those it recommends; settings that are not varied keep these values
+    growth: of the distance between two nearby starts, over the run
+    speed: the largest at the end, sizes per second
+    seeded: whether seeds change the start
+    walled: whether walls hold all bodies: a body beyond them in another run has escaped
+    trial: the observation of the run with all impacts at their true times; of a chaotic game the mean of some
+    nudge: sizes of a body by which repeats of a chaotic scene without seeds differ
+    inputs: times at which the recorded inputs change that the game plays back, s
     """
 
     settings: Settings

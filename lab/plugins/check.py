@@ -26,10 +26,8 @@ STEPS = 3
 def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str], None] = lambda what: None) -> Report:
     """Check all shapes, pairs and other functions of a plugin.
 
-    others
-        plugins whose shapes its pairs need, besides the built-in ones
-    progress
-        called with the name of each check before it runs
+    others: plugins whose shapes its pairs need, besides the built-in ones
+    progress: called with the name of each check before it runs
     """
     report = Report(plugin.name)
     registry = Registry()

@@ -19,9 +19,8 @@ class Conserved:
     Energy is kinetic plus potential energy. ``relative`` is relative to the energy at the start, and for momentum to
     sum(m |v|); rounding stays below 1e-12.
 
-    following
-        for games in which bodies come and go: what they bring and take is added to what is expected. Two systems of
-        the world look at the start and at the end of each step; ``close`` removes them
+    following: for games in which bodies come and go: what they bring and take is added to what is expected. Two systems
+    of the world look at the start and at the end of each step; ``close`` removes them
     """
 
     def __init__(self, world: World, relative: float = 1e-12, *, following: bool = False) -> None:

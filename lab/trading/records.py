@@ -92,23 +92,15 @@ class ErrorBar:
 class Point(Plain):
     """One cell over all its repeats.
 
-    errors
-        by norm, of the repeats that did not fail
-    failures
-        number of failed repeats, by kind
-    counts
-        per simulated second, means over the repeats, the same on every machine: steps, force_evaluations, candidates,
-        pairs, impacts, solver_loops
-    work
-        weighted sum of the counts, see :mod:`carom.lab.engines.adapters`; per simulated second
-    milliseconds
-        time per simulated second on this machine; None if it was not timed
-    effects
-        what could be noticed, each at its worst of all repeats, see :mod:`carom.lab.measure.effects`
-    line
-        the code that sets the settings
-    alone
-        timed in turns with others of the answer, and nothing else running
+    errors: by norm, of the repeats that did not fail
+    failures: number of failed repeats, by kind
+    counts: per simulated second, means over the repeats, the same on every machine: steps, force_evaluations,
+    candidates, pairs, impacts, solver_loops
+    work: weighted sum of the counts, see :mod:`carom.lab.engines.adapters`; per simulated second
+    milliseconds: time per simulated second on this machine; None if it was not timed
+    effects: what could be noticed, each at its worst of all repeats, see :mod:`carom.lab.measure.effects`
+    line: the code that sets the settings
+    alone: timed in turns with others of the answer, and nothing else running
     """
 
     cell: Cell
@@ -135,12 +127,9 @@ class Point(Plain):
 class Curve(Plain):
     """One method: its points from the largest step to the smallest.
 
-    label
-        distinguishes it from the other curves of its case
-    orders
-        by norm: the observed order in dt, fitted to the logarithms of the usable errors; None if there is none
-    theory
-        by norm: the order expected from theory; inf for exact (rounding only); None if unknown
+    label: distinguishes it from the other curves of its case
+    orders: by norm: the observed order in dt, fitted to the logarithms of the usable errors; None if there is none
+    theory: by norm: the order expected from theory; inf for exact (rounding only); None if unknown
     """
 
     label: str
@@ -153,13 +142,10 @@ class Curve(Plain):
 class Reference:
     """What the errors are measured against.
 
-    text
-        one sentence: a closed form by name, or own runs and how well they agree
-    agreement
-        by norm: the difference between two methods; 0 for a closed form. Errors below TRUSTED times this are not
-        reliable
-    spread
-        by norm, for statistics: the standard deviation of a single run
+    text: one sentence: a closed form by name, or own runs and how well they agree
+    agreement: by norm: the difference between two methods; 0 for a closed form. Errors below TRUSTED times this are not
+    reliable
+    spread: by norm, for statistics: the standard deviation of a single run
     """
 
     text: str
@@ -179,21 +165,14 @@ class Reference:
 class CaseTrade(Plain):
     """One scene with all its curves.
 
-    scene
-        its name, or the file's; ``target``: the name on the command line
-    kind
-        SMOOTH, IMPACTS, RESTING or CHAOTIC; ``why``: how it was determined
-    norms
-        quantity and scale, by name; charts and answers use the first one
-    repeated
-        what differs between repeats: "start phases" or "seeds"
-    refused
-        why nothing was measured, else ""
-    own
-        the settings that the scene has; scale: what the main norm is relative to, in the scene's units
-    inputs
-        the effects of recorded inputs that act in whole steps, by the length of the step in s: that of the scene's own
-        settings and that of the answer; none without inputs
+    scene: its name, or the file's; ``target``: the name on the command line
+    kind: SMOOTH, IMPACTS, RESTING or CHAOTIC; ``why``: how it was determined
+    norms: quantity and scale, by name; charts and answers use the first one
+    repeated: what differs between repeats: "start phases" or "seeds"
+    refused: why nothing was measured, else ""
+    own: the settings that the scene has; scale: what the main norm is relative to, in the scene's units
+    inputs: the effects of recorded inputs that act in whole steps, by the length of the step in s: that of the scene's
+    own settings and that of the answer; none without inputs
     """
 
     scene: str

@@ -29,10 +29,8 @@ BLOWN_UP = 1e6  # larger errors count as broken
 class Edge:
     """Where a level is first exceeded, going up or down from the quantity's home.
 
-    value
-        the first found beyond the level; None if none of those tried is
-    last
-        its neighbour that is not beyond; if value is None, the last tried. None if even the home is beyond
+    value: the first found beyond the level; None if none of those tried is
+    last: its neighbour that is not beyond; if value is None, the last tried. None if even the home is beyond
     """
 
     value: float | None
@@ -145,20 +143,13 @@ class Method:
 class Quantity:
     """What is varied, and the error that follows.
 
-    unit
-        of the values, in words
-    norm
-        the error, and what it is relative to
-    values
-        ascending; ``quick`` are fewer of them, ``long`` more
-    home
-        the value from which the search starts, where all works
-    measure
-        (method, value) -> error; raises BrokenError. Errors raised by carom count as broken too
-    fine
-        edges are found to this factor; None: the values are not refined
-    whole
-        True if values are whole numbers
+    unit: of the values, in words
+    norm: the error, and what it is relative to
+    values: ascending; ``quick`` are fewer of them, ``long`` more
+    home: the value from which the search starts, where all works
+    measure: (method, value) -> error; raises BrokenError. Errors raised by carom count as broken too
+    fine: edges are found to this factor; None: the values are not refined
+    whole: True if values are whole numbers
     """
 
     name: str

@@ -36,16 +36,11 @@ def steps(world: World, seconds: float) -> float:
 class Varied:
     """One field and one scene.
 
-    others
-        the fields other than the varied one that differ from the default
-    values
-        the values tried; the ratios are relative to the value in ``others`` or in Settings
-    errors
-        units by name; ``measure`` returns the errors, ``words`` describe them
-    seconds
-        duration of the runs whose errors are measured; ``timed``: of the timed runs
-    play
-        advances a world by that many seconds in the timed runs, and returns the seconds simulated
+    others: the fields other than the varied one that differ from the default
+    values: the values tried; the ratios are relative to the value in ``others`` or in Settings
+    errors: units by name; ``measure`` returns the errors, ``words`` describe them
+    seconds: duration of the runs whose errors are measured; ``timed``: of the timed runs
+    play: advances a world by that many seconds in the timed runs, and returns the seconds simulated
     """
 
     field: str
