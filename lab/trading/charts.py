@@ -31,11 +31,8 @@ AXIS = {
     TIME: "wall time per simulated second, ms",
 }
 
-WIDTH, PLOT = 10.0, 5.2  # inches
-LEFT, RIGHT, TOP, AXIS_LABEL = 0.85, 0.3, 0.9, 0.75
-STRIP, STRIP_GAP = 0.72, 0.12  # inches: a column of the strip of failures, and the gap on its left
-ROW, SMALL = 0.176, 7.5  # inches between rows of the legend; points of small print
-NOTE = 0.17  # inches between lines of small print
+WIDTH, PLOT, STRIP = 10.0, 6.9, 0.6  # inches: the chart, its plot with headings, a column of the strip of failures
+ROW, NOTE, SMALL = 0.176, 0.13, 7.5  # inches: a row of the legend, a line of small print; points of small print
 LEAST_ERROR = 1e-17  # lower end of an axis on which all errors are 0
 APART = (0.075, 0.035)  # minimum distance of two step labels, as fractions of the axes
 
@@ -50,7 +47,7 @@ MARKS, WIDTHS = (8.5, 4.5), (2.6, 1.3)  # points, of the first and the last curv
 
 @dataclass
 class Sheet:
-    """A chart in progress: its axes, its limits, and the small print below it."""
+    """A chart in progress: its axes and its limits."""
 
     case: CaseTrade
     norm: str
@@ -59,7 +56,6 @@ class Sheet:
     strip: Any = None
     kinds: list[str] = field(default_factory=list)
     errors: tuple[float, float] = (LEAST_ERROR, 1.0)
-    notes: list[str] = field(default_factory=list)
 
     def height(self, point: Point) -> float | None:
         """The cost of the point; None if it is unknown or not positive."""
@@ -105,35 +101,27 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
     sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in case.points)]
     drawn = list(zip(case.curves, styles(case.curves), strict=True))
     entries = [_entry(curve, style, sheet.norm) for curve, style in drawn]
-    sheet.notes = _notes(sheet)
-    notes = [line for note in sheet.notes for line in textwrap.wrap(note, 135)]
+    notes = [line for note in _notes(sheet) for line in textwrap.wrap(note, 135)]
     columns = 3 if max((len(str(entry.get_label())) for entry in entries), default=0) < 34 else 2
-    rows = -(-len(entries) // columns)
-    below = AXIS_LABEL + ROW * rows + 0.15 + NOTE * len(notes) + 0.15
-    size = (WIDTH, TOP + PLOT + below)
-    made = Figure(figsize=size)
+    below = ROW * -(-len(entries) // columns) + NOTE * len(notes)
+    made = Figure(figsize=(WIDTH, PLOT + below), layout="constrained")
     FigureCanvasAgg(made)
-    share = STRIP * len(sheet.kinds) + STRIP_GAP if sheet.kinds else 0.0
-    plot = WIDTH - LEFT - RIGHT - share
-    sheet.axes = _axes(made, (LEFT, below, plot, PLOT))
-    if sheet.kinds:
-        sheet.strip = _axes(made, (LEFT + plot + STRIP_GAP, below, share - STRIP_GAP, PLOT))
+    sheet.axes, *strip = made.subplots(1, 2, width_ratios=(PLOT, STRIP * len(sheet.kinds))) if sheet.kinds else (
+        made.subplots(),
+    )  # fmt: skip
+    sheet.strip = strip[0] if strip else None
     _set_limits(sheet)
     for curve, style in drawn:
         _draw_curve(sheet, curve, style)
     _draw_failures(sheet, drawn)
     _label_steps(sheet, drawn)
-    made.text(LEFT / WIDTH, 1 - 0.36 / size[1], case.scene, fontsize=16, fontweight="bold")
+    made.suptitle(case.scene, x=0.01, ha="left", fontsize=16, fontweight="bold")
     what = textwrap.shorten(f"{sheet.norm}: {case.norms[sheet.norm]}", 120, placeholder=" ...")
-    made.text(LEFT / WIDTH, 1 - 0.66 / size[1], what, color=canvas.MUTED, fontsize=9.5)
+    sheet.axes.set_title(what, loc="left", color=canvas.MUTED, fontsize=9.5)
     made.legend(
-        handles=entries, ncols=columns, loc="upper left", bbox_to_anchor=(LEFT / WIDTH, (below - 0.62) / size[1]),
-        bbox_transform=made.transFigure, borderaxespad=0, frameon=False, fontsize=8.5,
-        handlelength=2.6, labelspacing=0.45, borderpad=0,
+        handles=entries, ncols=columns, loc="outside lower left", frameon=False, fontsize=8.5, handlelength=2.6,
+        title="\n".join(notes), title_fontsize=SMALL, alignment="left",
     )  # fmt: skip
-    for place, note in enumerate(notes):
-        y = (0.12 + NOTE * (len(notes) - 1 - place)) / size[1]
-        made.text(LEFT / WIDTH, y, note, color=canvas.MUTED, fontsize=SMALL)
     return made
 
 
@@ -166,15 +154,6 @@ def _failures(point: Point, norm: str) -> dict[str, int]:
     return failures
 
 
-def _axes(made: Figure, place: tuple[float, float, float, float]) -> Any:
-    """Axes at a position in inches from the lower left corner."""
-    width, height = made.get_size_inches()
-    left, bottom, across, up = place
-    axes = made.add_axes((left / width, bottom / height, across / width, up / height))
-    axes.tick_params(which="both", labelsize=8.5)
-    return axes
-
-
 def _set_limits(sheet: Sheet) -> None:
     """Set both axes to enclose everything drawn, with room at the left edge for errors of 0."""
     axes, norm = sheet.axes, sheet.norm
@@ -185,18 +164,12 @@ def _set_limits(sheet: Sheet) -> None:
     if any(bar.mean <= 0 for bar in bars):
         least /= 10
     sheet.errors = _widened(least, most)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(*sheet.errors)
-    axes.set_ylim(*_widened(min(costs, default=1.0), max(costs, default=1.0)))
+    axes.set(xscale="log", yscale="log", xlim=sheet.errors, xlabel=error_heading(norm), ylabel=AXIS[sheet.quantity],
+             ylim=_widened(min(costs, default=1.0), max(costs, default=1.0)))  # fmt: skip
     axes.grid(lw=0.7)
-    axes.set_xlabel(error_heading(norm), fontsize=9.5)
-    axes.set_ylabel(AXIS[sheet.quantity], fontsize=9.5)
     if sheet.strip is not None:
         strip = sheet.strip
-        strip.set_yscale("log")
-        strip.set_ylim(*axes.get_ylim())
-        strip.set_xlim(0, len(sheet.kinds))
+        strip.set(yscale="log", ylim=axes.get_ylim(), xlim=(0, len(sheet.kinds)))
         strip.tick_params(which="both", left=False, labelleft=False, bottom=False, labelbottom=False)
         strip.set_title("failed", color=canvas.MUTED, fontsize=9, pad=4)
         for column, kind in enumerate(sheet.kinds):

@@ -36,7 +36,8 @@ def legend(chart):
 
 
 def words(chart):
-    return [text.get_text() for text in chart.texts]
+    small_print = [legend.get_title().get_text() for legend in chart.legends]
+    return [text.get_text() for text in chart.texts] + [chart.axes[0].get_title("left")] + small_print
 
 
 # -- curves -----------------------------------------------------------------------------------------------------
