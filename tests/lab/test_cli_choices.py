@@ -11,7 +11,6 @@ from helpers_cli import refusal, report_of
 
 from carom import __version__, scenes
 from carom.framework import Settings
-from carom.lab.cli.choices import parse_assignments
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 
@@ -26,23 +25,6 @@ def test_settings_come_from_the_scene_then_the_preset_then_set(carom):
     assert settings("--settings", "accurate")["substeps"] == Settings.accurate().substeps
     changed = settings("--set", "substeps=7", "--set", "restitution_threshold=0.25")
     assert (changed["dt"], changed["substeps"], changed["restitution_threshold"]) == (1 / 960, 7, 0.25)
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("dt=1/120", 1 / 120),
-        ("dt=0.01", 0.01),
-        ("substeps=8", 8),
-        ("slop=none", None),
-        ("slop=1e-3", 1e-3),
-        ("debug=yes", True),
-        ("restitution_mixing=min", "min"),
-        ("integrator = rk4", "rk4"),
-    ],
-)
-def test_set_takes_the_types_of_the_fields(text, value):
-    assert list(parse_assignments([text]).values()) == [value]
 
 
 def test_seconds_and_steps(carom, ball):
@@ -78,12 +60,6 @@ def test_scenes_lists_all_with_their_descriptions(carom):
     assert result.exit_code == 0
     for name in scenes.names():
         assert name in result.stdout
-
-
-def test_alone_it_shows_what_it_can_do(carom):
-    result = carom()
-    assert result.exit_code == 0
-    assert "Commands:" in result.stdout
 
 
 def test_version_and_python_dash_m():

@@ -14,20 +14,10 @@ from PIL import Image
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.lab.measure.paths import Traces
 from carom.lab.measure.run import FEW_BODIES, FEW_STEPS, run
 from carom.plugins import Physics
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
-
-
-def test_traces_keep_those_that_went_farthest():
-    """Three bodies on a line: 3 goes 2 to and fro, 7 goes 1, 8 goes 5 and is deleted."""
-    along = np.array([[0, 0, 0], [1, 0, 5], [0, 1, np.nan]], np.float32)
-    samples = np.stack([along, np.zeros((3, 3), np.float32)], axis=2)
-    kept = Traces(np.array([3, 7, 8]), samples).farthest(2)
-    assert kept.entities.tolist() == [3, 8]
-    np.testing.assert_array_equal(kept.positions[:, :, 0], along[:, [0, 2]])
 
 
 def test_run_prints_the_tables_and_draws_two_pictures(carom, tmp_path):

@@ -11,10 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.reporting.progress import Progress
 from carom.lab.trading.charts import TIME, WORK, figure
 from carom.lab.trading.records import Trade
-from studies import ladder, scaling, startup
+from studies import ladder, startup
 from studies.__main__ import STUDIES, cli
 from studies.accuracy import published, summary
 from studies.runner import Axis, Result, run
@@ -60,18 +59,6 @@ def test_an_axis_may_choose_by_what_it_has_found():
 
     (line,) = run([Axis("n", "here", facts=lambda value: {"square": value**2}, explore=explore)]).lines
     assert [sample.value for sample in line.samples] == [1, 2, 3, 4]
-
-
-def test_progress_ends_where_it_said():
-    class Recorder(Progress):
-        total = 0.0
-
-        def begin(self, total, done=0.0):
-            self.total = total
-
-    recorder = Recorder()
-    run([Axis("n", "a", (1, 2), lambda value, repeat: {}), Axis("m", "b", (1,))], 3, recorder)
-    assert recorder.done == recorder.total > 0
 
 
 # -- the command and its pages -------------------------------------------------------------------
@@ -139,18 +126,6 @@ def test_the_axes_of_a_study_have_names_of_their_own(name):
 
 
 # -- scaling, ladder, startup --------------------------------------------------------------------
-
-
-def test_scaling_grows_from_the_first_size():
-    result = run([scaling.axis((10, 40), body_steps=400)], repeats=2)
-    for sample in result.lines[0].samples:
-        assert sample.figures["set up"].low > 0.0
-        assert sample.facts["memory"] > 100.0  # position, velocity, mass, radius and where it was are that much alone
-    (table,), _ = scaling.report(result)
-    assert [row[0] for row in table.rows] == ["10", "40"]
-    assert table.rows[0][4] == "1.00"
-    first, last = (sample.figures["ns"].median for sample in result.lines[0].samples)
-    assert table.rows[1][4] == f"{last / first:.2f}"
 
 
 def test_the_ladder_measures_each_rung_beside_another():

@@ -8,10 +8,9 @@ import math
 
 import numpy as np
 import pytest
-from helpers_motion import NOISE, Oscillator, SpringAndDrag, oscillators
-from worlds import ball, box, floor, make_world, run
+from helpers_motion import SpringAndDrag, oscillators
+from worlds import ball, box, floor, make_world
 
-from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, NoPhysicsError, Settings, StepError, System, World
 from carom.lab.limits.step_length import SAFETY, step_limits, suggest_dt
@@ -138,14 +137,6 @@ def test_a_ball_and_a_wall():
         assert step_limits(shot(collision)).passage is None
 
 
-def test_the_shorter_of_both_limits_counts():
-    world = shot()
-    world.component_for_entity(2, RigidBody)
-    world.add_component(2, Oscillator(1e6))
-    world.add_system(SpringAndDrag())
-    assert suggest_dt(world) == pytest.approx(SAFETY * 2e-3, rel=NOISE)
-
-
 def test_what_does_not_meet_does_not_count():
     """Sensors, other layers, kinematic bodies against walls, half-spaces without an end."""
     world = World(Physics(), half_space)
@@ -183,14 +174,3 @@ def test_the_first_passage_against_all_pairs(seed):
         if "dynamic" in (a[0], b[0]) and a[3] & b[4] and b[3] & a[4] and a[1] + b[1] > 0
     )
     assert step_limits(world).tunnelling == pytest.approx(expected, rel=1e-12)
-
-
-def test_scenes_of_the_library():
-    """Each has a result, and none is changed by the call."""
-    for name in ("stack", "billiards", "gas2d", "jump", "conveyor", "cradle"):
-        with scenes.get(name).build() as world:
-            run(world, 3)
-            before = world.state_hash()
-            assert suggest_dt(world) > 0
-            assert world.state_hash() == before
-        world.close()

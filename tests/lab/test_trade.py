@@ -29,7 +29,7 @@ from carom.lab.trading.records import (
     CaseTrade,
     Point,
 )
-from carom.lab.trading.report import ORDER_TOLERANCE, order
+from carom.lab.trading.report import ORDER_TOLERANCE
 from carom.plugins import Physics
 
 pytestmark = [pytest.mark.slow, pytest.mark.early]  # many runs: half a minute or more together
@@ -69,17 +69,6 @@ def test_the_orders_of_all_methods_on_the_spring(spring):
         assert [point.cell.dt for point in curve.points] == [1 / 60, 1 / 120, 1 / 240]
 
 
-def test_errors_of_the_spring_are_those_of_the_recurrence():
-    """Semi-implicit Euler in whole steps, iterated here; 2: from 1 to -1 is the longest displacement."""
-    case = case_of("spring", seconds=1.3, repeats=1, steps=(1 / 120,), only=Only(integrators=("semi_implicit_euler",)))
-    omega, x, v = 2 * math.pi, 1.0, 0.0  # one oscillation a second
-    for _ in range(156):
-        v -= omega**2 * x / 120
-        x += v / 120
-    true = abs(x - math.cos(omega * 1.3)) / 2
-    assert errors(case, "position") == {("semi implicit euler", 1 / 120): pytest.approx(true, rel=1e-6)}
-
-
 def test_work_counts_evaluations_of_forces(spring):
     for (label, dt), point in points(spring).items():
         evaluations = {"rk4": 4, "yoshida4": 4, "velocity verlet": 2}.get(label, 1)
@@ -105,12 +94,6 @@ def test_the_apex_of_the_jump_arc(jump, hertz, missed):
     }  # fmt: skip
     for error in found.values():
         assert error == pytest.approx(missed / 64, rel=1e-9)
-
-
-def test_pymunk_moves_as_explicit_euler_does(jump):
-    found = errors(jump, "position")
-    for dt in (1 / 60, 1 / 30, 1 / 15):
-        assert found["pymunk, 10 iterations", dt] == pytest.approx(found["explicit euler", dt], rel=1e-9)
 
 
 PERIODS = 10  # of the orbit with eccentricity 0.6
@@ -171,13 +154,6 @@ def test_the_energy_of_elastic_balls(bouncing, dt):
 def test_pymunk_on_the_published_scene_is_the_published_column_of_ode(bouncing):
     """18808.3 J^2 at 0.01 s: it is the lag of semi-implicit Euler."""
     assert errors(bouncing, "energy_square")["pymunk, 10 iterations", 0.01] == pytest.approx(18808.3, rel=1e-4)
-
-
-def test_theory_stands_beside_each_curve(bouncing):
-    shown = {curve.label: order(curve, "energy_square") for curve in bouncing.curves}
-    assert shown["velocity verlet"] == "(exact)"
-    assert shown["semi implicit euler"].endswith("(2)")
-    assert shown["pymunk, 10 iterations"].endswith("(2)")
 
 
 # -- user scenes ----------------------------------------------------------------------------------
@@ -296,13 +272,6 @@ def test_a_function_that_no_other_process_can_import_is_measured_here():
 def test_wrong_arguments_are_named(options, words):
     with pytest.raises((ValueError, Problem), match=words):
         case_of("spring", **options)
-
-
-def test_unknown_scenes_and_things_that_build_no_world():
-    with pytest.raises(Problem, match="did you mean 'spring'"):
-        trade("sprin")
-    with pytest.raises(Problem, match="not a World"):
-        trade(lambda settings, seed=0: None)
 
 
 def test_the_names_of_the_laboratory():

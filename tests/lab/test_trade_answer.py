@@ -9,7 +9,6 @@ import pytest
 
 from carom.lab.measure.effects import in_words, noticed, severity
 from carom.lab.measure.timing import Spread
-from carom.lab.reporting.text import metres
 from carom.lab.trading.answer import answer, clearly_worse, recommended
 from carom.lab.trading.records import Cell, ErrorBar, Point
 
@@ -86,13 +85,6 @@ def test_a_dearer_choice_needs_a_gain_that_a_player_sees(case):
     assert with_points(case, own, finer)[1].endswith("now, which tunnelled")
 
 
-def test_of_choices_that_cost_the_same_the_one_with_fewest_changes(case):
-    own, same = point(1 / 60, 4.0), point(1 / 30, 2.0)
-    other = dataclasses.replace(same, cell=dataclasses.replace(same.cell, integrator="explicit_euler"))
-    other.work = 0.9 * same.work
-    assert with_points(case, other, same, own)[0] is same
-
-
 def test_where_something_is_noticed_with_all_the_least_is_best(case):
     points = [point(1 / 30, 1.0, place=9.0), point(1 / 60, 2.0, place=2.2), point(1 / 120, 9.0, place=2.0)]
     assert with_points(case, *points)[0].cell.dt == 1 / 60
@@ -120,12 +112,6 @@ def test_scenes_of_which_nothing_is_known(case):
 def test_what_is_noticed_is_told(effects, words):
     assert in_words(effects) == words
     assert bool(noticed(effects)) == (severity(effects) > 1) == bool(words)
-
-
-def test_lengths():
-    assert [metres(size) for size in (1e-9, 0.00042, 0.0123, 0.5, 12.345)] == [
-        "less than 0.001 mm", "0.42 mm", "1.2 cm", "50 cm", "12.3 m",
-    ]  # fmt: skip
 
 
 def test_what_is_clearly_worse_at_hardly_less_cost_is_not_run_again():

@@ -8,7 +8,6 @@ import helpers_trade as made
 import pytest
 
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.measure.timing import Spread
 from carom.lab.trading.charts import FEW, TIME, WORK, draw, figure, legend_text, quantities, styles
 from carom.lab.trading.records import PYMUNK, Cell, Curve, ErrorBar, Point
 
@@ -86,17 +85,6 @@ def test_wall_times_where_there_are_some():
     assert "ms" in plot(chart).get_ylabel()
 
 
-def test_another_norm_can_be_chosen():
-    chart = figure(made.smooth(), norm="energy")
-    assert lines(plot(chart), "rk4")[1][0] == pytest.approx(0.01 / 2**5)
-    assert any("relative to that of the start" in text for text in words(chart))
-
-
-def test_steps_are_written_at_the_ends_of_curves():
-    written = [text.get_text() for text in plot(figure(made.smooth())).texts]
-    assert {"1/15 s", "1/960 s"} <= set(written)
-
-
 def test_repeats_have_bars_from_the_least_to_the_largest():
     ends = [
         (segment[0][0], segment[1][0])
@@ -122,12 +110,6 @@ def test_an_error_of_nothing_is_drawn_at_the_left_edge():
     assert [x for x, _ in lines(plot(chart), "zero")] == [left] * 3
     least = min(point.errors["energy_square"].mean for point in made.bouncing().curves[1].points)
     assert left < least / 9
-
-
-def test_a_case_without_any_error_above_nothing_draws():
-    case = made.bouncing()
-    case.curves = case.curves[:1]
-    assert len(lines(plot(figure(case)), "zero")) == 3
 
 
 # -- failures ---------------------------------------------------------------------------------------------------
@@ -160,40 +142,7 @@ def test_no_failure_is_left_out_of_the_chart_of_wall_times():
     assert any("wall time of 3 that failed is not known" in text for text in words(chart))
 
 
-def test_an_error_that_is_no_number_is_a_failure():
-    case = made.bouncing()
-    for place, value in enumerate((float("nan"), float("inf"))):
-        case.curves[1].points[place].errors["energy_square"] = ErrorBar(value, value, value, 0.0)
-    chart = figure(case)
-    assert len(lines(strip(chart), "not finite")) == 2
-    assert len(lines(plot(chart), "semi-implicit Euler, continuous")) == 1
-
-
-def test_a_case_in_which_all_failed_draws():
-    case = made.smooth(against=False)
-    for curve in case.curves:
-        for point in curve.points:
-            point.errors, point.failures = {}, {"blew up": point.repeats}
-    assert len(lines(strip(figure(case)), "blew up")) == 5 * len(made.STEPS)
-
-
-def test_no_strip_where_nothing_failed():
-    assert len(figure(made.bouncing()).axes) == 1
-
-
-def test_points_of_unknown_cost_are_counted():
-    case = made.bouncing()
-    case.curves[2].points[0].work = 0.0
-    assert any("work of 1 points is not known" in text for text in words(figure(case)))
-
-
 # -- colours, lines, markers ------------------------------------------------------------------------------------
-
-
-def test_few_curves_have_a_colour_each_and_pymunk_is_dashed():
-    looks = styles(made.smooth().curves)
-    assert len({look.colour for look in looks}) == len(looks)
-    assert [look.line for look in looks] == ["-"] * 5 + ["--"]
 
 
 def test_many_curves_are_told_apart_by_colour_line_and_marker():
@@ -209,12 +158,6 @@ def test_many_curves_are_told_apart_by_colour_line_and_marker():
         carom = [(getattr(look, what), getattr(cell, of)) for look, cell in zip(looks, cells, strict=True)][:-2]
         assert len(set(carom)) == len({shown for shown, _ in carom}) == len({meant for _, meant in carom})
     assert [look.line for look in looks[-2:]] == ["--", "--"]
-
-
-def test_a_covered_curve_still_shows():
-    sizes = [look.size for look in styles(made.smooth().curves)]
-    assert sizes == sorted(sizes, reverse=True)
-    assert len(set(sizes)) == len(sizes)
 
 
 # -- files ------------------------------------------------------------------------------------------------------
@@ -248,14 +191,22 @@ def test_an_unknown_norm_and_a_file_in_the_way_are_problems(tmp_path):
         draw(made.trade(made.bouncing()), tmp_path / "file")
 
 
-def test_one_point_alone_draws():
-    case = made.bouncing()
-    bars = {"energy_square": ErrorBar.of([1.0])}
-    case.curves = [Curve("one", [Point(Cell(0.1), 1, bars, {}, {}, 5.0, Spread.of([1.0]))])]
-    assert lines(plot(figure(case)), "one") == [(1.0, 5.0)]
-
-
-def test_a_case_without_curves_draws():
-    case = made.bouncing()
-    case.curves = []
-    assert lines(plot(figure(case)), "trusted") == []
+def test_cases_with_hardly_anything_to_draw_are_drawn():
+    """No curve, one point, errors of 0 alone, errors that are no numbers, failures alone, costs that are not known."""
+    none, one, zero, odd, costless = (made.bouncing() for _ in range(5))
+    none.curves = []
+    assert lines(plot(figure(none)), "trusted") == []
+    one.curves = [Curve("one", [Point(Cell(0.1), 1, {one.norm: ErrorBar.of([1.0])}, {}, {}, 5.0)])]
+    assert lines(plot(figure(one)), "one") == [(1.0, 5.0)]
+    assert len(figure(one).axes) == 1  # no strip of failures
+    zero.curves = zero.curves[:1]
+    assert len(lines(plot(figure(zero)), "zero")) == 3
+    for place, value in enumerate((float("nan"), float("inf"))):
+        odd.curves[1].points[place].errors["energy_square"] = ErrorBar(value, value, value, 0.0)
+    assert len(lines(strip(figure(odd)), "not finite")) == 2
+    costless.curves[2].points[0].work = 0.0
+    assert any("work of 1 points is not known" in text for text in words(figure(costless)))
+    failed = made.smooth(against=False)
+    for point in failed.points:
+        point.errors, point.failures = {}, {"blew up": point.repeats}
+    assert len(lines(strip(figure(failed)), "blew up")) == 5 * len(made.STEPS)

@@ -129,15 +129,6 @@ def test_values_of_a_game_are_compared_by_name(mine, right, error, words):
     assert len(told(effects)) == 1
 
 
-def test_only_the_worst_places_are_told():
-    names = {f"ball {k}": [0.0, 0.1 * k] for k in range(6)}
-    effects = effects_of(seen(names), seen({name: [0.0, 0.0] for name in names}), IMPACTS)
-    assert in_words(effects) == [
-        "ball 4 ends 40 cm from where it should", "ball 5 ends 50 cm from where it should",
-        "3 more end less far from where they should",
-    ]  # fmt: skip
-
-
 def test_a_mean_is_noticed_beyond_chance_and_beyond_what_games_differ_by():
     right = mean_of([seen({"kills": [kills]}) for kills in (90.0, 110.0, 100.0, 100.0)], ())
     assert right.values == {"kills": [100.0]}

@@ -16,7 +16,7 @@ from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.text import TextTable
 from carom.lab.trading import report as trade_report
 from carom.lab.trading.files import COLUMNS, write_csv, write_json
-from carom.lab.trading.records import PYMUNK, Cell, ErrorBar, Point, Trade, python_line, seconds, settings_line
+from carom.lab.trading.records import PYMUNK, Cell, Trade, python_line, settings_line
 
 
 def column(table: TextTable, heading: str) -> list[str]:
@@ -27,40 +27,12 @@ def column(table: TextTable, heading: str) -> list[str]:
 # -- the table of all points ------------------------------------------------------------------------------------
 
 
-def test_every_point_has_a_row_and_a_refused_case_no_table():
-    tables = trade_report.tables(made.trade())
-    assert [table.title.split(",")[0] for table in tables] == ["orbit: position", "bouncing: energy_square"]
-    orbit, bouncing = tables
-    assert len(orbit.rows) == 6 * len(made.STEPS)
-    assert len(bouncing.rows) == 9
-    assert all(len(row) == len(table.headings) for table in tables for row in table.rows)
-
-
 def test_error_with_uncertainty_and_worst_as_the_power_of_the_step_says():
     table = made.trade(made.smooth())
     rows = {(row[0], row[2]): row for row in trade_report.tables(table)[0].rows}
     # rk4 at 1/30 s: 0.1 / 2^4, five percent of it, and twice it
     assert rows["rk4", "1/30"][3:5] == ("0.00625 ± 3e-4", "0.0125")
     assert rows["velocity verlet", "1/60"][3:5] == ("0.00625 ± 3e-4", "0.0125")
-
-
-def test_step_is_a_fraction_where_it_is_one_else_four_digits():
-    case = made.smooth(against=False)
-    period = 2 * math.pi / 1000
-    case.curves = [made.curve(Cell(1.0, "rk4"), "rk4", steps=(1 / 60, period))]
-    assert column(trade_report.points_table(case, "position"), "step, s") == ["1/60", "0.006283"]
-
-
-def test_wall_time_is_left_out_where_nothing_was_timed():
-    assert "wall ms" in trade_report.points_table(made.smooth(), "position").headings
-    assert "wall ms" not in trade_report.points_table(made.smooth(timed=False), "position").headings
-
-
-def test_failures_in_words():
-    rows = trade_report.points_table(made.smooth(), "position")
-    failed = [text for text in column(rows, "failed") if text]
-    assert failed == ["tunnelled", "2 of 64 escaped", "3 of 64 tunnelled"]
-    assert rows.rows[0][3:5] == ("-", "-")  # none of 64 reached the end: no error
 
 
 def test_a_setting_that_has_run_much_less_than_others_is_no_choice():
@@ -151,33 +123,12 @@ def test_cheapest_setting_for_each_target():
     assert column(table, "worst") == ["0.100", "7.81e-4", "7.81e-4", "1.91e-7"]
 
 
-def test_engines_are_chosen_apart_and_none_is_said():
-    table = trade_report.cheapest(made.smooth(), (0.01, 1e-6))
-    assert column(table, "engine") == ["carom", "pymunk", "carom", "pymunk"]
-    assert column(table, "method")[3] == "none"
-
-
 def test_a_target_that_the_reference_cannot_tell_is_not_promised():
     case = made.smooth(against=False)
     table = trade_report.cheapest(case, (9e-9, 1.1e-8))
     assert column(table, "method") == ["the reference is not exact enough to tell", "none"]
     case.reference.agreement["position"] = 0.0
     assert column(trade_report.cheapest(case, (1.2e-8,)), "method") == ["yoshida4"]
-
-
-def test_a_failed_repeat_rules_a_setting_out_however_cheap():
-    case = made.smooth(against=False)
-    for curve in case.curves:
-        for point in curve.points:
-            point.failures = {"tunnelled": 1}
-    assert all(found is None for _, _, found in trade_report.choices(case))
-
-
-def test_statistics_are_judged_two_standard_errors_beyond_the_mean():
-    case = made.smooth(against=False)
-    case.reference.spread["position"] = 0.01
-    assert "mean + 2 s.e." in trade_report.points_table(case, "position").headings
-    assert "two standard errors beyond the mean" in trade_report.cheapest(case).title
 
 
 def test_lines_to_paste():
@@ -219,27 +170,6 @@ def test_the_line_evaluates_to_the_same_settings(cell, base):
     assert eval(settings_line(cell, base), {"Settings": Settings}) == cell.settings(base)
 
 
-@pytest.mark.parametrize(
-    ("cell", "line"),
-    [
-        (Cell(1 / 60), "Settings()"),
-        (Cell(1 / 120, "velocity_verlet"), 'Settings(dt=1/120, integrator="velocity_verlet")'),
-        (Cell(2 / 45, substeps=8), "Settings(dt=2/45, substeps=8)"),
-        (
-            Cell(0.01, collision="continuous", geometry="bounds"),
-            'Settings(dt=0.01, collision="continuous", geometry="bounds")',
-        ),
-    ],
-)  # fmt: skip
-def test_the_line_is_short(cell, line):
-    assert settings_line(cell) == line
-
-
-def test_steps_as_python():
-    assert [seconds(dt) for dt in (1 / 7680, 0.001, 0.5, 2.0, 1e-5)] == ["1/7680", "0.001", "1/2", "2.0", "1e-05"]
-    assert seconds(2 * math.pi / 1000) == repr(2 * math.pi / 1000)
-
-
 def test_another_engine_has_no_settings():
     cell = Cell(1 / 120, "its own", engine=PYMUNK, substeps=20)
     with pytest.raises(ValueError, match="a cell of pymunk has no Settings"):
@@ -276,17 +206,3 @@ def test_files_that_cannot_be_written_are_a_problem(tmp_path):
     for write in (write_json, write_csv):
         with pytest.raises(Problem, match="file"):
             write(made.trade(), tmp_path / "file" / "trade")
-
-
-def test_a_point_without_counts_or_errors_still_has_a_row():
-    case = made.bouncing()
-    case.curves[0].points.append(Point(Cell(1e-4, engine=PYMUNK), 1, {}, {"stopped": 1}, {}, 0.0))
-    row = trade_report.points_table(case, "energy_square").rows[3]
-    assert row[2:4] == ("1/10000", "-")
-    assert row[-1] == "stopped"
-
-
-def test_a_single_repeat_has_no_uncertainty():
-    case = made.bouncing()
-    assert ErrorBar.of([1.9e6]) == ErrorBar(1.9e6, 1.9e6, 1.9e6, 0.0)
-    assert not any("±" in text for text in column(trade_report.points_table(case, "energy_square"), "error, J²"))

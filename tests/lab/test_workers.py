@@ -16,7 +16,6 @@ from helpers_workers import Task, alive, marks, perform, until
 
 import carom
 from carom.framework.compilation import log
-from carom.lab.jobs import workers
 from carom.lab.jobs.workers import Lost, in_parallel
 
 pytestmark = pytest.mark.slow  # many runs: half a minute or more together
@@ -62,18 +61,6 @@ def test_one_process_of_all_says_that_it_compiles(tmp_path, monkeypatch, announc
     assert sorted(found) == [False, not announced]
 
 
-def test_large_tasks_and_results_get_through():
-    tasks = [bytes([number]) * 3_000_000 + b"!" for number in range(3)]
-    results = list(in_parallel(helpers_workers.turned, tasks, workers=2))
-    assert all(result == task[::-1] for task, result in results)
-    assert {id(task) for task, _ in results} == set(map(id, tasks))  # the original objects, not pickled copies
-
-
-def test_nothing_to_do_starts_nothing(monkeypatch):
-    monkeypatch.setattr(workers, "process_pool", None)
-    assert list(in_parallel(perform, [], workers=2)) == []
-
-
 @pytest.mark.parametrize("number", [0, -1, 1.5, True, "2"])
 def test_a_number_of_workers_that_is_none(number):
     with pytest.raises(ValueError, match="workers"):
@@ -100,12 +87,6 @@ def test_a_task_that_always_ends_its_worker_is_lost_and_no_other(tmp_path):
     assert {number: result.task for number, result in lost.items()} == {n: tasks[n] for n in (0, 2, 3)}
     assert lost[0].reason == "its process ended 2 times"
     assert {"0", "1", "2", "3", "4"} <= set(marks(tmp_path))
-
-
-def test_a_single_task_has_a_process_of_its_own_too(tmp_path):
-    """Otherwise a lost task would end the whole command again when it is resumed."""
-    [(_, result)] = in_parallel(perform, tasks_of(tmp_path, "exits"), workers=2)
-    assert isinstance(result, Lost)
 
 
 # -- errors and ends --------------------------------------------------------------------------------------------
