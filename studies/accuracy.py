@@ -63,7 +63,9 @@ def summary(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
     for curve in case.curves:
         row = [order(curve, name) for name in case.norms]
         row += [_step(curve, norm, target) for target in trusted]
-        row += [_best(curve, norm), *[_failed(curve)] * failing]
+        errors = [point.errors[norm].high for point in curve.points if not point.failed and norm in point.errors]
+        failed = [f"{number(point.cell.dt)}: {failures(point)}" for point in curve.points if point.failed]
+        row += [compact(min(errors), 2) if errors else NOTHING, *["; ".join(failed) or NOTHING] * failing]
         labels.setdefault(tuple(row), []).append(curve.label)
     rows = [("; ".join(methods), *row) for row, methods in labels.items()]
     title = (
@@ -87,16 +89,6 @@ def _step(curve: Curve, norm: str, target: float) -> str:
             break
         kept = point
     return NOTHING if kept is None else f"{number(kept.cell.dt)}: {compact(kept.work, 2)}"
-
-
-def _best(curve: Curve, norm: str) -> str:
-    errors = [point.errors[norm].high for point in curve.points if not point.failed and norm in point.errors]
-    return compact(min(errors), 2) if errors else NOTHING
-
-
-def _failed(curve: Curve) -> str:
-    """The steps that failed, in words."""
-    return "; ".join(f"{number(point.cell.dt)}: {failures(point)}" for point in curve.points if point.failed) or NOTHING
 
 
 # -- published figures --------------------------------------------------------------------------------------------

@@ -98,22 +98,15 @@ def remarks(result: Result) -> list[str]:
         if values:
             lines.append(f"{engine}: {', '.join(f'{name} {_value(values[name])}' for name in names)}")
             if engine == "carom":
-                lines[-1] += "".join(f"; {name}: {what}" for name, what in _other_settings(result.rows).items())
+                others = {row.name: row.settings for row in result.rows if row.settings}  # that are not the default
+                for scene, values in others.items():
+                    lines[-1] += f"; {scene}: {', '.join(f'{name} {_value(value)}' for name, value in values.items())}"
     if "pymunk" in result.settings:
         lines[-1] += (
             "; moments infinite; index: its tree of boxes or its spatial hash (cells of two"
             " diameters), whichever was faster in the first repeat"
         )
     return lines
-
-
-def _other_settings(rows: list[Row]) -> dict[str, str]:
-    """Non-default settings by scene name."""
-    return {
-        row.name: ", ".join(f"{name} {_value(value)}" for name, value in row.settings.items())
-        for row in rows
-        if row.settings
-    }
 
 
 def _value(value: Any) -> str:

@@ -176,7 +176,7 @@ class Case:
         finest = steps[-1] if "steps" in self.given else own / effort.down
         if self.reference_cells and self.kind != CHAOTIC:
             fine = own / 2
-            while fine > finest / FINER and self._seconds_of_references(fine / 2) <= allowed:
+            while fine > finest / FINER and self._cost(fine / 2) <= allowed:
                 fine /= 2
         if "steps" not in self.given:
             finest = max(finest, 2 * fine)
@@ -189,7 +189,7 @@ class Case:
         fineness = max(round(steps[-1] / fine), 2)
         return case.replace(fineness=fineness)._with_reference_step(steps[-1] / fineness)
 
-    def _seconds_of_references(self, dt: float) -> float:
+    def _cost(self, dt: float) -> float:
         return sum(map(self.seconds_of, self._with_reference_step(dt).reference_cells))
 
     def _with_reference_step(self, dt: float) -> Case:
@@ -244,11 +244,15 @@ def case_of(
         asked, chosen = chosen, _statistics(subject, chosen, facts)
         left = [name for name in asked if not {name, MEAN + name} & {*chosen}]
         why += f"; places have no mean: {', '.join(left)}" if left else ""
-    ladder = _fitting(steps or known.steps or _unsplit(grids.steps_for(facts), facts, duration), duration)
+    own, changes = facts.settings.dt, len(facts.inputs)
+    usual = [dt for dt in grids.steps_for(facts) if dt <= own * (1 + 1e-9) or changes * dt <= DENSE * duration]
+    ladder = _fitting(steps or known.steps or usual, duration)
     form, reference = _closed_form(subject, duration, kind, chosen)
     if kind == RESTING and set(chosen) <= set(OF_KIND[RESTING]) and facts.trial.reach <= facts.trial.size:
         form, reference = "what rests stays where it is: all these errors should be 0", facts.trial
-    times = repeats or known.repeats or _repeats(kind, chosen)
+    times = repeats or known.repeats or PHASES[kind]
+    if "apex" in chosen and not (repeats or known.repeats):  # its error depends on where in a step it lies
+        times = max(times, PHASES[IMPACTS])
     found = Case(
         subject, facts, kind, why, chosen, duration, times, ladder, form, reference,
         () if reference is not None else _own_references(facts, ladder, bool(subject.names)),
@@ -306,17 +310,6 @@ def _fitting(steps: Sequence[float], seconds: float) -> tuple[float, ...]:
     if not fitting:
         raise Problem(f"a run of {seconds:g} s has no room for steps of {min(steps):g} s: at most {largest:g} s")
     return fitting
-
-
-def _unsplit(steps: Sequence[float], facts: Survey, seconds: float) -> list[float]:
-    """The steps without those, longer than the scene's own, in which the inputs change too often."""
-    own, changes = facts.settings.dt, len(facts.inputs)
-    return [dt for dt in steps if dt <= own * (1 + 1e-9) or changes * dt <= DENSE * seconds]
-
-
-def _repeats(kind: str, norms: Sequence[str]) -> int:
-    """An apex norm needs many start phases: the error depends on where in a step the apex lies."""
-    return max(PHASES[kind], PHASES[IMPACTS]) if "apex" in norms else PHASES[kind]
 
 
 def _closed_form(subject: Subject, seconds: float, kind: str, norms: Sequence[str]) -> tuple[str, Seen | None]:

@@ -77,13 +77,17 @@ def run_command(
     if loaded.view is not None and len(loaded.view[0]) != world.dimensions:
         raise Problem(f"{loaded.name}: view has {len(loaded.view[0])} dimensions, the world {world.dimensions}")
     if steps is None:
-        steps = _steps_for(loaded, seconds, world.settings.dt)
+        wanted = seconds if seconds is not None else (loaded.seconds or DEFAULT_SECONDS)
+        steps = round(wanted / world.settings.dt)
     film = None if films is None else films.Recording(world, steps)
     finished = _run_with_progress(loaded, world, steps, seed, screen, profile, film)
     finished.report.compared = loaded.values_of(finished.world)
     if draw is not None:
         with screen.status("drawing ..."):
-            finished.report.pictures = _pictures(draw, finished, out, loaded)
+            try:
+                finished.report.pictures = [str(path) for path in draw(finished, out, loaded.view)]
+            except OSError as error:
+                raise Problem(f"--out {out}: {error.strerror or error}") from error
     if film is not None and record is not None:
         finished.report.pictures.append(_save_film(film, finished, record, loaded, screen))
 
@@ -126,18 +130,6 @@ def _save_film(film: Any, finished: Run, file: Path, loaded: Loaded, screen: Con
             return str(film.save(finished, file, loaded.view, lambda _: bar.advance(1)))
         except OSError as error:
             raise Problem(f"--record {file}: {error.strerror or error}") from error
-
-
-def _pictures(draw: Any, finished: Run, out: Path, loaded: Loaded) -> list[str]:
-    try:
-        return [str(path) for path in draw(finished, out, loaded.view)]
-    except OSError as error:
-        raise Problem(f"--out {out}: {error.strerror or error}") from error
-
-
-def _steps_for(loaded: Loaded, seconds: float | None, dt: float) -> int:
-    wanted = seconds if seconds is not None else (loaded.seconds or DEFAULT_SECONDS)
-    return max(0, round(wanted / dt))
 
 
 def _run_with_progress(

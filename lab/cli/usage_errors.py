@@ -30,14 +30,10 @@ def one_line(error: BaseException) -> str:
     """The error's message in one line, with its type if the message alone is unclear."""
     from ...framework import CaromError  # only here, for the same reason
 
-    text = _shortened(" ".join(str(error).split()))
+    text = " ".join(str(error).split())
+    text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ... (--traceback shows all of it)"
     if isinstance(error, KeyError) and len(error.args) == 1 and isinstance(error.args[0], str):
         text = " ".join(error.args[0].split())
     if isinstance(error, (ValueError, CaromError, Problem)) and text:
         return text
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
-
-
-def _shortened(text: str) -> str:
-    """The beginning of a long message, and the option that shows all of it."""
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ... (--traceback shows all of it)"

@@ -25,7 +25,7 @@ from ..plain import Plain, jsonable
 from ..plugins.command import plugin_named
 from ..reporting.progress import Bar, Progress
 from ..reporting.text import counted, metres, number
-from ..trading.records import CaseTrade, Cell, Point, known_well
+from ..trading.records import CaseTrade, Cell, known_well
 from ..trading.report import failures
 from ..trading.trade import measured
 from .step_length import StepLimits, step_limits
@@ -196,17 +196,15 @@ class StepOutcome(Plain):
             return [f"Outcome: not measured: {self.refused}"]
         lines = []
         if self.longest:
-            moved = f"the step moves no body by more than {self._way()}, and nothing else is noticed"
+            way = f"{metres(SHARE * self.size)}, 1 % of the smallest one's size"
+            way = metres(self.way) if self.way is not None else way
+            moved = f"the step moves no body by more than {way}, and nothing else is noticed"
             kept = f"nothing would be noticed in {', '.join(self.compared)}" if self.compared else moved
             lines.append(f"Outcome: up to {number(self.longest)} s {kept}.")
         if self.link:
             lines.append(f"Weakest link: at {number(self.beyond)} s {self.link}.")
         return [*lines, f"Known {self.known}."]
 
-    def _way(self) -> str:
-        if self.way is not None:
-            return metres(self.way)
-        return f"{metres(SHARE * self.size)}, 1 % of the smallest one's size"
 
 
 def outcome_of_steps(
@@ -235,12 +233,8 @@ def _outcome(case: CaseTrade, way: float | None) -> StepOutcome:
     found.known = f"from {counted(runs, 'run')} of {number(case.seconds)} s with {counted(len(points), 'step')}"
     for point in points:
         if point.failed or noticed(point.effects, way):
-            found.link, found.beyond = _link(point, way), point.cell.dt
+            words = [failures(point)] * point.failed + in_words(point.effects, noticed(point.effects, way))
+            found.link, found.beyond = "; ".join(words), point.cell.dt
             break
         found.longest = point.cell.dt
     return found
-
-
-def _link(point: Point, way: float | None) -> str:
-    """What would be noticed, the bodies and their places first."""
-    return "; ".join([failures(point)] * point.failed + in_words(point.effects, noticed(point.effects, way)))

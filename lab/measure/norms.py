@@ -47,11 +47,6 @@ class Norm:
         return not self.relative_to or bool(getattr(reference, self.relative_to))
 
 
-def _one(seen: Seen, reference: Seen) -> float:
-    del seen, reference
-    return 1.0
-
-
 def _reach(seen: Seen, reference: Seen) -> float:
     return reference.reach or seen.reach or 1.0
 
@@ -147,7 +142,7 @@ def _relative(name: str, text: str, attribute: str = "", signed: bool = False) -
 
 
 def _own(name: str) -> tuple[Measure, Measure]:
-    return (lambda seen, reference: getattr(seen, name)), _one
+    return (lambda seen, reference: getattr(seen, name)), (lambda seen, reference: 1.0)
 
 
 NORMS: Mapping[str, Norm] = {

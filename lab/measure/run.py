@@ -261,14 +261,10 @@ def run(
     report.kernels_compiled, report.kernels_loaded = _kernels()[0] - compiled, _kernels()[1] - loaded
     meter.fill(report)
     stats = meter.stats() if profile else None
-    report.profile = None if stats is None else _plain_profile(stats)
+    if stats is not None:
+        kernels = [dataclasses.asdict(row) for row in stats.kernels]
+        report.profile = {"steps": stats.steps, "nanoseconds": stats.nanoseconds, "kernels": kernels}
     return Run(report, meter.recorder.traces().farthest(TRACED_BODIES), world, stats)
-
-
-def _plain_profile(stats: Stats) -> dict[str, Any]:
-    """What ``stats`` knows of systems and kernels, as values of JSON."""
-    kernels = [dataclasses.asdict(row) for row in stats.kernels]
-    return {"steps": stats.steps, "nanoseconds": stats.nanoseconds, "kernels": kernels}
 
 
 def plain_settings(world: World) -> dict[str, Any]:

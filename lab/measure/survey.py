@@ -51,12 +51,10 @@ class Survey:
     """
 
     settings: Settings
-    bodies: int
     force_systems: bool
     forces: bool
     damping: bool
     levels: bool
-    impacts: int
     contacts: int
     resting: int
     growth: float
@@ -126,7 +124,9 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
     first, walled = seen(0.0, True), True
     if first.failure == ESCAPED:  # for example a ball that rolls off a platform
         first, walled = seen(0.0, False), False
-    if first.created and _is_another(seen(SEEN), first):
+    other = seen(SEEN) if first.created else first
+    moved = float(distances(other, first)[0].max(initial=0.0))
+    if other.entities != first.entities or moved > first.size:  # another game, in which other bodies come
         growth = math.inf
     else:
         nudged = seen(NUDGE)
@@ -138,7 +138,6 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
     return Survey(
         settings,
         growth=growth,
-        impacts=first.impacts,
         contacts=max(sum(first.struck), int(first.met)),
         resting=int(first.counts["solver_loops"] > 0),
         speed=first.speed,
@@ -152,12 +151,6 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
     )
 
 
-def _is_another(seen: Seen, first: Seen) -> bool:
-    """True if another start has led to other bodies, or has taken one where it is nowhere near."""
-    apart, _ = distances(seen, first)
-    return seen.entities != first.entities or float(apart.max(initial=0.0)) > first.size
-
-
 def _facts(name: str, world: World) -> dict[str, Any]:
     dynamic = world.bodies.dynamic
     if not len(dynamic):
@@ -165,7 +158,6 @@ def _facts(name: str, world: World) -> dict[str, Any]:
     gravity = bool(np.any(world.gravity) and np.any(dynamic.gravity_scale))
     constant = bool(np.any(dynamic.constant_force))
     return {
-        "bodies": len(dynamic),
         "force_systems": bool(world.force_systems),
         "forces": gravity or constant or bool(world.force_systems),
         "damping": bool(np.any(dynamic.linear_damping)),

@@ -95,7 +95,8 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
         highs.append(paths + size)
     low, high = np.concatenate(lows), np.concatenate(highs)
     if not len(low):
-        low, high = _smallest(shapes) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
+        smallest = shapes.where(np.argsort(shapes.half.max(axis=1), kind="stable")[:1])
+        low, high = (smallest.lower, smallest.upper) if len(shapes.entity) else (np.zeros((1, d)), np.ones((1, d)))
     lower, upper = low.min(axis=0), high.max(axis=0)
     fixed = shapes.where(shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
     for k in np.argsort(fixed.half.max(axis=1), kind="stable"):  # smallest first
@@ -108,12 +109,6 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
         lower = np.minimum(lower, np.maximum(box_low, near_low))
         upper = np.maximum(upper, np.minimum(box_high, near_high))
     return lower - room / 2, upper + room / 2
-
-
-def _smallest(shapes: Shapes) -> tuple[Floats, Floats]:
-    """The lower and the upper corner (1, d each) of the smallest shape."""
-    k = int(np.argmin(shapes.half.max(axis=1)))
-    return shapes.lower[k : k + 1], shapes.upper[k : k + 1]
 
 
 def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas.View:
@@ -176,7 +171,8 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     elif count < moved:
         subtitle = f"paths of {count:,} of the {moved:,} bodies that moved, those that went farthest, over {over}"
     else:
-        subtitle = f"{'path' if count == 1 else 'paths'} of {_that_moved(count)}, over {over}"
+        that_moved = "path of the one body" if count == 1 else f"paths of the {count:,} bodies"
+        subtitle = f"{that_moved} that moved, over {over}"
     subtitle += ", fading into the past" if count else ""
     if traces.impacts is not None:
         subtitle += f"   ·   {report.settings['collision']}"
@@ -204,10 +200,6 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
         draw_contacts(panel, points, normals, followed.typical_diameter, projection)
         sheet.legend([("o", canvas.CONTACT, "impact")])
     return sheet
-
-
-def _that_moved(count: int) -> str:
-    return "the one body that moved" if count == 1 else f"the {count:,} bodies that moved"
 
 
 def _moving_bodies(report: RunReport) -> str:

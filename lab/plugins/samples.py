@@ -125,7 +125,10 @@ def _rows(shape: Shape, scale: np.ndarray, upright: np.ndarray, dimensions: int,
             arrays[name] = _numbers(column, value, common, own_sample, dimensions, rng)
             if type(column) is not Column:  # it has its own rules
                 _keep_rules(column, value, arrays[name])
-    axes = np.eye(dimensions) * np.ones((count, 1, 1)) if not shape.rotates else _axes(count, dimensions, rng)
+    axes = np.eye(dimensions) * np.ones((count, 1, 1))  # rotation matrices; their columns are the bodies' axes
+    if shape.rotates:
+        angles = rng.uniform(-np.pi, np.pi, count) if dimensions == 2 else rng.normal(size=(count, 4))
+        axes = axes_of(angles, dimensions)
     axes[upright] = np.eye(dimensions)
     return Rows(shape, arrays, axes, half_extents_of(shape, arrays, axes))
 
@@ -188,11 +191,6 @@ def _array_numbers(column: ArrayColumn, value: Any, common: np.ndarray, rng: np.
     wanted = np.log(common) + rng.uniform(-0.5, 0.5, len(common))
     order = np.argsort(np.abs(sizes[None, :] - wanted[:, None]), axis=1, kind="stable")
     return numbers[order[np.arange(len(common)), rng.integers(0, min(2, len(scaled)), len(common))]].astype(np.int64)
-
-
-def _axes(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
-    """(count, d, d) rotation matrices; their columns are the bodies' axes in the world."""
-    return axes_of(rng.uniform(-np.pi, np.pi, count) if dimensions == 2 else rng.normal(size=(count, 4)), dimensions)
 
 
 def directions(count: int, dimensions: int, rng: np.random.Generator) -> np.ndarray:
@@ -279,13 +277,10 @@ def pose_shown(poses: Poses, at: int, d: Any = None, swapped: bool = False) -> s
 
 def row_shown(rows: Rows, at: int) -> str:
     parameters = rows.at(at)
-    axes = f", axes={plain(parameters.axes)!r}" if rows.shape.rotates and not _upright(rows.axes[at]) else ""
+    turned = rows.shape.rotates and (rows.axes[at] != np.eye(len(rows.axes[at]))).any()
+    axes = f", axes={plain(parameters.axes)!r}" if turned else ""
     return shown(parameters)[:-1].removesuffix(", ") + axes + ")"
 
 
 def numbers_shown(values: Any) -> str:
     return repr(tuple(float(value) for value in values))
-
-
-def _upright(axes: np.ndarray) -> bool:
-    return bool((axes == np.eye(len(axes))).all())

@@ -159,7 +159,10 @@ def answer(case: CaseTrade, target: Target | None = None) -> list[str]:
     lines.append(f"  error    {asked}{_error(case, chosen)}; noticed: {noticed_text(chosen)}")
     found = next_choice(case, chosen)
     if found is not None:
-        lines.append(f"  {found[0]:8} {_compared(case, found[1], chosen, target)}")
+        name, other = found
+        error = f"; error {in_unit(case, error_of(case, other))}" if asked else ""
+        told_of = f"{_ratio(other, chosen)} times the cost; noticed: {noticed_text(other)}{error}"
+        lines.append(f"  {name:8} {other.line}: {told_of}")
     return [*lines, *_inputs(case)]
 
 
@@ -192,12 +195,6 @@ def next_choice(case: CaseTrade, chosen: Point) -> tuple[str, Point] | None:
     cheaper = [point for point in best if price(point) < CHEAPER * price(chosen)]
     cheaper = [point for point in cheaper if not _is_cheaper_by_work_only(point, chosen)]
     return ("cheaper", cheaper[-1]) if cheaper else None
-
-
-def _compared(case: CaseTrade, point: Point, chosen: Point, target: Target | None) -> str:
-    asked = target is not None and target.max_error is not None
-    error = f"; error {in_unit(case, error_of(case, point))}" if asked else ""
-    return f"{point.line}: {_ratio(point, chosen)} times the cost; noticed: {noticed_text(point)}{error}"
 
 
 def _ratio(point: Point, other: Point) -> str:

@@ -100,7 +100,11 @@ def figure(case: CaseTrade, quantity: str = WORK, norm: str | None = None) -> Fi
     sheet = Sheet(case, norm_of(case, norm), quantity)
     sheet.kinds = [kind for kind in FAILURES if any(kind in _failures(p, sheet.norm) for p in case.points)]
     drawn = list(zip(case.curves, styles(case.curves), strict=True))
-    entries = [_entry(curve, style, sheet.norm) for curve, style in drawn]
+    entries = [
+        Line2D([], [], label=legend_text(curve, sheet.norm), color=style.colour, ls=style.line, marker=style.marker,
+               ms=5.5, lw=1.6)
+        for curve, style in drawn
+    ]  # fmt: skip
     notes = [line for note in _notes(sheet) for line in textwrap.wrap(note, 135)]
     columns = 3 if max((len(str(entry.get_label())) for entry in entries), default=0) < 34 else 2
     below = ROW * -(-len(entries) // columns) + NOTE * len(notes)
@@ -133,11 +137,6 @@ def legend_text(curve: Curve, norm: str) -> str:
     if found is None:
         return curve.label
     return f"{curve.label}, order {order(curve, norm)}"
-
-
-def _entry(curve: Curve, style: Style, norm: str) -> Line2D:
-    look: dict[str, Any] = {"color": style.colour, "ls": style.line, "marker": style.marker, "ms": 5.5, "lw": 1.6}
-    return Line2D([], [], label=legend_text(curve, norm), **look)
 
 
 def _bar(point: Point, norm: str) -> ErrorBar | None:

@@ -187,8 +187,11 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
     repeated = f", {case.repeats} {case.repeated}" if case.repeats > 1 else ""
     lines.append(f"{number(case.seconds)} s simulated{repeated}")
     lines.append(f"{norm}: {case.norms[norm]}")
-    lines.append(f"reference: {reference_line(case, norm)}")
-    doubted = untrusted(case, norm)
+    agreement = case.reference.agreement.get(norm, 0.0)
+    apart = f" ({norm}: {compact(agreement)} apart)" if agreement else ""
+    lines.append(f"reference: {case.reference.text}{apart}")
+    known = [point.errors[norm].mean for point in case.points if norm in point.errors]
+    doubted = [error for error in known if not case.reference.trusts(norm, error)]
     if doubted:
         limit = TRUSTED * case.reference.agreement[norm]
         lines.append(
@@ -199,15 +202,3 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
     if off:
         lines.append(f"observed orders more than {ORDER_TOLERANCE:g} from the theory's: {', '.join(off)}")
     return lines
-
-
-def reference_line(case: CaseTrade, norm: str) -> str:
-    """What the errors are measured against, and its accuracy."""
-    agreement = case.reference.agreement.get(norm, 0.0)
-    return f"{case.reference.text} ({norm}: {compact(agreement)} apart)" if agreement else case.reference.text
-
-
-def untrusted(case: CaseTrade, norm: str) -> list[Point]:
-    """The points whose error is too small for the reference."""
-    points = [point for point in case.points if norm in point.errors]
-    return [point for point in points if not case.reference.trusts(norm, point.errors[norm].mean)]

@@ -129,7 +129,9 @@ def trade(
         except Problem as problem:
             if len(targets) == 1:
                 raise
-            result.cases.append(_refused(name, problem.message))
+            why = problem.message
+            nothing = {"norms": {"": ""}, "seconds": 0.0, "repeats": 0, "repeated": "", "reference": Reference("")}
+            result.cases.append(CaseTrade(name, name, "", "", "", **nothing, curves=[], refused=why))
     return result
 
 
@@ -288,7 +290,3 @@ def label_of(method: Cell, others: Iterable[Cell]) -> str:
     if differs(lambda cell: cell.geometry):
         parts.append(method.geometry)
     return ", ".join(parts)
-
-
-def _refused(name: str, why: str) -> CaseTrade:
-    return CaseTrade(name, name, "", "", "", {"": ""}, 0.0, 0, "", Reference(""), [], refused=why)

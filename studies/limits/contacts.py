@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.lab import testing as kit
 
 from .edges import BY_MODE, BrokenError, Method, Quantity, decades
 from .motion import GRAVITY, SPEED, new_world
@@ -35,8 +36,7 @@ def speed(method: Method, ratio: float) -> float:
             RigidBody.many(linear_velocity=(velocity, 0.0), ccd=method is ONE_SWEPT),
             SphereCollider.many(radius=RADIUS, restitution=1.0, layer=2, mask=1),
         )
-        for _ in range(3):
-            world.step()
+        kit.run(world, 3)
         x = world.bodies.dynamic.position[:, 0].copy()
         back = world.bodies.dynamic.linear_velocity[:, 0] < 0
     through = float(np.mean(~back))
@@ -51,11 +51,8 @@ def exchange(method: Method, ratio: float) -> float:
     """Elastic impact of a light ball and one ``ratio`` times heavier, against the closed form: velocities, momentum."""
     with closing(new_world(method)) as world:
         for side, mass in ((-1, 1.0), (1, ratio)):
-            world.create_entity(
-                Transform((0.6 * side, 0)), RigidBody(mass, (-SPEED * side, 0)), SphereCollider(0.5, restitution=1.0)
-            )
-        for _ in range(12):
-            world.step()
+            kit.ball(world, 0.6 * side, -SPEED * side, mass=mass, restitution=1.0)
+        kit.run(world, 12)
         light, heavy = world.bodies.linear_velocity[:, 0].tolist()
         momentum = float(world.momentum()[0])
     true = SPEED * np.array([(1 - 3 * ratio) / (1 + ratio), (3 - ratio) / (1 + ratio)])
@@ -84,7 +81,7 @@ def tower(method: Method, height: float) -> float:
 def _tower(method: Method, masses: list[float]) -> tuple[float, float]:
     """(largest overlap in ten seconds, sinking of the top in the last second), in box sizes."""
     with closing(new_world(method, GRAVITY)) as world:
-        world.create_entity(Transform((0, -0.5)), AABBCollider((10, 0.5)))
+        kit.floor(world)
         n = len(masses)
         world.create_entities(
             n,
@@ -111,8 +108,7 @@ def crowd(method: Method, count: float) -> float:
     with closing(new_world(method)) as world:
         n = round(count)
         world.create_entities(n, Transform.many(np.zeros((n, 2))), RigidBody.many(), SphereCollider.many(radius=0.5))
-        for _ in range(CROWD_STEPS):
-            world.step()
+        kit.run(world, CROWD_STEPS)
         depth = np.asarray(world.contacts.depth)
         finite = np.isfinite(world.bodies.position).all()
     if not finite:

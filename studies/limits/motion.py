@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem, World
+from carom.lab import testing as kit
 from carom.plugins import Physics
 from carom.systems.integration.integrators import STANDARD_INTEGRATORS
 
@@ -31,24 +32,14 @@ TEN_SWINGS, TEN_BOUNCES = 628, 1073  # steps of ten oscillations and ten bounces
 SPEED = 1.0  # m/s, of bodies that meet head on
 
 
-class PullToOrigin(ForceSystem):
-    """A spring to the origin, in N/m."""
+class PullOrDrag(ForceSystem):
+    """A spring to the origin, in N/m, and a force opposite to the velocity, in N s/m."""
 
-    def __init__(self, stiffness: float) -> None:
-        self.stiffness = stiffness
-
-    def add_forces(self, bodies: Any, time: float) -> None:
-        bodies.force[:] -= self.stiffness * bodies.position
-
-
-class Drag(ForceSystem):
-    """A force opposite to the velocity, in N s/m."""
-
-    def __init__(self, rate: float) -> None:
-        self.rate = rate
+    def __init__(self, stiffness: float = 0.0, drag: float = 0.0) -> None:
+        self.stiffness, self.drag = stiffness, drag
 
     def add_forces(self, bodies: Any, time: float) -> None:
-        bodies.force[:] -= self.rate * bodies.linear_velocity
+        bodies.force[:] -= self.stiffness * bodies.position + self.drag * bodies.linear_velocity
 
 
 def new_world(method: Method, gravity: float = 0.0, **settings: Any) -> World:
@@ -92,7 +83,7 @@ def drag(method: Method, ratio: float) -> float:
     """A body slowed by a drag force, against exp(-c t), a thousand steps."""
     with closing(new_world(method, dt=1.0)) as world:
         world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(SPEED, 0)))
-        world.add_system(Drag(ratio))
+        world.add_system(PullOrDrag(drag=ratio))
         velocity, worst = world.bodies.linear_velocity, 0.0
         for n in range(1, MOST_STEPS + 1):
             world.step()
@@ -107,7 +98,7 @@ def _swung(method: Method, dt: float, frequency: float, x: float, v: float, step
     states = np.empty((steps, 2))
     with closing(new_world(method, dt=dt)) as world:
         world.create_entity(Transform((x, 0)), RigidBody(linear_velocity=(v, 0)))
-        world.add_system(PullToOrigin(frequency**2))
+        world.add_system(PullOrDrag(frequency**2))
         highest = BLOWN_UP * ((frequency * x) ** 2 + v * v)
         position, velocity = world.bodies.position, world.bodies.linear_velocity
         for n in range(steps):
@@ -122,24 +113,18 @@ def long_swing(method: Method, steps: float) -> float:
     """Drift of the mean energy of a spring of z = 0.1, from the first steps to the last."""
     with closing(new_world(method, dt=1.0)) as world:
         world.create_entity(Transform((1, 0)), RigidBody())
-        world.add_system(PullToOrigin(SHORT_SWING**2))
-        bodies = world.bodies
-        position, velocity = bodies.position, bodies.linear_velocity
-        return _drift(
-            world, round(steps), TEN_SWINGS, lambda: SHORT_SWING**2 * position[0, 0] ** 2 + velocity[0, 0] ** 2
-        )
+        world.add_system(PullOrDrag(SHORT_SWING**2))
+        x, v = world.bodies.position, world.bodies.linear_velocity
+        return _drift(world, round(steps), TEN_SWINGS, lambda: SHORT_SWING**2 * x[0, 0] ** 2 + v[0, 0] ** 2)
 
 
 def long_bounce(method: Method, steps: float) -> float:
     """Drift of the mean energy of an elastic ball that falls four metres, at 60 steps a second."""
     with closing(new_world(method, GRAVITY)) as world:
-        world.create_entity(Transform((0, -1)), AABBCollider((5, 1)))
-        world.create_entity(Transform((0, 4.5)), RigidBody(), SphereCollider(0.5, restitution=1.0))
-        bodies = world.bodies
-        position, velocity = bodies.position, bodies.linear_velocity
-        return _drift(
-            world, round(steps), TEN_BOUNCES, lambda: GRAVITY * (position[0, 1] - 0.5) + velocity[0, 1] ** 2 / 2
-        )
+        kit.floor(world)
+        kit.ball(world, (0, 4.5), restitution=1.0)
+        x, v = world.bodies.position, world.bodies.linear_velocity
+        return _drift(world, round(steps), TEN_BOUNCES, lambda: GRAVITY * (x[0, 1] - 0.5) + v[0, 1] ** 2 / 2)
 
 
 def _drift(world: World, steps: int, window: int, energy: Callable[[], float]) -> float:
@@ -147,8 +132,7 @@ def _drift(world: World, steps: int, window: int, energy: Callable[[], float]) -
     window = min(window, steps // 2)
     means = []
     for skipped in (0, steps - 2 * window):
-        for _ in range(skipped):
-            world.step()
+        kit.run(world, skipped)
         total = 0.0
         for _ in range(window):
             world.step()
@@ -161,13 +145,9 @@ def distance(method: Method, offset: float) -> float:
     """Two balls of 1 m meet head on at this distance from the origin: the error of their positions after 0.5 s."""
     with closing(new_world(method)) as world:
         for side in (-1, 1):
-            world.create_entity(
-                Transform((offset + 0.6 * side, 0)), RigidBody(linear_velocity=(-SPEED * side, 0)),
-                SphereCollider(0.5, restitution=1.0),
-            )  # fmt: skip
+            kit.ball(world, offset + 0.6 * side, -SPEED * side, restitution=1.0)
         start = world.bodies.position.copy()
-        for _ in range(30):
-            world.step()
+        kit.run(world, 30)
         position, velocity = world.bodies.position.copy(), world.bodies.linear_velocity.copy()
     if (position == start).all():
         raise BrokenError("nothing moves: a step is less than the spacing of the numbers")
@@ -183,12 +163,9 @@ def sizes(method: Method, ratio: float) -> float:
     small, large = ratio**-0.5, ratio**0.5
     gap, steps = 0.1, 12
     with closing(new_world(method)) as world:
-        world.create_entity(
-            Transform((-small - gap, 0)), RigidBody(linear_velocity=(SPEED, 0)), SphereCollider(small, restitution=1.0)
-        )
-        world.create_entity(Transform((large, 0)), RigidBody(), SphereCollider(large))
-        for _ in range(steps):
-            world.step()
+        kit.ball(world, -small - gap, SPEED, radius=small, restitution=1.0)
+        kit.ball(world, large, radius=large)
+        kit.run(world, steps)
         position, velocity = world.bodies.position.copy(), world.bodies.linear_velocity.copy()
     travel = steps / 60 * SPEED
     true = np.array([-small, large + travel - gap])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 from carom.lab.reporting.text import NOTHING, TextTable
@@ -44,7 +45,7 @@ def table(quantity: Quantity, lines: Sequence[Line]) -> TextTable:
         edges = {level: edge(quantity, line.samples, level) for level in (*LEVELS, BREAKS)}
         cells = [_edge(found) for found in edges.values()]
         cells += [_below(quantity, line)] if both_ways else []
-        cells += [_worst(line), _short(edges[BREAKS].why) or NOTHING]
+        cells += [_worst(line), textwrap.shorten(edges[BREAKS].why, LONGEST, placeholder=" ...") or NOTHING]
         rows.setdefault(tuple(cells), []).append(line.of)
     unit = f" ({quantity.unit})" if quantity.unit else ""
     headings = ("method", "1 % at", "10 % at", "breaks at", *["downwards"] * both_ways, "worst", "how")
@@ -84,7 +85,3 @@ def _worst(line: Line) -> str:
     if worst < ROUNDING:
         return "rounding"
     return f"{number(float(f'{100 * worst:.2g}'))} %" if worst < MOST else f"over {number(100 * MOST)} %"
-
-
-def _short(why: str) -> str:
-    return why if len(why) <= LONGEST else f"{why[:LONGEST].rsplit(' ', 1)[0]} ..."

@@ -16,6 +16,7 @@ import numpy as np
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Plugin, Settings, System, World
+from carom.lab import testing as kit
 from carom.lab.cases.closed_forms import FORMS
 from carom.lab.engines.adapters import CaromEngine
 from carom.lab.measure.body_shapes import Enclosure, Floats
@@ -46,8 +47,7 @@ def seen(make: Make, seconds: float, phase: float = 1.0) -> Seen:
 
 
 def _run(world: World, seconds: float) -> None:
-    for _ in range(round(seconds / world.settings.dt)):
-        world.step()
+    kit.run(world, round(seconds / world.settings.dt))
 
 
 # -- motion and rest --------------------------------------------------------------------------------------------
@@ -99,7 +99,7 @@ def tiles(settings: Settings, *, step: float = 0.0) -> World:
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
     for k in range(TILES):
         world.create_entity(Transform((k * LENGTH, -0.5 + step * (k % 2))), AABBCollider((LENGTH / 2, 0.5)))
-    world.create_entity(Transform((0.0, 0.5)), RigidBody(linear_velocity=(GOES, 0.0)), AABBCollider((0.5, 0.5)))
+    kit.box(world, (0.0, 0.5), GOES)
     return world
 
 
@@ -206,8 +206,7 @@ def head_on(settings: Settings) -> World:
     """Two balls of equal mass that meet at 1 m/s, one of restitution FIRST, the other of SECOND."""
     world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
     for x, speed, restitution in ((0.0, 1.0, FIRST), (1.01, 0.0, SECOND)):
-        body = RigidBody(linear_velocity=(speed, 0.0))
-        world.create_entity(Transform((x, 0.0)), body, SphereCollider(0.5, restitution=restitution))
+        kit.ball(world, x, speed, restitution=restitution)
     return world
 
 
@@ -221,9 +220,8 @@ def bounced(make: Make, seconds: float) -> Errors:
 def sliding(settings: Settings) -> World:
     """A box with friction FIRST that slides at 5 m/s on a floor with friction SECOND."""
     world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
-    world.create_entity(Transform((0.0, -0.5)), AABBCollider((50.0, 0.5), friction=SECOND))
-    body = RigidBody(linear_velocity=(5.0, 0.0))
-    world.create_entity(Transform((0.0, 0.5)), body, AABBCollider((0.5, 0.5), friction=FIRST))
+    kit.floor(world, friction=SECOND)
+    kit.box(world, (0.0, 0.5), 5.0, friction=FIRST)
     return world
 
 
