@@ -15,13 +15,18 @@ import numpy as np
 
 def jsonable(value: Any) -> Any:
     """Records as plain data, with None instead of numbers that JSON cannot represent: infinity and NaN."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        value = dataclasses.asdict(value)
     if isinstance(value, Mapping):
         return {key: jsonable(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [jsonable(item) for item in value]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return jsonable(_plain(value))
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _plain(record: Any) -> dict[str, Any]:
+    found = dataclasses.asdict(record)
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in found.items()}
 
 
 class Plain:
@@ -29,7 +34,7 @@ class Plain:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return dataclasses.asdict(self)  # type: ignore[call-overload]
+        return _plain(self)
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Self:

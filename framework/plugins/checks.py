@@ -10,7 +10,7 @@ import collections
 import inspect
 import math
 import numbers
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ POSES = (
     (1e6, 1e6, 1e6), (1e-9, 0.0, 0.0), (0.0, -1e-9, 0.0), (-0.1, 0.0, 0.0),
 )  # fmt: skip
 SCALES = (1.0, 1e-9, 1e9)
+VALUES = ((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0))  # of both bodies, for a mixing rule
 # What functions of pairs with Convex get besides, by how many of the two it is.
 HELPERS = {0: (), 1: ("support", "rounding"), 2: ("a_support", "b_support", "a_rounding", "b_rounding")}
 UNIT = 1e-9  # how far from 1 a normal's length may be
@@ -297,7 +298,12 @@ def check_mixing_rule(plugin: Any, name: str, function: Any) -> None:
     if not inspect.isfunction(function):
         raise PluginError(f"{where}: register a plain function of two numbers, got {function!r}")
     _check_arity(where, function, ("x", "y"))
-    for x, y in ((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0)):
+    check_mixed(where, function, VALUES)
+
+
+def check_mixed(where: str, function: Any, values: Iterable[Any]) -> None:
+    """PluginError unless the rule makes one number of each two, from 0, whichever comes first."""
+    for x, y in values:
         there, back = _call(where, function, (x, y), None), _call(where, function, (y, x), None)
         if not _is_number(there) or not (math.isfinite(there) and there >= 0):
             raise PluginError(f"{where}: for {x} and {y} it returned {there!r}: return a number from 0")

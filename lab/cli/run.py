@@ -12,6 +12,7 @@ from rich.console import Console
 
 from ...framework import Settings
 from ..measure.run import Run, run
+from ..plain import jsonable
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_module
 from ..reporting.progress import Bar
@@ -92,7 +93,7 @@ def run_command(
         finished.report.pictures.append(_save_film(film, finished, record, loaded, screen))
 
     if as_json:
-        click.echo(json.dumps(finished.report.as_dict(), indent=2, allow_nan=False))
+        click.echo(json.dumps(jsonable(finished.report), indent=2, allow_nan=False))
         return
     console = Console()
     print_report(finished.report, console, finished.profile)

@@ -131,7 +131,7 @@ def _show(name: str, found: list[tuple[float, StepLimits]], outcome: StepOutcome
     if as_json:
         shortest: dict[str, Any] = {"time": at, **tightest.as_dict()}
         plain = {
-            "scene": name, "suggested": dt, "outcome": outcome.as_dict(),
+            "scene": name, "suggested": dt, "outcome": outcome,
             "start": start.as_dict(), "tightest": shortest,
         }  # fmt: skip
         click.echo(json.dumps(jsonable(plain), indent=2))
@@ -185,10 +185,6 @@ class StepOutcome(Plain):
     refused: str = ""
     compared: tuple[str, ...] = ()
     known: str = ""
-
-    def as_dict(self) -> dict[str, object]:
-        """For JSON, which has no infinity."""
-        return jsonable(super().as_dict())
 
     def sentences(self) -> list[str]:
         """For a person."""

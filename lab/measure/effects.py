@@ -185,17 +185,15 @@ def _phrase(name: str, value: float, effects: Mapping[str, float]) -> str:
     if name == "place":
         body = f"entity {effects['body']:.0f}" if "body" in effects else "a body"
         return f"{body} ends {metres(value)} from where it should"
-    if name == "apex":
-        return f"the highest point is {metres(value)} {'higher' if value > 0 else 'lower'}"
-    if name == "contact":
-        return f"the first contact is {1e3 * abs(value):.3g} ms {'late' if value > 0 else 'early'}"
-    if name == "impacts":
-        return f"{abs(value):.0f} impacts {'more' if value > 0 else 'fewer'}"
-    if name == "sink":
-        return f"bodies sink {metres(value)} into each other"
-    if name == "jitter":
-        return f"what rests still moves at {metres(value)} per second"
-    return f"the energy {'grows' if value > 0 else 'falls'} by {100 * abs(value):.2g} % a minute"
+    more = value > 0
+    words = {
+        "apex": f"the highest point is {metres(value)} {'higher' if more else 'lower'}",
+        "contact": f"the first contact is {1e3 * abs(value):.3g} ms {'late' if more else 'early'}",
+        "impacts": f"{abs(value):.0f} impacts {'more' if more else 'fewer'}",
+        "sink": f"bodies sink {metres(value)} into each other",
+        "jitter": f"what rests still moves at {metres(value)} per second",
+    }
+    return words.get(name, f"the energy {'grows' if more else 'falls'} by {100 * abs(value):.2g} % a minute")
 
 
 def _of_game_in_words(what: str, name: str, value: float, effects: Mapping[str, float]) -> str:

@@ -93,10 +93,6 @@ class Seen(Plain):
     runs: int = 1
     doubt: float = 0.0
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {**dataclasses.asdict(self), "position": self.position.tolist()}
-
 
 def observe(
     engine: Engine,

@@ -18,7 +18,6 @@ from ...framework import World
 from ...framework.compilation import log
 from ...framework.schedule.profile_report import Stats, Totals
 from ..engines.adapters import CaromEngine
-from ..plain import jsonable
 from .body_shapes import QUIET, dimensions_of
 from .observation import Observer
 from .paths import Recorder, Traces
@@ -76,10 +75,6 @@ class RunReport:
     compared: dict[str, list[float]] = field(default_factory=dict)  # what a game counts, see Loaded.values_of
     state_hash: str = ""
     pictures: list[str] = field(default_factory=list)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain dicts, lists and numbers for json.dumps; non-finite numbers become None."""
-        return jsonable(self)
 
 
 @dataclass

@@ -29,24 +29,23 @@ COLOURS: dict[str, str] = dict(
 )  # fmt: skip
 
 
+@canvas.styled
 def draw_limits(result: Result, folder: Path) -> Path:
     """Draw limits.png with one panel per axis."""
     panels = by_quantity(result)
     columns = min(COLUMNS, len(panels))
     rows = -(-len(panels) // columns)
     size = (PANEL[0] * columns, PANEL[1] * rows + 0.9)
-    figure = Figure(figsize=size, dpi=DPI, facecolor=canvas.BACKGROUND, layout="constrained")
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle("where carom's errors grow, and where it breaks", color=canvas.TEXT, fontsize=13, fontweight="bold")
+    figure.suptitle("where carom's errors grow, and where it breaks", fontsize=13, fontweight="bold")
     shown: dict[str, Any] = {}
     for place, (quantity, lines) in enumerate(panels):
-        panel = figure.add_subplot(rows, columns, place + 1, facecolor=canvas.PANEL)
+        panel = figure.add_subplot(rows, columns, place + 1)
         _draw(panel, quantity, lines, shown, place % columns == 0)
     cross = figure.axes[0].plot([], [], "x", color=canvas.TEXT, ms=6, mew=1.5)[0]
-    figure.legend(
-        [*shown.values(), cross], [*shown, "broken"], loc="outside lower center", ncols=min(4, len(shown) + 1),
-        fontsize=8, facecolor=canvas.PANEL, edgecolor=canvas.FRAME, labelcolor=canvas.TEXT,
-    )  # fmt: skip
+    columns = min(4, len(shown) + 1)
+    figure.legend([*shown.values(), cross], [*shown, "broken"], loc="outside lower center", ncols=columns, fontsize=8)
     path = folder / "limits.png"
     figure.savefig(path, facecolor=canvas.BACKGROUND, pil_kwargs={"optimize": True})
     return path
@@ -66,17 +65,11 @@ def _draw(panel: Any, quantity: Quantity, lines: list[Line], shown: dict[str, An
             panel.plot([value], [height], "x", color=colour, ms=7, mew=1.8, zorder=5, clip_on=False)
     for level in LEVELS.values():
         panel.axhline(level, color=canvas.MUTED, lw=0.7, ls=":")
-    panel.set_xscale("log")
-    panel.set_yscale("log")
-    panel.set_ylim(BOTTOM / 3, TOP)
-    panel.set_title(quantity.title, color=canvas.TEXT, fontsize=9, loc="left")
-    if quantity.unit:
-        panel.set_xlabel(quantity.unit, color=canvas.MUTED, fontsize=8)
-    panel.tick_params(colors=canvas.MUTED, labelsize=7, which="both", length=2)
-    if labelled:
-        panel.set_ylabel("error", color=canvas.MUTED, fontsize=8)
-    for spine in panel.spines.values():
-        spine.set_color(canvas.FRAME)
+    panel.set(xscale="log", yscale="log", ylim=(BOTTOM / 3, TOP))
+    panel.set_title(quantity.title, fontsize=9, loc="left")
+    panel.set_xlabel(quantity.unit, fontsize=8)
+    panel.set_ylabel("error" if labelled else "", fontsize=8)
+    panel.tick_params(labelsize=7, which="both", length=2)
 
 
 def _shown(error: float) -> float:
