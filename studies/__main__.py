@@ -88,7 +88,7 @@ def _command(name: str, study: Study) -> click.Command:
         if quick and long:
             raise Problem("--quick and --long exclude each other")
         axes = study.chosen(names, quick, long)
-        output = PageOutput.of(f"studies {name}", as_json, as_markdown, into)
+        output = PageOutput(as_json, as_markdown, into, f"studies {name}")
         if out is not None:
             writable_folder(out)
         with Bar(Console(stderr=True)) as bar:

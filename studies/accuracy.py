@@ -35,7 +35,7 @@ def accuracy_command(
     as_markdown: bool, into: Path | None,
 ) -> None:  # fmt: skip
     """Measure a scene as `carom trade SCENE --thorough` does: a row per method, and the cheapest for each target."""
-    output = PageOutput.of(f"studies accuracy {scene}", as_json, as_markdown, into)
+    output = PageOutput(as_json, as_markdown, into, f"studies accuracy {scene}")
     command = shlex.join(["python", "-m", "studies", "accuracy", *context.meta[WORDS]])
     with Store(kept) as store, Bar(Console(stderr=True)) as bar:
         result = trade(scene, against_pymunk=against == PYMUNK, store=store, progress=bar, command=command)

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import click
 
@@ -27,15 +27,13 @@ shown_options = together(printed_options, into_option)
 class PageOutput(Output):
     """Output that also goes into a page, between the marks of that name."""
 
-    mark: str = ""
-    into: Path | None = None
+    into: Path | None
+    mark: str
 
-    @classmethod
-    def of(cls, mark: str, as_json: bool, as_markdown: bool, into: Path | None) -> Self:
-        """Problem for impossible options and a page without the marks, raised before the long run."""
-        if into is not None:
-            between_marks(into, mark)
-        return cls(**vars(Output.checked(as_json, as_markdown)), mark=mark, into=into)
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.into is not None:
+            between_marks(self.into, self.mark)  # Problem, before the long run, for a page without the marks
 
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
         """Print the result, and write the tables into the page, the remarks as a list."""

@@ -9,7 +9,7 @@ these within a repeat. Reading states, measuring quality, building and compiling
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
@@ -60,26 +60,24 @@ Engines = dict[str, CaromWorld | PymunkSpace]
 
 @dataclass
 class Case:
-    """A subject at one size with its results: by window (or query) and engine, one entry per repeat.
+    """A subject at one size with its results.
 
-    ``milliseconds``: medians; ``fast``: the tenth percentiles.
+    ``found``: by window (or query) and engine, for each repeat the median of the times and the tenth percentile, in ms,
+    and the figures of quality.
     """
 
     subject: Subject
     size: int
     bodies: int = 0
     timed: dict[str, int] = field(default_factory=dict)
-    milliseconds: dict[str, dict[str, list[float]]] = field(default_factory=dict)
-    fast: dict[str, dict[str, list[float]]] = field(default_factory=dict)
-    quality: dict[str, dict[str, list[dict[str, float]]]] = field(default_factory=dict)
+    found: dict[str, dict[str, list[tuple[float, float, dict[str, float]]]]] = field(default_factory=dict)
     peer: str | None = None
     compile_seconds: float = 0.0
 
     def note(self, window: str, engine: str, seconds: list[float], figures: dict[str, float]) -> None:
-        """Record the result of one repeat for one engine: median and tenth percentile of its times."""
-        self.milliseconds.setdefault(window, {}).setdefault(engine, []).append(1e3 * float(np.median(seconds)))
-        self.fast.setdefault(window, {}).setdefault(engine, []).append(1e3 * float(np.percentile(seconds, 10)))
-        self.quality.setdefault(window, {}).setdefault(engine, []).append(figures)
+        """Record the result of one repeat for one engine."""
+        median, fast = (1e3 * float(np.percentile(seconds, share)) for share in (50, 10))
+        self.found.setdefault(window, {}).setdefault(engine, []).append((median, fast, figures))
 
     def build(self, seed: int, settings: Settings | None = None) -> World:
         """The scene's world, with the subject's settings if none are given."""
@@ -138,10 +136,13 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
             with contextlib.closing(case.build(repeat)) as other:
                 _run_windows(case, other, engines, progress)
         else:
-            _run_queries(case, world, engines, repeat)
+            for query, answers in time_queries(world, engines, case.bodies, repeat).items():
+                case.timed[query] = Query.COUNT
+                for name, (seconds, figures) in answers.items():
+                    case.note(query, name, seconds, figures)
         progress.advance(case.effort() - (progress.done - before))
     if peer and case.peer is None:
-        case.peer = min(indexes, key=lambda index: sum(case.milliseconds[w][index][0] for w in case.milliseconds))
+        case.peer = min(indexes, key=lambda index: sum(by_engine[index][0][0] for by_engine in case.found.values()))
     case.compile_seconds += log.waited - waited
 
 
@@ -193,35 +194,27 @@ def _run_window(
     return seconds
 
 
-def _run_queries(case: Case, world: World, engines: dict[str, Any], repeat: int) -> None:
-    for query, answers in time_queries(world, engines, case.bodies, repeat).items():
-        case.timed[query] = Query.COUNT
-        for name, (seconds, figures) in answers.items():
-            case.note(query, name, seconds, figures)
-
-
 def _rows(case: Case) -> list[Row]:
     subject, rows = case.subject, []
     unit = "step" if subject.windows else f"{Query.COUNT:,} queries"
-    for window, by_engine in case.milliseconds.items():
-        own = by_engine[CAROM]
+    for window, by_engine in case.found.items():
+        own, own_fast, figures = zip(*by_engine[CAROM], strict=True)
         row = Row(
             subject.scene, subject.variant, case.bodies, window, unit, case.timed[window],
-            subject.target(window, case.size), subject.energy, Spread.of(own), Spread.of(case.fast[window][CAROM]),
+            subject.target(window, case.size), subject.energy, Spread.of(own), Spread.of(own_fast),
             compile_seconds=case.compile_seconds, settings=dict(subject.settings),
         )  # fmt: skip
-        row.quality[CAROM] = _together(case.quality[window][CAROM])
+        row.quality[CAROM] = _together(figures)
         if case.peer is not None:
-            others = by_engine[case.peer]
-            row.peer_index, row.peer_ms = case.peer, Spread.of(others)
-            row.peer_fast_ms = Spread.of(case.fast[window][case.peer])
+            others, fast, figures = zip(*by_engine[case.peer], strict=True)
+            row.peer_index, row.peer_ms, row.peer_fast_ms = case.peer, Spread.of(others), Spread.of(fast)
             row.ratio = Spread.of([theirs / ours for theirs, ours in zip(others, own, strict=True)])
-            row.quality["pymunk"] = _together(case.quality[window][case.peer])
+            row.quality["pymunk"] = _together(figures)
         rows.append(row)
     return rows
 
 
-def _together(figures: list[dict[str, float]]) -> dict[str, float]:
+def _together(figures: Sequence[dict[str, float]]) -> dict[str, float]:
     """Combine the repeats: the maximum of error figures, the mean of the others."""
     worst = ("overlap_max", "escaped", "drift", "sink")
     return {name: float((max if name in worst else np.mean)([one[name] for one in figures])) for name in figures[0]}

@@ -58,7 +58,7 @@ def bench_command(
     if large:
         asked = tuple(sorted({*asked, LARGE}))
     repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
-    output, charts = Output.checked(as_json, as_markdown), drawing_into(out, "bench.charts")
+    output, charts = Output(as_json, as_markdown), drawing_into(out, "bench.charts")
     peer = not no_peer and _peer_there()
     with Bar(Console(stderr=True)) as bar:
         result = bench(wanted, asked, repeats, peer, bar)

@@ -11,12 +11,12 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
+from ...framework.settings import COLLISION_MODES, GEOMETRY_MODES
 from ..measure.survey import Survey
 from ..trading.records import CAROM, CHAOTIC, IMPACTS, PYMUNK, RESTING, SMOOTH, Cell
 
 ALL_METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 CONSTANT_FORCE = ("explicit_euler", "semi_implicit_euler", "velocity_verlet")
-COLLISIONS = ("discrete", "continuous", "event_driven")
 SUBSTEPS = (1, 2, 4, 8, 16, 32)
 ITERATIONS = (10, 50)  # of pymunk's solver: its default, and the number needed to hold a stack
 SLOWEST = 1 / 15  # s: the largest step of a game
@@ -42,9 +42,9 @@ def methods(survey: Survey) -> tuple[Cell, ...]:
         integrators = (own.integrator,)
     if own.integrator not in integrators and own.integrator not in ALL_METHODS:
         integrators = (*integrators, own.integrator)  # from a plugin
-    collisions = COLLISIONS if survey.contacts else (own.collision,)
+    collisions = COLLISION_MODES if survey.contacts else (own.collision,)
     substeps = SUBSTEPS if survey.kind == RESTING else (own.substeps,)
-    geometries = ("precise", "bounds") if survey.levels else (own.geometry,)
+    geometries = GEOMETRY_MODES if survey.levels else (own.geometry,)
     found = []
     for collision in collisions:
         for integrator in integrators if collision != "event_driven" else integrators[-1:]:

@@ -21,6 +21,7 @@ from ... import scenes
 from ...framework import Settings, World
 from ..cli.loading import Loaded, load
 from ..inputs import texts_read
+from ..plugins.command import plugin_named
 
 DEFAULT_SECONDS = 5.0  # if the subject does not define it
 
@@ -30,6 +31,8 @@ class Subject:
     """``target``: a scene's name or a file; or ``build``, a function build(settings, seed=0) -> World.
 
     options: keywords for the scene's build besides settings and seed
+    chosen, changes: instead of the recommended settings, and of some of their fields
+    plugins: names of those that are added
     """
 
     name: str
@@ -37,10 +40,15 @@ class Subject:
     build: Any = None
     options: tuple[tuple[str, Any], ...] = ()
     seed: int = 0
+    chosen: Settings | None = None
+    changes: tuple[tuple[str, Any], ...] = ()
+    plugins: tuple[str, ...] = ()
 
     def world(self, settings: Settings | None, seed: int | None = None) -> World:
         """A new world; Problem for errors in a user's file. settings None: the recommended ones."""
-        return self._loaded.build(settings, {}, self.seed if seed is None else seed)
+        changes = dict(self.changes) if settings is None else {}
+        added = [plugin_named(name) for name in self.plugins]
+        return self._loaded.build(settings or self.chosen, changes, self.seed if seed is None else seed, added)
 
     def attribute_errors(self) -> contextlib.AbstractContextManager[None]:
         """Convert exceptions raised inside to a Problem that names the line of the user's file."""
@@ -89,7 +97,7 @@ class Subject:
     @functools.cached_property
     def mark(self) -> str:
         """Identifies its results: differs between scenes, file contents and versions of carom."""
-        text = repr((self.name, self.target, self.options, self.seed, _version()))
+        text = repr((self.name, self.target, self.options, self.seed, self.plugins, _version()))
         if self.build is not None:
             text += _source_of(self.build)
         elif self.target not in scenes.names():
@@ -157,7 +165,9 @@ def _first_line(text: str | None) -> str:
 
 
 def subject_of(target: Any, options: Mapping[str, Any] | None = None, seed: int = 0) -> Subject:
-    """A subject from a scene's name, a path, or a build function; Problem if there is none of that name."""
+    """A subject from a subject, a scene's name, a path, or a build function; Problem if there is none of that name."""
+    if isinstance(target, Subject):
+        return target
     chosen = tuple(sorted((options or {}).items()))
     if callable(target):
         return Subject(getattr(target, "__name__", "scene"), build=target, options=chosen, seed=seed)

@@ -11,11 +11,10 @@ from typing import Any
 
 import click
 
-from ..cases.grid import COLLISIONS
+from ...framework.settings import COLLISION_MODES, GEOMETRY_MODES
 from .choices import assigned, parse_assignments, preset, real_number
 from .usage_errors import Problem, did_you_mean
 
-GEOMETRIES = ("precise", "bounds")
 WORDS = "carom.words"  # key for the words of a command line: see KeepsWords
 
 Option = Callable[[Any], Any]
@@ -210,8 +209,8 @@ only_options = together(
     ),
     click.option(
         "--collisions", metavar="NAME,NAME",
-        callback=listed("--collisions", "names", one_of("--collisions", COLLISIONS)),
-        help=f"Only these of {', '.join(COLLISIONS)}.",
+        callback=listed("--collisions", "names", one_of("--collisions", COLLISION_MODES)),
+        help=f"Only these of {', '.join(COLLISION_MODES)}.",
     ),
     click.option(
         "--substeps", metavar="N,N", callback=listed("--substeps", "whole numbers from 1", whole_number),
@@ -219,8 +218,8 @@ only_options = together(
     ),
     click.option(
         "--geometry", "geometries", metavar="NAME,NAME",
-        callback=listed("--geometry", "names", one_of("--geometry", GEOMETRIES)),
-        help=f"Only these of {', '.join(GEOMETRIES)}.",
+        callback=listed("--geometry", "names", one_of("--geometry", GEOMETRY_MODES)),
+        help=f"Only these of {', '.join(GEOMETRY_MODES)}.",
     ),
 )  # fmt: skip
 

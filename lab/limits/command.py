@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -15,14 +14,13 @@ from rich.console import Console
 
 from ...framework import Settings, World
 from ..cases.case import QUICK, case_of
-from ..cases.subjects import load_once
+from ..cases.subjects import Subject, load_once
 from ..cli.loading import Loaded, stdout_kept_clean
 from ..cli.options import above_zero, thorough_option, traceback_option, world_options
 from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
 from ..measure.effects import SHARE, in_words, names_told, noticed
 from ..plain import Plain, jsonable
-from ..plugins.command import plugin_named
 from ..reporting.progress import Bar, Progress
 from ..reporting.text import counted, metres, number
 from ..trading.records import CaseTrade, Cell, known_well
@@ -65,42 +63,17 @@ def limits_command(
     The scene runs with longer and shorter steps until a player would notice the difference, and its forces and speeds
     are examined on the way.
     """
-    scene = Asked(target, settings, tuple(changes.items()), plugins)
     loaded = load_once(target)
+    scene = Subject(loaded.name, target, seed=seed, chosen=settings, changes=tuple(changes.items()), plugins=plugins)
     if way is not None and loaded.compared is not None:
         raise Problem(f"--max-error does not apply: {loaded.name} says itself what counts, in compared(world)")
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
     with Bar(Console(stderr=True)) as bar:
-        with closing(scene(None, seed)) as world:
+        with closing(scene.world(None)) as world:
             found = _watched(loaded, world, seconds, bar)
-        outcome = outcome_of_steps(scene, seed, seconds, Runs(progress=bar), thorough, way)
+        outcome = outcome_of_steps(scene, seconds, Runs(progress=bar), thorough, way)
     _show(loaded.name, found, outcome, as_json)
-
-
-@dataclass(frozen=True)
-class Asked:
-    """The scene as the command line has it: build(settings, seed=0) -> World, which worker processes can call too."""
-
-    target: str
-    settings: Settings | None
-    changes: tuple[tuple[str, Any], ...]
-    plugins: tuple[str, ...]
-
-    def __call__(self, settings: Settings | None, seed: int = 0) -> World:
-        added = [plugin_named(name) for name in self.plugins]
-        if settings is None:
-            return load_once(self.target).build(self.settings, dict(self.changes), seed, added)
-        return load_once(self.target).build(settings, {}, seed, added)
-
-    @property
-    def __name__(self) -> str:
-        return load_once(self.target).name
-
-    @property
-    def compared(self) -> Any:
-        """What the game is judged by, or None."""
-        return load_once(self.target).compared
 
 
 def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -> list[tuple[float, StepLimits]]:
@@ -204,13 +177,13 @@ class StepOutcome(Plain):
 
 
 def outcome_of_steps(
-    build: Callable[..., World], seed: int, seconds: float, runs: Runs, thorough: bool = False, way: float | None = None
+    scene: Subject, seconds: float, runs: Runs, thorough: bool = False, way: float | None = None
 ) -> StepOutcome:
     """Run the scene with its own settings and several steps; way: see :class:`StepOutcome`."""
     if not seconds:
         return StepOutcome(refused="it was not run")
     try:
-        case = case_of(build, seconds=seconds, seed=seed, each=runs.each)
+        case = case_of(scene, seconds=seconds, each=runs.each)
         own = case.survey.settings
         longest = min(LONGEST, seconds / 3)
         steps = tuple(own.dt * factor for factor in STEPS if factor <= 1 or own.dt * factor <= longest)

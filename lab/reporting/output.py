@@ -18,22 +18,19 @@ from .text import TextTable
 
 @dataclass(frozen=True)
 class Output:
-    """What a command prints, and for whom."""
+    """What a command prints, and for whom; Problem, before the long run, for options that exclude each other."""
 
     as_json: bool
     as_markdown: bool
+
+    def __post_init__(self) -> None:
+        if self.as_json and self.as_markdown:
+            raise Problem("--json and --markdown exclude each other")
 
     @property
     def plain(self) -> bool:
         """True if a person reads stdout."""
         return not self.as_json and not self.as_markdown
-
-    @staticmethod
-    def checked(as_json: bool, as_markdown: bool) -> Output:
-        """Problem for options that exclude each other, raised before the long run."""
-        if as_json and as_markdown:
-            raise Problem("--json and --markdown exclude each other")
-        return Output(as_json, as_markdown)
 
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
         """Print the result."""

@@ -37,7 +37,7 @@ from ..reporting.text import counted
 from .answer import Target, answer, recommended
 from .files import write_csv, write_json
 from .records import PYMUNK, Trade
-from .report import cheapest, choice_lines, measured, remarks, tables
+from .report import cheapest, measured, remarks, tables
 from .trade import Only, trade
 
 MARK = "carom trade"
@@ -81,7 +81,7 @@ def trade_command(
     check_integrators(subjects, only.integrators)
     if against == PYMUNK:
         pymunk_module()
-    output = Output.checked(as_json, as_markdown)
+    output = Output(as_json, as_markdown)
     target = _target(max_error, max_cost, absolute, no_timing)
     writable_folder(out)
 
@@ -104,7 +104,7 @@ def trade_command(
             click.echo("\n".join(answer(case, target)) + "\n")
     shown = [table for norm in norms or [None] for table in tables(result, norm)]
     shown += [cheapest(case) for case in measured(result)]
-    output.show(result, shown, [*remarks(result), *_lines(result)])
+    output.show(result, shown, remarks(result))
     for path in files:
         click.echo(f"written: {path}", err=True)
     if target is not None and any(recommended(case, target) is None for case in result.cases):
@@ -152,8 +152,3 @@ def _charts(result: Trade, out: Path, norms: Sequence[str]) -> list[Path]:
         click.echo(f"carom: {problem.message}", err=True)
         return []
     return [path for norm in norms or [None] for path in draw(result, out, norm)]
-
-
-def _lines(result: Trade) -> list[str]:
-    """The settings to paste."""
-    return [f"{case.scene}, {target}: {line}" for case in measured(result) for target, line in choice_lines(case)]

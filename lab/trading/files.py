@@ -14,34 +14,14 @@ from ..cli.usage_errors import Problem
 from ..engines.adapters import WEIGHTS
 from .records import CaseTrade, Curve, Point, Trade
 
-COLUMNS: dict[str, str] = {
-    "scene": "its name, or the file's",
-    "target": "what the command line called it",
-    "kind": "smooth, impacts, resting or chaotic",
-    "seconds": "simulated, s",
-    "method": "the curve's label",
-    "engine": "carom or pymunk",
-    "integrator": "",
-    "collision": "",
-    "substeps": "of the solver; of pymunk its iterations",
-    "geometry": "",
-    "dt": "step, s",
-    "norm": "what the error is the error of",
-    "error": "mean over the repeats that did not fail; relative, but for norms with a unit; empty if all failed",
-    "error_low": "the least of them",
-    "error_high": "the largest of them",
-    "error_uncertainty": "standard error of the mean",
-    "trusted": "1 if the reference is exact enough to tell this error, else 0",
-    "order": "observed, of the whole curve; empty if there is none",
-    "theory": "the order that theory gives; exact: rounding only; empty if nobody knows",
-    "repeats": "how many there were",
-    "failed": "kind and number of those that failed, as tunnelled 3; escaped 1",
-    "work": "weighted sum of the counts, per simulated second",
-    **dict.fromkeys(WEIGHTS, "per simulated second"),
-    "wall_ms": "median wall time per simulated second, ms; empty if it was not timed",
-    "wall_ms_low": "the least",
-    "wall_ms_high": "the largest",
-}
+# Scene and point; the error in the norm: mean, least, largest and standard error of the mean over the repeats that did
+# not fail; whether the reference can tell it; the order observed and in theory ("exact": rounding only); what failed,
+# as in "tunnelled 3; escaped 1"; per simulated second the work, what it counts, and the wall time in ms.
+COLUMNS = (
+    "scene", "target", "kind", "seconds", "method", "engine", "integrator", "collision", "substeps", "geometry", "dt",
+    "norm", "error", "error_low", "error_high", "error_uncertainty", "trusted", "order", "theory", "repeats", "failed",
+    "work", *WEIGHTS, "wall_ms", "wall_ms_low", "wall_ms_high",
+)  # fmt: skip
 
 
 def write_json(trade: Trade, path: Path) -> Path:
@@ -53,7 +33,7 @@ def write_json(trade: Trade, path: Path) -> Path:
 def write_csv(trade: Trade, path: Path) -> Path:
     """Write one row per point and norm, with COLUMNS. Problem if the file cannot be written."""
     buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, list(COLUMNS), lineterminator="\n")
+    writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
     writer.writeheader()
     for case in trade.cases:
         for curve in case.curves:

@@ -109,11 +109,10 @@ def failures(point: Point) -> str:
     return ", ".join(words)
 
 
-def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None) -> TextTable:
+def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
     """For each target and engine, the setting of least work that meets it in all repeats."""
-    chosen = norm_of(case, norm)
-    rows = []
-    for target, engine, found in choices(case, targets, chosen):
+    chosen, rows = case.norm, []
+    for target, engine, found in choices(case, targets):
         words = (target_text(target, chosen), engine)
         if found is None:
             reason = "none" if case.reference.trusts(chosen, target) else "the reference is not exact enough to tell"
@@ -130,13 +129,13 @@ def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | No
 
 
 def choices(
-    case: CaseTrade, targets: Sequence[float] = TARGETS, norm: str | None = None
+    case: CaseTrade, targets: Sequence[float] = TARGETS
 ) -> list[tuple[float, str, tuple[Curve, Point] | None]]:
     """Target, engine, and the curve and point of least work that meets it; None if there is none or it is unknown.
 
     Engines are treated separately, because their counts are not comparable.
     """
-    chosen = norm_of(case, norm)
+    chosen = case.norm
     engines = dict.fromkeys(point.cell.engine for point in case.points)
     known = {point.cell for point in known_well(case.points)}
     made: list[tuple[float, str, tuple[Curve, Point] | None]] = []
@@ -153,12 +152,11 @@ def choices(
     return made
 
 
-def choice_lines(case: CaseTrade, norm: str | None = None) -> list[tuple[str, str]]:
-    """For each target that can be met: its text, and the line of Python that meets it."""
-    chosen = norm_of(case, norm)
+def choice_lines(case: CaseTrade) -> list[str]:
+    """For each target that can be met: scene, target, engine, and the line of Python that meets it."""
     return [
-        (f"{target_text(target, chosen)}, {engine}", python_line(found[1].cell))
-        for target, engine, found in choices(case, norm=chosen)
+        f"{case.scene}, {target_text(target, case.norm)}, {engine}: {python_line(found[1].cell)}"
+        for target, engine, found in choices(case)
         if found is not None
     ]
 
@@ -171,12 +169,12 @@ def target_text(target: float, norm: str) -> str:
     return f"{short} {ERROR_UNIT}" if norm == ENERGY_SQUARE else short
 
 
-def remarks(trade: Trade, norm: str | None = None) -> list[str]:
-    """The machine and, for each case, what was measured, against what, and how reliable it is."""
+def remarks(trade: Trade) -> list[str]:
+    """The machine and, for each case, what was measured, against what, and how reliable it is; then what to paste."""
     lines = [machine_line(trade.machine), trade.command]
     for case in trade.cases:
-        lines += [f"{case.scene}: {line}" for line in case_remarks(case, norm_of(case, norm))]
-    return lines
+        lines += [f"{case.scene}: {line}" for line in case_remarks(case, case.norm)]
+    return [*lines, *(line for case in measured(trade) for line in choice_lines(case))]
 
 
 def case_remarks(case: CaseTrade, norm: str) -> list[str]:

@@ -11,7 +11,7 @@ import helpers_cli
 import pytest
 from helpers_cli import refusal
 
-from carom.lab.limits.command import Asked
+from carom.lab.cases.subjects import Subject
 
 carom = helpers_cli.carom  # fixture
 
@@ -157,10 +157,9 @@ def test_a_platform_that_moves_through_the_floor_is_no_overlap(carom):
 
 
 def test_a_scene_with_options_is_measured_in_other_processes_too():
-    asked = pickle.loads(pickle.dumps(Asked("gas2d", None, (("substeps", 3),), ("springs",))))
-    with closing(asked(None)) as world:
+    asked = pickle.loads(pickle.dumps(Subject("gas2d", "gas2d", changes=(("substeps", 3),), plugins=("springs",))))
+    with closing(asked.world(None)) as world:
         assert world.settings.substeps == 3
         assert any(plugin.name == "springs" for plugin in world.plugins)
-    with closing(asked(world.settings.replace(substeps=2))) as other:
+    with closing(asked.world(world.settings.replace(substeps=2))) as other:
         assert other.settings.substeps == 2
-    assert asked.__name__ == "gas2d"
