@@ -22,7 +22,7 @@ from ..reporting.progress import NO_PROGRESS, Progress
 from ..trading.records import CHAOTIC, Cell, ErrorBar, Point, Reference
 from .result_store import Store
 from .tasks import Task, perform, stopped
-from .workers import Lost, Workers, available_cores, in_parallel
+from .workers import Lost, Workers, in_parallel
 
 FEW_SECONDS = 4.0  # of work in all: less takes not much longer than starting workers
 WORTH_IT = 4.0  # required improvement of the agreement with steps 8 times smaller; less is rounding or chance
@@ -35,14 +35,10 @@ class Runs:
     def __init__(
         self, workers: int | Workers | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS
     ) -> None:
-        number = isinstance(workers, int) and not isinstance(workers, bool) and workers > 0
-        if not (number or workers is None or isinstance(workers, Workers)):
-            raise ValueError(f"workers must be a whole number from 1, got {workers!r}")
-        kept = workers if isinstance(workers, Workers) else Workers(available_cores() if workers is None else workers)
-        self.processes = kept if isinstance(workers, Workers) or kept.size > 1 else 1
+        self.workers = workers if isinstance(workers, Workers) else Workers(workers)
         self.progress = progress
         self._store = Store() if store is None else store
-        weakref.finalize(self, kept.end)
+        weakref.finalize(self, self.workers.end)
 
     def all(self, tasks: Iterable[Task], what: str) -> list[Seen]:
         """What all tasks showed, in order; those of which the store has the result are not run."""
@@ -53,7 +49,7 @@ class Runs:
         self.progress.say(what)
         missing.sort(key=lambda task: -task.steps)  # longest first, so that no core is idle at the end
         few = sum(task.case.seconds_of(task.cell) for task in missing) < FEW_SECONDS
-        with contextlib.closing(in_parallel(perform, missing, 1 if few else self.processes)) as results:
+        with contextlib.closing(in_parallel(perform, missing, 1 if few else self.workers)) as results:
             for task, record in results:
                 self._store.add(task.key, _lost(task, record) if isinstance(record, Lost) else record)
                 self.progress.advance(task.steps)
@@ -63,7 +59,7 @@ class Runs:
         """The function's result for each task, in order. Problem for one that ends its process."""
         tasks = list(tasks)
         found: dict[int, Any] = {}
-        with contextlib.closing(in_parallel(function, tasks, self.processes)) as results:
+        with contextlib.closing(in_parallel(function, tasks, self.workers)) as results:
             for task, result in results:
                 if isinstance(result, Lost):
                     raise Problem(f"a trial run was lost: {result.reason}")

@@ -62,7 +62,9 @@ class Task:
 def perform(task: Task) -> dict[str, Any]:
     """Perform the run and return its observation as plain data. A run stopped by an error is a result too."""
     try:
-        return _run(task).as_dict()
+        cost = bare_cost(task) if task.bare and task.cell.engine != PYMUNK else None
+        found = _observed(task).as_dict()
+        return found if cost is None else {**found, "milliseconds": cost}
     except Problem as problem:
         if task.reference or task.cell.engine == PYMUNK:
             raise
@@ -72,12 +74,6 @@ def perform(task: Task) -> dict[str, Any]:
 def stopped(task: Task, why: str) -> Seen:
     """The observation of a run that an error ended."""
     return Seen(np.zeros((0, 2)), failure=STOPPED, detail=why, seconds=task.case.seconds)
-
-
-def _run(task: Task) -> Seen:
-    cost = bare_cost(task) if task.bare and task.cell.engine != PYMUNK else None
-    seen = _observed(task)
-    return seen if cost is None else dataclasses.replace(seen, milliseconds=cost)
 
 
 def bare_cost(task: Task) -> float | None:

@@ -66,15 +66,20 @@ def process_pool(workers: int) -> Executor:
 
 
 class Workers:
-    """An executor for ``size`` tasks at a time, made when it is needed and kept until :meth:`end`.
+    """An executor for ``size`` tasks at a time (None: all cores), made when it is needed and kept until :meth:`end`.
 
-    lost: what it raises for a task whose workers have died, after tries of its own
+    ValueError for fewer than one. ``alone``: that is this process. lost: what it raises for a task whose workers have
+    died, after tries of its own
     """
 
     def __init__(
-        self, size: int, executor: Callable[[int], Executor] = process_pool, lost: tuple[type[Exception], ...] = ()
+        self, size: int | None, executor: Callable[[int], Executor] | None = None, lost: Any = ()
     ) -> None:
-        self.size, self._make, self.lost = size, executor, lost
+        self.size = available_cores() if size is None else size
+        if not isinstance(self.size, int) or isinstance(self.size, bool) or self.size < 1:
+            raise ValueError(f"workers must be a whole number of at least 1, not {size!r}")
+        self.alone = executor is None and self.size == 1
+        self._make, self.lost = executor or process_pool, lost
         self._executor: Executor | None = None
         self._others: set[Any] = set()
 
@@ -115,13 +120,9 @@ def in_parallel(
     worker.
     """
     tasks = list(tasks)
-    size = workers.size if isinstance(workers, Workers) else available_cores() if workers is None else workers
-    if not isinstance(size, int) or isinstance(size, bool) or size < 1:
-        raise ValueError(f"workers must be a whole number of at least 1, not {workers!r}")
-    shared = isinstance(workers, Workers) or size > 1
-    if not shared or not tasks or multiprocessing.parent_process() is not None or _pickled(function) is None:
+    pool = workers if isinstance(workers, Workers) else Workers(workers)
+    if pool.alone or not tasks or multiprocessing.parent_process() is not None or _pickled(function) is None:
         return ((task, function(task)) for task in tasks)
-    pool = workers if isinstance(workers, Workers) else Workers(size)
     return _shared_out(function, tasks, pool, pool is workers)
 
 

@@ -148,20 +148,10 @@ def _own(name: str) -> tuple[Measure, Measure]:
 NORMS: Mapping[str, Norm] = {
     norm.name: norm
     for norm in (
-        Norm(
-            "position",
-            "largest distance of a body from where it should be in the end; 1 is the longest way a body gets from its "
-            "start",
-            _position,
-            _reach,
-        ),
-        Norm(
-            "energy",
-            "largest departure of the energy on the way (in the end, where it is not conserved); 1 is the energy at "
-            "the start, or the largest kinetic energy if that is smaller",
-            _energy,
-            energy_scale,
-        ),
+        Norm("position", "largest distance of a body from where it should be in the end; 1 is the longest way a body "
+             "gets from its start", _position, _reach),
+        Norm("energy", "largest departure of the energy on the way (in the end, where it is not conserved); 1 is the "
+             "energy at the start, or the largest kinetic energy if that is smaller", _energy, energy_scale),
         _relative("apex", "height of the highest point reached, at steps; 1 is the right height"),
         Norm("impact_time", "largest error of an impact's time, a missing one being at the end; 1 is the whole run",
              _impact_time, lambda seen, reference: reference.seconds),

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from carom.framework import CaromError, Settings
+from carom.framework.settings import COLLISION_MODES
 from carom.lab.cli.usage_errors import one_line
 
 from ..runner import Axis, Sample
@@ -113,8 +114,6 @@ def _between(quantity: Quantity, found: Edge) -> float | None:
     return middle if middle not in (bad, good) else float(round((bad + good) / 2))
 
 
-MODES = ("discrete", "continuous", "event_driven")
-
 
 class BrokenError(Exception):
     """Raised by a measurement whose result is unusable; the message says why.
@@ -178,7 +177,7 @@ def decades(first: int, last: int, per_decade: int = 1) -> tuple[float, ...]:
     return tuple(float(10.0 ** (first + k / per_decade)) for k in range(count + 1))
 
 
-BY_MODE = tuple(Method(mode, MappingProxyType({"collision": mode})) for mode in MODES)
+BY_MODE = tuple(Method(mode, MappingProxyType({"collision": mode})) for mode in COLLISION_MODES)
 
 
 def by_integrator(names: Sequence[str]) -> tuple[Method, ...]:

@@ -12,6 +12,8 @@ from functools import partial
 from typing import Any
 
 from carom.framework import Settings, World
+from carom.framework.settings import COLLISION_MODES
+from carom.lab.cases.grid import ALL_METHODS
 from carom.lab.engines.adapters import counts_of, work_of
 from carom.lab.measure.timing import timed
 
@@ -100,8 +102,6 @@ class Varied:
         return {"seconds": spent / simulated}
 
 
-INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
-COLLISIONS = ("discrete", "continuous", "event_driven")
 SWEPT = {"integrator": "velocity_verlet", "collision": "continuous"}
 OVERLAP = {"overlap": "%", "speed": "mm/s"}
 RESTS = "deepest overlap of two boxes in the second half, in % of their size; fastest box in the end; right is 0"
@@ -134,25 +134,26 @@ VARIED: tuple[Varied, ...] = (
         3.0, 0.5,
     ),
     Varied(
-        "integrator", "jump", at.scene_of("jump"), INTEGRATORS, at.apex, {"apex": "px"},
+        "integrator", "jump", at.scene_of("jump"), ALL_METHODS, at.apex, {"apex": "px"},
         APEX, 1.0, 0.8,
     ),
     Varied(
-        "integrator", "orbit", at.scene_of("orbit"), INTEGRATORS, at.orbit, {"energy": "%", "growth": "% in the end"},
+        "integrator", "orbit", at.scene_of("orbit"), ALL_METHODS, at.orbit, {"energy": "%", "growth": "% in the end"},
         "largest departure of the energy in ten turns of an ellipse (e = 0.6) of 377 steps each; what of it is left in "
         "the end, with its sign",
         at.TEN_TURNS, 2.0,
     ),
     Varied(
-        "collision", "shots", at.scene_of("shots"), COLLISIONS, at.wrong_balls, {"wrong": "of 8 balls"},
+        "collision", "shots", at.scene_of("shots"), COLLISION_MODES, at.wrong_balls, {"wrong": "of 8 balls"},
         "balls that go 4 sizes in a step and are not where they must be, by more than 1 % of their size", 0.1, 1 / 12,
     ),
     Varied(
-        "collision", "fast gas", at.scene_of("fastgas"), COLLISIONS, at.lost, LOST, IMPACTS_LOST, 0.5, 0.5,
+        "collision", "fast gas", at.scene_of("fastgas"), COLLISION_MODES, at.lost, LOST, IMPACTS_LOST, 0.5, 0.5,
     ),
-    Varied("collision", "slow gas", at.scene_of("gas2d"), COLLISIONS, at.lost, LOST, IMPACTS_LOST, 2.0, 0.5),
+    Varied("collision", "slow gas", at.scene_of("gas2d"), COLLISION_MODES, at.lost, LOST, IMPACTS_LOST, 2.0, 0.5),
     Varied(
-        "collision", "pyramid of 210", at.scene_of("pyramid", rows=20), COLLISIONS, at.rest, OVERLAP, RESTS, 3.0, 0.5
+        "collision", "pyramid of 210", at.scene_of("pyramid", rows=20), COLLISION_MODES, at.rest, OVERLAP, RESTS,
+        3.0, 0.5,
     ),
     *(
         Varied(
