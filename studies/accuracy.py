@@ -11,7 +11,7 @@ import click
 from rich.console import Console
 
 from carom.lab.cli.options import WORDS, KeepsWords, out_option
-from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.runs import Store
 from carom.lab.measure.timing import Spread
 from carom.lab.reporting.progress import Bar
 from carom.lab.reporting.text import NOTHING, TextTable, compact, number

@@ -1,4 +1,4 @@
-"""Output in the terminal and in files: tables, progress, the report of a run, JSON and Markdown.
+"""Output in the terminal and in files: numbers, tables, progress, JSON and Markdown.
 
 Reads results as plain records. Writes to stdout, stderr and marked sections of Markdown pages.
 """

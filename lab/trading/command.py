@@ -30,14 +30,13 @@ from ..cli.options import (
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs import cluster as clusters
-from ..jobs.result_store import Store
+from ..jobs.runs import Store
 from ..reporting.output import Output, drawing_module
 from ..reporting.progress import Bar
 from ..reporting.text import counted
 from .answer import Target, answer, recommended
-from .files import write_csv, write_json
 from .records import PYMUNK, Trade
-from .report import cheapest, measured, remarks, tables
+from .report import cheapest, measured, remarks, tables, write_csv, write_json
 from .trade import Only, trade
 
 MARK = "carom trade"

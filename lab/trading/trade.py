@@ -13,8 +13,7 @@ from ..cases import grid as grids
 from ..cases.case import FIRST, FOR_REFERENCES, QUICK, Case, Effort, case_of, check_arguments
 from ..cases.subjects import subject_of
 from ..cli.usage_errors import Problem
-from ..jobs.result_store import Store
-from ..jobs.runs import Runs, inputs_late, measure, refined_reference
+from ..jobs.runs import Runs, Store, inputs_late, measure, refined_reference
 from ..jobs.tasks import Task, bare_cost, engine_of
 from ..jobs.workers import Workers
 from ..measure.norms import NORMS, check_norm, norm_of

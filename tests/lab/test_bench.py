@@ -14,8 +14,7 @@ import pytest
 
 from carom.framework.jit.log import CompilationLog
 from carom.lab.bench import report as bench_report
-from carom.lab.bench.against_pymunk import bench
-from carom.lab.bench.queries import QUERIES
+from carom.lab.bench.against_pymunk import QUERIES, bench
 from carom.lab.bench.suite import Subject, Window, subjects
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.engines import pymunk_space as peer_pymunk

@@ -9,7 +9,7 @@ import pytest
 from helpers_cli import report_of
 from helpers_processes import copied_cache, run_carom
 
-from carom.lab.reporting.run_report import fault_lines
+from carom.lab.cli.run import fault_lines
 
 carom, ball = helpers_cli.carom, helpers_cli.ball  # fixtures
 

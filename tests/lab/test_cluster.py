@@ -17,7 +17,7 @@ from helpers_workers import Task, alive, marks, perform, until
 
 from carom.lab.cli.main import cli
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.runs import Store
 from carom.lab.jobs.workers import in_parallel
 
 SHORT = (

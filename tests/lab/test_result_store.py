@@ -11,7 +11,7 @@ from helpers_processes import run_python
 from rich.console import Console
 
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.runs import Store
 from carom.lab.reporting.progress import Bar
 
 RECORDS = {
@@ -46,7 +46,7 @@ def test_two_processes_may_use_one_file(path):
     with Store(path) as store:
         store.add("mine", {})
         code = f"""
-from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.runs import Store
 with Store({str(path)!r}) as store:
     print(len(store))
     store.add("theirs", {{"pi": 3.14}})

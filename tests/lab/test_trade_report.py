@@ -15,8 +15,8 @@ from carom.framework import Settings
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.reporting.text import TextTable
 from carom.lab.trading import report as trade_report
-from carom.lab.trading.files import COLUMNS, write_csv, write_json
 from carom.lab.trading.records import PYMUNK, Cell, Trade, python_line, settings_line
+from carom.lab.trading.report import COLUMNS, write_csv, write_json
 
 
 def column(table: TextTable, heading: str) -> list[str]:

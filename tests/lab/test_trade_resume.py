@@ -12,7 +12,7 @@ from helpers_trade_scenes import BALL, DEADLY, dies, scene_file
 from carom.lab import Only, Trade, trade
 from carom.lab.cases import case as cases
 from carom.lab.jobs import runs as trade_runs
-from carom.lab.jobs.result_store import Store
+from carom.lab.jobs.runs import Store
 from carom.lab.jobs.tasks import perform
 from carom.lab.trading.records import STOPPED
 
