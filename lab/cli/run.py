@@ -21,9 +21,8 @@ from ..plugins.command import plugin_named
 from ..reporting.output import drawing_module
 from ..reporting.progress import Bar
 from ..reporting.text import NOTHING, TextTable, counted, number
-from .choices import parse_view
 from .loading import Loaded, load, stdout_kept_clean
-from .options import above_zero, traceback_option, world_options, writable_folder
+from .options import above_zero, parse_view, traceback_option, world_options, writable_folder
 from .usage_errors import Problem
 
 DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it

@@ -15,9 +15,8 @@ from rich.console import Console
 from ...framework import Plugin, PluginError
 from ...framework.plugins.discovery import GROUP, find, offers
 from ..cli.group import Commands
-from ..cli.loading import import_file, stdout_kept_clean
+from ..cli.loading import import_file, module_of, stdout_kept_clean
 from ..cli.options import traceback_option
-from ..cli.siblings import module_of
 from ..cli.usage_errors import Problem, did_you_mean, one_line
 from ..reporting.progress import Bar
 from ..reporting.text import TextTable, counted

@@ -11,11 +11,10 @@ import pytest
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
-from carom.lab.bench.against_pymunk import CaromWorld
+from carom.lab.bench.against_pymunk import CaromWorld, Quality
 from carom.lab.bench.suite import SUITE
 from carom.lab.engines import pymunk_space as peer_pymunk
 from carom.lab.engines.pymunk_space import NotPlainError, PymunkSpace, moving_and_fixed
-from carom.lab.engines.quality import Quality
 from carom.lab.measure.body_shapes import overlaps_of
 from carom.plugins import Physics
 from carom.scenes.walls import enclose

@@ -207,7 +207,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
     (("spring", "--seconds", "inf"), "--seconds takes a number above 0"),
     (("spring", "--repeats", "0"), "--repeats"),
     (("spring", "--workers", "0"), "--workers"),
-    (("spring", "--seed", "-1"), "--seed takes a whole number"),
+    (("spring", "--seed", "-1"), "'--seed': -1 is not in the range x>=0"),
     (("spring", "--against", "bullet"), "--against"),
     (("spring", "--integrators", "rk5"), "did you mean 'rk4'"),
     (("spring", "--integrators", ","), "--integrators takes names"),
