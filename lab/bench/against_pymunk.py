@@ -23,7 +23,7 @@ from ...framework.compilation import log
 from ...scenes import gas, player_query
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import INDEXES, PymunkSpace
-from ..measure.body_shapes import Enclosure, Floats, overlaps_of, shapes_of
+from ..measure.body_shapes import Enclosure, Floats, dynamic_by_id, overlaps_of, shapes_of
 from ..measure.run import plain_settings
 from ..measure.timing import Spread, no_garbage_collection, timed
 from ..reporting.progress import NO_PROGRESS, Progress
@@ -49,9 +49,7 @@ class CaromWorld:
 
     def state(self) -> tuple[Floats, Floats]:
         """Positions and velocities of the dynamic bodies, (n, 2) each, ascending by entity id."""
-        bodies = self.world.bodies.dynamic
-        order = np.argsort(bodies.entity, kind="stable")
-        return np.array(bodies.position)[order], np.array(bodies.linear_velocity)[order]
+        return dynamic_by_id(self.world)[:2]
 
 
 Engines = dict[str, CaromWorld | PymunkSpace]
@@ -321,9 +319,8 @@ class Quality:
 
     def __init__(self, world: World) -> None:
         self.world = world
-        dynamic = world.bodies.dynamic
-        self._order = np.argsort(dynamic.entity, kind="stable")
-        self.mass, self.start = dynamic.mass[self._order], dynamic.position[self._order]
+        self._order = np.argsort(world.bodies.dynamic.entity, kind="stable")
+        self.start, _, self.mass = dynamic_by_id(world)
         self.kinetic, self.enclosure = world.kinetic_energy(), Enclosure.around(world)
         self.begin()
 

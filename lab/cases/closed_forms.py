@@ -10,20 +10,12 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..measure.body_shapes import Floats
+from ..measure.body_shapes import Floats, dynamic_by_id
 from ..measure.observation import Seen
 from ..testing.predict import bounce_times, collide, free_flight, impact_time, orbit_speed, spring
 
 SAMPLES = 2000  # of a path, to find the largest displacement
 Path = Callable[[float], Floats]  # maps seconds to positions (n, d)
-
-
-def _start(world: World) -> tuple[Floats, Floats, Floats]:
-    """Positions, velocities (n, d) and masses (n,) of the dynamic bodies, by entity id."""
-    dynamic = world.bodies.dynamic
-    order = np.argsort(dynamic.entity, kind="stable")
-    position, velocity, mass = dynamic.position, dynamic.linear_velocity, dynamic.mass
-    return np.array(position)[order], np.array(velocity)[order], np.array(mass)[order]
 
 
 def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[float], **found: Any) -> Seen:
@@ -47,7 +39,7 @@ def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[fl
 
 def flight(world: World, seconds: float) -> Seen:
     """Parabolas without contacts; the apex is v^2 / 2g."""
-    x, v, _ = _start(world)
+    x, v, _ = dynamic_by_id(world)
     gravity = np.asarray(world.gravity, float)
     size = float(np.linalg.norm(gravity))
     rise = float((-(v @ gravity)).max() / size) if size else 0.0  # m/s, upwards
@@ -57,7 +49,7 @@ def flight(world: World, seconds: float) -> Seen:
 
 def swinging(world: World, seconds: float) -> Seen:
     """The undamped spring of the scene: x(t) = x0 cos(w t); at the centre all energy is kinetic."""
-    x, v, mass = _start(world)
+    x, v, mass = dynamic_by_id(world)
     stiffness = world.force_systems[0].stiffness  # type: ignore[attr-defined]
     total = world.kinetic_energy() + world.potential_energy()
     return _seen(lambda t: spring(t, stiffness, mass[0], x, v)[0], seconds, world, False, [], energy_scale=total)
@@ -65,7 +57,7 @@ def swinging(world: World, seconds: float) -> Seen:
 
 def kepler(world: World, seconds: float) -> Seen:
     """An ellipse around the origin, GM = 1, from the perihelion on the x axis, by Kepler's equation M = E - e sin E."""
-    x, v, _ = _start(world)
+    x, v, _ = dynamic_by_id(world)
     near, speed = float(x[0, 0]), float(v[0, 1])
     axis = 1 / (2 / near - speed**2)
     e = 1 - near / axis
@@ -83,7 +75,7 @@ def kepler(world: World, seconds: float) -> Seen:
 
 def bounces(world: World, seconds: float) -> Seen:
     """Elastic balls dropped from rest: each flight is the previous one mirrored in time."""
-    x, _, mass = _start(world)
+    x, _, mass = dynamic_by_id(world)
     g = -float(np.asarray(world.gravity)[1])
     radius = 0.1
     fall = math.sqrt(2 * (float(x[0, 1]) - radius) / g)
@@ -100,7 +92,7 @@ def bounces(world: World, seconds: float) -> Seen:
 
 def one_impact(world: World, seconds: float) -> Seen:
     """Two equal elastic discs of radius 1/2, as in the scene: straight lines with one corner each."""
-    x, v, mass = _start(world)
+    x, v, mass = dynamic_by_id(world)
     when = impact_time(x[0], v[0], x[1], v[1], 1.0)
     touch = x + when * v
     normal = touch[1] - touch[0]

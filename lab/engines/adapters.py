@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...framework import World
-from ..measure.body_shapes import Enclosure, Floats, overlaps_of, sensor_entities, shapes_of
+from ..measure.body_shapes import Enclosure, Floats, overlaps_of, sensor_entities, sizes_of
 from ..measure.timing import timed
 from ..trading.records import PYMUNK
 from .pymunk_space import PymunkSpace
@@ -95,8 +95,7 @@ class Engine(ABC):
     @cached_property
     def sizes(self) -> dict[int, float]:
         """The smallest extent of each entity that has a built-in shape."""
-        shapes = shapes_of(self.world)
-        return dict(zip(shapes.entity.tolist(), (2 * shapes.half.min(axis=1)).tolist(), strict=True))
+        return sizes_of(self.world)
 
     @cached_property
     def size(self) -> float:

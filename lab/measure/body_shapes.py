@@ -87,6 +87,19 @@ def shapes_of(world: World) -> Shapes:
     return Shapes(*(np.concatenate([np.asarray(column) for column in columns]) for columns in zip(*parts, strict=True)))
 
 
+def sizes_of(world: World) -> dict[int, float]:
+    """The smallest extent of each entity that has a built-in shape, m."""
+    shapes = shapes_of(world)
+    return dict(zip(shapes.entity.tolist(), (2 * shapes.half.min(axis=1)).tolist(), strict=True))
+
+
+def dynamic_by_id(world: World) -> tuple[Floats, Floats, Floats]:
+    """Positions, velocities (n, d) and masses (n,) of the dynamic bodies, ascending by entity id; copies."""
+    dynamic = world.bodies.dynamic
+    order = np.argsort(dynamic.entity, kind="stable")
+    return dynamic.position[order], dynamic.linear_velocity[order], dynamic.mass[order]
+
+
 def sensor_entities(world: World) -> NDArray[np.int64]:
     """The ids of entities with a sensor collider."""
     bodies = world.bodies

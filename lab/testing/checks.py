@@ -10,7 +10,7 @@ import numpy as np
 
 from ...framework import Contact, Phase, System, World
 from ...framework.typing import Integers
-from ..measure.body_shapes import Floats, overlaps_of, shapes_of
+from ..measure.body_shapes import Floats, overlaps_of, sizes_of
 
 
 class Conserved:
@@ -201,11 +201,8 @@ def _moving_ids(world: World) -> Integers:
 
 
 def _sizes(world: World) -> Floats:
-    shapes = shapes_of(world)
-    smallest: dict[int, float] = {}
-    for entity, half in zip(shapes.entity.tolist(), shapes.half.min(axis=1).tolist(), strict=True):
-        smallest[entity] = 2 * half
-    return np.array([smallest.get(entity, 1.0) or 1.0 for entity in world.bodies.dynamic.entity.tolist()])
+    known = sizes_of(world)
+    return np.array([known.get(entity, 1.0) or 1.0 for entity in world.bodies.dynamic.entity.tolist()])
 
 
 def _assert_largest(world: World, values: Floats, limit: float, verb: str, unit: str) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from ..cases.case import Case
 from ..measure.effects import in_words, severity, told
 from ..reporting.text import compact, counted, metres
-from .records import RESTING, TRUSTED, CaseTrade, Cell, Point, Reference
+from .records import RESTING, CaseTrade, Cell, Point, Reference
 from .report import failures
 
 FRAME = 1 / 60  # s: the frame of a game whose cost is told
@@ -44,16 +44,18 @@ class Target:
 
     def error_of(self, case: CaseTrade) -> float:
         """The largest error, relative to the scale of the norm."""
+        return self._relative(case.scale)
+
+    def _relative(self, scale: float) -> float:
         assert self.max_error is not None
-        return self.max_error / case.scale if self.absolute else self.max_error
+        return self.max_error / scale if self.absolute else self.max_error
 
     def is_known_by(self, case: Case, reference: Reference) -> bool:
         """True if that reference is exact enough to tell errors of that size."""
         norm = case.norms[0]
         if self.max_error is None or norm not in reference.agreement:
             return False
-        error = self.max_error / case.scale(norm) if self.absolute else self.max_error
-        return error >= TRUSTED * reference.agreement[norm]
+        return reference.trusts(norm, self._relative(case.scale(norm)))
 
     def is_unknowable(self, case: CaseTrade) -> bool:
         """True if the reference of the case cannot tell errors of that size."""
