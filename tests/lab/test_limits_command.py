@@ -15,11 +15,13 @@ from carom.lab.cases.subjects import Subject
 
 carom = helpers_cli.carom  # fixture
 
-SPRING = """
-from carom.components import RigidBody, Transform
-from carom.framework import ForceSystem, Settings, World
+IMPORTS = """
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import ForceSystem, System, World
 from carom.plugins import Physics
 
+"""
+SPRING = IMPORTS + """
 seconds = 0.1
 
 
@@ -60,11 +62,8 @@ def test_the_command_watches_a_scene_of_the_library(carom):
     assert "overlap on a way of 0.1143 m" in result.stdout
 
 
-BROKEN_ON_THE_WAY = """
+BROKEN_ON_THE_WAY = IMPORTS + """
 import numpy as np
-from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import System, World
-from carom.plugins import Physics
 
 class Spoiler(System):
     def process(self, dt):
@@ -101,13 +100,8 @@ def test_the_command_refuses_in_one_line(carom, arguments, message):
     assert message in refusal(carom("limits", *arguments))
 
 
-FALLS = """
-from carom.components import RigidBody, Transform
-from carom.framework import World
-from carom.plugins import Physics
-
+FALLS = IMPORTS + """
 seconds = 1.0
-
 
 def build(settings, seed=0):
     world = World(Physics(dimensions=2, gravity=(0, -10)), settings=settings)
@@ -116,13 +110,8 @@ def build(settings, seed=0):
 """
 
 
-SLIDES = """
-from carom.components import AABBCollider, RigidBody, Transform
-from carom.framework import World
-from carom.plugins import Physics
-
+SLIDES = IMPORTS + """
 seconds = 1.0
-
 
 def build(settings, seed=0):
     world = World(Physics(dimensions=2, gravity=(0, -10)), settings=settings)

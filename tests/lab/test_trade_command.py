@@ -196,30 +196,22 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(carom, monkeypatch):
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (("sprin",), "no scene named 'sprin'; did you mean 'spring'"),
-    (("spring", "orbti"), "no scene named 'orbti'; did you mean 'orbit'"),
     (("gone.py",), "no file 'gone.py'"),
     ((), "Missing argument"),
     (("spring", "--norm", "positon"), "no norm 'positon'; did you mean 'position'"),
-    (("spring", "--dt", "0"), "--dt takes steps above 0 s"),
     (("spring", "--dt", "1/60,x"), "--dt takes steps above 0 s"),
-    (("spring", "--dt", "nan"), "--dt takes steps above 0 s"),
     (("spring", "--seconds", "0"), "--seconds takes a number above 0"),
-    (("spring", "--seconds", "inf"), "--seconds takes a number above 0"),
     (("spring", "--repeats", "0"), "--repeats"),
-    (("spring", "--workers", "0"), "--workers"),
-    (("spring", "--seed", "-1"), "'--seed': -1 is not in the range x>=0"),
     (("spring", "--against", "bullet"), "--against"),
     (("spring", "--integrators", "rk5"), "did you mean 'rk4'"),
     (("spring", "--integrators", ","), "--integrators takes names"),
     (("spring", "--collisions", "discreet"), "--collisions: no 'discreet'; did you mean 'discrete'"),
-    (("spring", "--substeps", "0"), "--substeps takes whole numbers from 1"),
     (("spring", "--geometry", "box"), "--geometry: no 'box'; there are: precise, bounds"),
     (("spring", "--option", "n"), "--option takes NAME=VALUE"),
     (("spring", "--option", "seed=1"), "--option cannot set seed"),
     (("spring", "--option", "n=1", "--option", "n=2"), "--option gives n twice"),
     (("spring", "--option", "mass=3"), "mass"),
     (("spring", "--json", "--markdown"), "--json and --markdown exclude each other"),
-    (("spring", "--no-timign"), "--no-timing"),
 ])  # fmt: skip
 def test_wrong_input_is_refused_at_once_in_one_line(carom, monkeypatch, arguments, words):
     monkeypatch.setattr(trade_runs, "perform", None)  # no task runs before
