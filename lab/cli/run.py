@@ -18,7 +18,7 @@ from ...framework.schedule.profile_report import Stats
 from ..measure.run import Drift, Run, RunReport, run
 from ..plain import jsonable
 from ..plugins.command import plugin_named
-from ..reporting.output import drawing_module
+from ..reporting.output import drawing_if_there, drawing_module
 from ..reporting.progress import Bar
 from ..reporting.text import NOTHING, TextTable, counted, number
 from .loading import Loaded, load, stdout_kept_clean
@@ -108,10 +108,8 @@ def _drawing(no_pictures: bool, out: Path) -> Any:
     """The drawing function, or None; missing packages and permissions are reported before a long run."""
     if no_pictures:
         return None
-    try:
-        pictures = drawing_module("pictures.run_pictures", "no pictures,")
-    except Problem as problem:
-        click.echo(f"carom: {problem.message}", err=True)
+    pictures = drawing_if_there("pictures.run_pictures", "no pictures,")
+    if pictures is None:
         return None
     writable_folder(out.parent if pictures.is_file(out) else out, out)
     return pictures.draw_run

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -57,19 +56,6 @@ class RaisedError(Exception):
         self.at = at
 
 
-@dataclass
-class Results:
-    """The results of a pair function, one array per part."""
-
-    hit: np.ndarray
-    depth: np.ndarray
-    normal: np.ndarray
-    point: np.ndarray
-
-    def take(self, rows: np.ndarray) -> Results:
-        return Results(self.hit[rows], self.depth[rows], self.normal[rows], self.point[rows])
-
-
 class PairCode:
     """The function of a pair for two shapes, in the pair's own order, compiled for one dimension."""
 
@@ -77,10 +63,10 @@ class PairCode:
         linked = linked_pair(first, second, pair, dimensions)
         self._functions = UncheckedPair(linked.first, linked.second, linked.pair, dimensions)
 
-    def __call__(self, a: Rows, b: Rows, d: np.ndarray) -> Results:
-        """RaisedError if the function raises; numba's errors if it does not compile."""
-        calls = _run(0, d, self._functions.evaluate.address, *self._parameters(a, b))
-        return Results(calls.hit, calls.depth, calls.normal, calls.point)
+    def __call__(self, a: Rows, b: Rows, d: np.ndarray) -> Any:
+        """hit, depth, normal and point of each row; RaisedError if the function raises, numba's errors if it does not
+        compile."""
+        return _run(0, d, self._functions.evaluate.address, *self._parameters(a, b))
 
     def sweep(self, a: Rows, b: Rows, d: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(hit, time) of the pair's sweep function."""

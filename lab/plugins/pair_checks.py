@@ -12,7 +12,7 @@ import numpy as np
 
 from ...framework.plugins.checks import plain
 from ...framework.plugins.registry import Pair, Shape
-from .kernels import PairCode, RaisedError, Results, SupportCode
+from .kernels import PairCode, RaisedError, SupportCode
 from .samples import KINDS, Poses, Subject, directions, numbers_shown, pose_shown
 
 TOLERANCE, GENERIC = 1e-9, 2e-6
@@ -62,7 +62,7 @@ class PairChecks:
 
     # -- each pose by itself ----------------------------------------------------------------------
 
-    def _contacts(self, r: Results) -> np.ndarray:
+    def _contacts(self, r: Any) -> np.ndarray:
         """Check that results are valid, and return which of them are usable."""
         apart = ~r.hit & (r.depth == -np.inf)
         finite = np.isfinite(r.depth) & np.isfinite(r.normal).all(axis=1) & np.isfinite(r.point).all(axis=1) | apart
@@ -80,7 +80,7 @@ class PairChecks:
         )
         return finite & ~bent & ~apart
 
-    def _boxes(self, r: Results) -> None:
+    def _boxes(self, r: Any) -> None:
         """At a contact the bounds of both shapes overlap; otherwise the broad phase does not report the pair."""
         reach = self.poses.a.half + self.poses.b.half
         outside = (r.depth > self.tolerance) & (np.abs(self.d) - reach > self.tolerance[:, None]).any(axis=1)
@@ -91,7 +91,7 @@ class PairChecks:
             "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct the depth",
         )
 
-    def _points(self, r: Results) -> None:
+    def _points(self, r: Any) -> None:
         """The contact point lies in both boxes, up to the overlap."""
         room = np.abs(r.depth) + self.tolerance
         hit = r.depth >= 0
@@ -104,14 +104,14 @@ class PairChecks:
             "point counts from the centre of the first shape, and lies in the overlap",
         )
 
-    def _meets(self, r: Results) -> None:
+    def _meets(self, r: Any) -> None:
         if not (r.hit & (r.depth >= 0)).any():
             near = (np.abs(self.d) <= self.poses.a.half + self.poses.b.half).all(axis=1)
             what = f"they never touch, in none of {near.sum()} poses in which their boxes overlap"
             cure = "return depth >= 0 where they overlap; to keep two shapes apart use layer and mask"
             self._found_one(int(np.argmax(near)), what, cure)
 
-    def _supports(self, r: Results) -> None:
+    def _supports(self, r: Any) -> None:
         """The depth along the normal agrees with the support functions of both shapes."""
         known = np.isfinite(r.depth)
         normal = np.where(known[:, None], r.normal, np.eye(self.d.shape[1])[0])
@@ -130,7 +130,7 @@ class PairChecks:
 
     # -- two related poses ------------------------------------------------------------------------
 
-    def _parting(self, r: Results) -> None:
+    def _parting(self, r: Any) -> None:
         """After a translation by depth along the normal the shapes just touch."""
         hit = r.depth >= 0
         after = self._evaluate(self.d + np.where(np.isfinite(r.depth), r.depth, 0.0)[:, None] * r.normal)
@@ -154,7 +154,7 @@ class PairChecks:
             cure + "first shape to the second",
         )
 
-    def _steadiness(self, r: Results) -> None:
+    def _steadiness(self, r: Any) -> None:
         """A translation by s changes the distance by at most s: the search for the time of impact relies on it."""
         n, dimensions = self.d.shape
         size = np.where(np.isfinite(r.depth), np.abs(r.depth), 0.0) + 0.1 * self.poses.scale()
@@ -173,7 +173,7 @@ class PairChecks:
             "apart, depth is minus the distance, or minus something smaller: fast bodies would pass through else",
         )
 
-    def _turned_round(self, r: Results) -> None:
+    def _turned_round(self, r: Any) -> None:
         """Two of one shape, with the roles exchanged."""
         back = self.code(self.poses.b, self.poses.a, -self.d)
         both = np.isfinite(r.depth) & np.isfinite(back.depth)
@@ -208,7 +208,7 @@ class PairChecks:
 
     # -- other ways to the same result ------------------------------------------------------------
 
-    def _plain(self, r: Results) -> None:
+    def _plain(self, r: Any) -> None:
         """Compiled code and plain Python agree."""
         chosen = np.concatenate(
             [np.flatnonzero(self.poses.kind == k)[: PLAIN_ORDINARY if k == 0 else PLAIN_EXTREME] for k in
@@ -236,7 +236,7 @@ class PairChecks:
                 self._found_one(i, what, cure)
                 return
 
-    def _sweeps(self, r: Results) -> None:
+    def _sweeps(self, r: Any) -> None:
         """The closed-form sweep agrees with the depth along the path."""
         away = np.flatnonzero(r.depth < 0)
         poses = self.poses.take(away)
@@ -274,10 +274,10 @@ class PairChecks:
 
     # -- help -------------------------------------------------------------------------------------
 
-    def _evaluate(self, d: np.ndarray) -> Results:
+    def _evaluate(self, d: np.ndarray) -> Any:
         return self.code(self.poses.a, self.poses.b, d)
 
-    def _said(self, r: Results, i: int) -> str:
+    def _said(self, r: Any, i: int) -> str:
         depth = float(r.depth[i])
         return f"({bool(r.hit[i])}, {depth!r}, {numbers_shown(r.normal[i])}, {numbers_shown(r.point[i])})"
 

@@ -69,3 +69,12 @@ def drawing_module(name: str, what: str, extra: str = "plot") -> Any:
     except ImportError as error:
         reason = f"matplotlib is missing; it comes with the extra: pip install 'carom[{extra}]'"
         raise Problem(f"{what} {reason}") from error
+
+
+def drawing_if_there(name: str, what: str) -> Any:
+    """That module; a note on stderr, and None, if matplotlib is missing."""
+    try:
+        return drawing_module(name, what)
+    except Problem as problem:
+        click.echo(f"carom: {problem.message}", err=True)
+        return None

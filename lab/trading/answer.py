@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..cases.case import Case
 from ..measure.effects import in_words, severity, told
@@ -112,12 +113,12 @@ def _nearest(case: CaseTrade, points: Sequence[Point]) -> Point:
     least = min(map(price, points))
     own = case.own or points[0].cell
 
-    def changes(point: Point) -> int:
-        names = ("integrator", "collision", "substeps", "geometry")
-        return sum(getattr(point.cell, name) != getattr(own, name) for name in names)
-
     alike = [point for point in points if price(point) <= HARDLY * least]
-    return min(alike, key=lambda point: (changes(point), price(point), severity(point.effects), point.cell.key))
+
+    def order(point: Point) -> tuple[Any, ...]:
+        return point.cell.differences(own), price(point), severity(point.effects), point.cell.key
+
+    return min(alike, key=order)
 
 
 def _gain(now: Point, other: Point) -> float:

@@ -31,11 +31,11 @@ from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..jobs import cluster as clusters
 from ..jobs.runs import Store
-from ..reporting.output import Output, drawing_module
+from ..reporting.output import Output, drawing_if_there
 from ..reporting.progress import Bar
 from ..reporting.text import counted
 from .answer import Target, answer, recommended
-from .records import PYMUNK, Trade
+from .records import PYMUNK
 from .report import cheapest, measured, remarks, tables, write_csv, write_json
 from .trade import Only, trade
 
@@ -97,7 +97,9 @@ def trade_command(
         )  # fmt: skip
         files = [write_json(result, out / "trade.json"), write_csv(result, out / "trade.csv")]
         runs["progress"].say("charts")
-        files += _charts(result, out, norms)
+        charts = drawing_if_there("trading.charts", "no charts,")
+        if charts is not None:
+            files += [path for norm in norms or [None] for path in charts.draw(result, out, norm)]
     if output.plain:
         for case in result.cases:
             click.echo("\n".join(answer(case, target)) + "\n")
@@ -141,13 +143,3 @@ def performing(workers: int | None, cluster: str | None, kept: Path) -> Iterator
             runs = counted(len(store), "run")
             click.echo(f"carom: stopped; {runs} kept in {kept}, the same command goes on", err=True)
             raise click.exceptions.Exit(STOPPED) from None
-
-
-def _charts(result: Trade, out: Path, norms: Sequence[str]) -> list[Path]:
-    """Draw them; without matplotlib a note is all."""
-    try:
-        draw = drawing_module("trading.charts", "no charts,").draw
-    except Problem as problem:
-        click.echo(f"carom: {problem.message}", err=True)
-        return []
-    return [path for norm in norms or [None] for path in draw(result, out, norm)]

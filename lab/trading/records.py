@@ -60,6 +60,11 @@ class Cell:
         """Identifies the curve of this point: the same fields with a step of 1 s."""
         return dataclasses.replace(self, dt=1.0)
 
+    def differences(self, other: Cell) -> int:
+        """How many fields besides the step differ."""
+        names = ("integrator", "collision", "substeps", "geometry")
+        return sum(getattr(self, name) != getattr(other, name) for name in names)
+
     @property
     def key(self) -> str:
         """A unique word for the cell."""

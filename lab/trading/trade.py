@@ -217,9 +217,8 @@ def _time_alone(case: Case, points: Sequence[Point]) -> None:
 def _distance(cell: Cell, own: Cell) -> float:
     """How far a setting is from the scene's own: fields that differ, and halvings or doublings of the step; smaller
     steps are farther, because they cost more."""
-    fields = ("integrator", "collision", "substeps", "geometry")
     alike = grids.with_own_flight(dataclasses.replace(own, collision=cell.collision))
-    differ = sum(getattr(cell, name) != getattr(alike, name) for name in fields) + (cell.collision != own.collision)
+    differ = cell.differences(alike) + (cell.collision != own.collision)
     halvings = math.log2(own.dt / cell.dt)
     return differ + (1.5 * halvings if halvings > 0 else -halvings)
 
