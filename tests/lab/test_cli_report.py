@@ -78,7 +78,7 @@ def test_the_worlds_faults_are_shown(carom, ball):
     ball.write_text(text.replace("    return world", f"{wall}\n    return world"))
     result = carom("run", "ball.py", "--steps", "3", "--no-pictures")
     assert result.exit_code == 0, result.stderr
-    assert "! step 0: " in result.stdout or "! step 1: " in result.stdout
+    assert "! 1 impacts beyond 8 of a body in one step" in result.stdout
 
 
 def test_the_progress_says_what_compiles(tmp_path):
