@@ -256,9 +256,6 @@ def test_the_game_of_the_readme_waits_for_nothing_after_its_first_frame():
     assert result.returncode == 0, result.stderr[-3000:]
 
 
-# -- other guarantees --------------------------------------------------------------------------------------
-
-
 def test_prepare_changes_nothing_that_can_be_seen():
     worlds = make_world(gravity=9.81), make_world(gravity=9.81)
     for world in worlds:
@@ -305,17 +302,6 @@ def test_worlds_with_every_plugin_can_be_prepared_and_no_system_is_made_or_run()
     assert len(updates) == 2
 
 
-def test_one_may_prepare_more_and_more():
-    world = make_world()
-    world.prepare()
-    ball(world, 0)
-    world.step()
-    world.prepare(AABBCollider)
-    world.prepare(AABBCollider)
-    world.step()
-    assert {shape.component for shape in world.physics.scene.linked.shapes} == {SphereCollider, AABBCollider}
-
-
 def test_force_systems_are_called_for_the_present_bodies():
     seen = []
 
@@ -358,17 +344,3 @@ def test_what_cannot_be_prepared():
     world.add_system(InMidStep())
     with pytest.raises(CaromError, match="between steps"):
         world.step()
-
-
-def test_shapes_prepared_for_an_empty_world_have_room():
-    """What all bodies of a world have left behind, and what is prepared, has columns as long as the table."""
-    world = make_world()
-    entity = ball(world, (0.0, 0.0))
-    world.step()
-    world.delete_entity(entity, immediate=True)
-    world.prepare(SphereCollider, AABBCollider)
-    world.step()
-    ball(world, (0.0, 0.0), (1.0, 0.0))
-    world.step()
-    bodies = world.physics.state.bodies
-    assert bodies.level_offsets.shape[1] == bodies.offset.shape[0] == bodies.levels.shape[1]

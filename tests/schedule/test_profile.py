@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from worlds import ball, floor, make_world, run
 
 from carom.components import RigidBody, Transform
-from carom.framework import CaromError, ForceSystem, Phase, System
+from carom.framework import CaromError, ForceSystem
 from carom.framework.compilation import kernel, log, timing
 from carom.framework.schedule.profile_report import Stats, Totals
 from carom.lab.cli.main import cli
@@ -137,19 +137,6 @@ def test_what_there_was_none_of_divides_nothing():
     assert empty.stats().nanoseconds["Integration"] == {}
 
 
-def test_systems_of_a_game_have_their_phase_s_units():
-    class Judge(System):
-        phase = Phase.NARROW
-
-        def process(self, dt):
-            pass
-
-    world = bouncing()
-    world.add_system(Judge())
-    run(world, STEPS)
-    assert world.stats().nanoseconds["Judge"].keys() == {"body", "candidate"}
-
-
 @pytest.mark.compiled
 def test_compiling_is_kept_apart(monkeypatch, tmp_path):
     monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
@@ -192,20 +179,6 @@ def test_a_profile_leaves_everything_as_it_was():
     assert plain.state_hash() == profiled.state_hash()
 
 
-@pytest.mark.compiled
-def test_kernels_made_inside_a_profile_are_timed_too():
-    world = bouncing()
-    with world.profile():
-
-        @kernel
-        def thing(x):
-            return x + 41.0
-
-        thing(1.0)
-        thing(1.0)
-    assert [row.kernel for row in world.stats().kernels] == ["thing"]
-
-
 def test_one_profile_at_a_time():
     first, second = bouncing(), bouncing()
     with first.profile():
@@ -233,22 +206,10 @@ def test_the_stats_print_as_a_table():
     assert "nan" not in str(Stats(Totals()))
 
 
-# -- carom run --profile ---------------------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def carom(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return lambda *arguments: CliRunner().invoke(cli, ["run", "billiards", "--no-pictures", *arguments])
-
-
-def test_the_command_shows_systems_and_their_kernels(carom):
-    result = carom("--steps", "40", "--profile")
-    assert result.exit_code == 0, result.stderr
-    for words in ("ns per candidate", "ForceAccumulation", "  evaluate_pairs", "whole step", "everything else"):
-        assert words in result.stdout
-    assert "for the steps that compiled or loaded kernels" in result.stdout
-    assert "evaluate_pairs" not in carom("--steps", "2").stdout
 
 
 @pytest.mark.compiled

@@ -5,40 +5,24 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-import numpy as np
 import pytest
 from helpers_processes import run_python
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
-from carom.framework.jit.records.record import make_record
-from carom.framework.jit.records.schema import Schema, flags, integer, ints, number, vectors
-from carom.framework.schedule.stages import Program, Stage
 from carom.plugins import Physics
 from carom.systems import ContactEvents
-from carom.systems.records import STATE
 from carom.systems.stage_list import CLOSING, check_stages
 from studies.page import between_marks
-from studies.stages import GROUPS, file_of, table
+from studies.stages import table
 
 ROOT = Path(__file__).resolve().parents[2]
-INNER = Schema("TestInner", total=number())
-OUTER = Schema(
-    "TestOuter", count=integer(), place=vectors(), hit=flags(), order=ints("int32", stacked=True), inner=INNER
-)
 
 
 def test_the_page_shows_the_stages_that_run():
     """``studies stages --into docs/architecture.md`` writes what the page has to hold."""
     _, written, _ = between_marks(ROOT / "docs" / "architecture.md", "studies stages")
     assert written.strip() == table().markdown()
-
-
-def test_every_stage_is_described_and_its_file_is_there():
-    for stages in GROUPS.values():
-        for stage in stages:
-            assert stage.why
-            assert f"def {stage.name}(state, " in (ROOT / file_of(stage)).read_text(encoding="utf-8")
 
 
 def test_the_checked_build_names_the_column_and_the_index():
@@ -69,35 +53,6 @@ for i in (3, -1):
     assert "Shelf.weight" in said[0]
     assert "3, 3" in said[0]
     assert "-1, 3" in said[1]
-
-
-# -- records --------------------------------------------------------------------------------------
-
-
-def test_a_record_holds_what_is_assigned_and_grows_without_losing_it():
-    record = make_record(OUTER, 3)
-    record.count, record.inner.total = 7, 0.5
-    record.place = np.arange(6.0).reshape(2, 3)
-    record.reserve(5, "place", keep=2)
-    record.reserve(5, "hit")
-    assert (record.count, record.inner.total) == (7, 0.5)
-    assert record.place.shape == (5, 3)
-    assert record.place[:2].ravel().tolist() == list(range(6))
-    assert len(record.hit) == 5
-
-
-@pytest.mark.parametrize(
-    ("name", "array"),
-    [("place", np.zeros((2, 2))), ("hit", np.zeros(2)), ("order", np.zeros(3, np.int32))],
-    ids=["another dimension", "another type", "one axis too few"],
-)
-def test_an_array_of_another_kind_is_refused_by_name(name, array):
-    record = make_record(OUTER, 3)
-    with pytest.raises(ValueError, match=f"TestOuter.{name} takes arrays of"):
-        setattr(record, name, array)
-
-
-# -- systems around stages ------------------------------------------------------------------------
 
 
 def falling(*systems):
@@ -145,28 +100,3 @@ def test_without_its_system_the_events_end_and_the_rest_goes_on():
 def test_a_stage_that_the_step_cannot_keep_its_promises_for_is_refused(change, message):
     with pytest.raises(ValueError, match=f"stage check_finite.*{message}"):
         check_stages((dataclasses.replace(CLOSING[-1], **change),))
-
-
-def half_done(state, dt):
-    if dt > 1.0:
-        return 0
-
-
-def not_done(state, dt):
-    state.count = 3
-
-
-def of_another_code(state, dt):
-    return 77
-
-
-@pytest.mark.parametrize("function", [half_done, not_done])
-def test_a_stage_that_returns_no_code_is_refused(function):
-    with pytest.raises(ValueError, match=f"stage {function.__name__} must return a code on every path: 0, or"):
-        Stage(function, "nothing")
-
-
-def test_a_stage_that_returns_an_unknown_code_is_named():
-    program = Program(make_record(STATE, 2), (Stage(of_another_code, "nothing"),), {3: lambda dt: None}, 32)
-    with pytest.raises(ValueError, match=r"stage of_another_code returned 77, .*: these are 3, and 0 for"):
-        program.run_one("of_another_code", 0.0)

@@ -159,27 +159,6 @@ def test_an_interrupt_goes_through_as_it_is_and_undoes_the_step():
     assert world.component_for_entity(e, Transform).x == 1.0
 
 
-def test_the_time_of_steps_that_were_not_taken_is_kept():
-    world = make_world(dt=0.25)
-    ball(world, 0.0, 1.0)
-
-    class Second(System):
-        healed = False
-
-        def process(self, dt):
-            if self.world.step_count == 1 and not self.healed:
-                raise RuntimeError
-
-    system = Second()
-    world.add_system(system)
-    with pytest.raises(StepError):
-        world.advance(0.8)
-    assert world.step_count == 1
-    system.healed = True
-    assert world.advance(0.0) == 2
-    assert world.alpha == pytest.approx(0.2)
-
-
 def test_an_error_in_a_world_stepped_by_a_system_undoes_both():
     inner, outer = make_world(), make_world()
     ball(inner, 0.0, 60.0)
@@ -243,4 +222,3 @@ def test_a_processor_added_within_a_plain_step_joins_at_its_end_and_its_failure_
         esper.process(world.settings.dt)
     assert world.component_for_entity(e, Transform).x == 2.0
     assert world.step_count == 2
-

@@ -7,13 +7,10 @@ import pytest
 from helpers_systems import A, B, Note, PlainNote, in_phase
 from worlds import ball, make_world
 
-from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, NoPhysicsError, Phase, Settings, System, World
+from carom.framework import ForceSystem, NoPhysicsError, Phase, System, World
 from carom.systems import ForceAccumulation, Response
 
 pytestmark = pytest.mark.plain
-
-# -- once per step, once per frame -----------------------------------------------------------------------------------
 
 
 def test_systems_run_once_per_step_and_frame_systems_once_per_advance():
@@ -67,9 +64,6 @@ def test_what_cannot_be_added():
             make_world().add_system(system)
         world.remove_system(system)
         make_world().add_system(system)  # free again
-
-
-# -- adding and removing ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("plain_process", [False, True], ids=["step", "esper.process"])
@@ -181,31 +175,3 @@ def test_a_built_in_system_can_be_taken_out():
     world.add_system(forces)
     world.step()
     assert world.bodies.linear_velocity.tolist() == [[1.0, -10.0]]
-
-
-def test_stats_know_every_system_and_can_be_reset():
-    world = make_world()
-    world.add_system(Note())
-    world.add_processor(PlainNote([], ""))
-    world.step()
-    stats = world.stats()
-    assert stats.steps == 1
-    assert {"Integration", "Response", "Note", "PlainNote"} <= stats.milliseconds.keys()
-    assert stats.total > 0
-    world.reset_stats()
-    assert world.stats().steps == 0
-    assert world.stats().total == 0
-
-
-def test_settings_for_a_world_without_physics_are_kept():
-    assert World(settings=Settings(dt=0.5)).settings.dt == 0.5
-
-
-def test_sphere_colliders_are_needed_only_if_there_are_any():
-    world = make_world()
-    world.create_entity(Transform((0, 0)), RigidBody(linear_velocity=(60.0, 0)))
-    world.step()
-    assert "no colliders" in str(world.plan())
-    world.create_entity(Transform((9, 9)), RigidBody(), SphereCollider(1.0))
-    world.step()
-    assert "no colliders" not in str(world.plan())

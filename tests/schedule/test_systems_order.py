@@ -40,9 +40,6 @@ def trace(world, log):
     return log
 
 
-# -- order -----------------------------------------------------------------------------------------------------------
-
-
 def test_the_built_in_systems_are_esper_processors_in_the_order_of_the_step():
     world = make_world()
     expected = [ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, ContactEvents]
@@ -163,30 +160,6 @@ def test_two_writers_of_one_column_need_an_order():
     world.add_system(third(), after=second)  # after Writer too then, through Second
     world.add_system(type("Elsewhere", (Note,), {"phase": Phase.START, "writes": ("position",)})())
     assert order(world)[-3:] == ["Writer", "Second", "Third"]
-
-
-def test_the_plan_shows_the_order_and_the_reasons():
-    world = make_world(gravity=9.81)
-    world.add_system(A(), before=Response)
-    ball(world, 0.0)
-    plan = world.plan()
-    assert [entry.system for entry in plan.entries] == order(world)
-    assert [entry.priority for entry in plan.entries] == [system.priority for system in world.systems]
-    text = str(plan)
-    assert "gravity" in text
-    assert "no event has a handler" in text
-    with world:
-        esper.set_handler("contact_begin", _handler)
-    assert "handlers of contact_begin" in str(world.plan())
-    with world:
-        esper.remove_handler("contact_begin", _handler)
-
-
-def _handler(contact):
-    pass
-
-
-# -- one phase alone -------------------------------------------------------------------------------------------------
 
 
 def test_run_forces_alone():

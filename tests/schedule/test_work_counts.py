@@ -9,9 +9,7 @@ from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import PhysicsWarning, Settings, StepError, World
 from carom.framework.jit.records.schema import Column
-from carom.plugins import Physics, convex_polygon, half_space
-from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.half_space import HalfSpaceCollider
+from carom.plugins import Physics
 from carom.systems.codes import CHECK_FLIGHT
 
 
@@ -25,16 +23,6 @@ def test_looks_for_impacts_of_fast_bodies():
         assert state.refreshes_counted > 100
         assert state.impacts_counted > 10_000
         assert state.looks_counted < 17 * state.impacts_counted
-
-
-def test_looks_of_a_slow_gas():
-    """A look at each contact, and after its impact at the pairs of both bodies."""
-    with scenes.get("gas2d").build(Settings(), 1, n=1000) as world:
-        for _ in range(30):
-            world.step()
-        state = world.physics.state
-        assert state.impacts_counted > 1000
-        assert state.looks_counted < 4 * state.impacts_counted
 
 
 def evaluations_of_a_step(world: World) -> int:
@@ -59,29 +47,6 @@ def test_a_pair_at_rest_is_evaluated_once_a_step(scene, steps, options):
         evaluations = evaluations_of_a_step(world)
         assert pairs.touching_count > 0.85 * pairs.count
         assert pairs.count <= evaluations <= pairs.count + 2 * (pairs.resting_count - pairs.touching_count)
-
-
-def test_a_pair_at_rest_that_is_a_plugins_is_evaluated_once_a_step():
-    """Also on a slope, and if it may bounce."""
-    world = World(Physics(dimensions=2, gravity=(0.0, -10.0)), half_space.plugin, convex_polygon.plugin)
-    world.create_entity(Transform((0.0, 0.0)), HalfSpaceCollider((-0.1, 1.0), friction=1.0))
-    world.create_entity(
-        Transform((0.0, 0.5)), RigidBody(mass=1.0),
-        ConvexPolygonCollider([(-0.5, -0.45), (0.5, -0.55), (0.4, 0.5)], restitution=0.2, friction=1.0),
-    )  # fmt: skip
-    with world:
-        for _ in range(300):
-            world.step()
-        assert world.physics.state.pairs.resting_count == 1
-        assert evaluations_of_a_step(world) == 1
-
-
-def test_a_pile_that_settles_is_evaluated_at_most_twice_a_step():
-    """Where the step starts and where it ends; and pairs near each other where free flight leads."""
-    with settled("pile2d", 180, n=200) as world:
-        pairs = world.physics.state.pairs
-        total = sum(evaluations_of_a_step(world) for _ in range(10))
-        assert total < 10 * 2.3 * pairs.count
 
 
 def columns_of(*records):
@@ -115,15 +80,6 @@ def free_world():
     return world
 
 
-def test_a_world_without_colliders_keeps_its_velocities_once():
-    with free_world() as world:
-        state = world.physics.state
-        state.bodies.kept_velocity[:] = 7.0
-        world.step()
-        assert (state.bodies.kept_velocity == 7.0).all()
-        assert not state.velocity_kept
-
-
 def test_a_failed_step_without_colliders_is_put_back():
     """It fails after the flight, when positions and velocities are those of the end of the step."""
     with free_world() as world:
@@ -142,45 +98,12 @@ def test_a_failed_step_without_colliders_is_put_back():
         np.testing.assert_array_equal(world.physics.state.bodies.previous_position[:5], previous)
 
 
-def test_what_the_check_of_the_flight_has_seen_is_not_looked_for_again():
-    """And what goes wrong is seen all the same."""
-    with free_world() as world:
-        state = world.physics.state
-        assert state.flight_usual
-        assert state.finite
-        world.bodies.position[0] = (1e12, 0)
-        world.step()
-        assert not state.flight_usual
-        assert state.finite
-
-
 def ball_above_a_box() -> tuple[World, int, int]:
     world = World(Physics(dimensions=2, gravity=(0.0, -9.81)))
     box = world.create_entity(Transform((0.0, -0.5)), AABBCollider(half_extents=(5.0, 0.5), restitution=0.5))
     world.create_entity(Transform((0.0, 1.0)), RigidBody(mass=1.0), SphereCollider(radius=0.5))
     world.step()
     return world, box, world.bodies.row_of(box)
-
-
-def test_static_rows_are_not_read_again_while_nothing_can_have_written_them():
-    """What is written into the table past all that code of the game can reach is not seen: no stage has looked."""
-    world, box, row = ball_above_a_box()
-    with world:
-        table, state = world.physics.table, world.physics.state
-        boxes = state.statics_version
-        table.arrays["position"][row] = 40.0
-        table.arrays["inverse_mass"][row] = 1.0
-        table.arrays["aabb_collider.restitution"][row] = np.nan
-        for _ in range(5):
-            world.step()
-        assert state.statics_version == boxes
-        assert state.bodies.inverse_mass[row] == 1.0
-        assert not world.faults
-        world.component_for_entity(box, Transform).rotation = 0.0  # any assignment to a static body
-        with pytest.warns(PhysicsWarning, match="restitution is nan"):
-            world.step()
-        assert state.statics_version > boxes
-        assert state.bodies.inverse_mass[row] == 0.0
 
 
 @pytest.mark.parametrize("taken", ["before", "between"])
@@ -197,19 +120,3 @@ def test_static_rows_of_a_column_that_the_game_holds_are_read_in_each_step(taken
             world.step()
         assert state.statics_version > boxes
         assert inverse_masses[row] == 0.0
-
-
-def test_memory_of_impacts_covers_rows_that_become_static():
-    """Impacts are counted for what moves; a body that has had some, and is static now, has none."""
-    world, _, _ = ball_above_a_box()
-    with world:
-        body = world.create_entity(
-            Transform((3.0, 0.45)), RigidBody(mass=1.0, linear_velocity=(0.0, -5.0)),
-            SphereCollider(radius=0.5, restitution=1.0),
-        )  # fmt: skip
-        world.step()
-        state = world.physics.state
-        assert state.bodies.impact_count[world.bodies.row_of(body)] == 1
-        world.component_for_entity(body, RigidBody).kind = "static"
-        world.step()
-        assert not state.bodies.impact_count[state.moving : state.count].any()
