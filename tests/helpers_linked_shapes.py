@@ -235,9 +235,6 @@ def all_pairs(scene):
     return a[a != b], b[a != b]
 
 
-# -- functions of plugins that fail ---------------------------------------------------------------
-
-
 def blob_class(bounds_function):
     class BlobCollider(Collider):
         __slots__ = ()

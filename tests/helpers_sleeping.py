@@ -47,9 +47,6 @@ def two_towers():
     return world, boxes, others, world.snapshot()
 
 
-# -- what wakes a tower, its boxes from the bottom on ------------------------------------------------------------------
-
-
 def push(world, boxes):
     world.component_for_entity(boxes[1], RigidBody).apply_force((30.0, 0.0))
 

@@ -24,9 +24,6 @@ def rain(restitution=0.5, **settings):
     return world
 
 
-# -- begin, stay, end, impacts -------------------------------------------------------------------
-
-
 def test_begin_stay_end_in_order():
     """Each pair: begin, then stay in every step, then end; never two begins without an end between."""
     world = rain()
@@ -146,9 +143,6 @@ def test_deleting_everything_ends_everything():
     world.step()
     assert len(world.contacts.end) == begun > 0
     assert len(world.contacts) == 0
-
-
-# -- handlers ------------------------------------------------------------------------------------
 
 
 def test_handlers_run_in_order_and_are_kept_alive():

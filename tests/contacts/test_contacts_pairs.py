@@ -99,9 +99,6 @@ def change(world, entities):
     world.contacts.enabled[::11] = False
 
 
-# -- the same as by definition -------------------------------------------------------------------
-
-
 @both_dimensions
 @pytest.mark.parametrize("changed", [False, True])
 def test_pairs_and_between_of_every_list_and_all_types(d, changed):
@@ -160,9 +157,6 @@ def test_records_are_copies():
     world.contacts.normals_from(found.a, found.rows)[:] = np.nan
     np.testing.assert_array_equal((world.contacts.normal, world.contacts.point), before)
     assert np.isfinite([contact.normal for *_, contact in world.contacts.pairs(RigidBody, Transform)]).all()
-
-
-# -- changes by the body of the loop -------------------------------------------------------------
 
 
 def disturb(world, rng, entities, found):
@@ -251,9 +245,6 @@ def test_a_step_within_the_loop():
     assert seen == before
 
 
-# -- errors --------------------------------------------------------------------------------------
-
-
 def test_a_closed_world_says_so():
     """Also when the loop closes it; a list without rows asks nothing."""
     world, _ = crowd()
@@ -274,9 +265,6 @@ def test_what_is_no_type():
         for wrong in ([], Tag()):
             with pytest.raises(TypeError, match="component types"):
                 verb(Tag, wrong)
-
-
-# -- work ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("first", [RigidBody, Unused])

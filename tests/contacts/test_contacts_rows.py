@@ -12,9 +12,6 @@ pytestmark = pytest.mark.plain
 COLUMNS = {"entity_a": 1, "entity_b": 1, "point": 2, "normal": 2, "depth": 1, "normal_impulse": 1, "step": 1}
 
 
-# -- columns -------------------------------------------------------------------------------------
-
-
 @both_dimensions
 def test_columns_and_their_shapes(d):
     """Before any step and after, empty or not: the same columns, dtypes and shapes; impacts also have their time."""
@@ -74,9 +71,6 @@ def test_normal_impulse_is_the_momentum_exchanged():
     run(world, 120)
     load = 9.81 / 60 * np.array([6.0, 5.0, 3.0])  # on the floor, on the lowest, on the middle one
     np.testing.assert_allclose(world.contacts.normal_impulse, load, rtol=1e-3)
-
-
-# -- of -----------------------------------------------------------------------------------------
 
 
 def test_of_looks_from_the_entity():

@@ -29,9 +29,6 @@ def rows_of(world: World, entities) -> list[tuple]:
     return seen + [getattr(contacts, name)[touching].tobytes() for name in names]
 
 
-# -- falling asleep ----------------------------------------------------------------------------------------------------
-
-
 def test_off_by_default_and_nothing_sleeps():
     world = sleepy_world(sleeping=False)
     assert Settings().sleeping is False
@@ -121,9 +118,6 @@ def test_a_sleeping_pile_costs_no_pairs_and_no_solving():
     assert len(world.contacts) == 12
 
 
-# -- the same as without -----------------------------------------------------------------------------------------------
-
-
 def halves(sleeping: bool, d: int, mode: str) -> tuple[World, list[int], list[int]]:
     """A tower that comes to rest, and far from it balls that bounce and roll among boxes."""
     world = sleepy_world(d, sleeping=sleeping, collision=mode)
@@ -166,9 +160,6 @@ def test_waking_goes_on_as_if_nothing_had_happened():
     np.testing.assert_allclose(world.contacts.normal_impulse, impulses, rtol=1e-2)
     np.testing.assert_allclose(world.bodies.dynamic.position, before, atol=1e-5)
     assert len(world.contacts.begin) == len(world.contacts.end) == 0
-
-
-# -- contacts ----------------------------------------------------------------------------------------------------------
 
 
 def test_contacts_of_sleepers_are_listed_in_order_and_make_no_events():

@@ -21,9 +21,6 @@ class Health:
     """A component that is not carom's."""
 
 
-# -- components added, removed, replaced ---------------------------------------------------------
-
-
 @pytest.mark.parametrize("plain", [False, True], ids=["facade", "plain esper"])
 def test_components_are_replaced_removed_and_added_again(world, plain):
     verbs = esper if plain else world
@@ -181,9 +178,6 @@ def test_a_component_under_another_type_is_refused(world):
     world.step()
 
 
-# -- kinds ---------------------------------------------------------------------------------------
-
-
 def test_the_kind_changes_at_run_time():
     world = make_world(gravity=10.0, dt=0.5)
     e, other = ball(world, (0.0, 0.0), (1.0, 0.0)), ball(world, (50.0, 0.0))
@@ -242,9 +236,6 @@ def test_a_kind_set_before_adoption_or_inside_a_step_counts(world):
     world.step()
     assert world.component_for_entity(e, Transform).x == 1.0
     assert matches_esper(world)
-
-
-# -- custom components ---------------------------------------------------------------------------
 
 
 def test_custom_components_need_no_body_and_join_it_when_it_comes(world):

@@ -18,9 +18,6 @@ from carom.framework import Component, System
 world = helpers_adoption.world  # a fixture
 
 
-# -- inside a step -------------------------------------------------------------------------------
-
-
 class Once(System):
     """Does something in the middle of the first step."""
 
@@ -115,9 +112,6 @@ def test_components_changed_inside_a_step_count_from_the_next(world):
     world.step()
     assert world.bodies.position[0, 0] == 3.0
     assert matches_esper(world)
-
-
-# -- many changes --------------------------------------------------------------------------------
 
 
 def test_any_sequence_of_changes_leads_to_what_esper_has():

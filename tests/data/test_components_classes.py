@@ -12,8 +12,6 @@ from carom.framework import Component, column
 
 pytestmark = pytest.mark.plain
 
-# -- classes -------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("base", [Transform, RigidBody, SphereCollider, AABBCollider, Charge])
 def test_component_classes_are_final(base):
@@ -75,9 +73,6 @@ def test_names_that_would_hide_others_are_refused_and_nothing_is_disturbed():
         world.remove_component(e, clash)
         world.step()
     assert world.bodies.charge.value.tolist() == [1.0]
-
-
-# -- columns by name -----------------------------------------------------------------------------
 
 
 def test_columns_of_ones_own_have_a_namespace():

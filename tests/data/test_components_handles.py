@@ -14,8 +14,6 @@ from carom.framework import System
 
 pytestmark = pytest.mark.plain
 
-# -- values --------------------------------------------------------------------------------------
-
 
 def test_unbound_components_hold_what_they_were_given():
     transform = Transform((1, 2), rotation=0.5)
@@ -126,9 +124,6 @@ def test_assigning_a_position_is_a_teleport():
     assert transform.interpolated_position.tolist() == [1.0, 0.0]
     transform.position = (10.0, 0.0)
     assert transform.interpolated_position.tolist() == [10.0, 0.0]
-
-
-# -- handles last --------------------------------------------------------------------------------
 
 
 @pytest.mark.compiled

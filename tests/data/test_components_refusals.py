@@ -15,8 +15,6 @@ from carom.framework import Component, column
 
 pytestmark = pytest.mark.plain
 
-# -- wrong values --------------------------------------------------------------------------------
-
 WRONG = [
     (lambda v: Transform(v), "Transform.position", [(1, 2, 3, 4), (1,), ((1, 2), (3, 4)), "ab", None, {}]),
     (lambda v: Transform(v), "Transform.position", [(NAN, 0), (0, INF), (True, 2.0), (1 + 2j, 0), (10**400, 0)]),
@@ -157,9 +155,6 @@ def test_forces_and_impulses_are_checked(call, value):
     with pytest.raises(ValueError, match=call.removeprefix("apply_")):
         getattr(world.component_for_entity(e, RigidBody), call)(value)
     assert world.state_hash() == before
-
-
-# -- mistakes that would otherwise be silent -----------------------------------------------------
 
 
 def test_classes_and_lists_are_no_components():

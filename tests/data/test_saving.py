@@ -244,9 +244,6 @@ def test_components_are_pickled_with_their_values():
     assert (twin.expires, twin.owner) == (3.0, [twin])
 
 
-# -- worlds that are dropped -----------------------------------------------------------------------------------------
-
-
 @pytest.mark.compiled
 def test_a_world_that_is_dropped_is_collected_with_its_context():
     world = make(2, "discrete")

@@ -10,8 +10,6 @@ from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
 
-# -- snapshots -------------------------------------------------------------------------------------------------------
-
 
 def pile():
     world = settled()
@@ -81,9 +79,6 @@ def test_settings_stay_when_a_snapshot_is_restored():
     world.step()
     assert (world.time, world.bodies.position[0, 0]) == (0.25, 0.25)
     assert world.advance(0.5) == 2
-
-
-# -- the hash --------------------------------------------------------------------------------------------------------
 
 
 def test_the_hash_notices_the_smallest_change_of_any_value():

@@ -17,9 +17,6 @@ exact = pytest.mark.parametrize(
 )
 
 
-# -- A1: SimBenchmark's bouncing spheres -----------------------------------------------------------
-
-
 def bounce_errors(mode, integrator, dt, d=2):
     """(E - E0)^2 after each step of 20 s, J^2, of one sphere of 10 kg; impacts on the way."""
     world = mode_world(mode, d, G, dt=dt, integrator=integrator, restitution_threshold=0.0)
@@ -57,9 +54,6 @@ def test_a1_bound_of_semi_implicit_euler(dt):
     lag = (10 * G * dt / 2) ** 2 * 2 / 3 * G * 4.9
     assert 0.9 * lag < errors.mean() <= 7.5 * lag
     assert hits == 10
-
-
-# -- B11: e < 1 ------------------------------------------------------------------------------------
 
 E_SWEEP = np.array([k / 10 for k in range(11)] + [1.5])
 DROP = 4.9
@@ -135,9 +129,6 @@ def test_b11_zeno_without_a_threshold_ends(mode, integrator):
         assert heights.min() > -0.005 * 0.2
         late = step * DT > over + 4 * DT
         assert (np.abs(world.bodies.linear_velocity[rows, 1][late]) < G * DT).all()
-
-
-# -- B12: no drift at e = 1 ------------------------------------------------------------------------
 
 HEIGHTS = np.array([4.9, 3.1, 2.7, 6.3, 8.8])
 

@@ -29,9 +29,6 @@ DT, G = 1 / 60, 9.81
 every_mode = pytest.mark.parametrize("mode", ["discrete", *MODES])
 
 
-# -- sizes, places, steps --------------------------------------------------------------------------
-
-
 @mostly_2d
 @each_sweep
 def test_c4_sizes_from_1e_minus_9_to_1e9(mode, d):
@@ -106,9 +103,6 @@ def test_c7_steps_from_1e_minus_9_to_10(mode, integrator, dt, steps):
     assert position(world, thrown)[0] == pytest.approx(steps * dt, rel=1e-13)
 
 
-# -- barely touching -------------------------------------------------------------------------------
-
-
 @mostly_2d
 @pytest.mark.parametrize(
     ("mode", "first", "second", "speed", "sign"),
@@ -154,9 +148,6 @@ def test_c15_grazing(mode, d, beside):
     if len(hits):
         centre = np.array(along(d, -3.0 + 300 * hits.time[0], impact_parameter))
         assert np.linalg.norm(centre) == pytest.approx(1.0, abs=1e-9)
-
-
-# -- symmetries ------------------------------------------------------------------------------------
 
 
 def brawl(mode, *, turn=lambda v: v, length=1.0, time=1.0, mass=1.0, order=None, d=2, steps=40):

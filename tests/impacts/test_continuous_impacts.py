@@ -25,9 +25,6 @@ exact = pytest.mark.parametrize(
 )
 
 
-# -- A9: Jolt's unit tests, with the step completed -------------------------------------------------
-
-
 @exact
 def test_a9_elastic_drop_that_ends_at_the_floor(mode, integrator):
     """It meets the floor after 1 s up to rounding, and is back at its start after another."""
@@ -89,9 +86,6 @@ def test_a9_boxes_at_120_metres_a_second(mode, d):
             places = [x + v * DT for x, v in zip(places, speeds, strict=True)]
 
 
-# -- B9: two bodies on a line ----------------------------------------------------------------------
-
-
 @both_dimensions
 @every_mode
 @makers
@@ -140,9 +134,6 @@ def test_b9_infinite_ratio(mode, d, maker, kind, share):
         assert position(world, a)[0] == pytest.approx(place, abs=1e-13)
         assert velocity(world, wall)[0] == speed
         assert position(world, wall)[0] == pytest.approx(0.5 + 2 * DT * speed, abs=1e-15)
-
-
-# -- B10: off the centre line ----------------------------------------------------------------------
 
 # p1, toi, normal, then (e, m2, v1', v2'): rational answers, the other body at rest at the origin, radii sum to 1
 OBLIQUE = {
@@ -195,9 +186,6 @@ def test_b10_state_at_three_seconds(mode, steps):
     a, b = ball(world, (-3, 0.6), 1.0, restitution=1.0), ball(world, 0.0, restitution=1.0)
     run(world, steps)
     np.testing.assert_allclose(positions(world, [a, b]), [(-0.512, 0.984), (0.512, -0.384)], atol=1e-12)
-
-
-# -- kinematic walls, threshold, e above 1 ---------------------------------------------------------
 
 
 @both_dimensions

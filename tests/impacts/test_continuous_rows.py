@@ -19,9 +19,6 @@ from carom.plugins.tile_grid import TileGridCollider
 G = 10.0
 
 
-# -- rows without restitution --------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("mode", "gap", "speed"), pairwise(SWEPT, (0.0, 0.01, 0.5), (10.0, 30.0, 300.0)))
 def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
     """Five plastic balls are pushed along: none ends up behind it, their order is kept, each is as fast as the ram; or
@@ -54,9 +51,6 @@ def test_a_plastic_impact_on_a_row(mode, mass, speed):
     kept.check()
 
 
-# -- seams -----------------------------------------------------------------------------------------
-
-
 @each_sweep
 @pytest.mark.parametrize(("shape", "size", "speed"), [("ball", 0.25, 25.0), ("ball", 0.1, 12.0), ("box", 0.1, 50.0)])
 def test_what_rests_on_a_row_of_boxes_does_not_catch_on_its_seams(mode, shape, size, speed):
@@ -68,9 +62,6 @@ def test_what_rests_on_a_row_of_boxes_does_not_catch_on_its_seams(mode, shape, s
     run(world, 90)
     assert velocities(world, [mover])[0, 0] == pytest.approx(speed, rel=1e-9)
     assert positions(world, [mover])[0, 1] == pytest.approx(size, abs=0.01 * size)
-
-
-# -- maps of tiles -----------------------------------------------------------------------------------
 
 
 def tile_world(cells, faces="all", gravity=0.0, **settings):
@@ -127,9 +118,6 @@ def test_what_falls_beside_a_wall_of_tiles_falls_on():
     run(world, 30)
     assert positions(world, [ball])[0] == pytest.approx((0.89, 95.0 - 30.0 - 0.5 * G * 0.25), abs=1e-9)
     assert not len(world.contacts.impacts)
-
-
-# -- damping and forces around a bounce --------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -28,9 +28,6 @@ from carom.plugins import Physics
 
 DT = 1 / 60
 
-
-# -- B13: a sphere swept against a box -------------------------------------------------------------
-
 # (y, z), time and normal (sphere to box), in units in which the box is [-1, 1]^3, the sphere has radius 1, starts at
 # x = -5 and comes with 2 along x. What |v.n| = 4.5e-5 of |v| does to rounding of y is 1e-16 / 4.5e-5 of a length.
 GRAZE = math.sqrt(2e-9)
@@ -105,9 +102,6 @@ def test_b13_tangent_point_and_overlap(mode, d):
         np.testing.assert_allclose(velocity(world, inside), along(d, -60.0, 30.0), atol=1e-12)
 
 
-# -- C5: a thin wall at any speed ------------------------------------------------------------------
-
-
 @both_dimensions
 @each_sweep
 def test_c5_thin_wall(mode, d):
@@ -138,9 +132,6 @@ def test_c5_without_it_bullets_pass():
     bullets = [ball(world, (-0.1 - 0.3 * k, 2.0 * k), 100.0, radius=0.1, restitution=1.0) for k in range(8)]
     run(world, 4)
     assert (positions(world, bullets)[:, 0] > 0).any()
-
-
-# -- B15: many passes in one step ------------------------------------------------------------------
 
 
 @both_dimensions
@@ -203,9 +194,6 @@ def test_b15_elastic_impacts_are_not_capped_when_event_driven():
     assert len(strikes(world, 60)) == 1000
     assert position(world, mover)[0] == pytest.approx(0.0, abs=1e-11)
     assert world.stats().counters["capped_impacts"] == 0
-
-
-# -- bullets against bullets -----------------------------------------------------------------------
 
 
 def meet(rng, d, shapes):
@@ -272,9 +260,6 @@ def test_two_bullets_meet(mode, d, shapes):
             np.testing.assert_allclose(position(world, entity), x, atol=200 * rounding * (1 + speed * DT))
 
 
-# -- bullets among others --------------------------------------------------------------------------
-
-
 def field(with_bullets):
     """A discrete world: slow balls and boxes that bounce about, thin plates, and two bullets at the plates."""
     world = make_world()
@@ -324,9 +309,6 @@ def test_a_bullet_and_its_partners_partners(mode):
     assert hits.time[4] == pytest.approx((100 - back) / 6000, rel=1e-12)
     assert position(world, chain[4])[0] == pytest.approx(79.89 - back, rel=1e-12)
     assert velocities(world, chain)[:, 0].tolist() == pytest.approx([0, 0, 0, 0, -6000], abs=1e-9)
-
-
-# -- excluded pairs --------------------------------------------------------------------------------
 
 
 class Disable(System):

@@ -18,9 +18,6 @@ from carom.scenes import galperin
 DT, G = 1 / 60, 9.81
 
 
-# -- B16: Newton's cradle --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("mode", "maker", "speed", "gap", "arriving"),
     pairwise(("discrete", *MODES), (ball, box), (1.0, 120.0), (0.0, 1e-6, 0.01), (1, 2, 3, 4)),
@@ -46,9 +43,6 @@ def test_b16_cradle(mode, maker, speed, gap, arriving):
     np.testing.assert_allclose(velocities(world, row)[:, 0], np.sort(speeds), atol=1e-12 * speed)
     assert seen == arriving * (5 - arriving)
     kept.check()
-
-
-# -- B17: Galperin's blocks ------------------------------------------------------------------------
 
 
 def check_galperin(settings, digits, seconds):
@@ -83,9 +77,6 @@ def test_b17_galperin_3141592(digits):
     check_galperin(Settings(collision="event_driven"), digits, 6.0)
 
 
-# -- order of time ---------------------------------------------------------------------------------
-
-
 @both_dimensions
 @each_mode
 def test_impacts_are_reported_in_the_order_of_time(mode, d):
@@ -118,9 +109,6 @@ def test_impacts_are_reported_in_the_order_of_time(mode, d):
     assert pairs > 0  # several of one pair in one step
     kept.check(momentum=False)
     assert world.kinetic_energy() == pytest.approx(kept.energy, rel=1e-12)
-
-
-# -- infinite sequences ----------------------------------------------------------------------------
 
 
 @each_mode
@@ -162,9 +150,6 @@ def test_a_row_collapses_against_a_wall(mode, e, row):
         assert (np.diff(x) > 0).all()
         assert x[-1] < 20.0
     assert world.kinetic_energy() < 0.09 * energy
-
-
-# -- flight ----------------------------------------------------------------------------------------
 
 
 @both_dimensions

@@ -229,9 +229,6 @@ def test_several_strike_one_at_the_same_time(mode, d):
     assert told.differ == 0
 
 
-# -- beyond the limit on impacts -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("d", "cap", "pillar"), pairwise((2, 3), (1, 2), (False, True)))
 def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
     """50 separate clusters of three to eight elastic bullets, with one or two impacts each in a step: stopped bodies
@@ -340,9 +337,6 @@ def test_neighbours_in_a_discrete_world_do_not_lose_contacts_to_a_crowd_of_bulle
     world.step()
     assert world.stats().counters["rounds"] > 0
     assert kit.position(world, ball)[0] < 8.1
-
-
-# -- the oracle itself -----------------------------------------------------------------------------
 
 
 def test_the_oracle_sees_impacts_that_are_wrong():

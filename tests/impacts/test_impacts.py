@@ -16,9 +16,6 @@ makers = pytest.mark.parametrize("maker", [ball, box])
 integrators = pytest.mark.parametrize("integrator", INTEGRATORS)
 
 
-# -- the two defects -----------------------------------------------------------------------------
-
-
 @makers
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 def test_stuck_pair(maker, e):
@@ -99,9 +96,6 @@ def test_impact_time_on_the_path_of_the_integrator(d, integrator):
     assert abs(hit.normal[1]) == 1
 
 
-# -- B11: bouncing ball, e < 1 -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("integrator", "maker"), list(zip(INTEGRATORS, (ball, box, ball, box, ball), strict=True)))
 def test_bouncing_ball_comes_to_rest(maker, integrator):
     """Impacts end at T0 (1+e)/(1-e) (Zeno), from any height; then the ball is at rest: no sinking, v = 0.
@@ -173,9 +167,6 @@ def test_flights_follow_the_square_of_restitution(e, integrator):
         np.testing.assert_allclose(flight, expected, atol=error if lag else 1e-12, rtol=1e-11)
 
 
-# -- B12: no drift at e = 1 ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("integrator", "rate"), [*((name, 60) for name in INTEGRATORS), *((name, 240) for name in (*LAG, "yoshida4"))]
 )
@@ -224,9 +215,6 @@ def test_impacts_beyond_the_cap_are_counted_and_reported():
     assert any("impacts beyond 1 of a body in one step" in fault for fault in world.faults)
     run(world, 60)
     kept.check()
-
-
-# -- settings that decide an impact --------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -43,9 +43,6 @@ def exact_time(d, v, reach):
         return math.inf if rest < 0 or along >= 0 else float((-along - rest.sqrt()) / way)
 
 
-# -- closed forms ---------------------------------------------------------------------------------
-
-
 def test_b10_oblique_spheres():
     """The second moves: d is minus the first's position, v its reversed velocity; v covers 4 s."""
     hit, time = sphere_sphere_sweep(Sphere(0.25), Sphere(0.75), (-3.0, 0.6), (4.0, 0.0))
@@ -252,9 +249,6 @@ def test_finite_numbers_of_any_size_give_a_time():
             assert hit or time == 0.0
 
 
-# -- ten thousand random motions ------------------------------------------------------------------
-
-
 def registry():
     made = Registry()
     for plugin in (Physics(), capsule.plugin, half_space.plugin):
@@ -378,9 +372,6 @@ def test_plain_python_gives_the_same_digits(d):
             a, b = (SimpleNamespace(**rows.at(i)._asdict()) for rows in (cases.a, cases.b))
             found = function(a, b, tuple(map(float, cases.d[i])), tuple(map(float, v[i])))
             assert found == (hit[i], time[i])
-
-
-# -- in casts -------------------------------------------------------------------------------------
 
 
 @both_dimensions

@@ -14,8 +14,6 @@ from worlds import EPS, make_world, position, run, velocity
 from carom.components import RigidBody, Transform
 from carom.framework import Phase
 
-# -- gravity, constant forces, impulses ----------------------------------------------------------
-
 
 @all_methods
 def test_gravity_scale_and_constant_force(method):
@@ -73,9 +71,6 @@ def test_impulse_inside_a_system_acts_once(phase):
     world.add_system(Calls(phase, lambda: rigid.apply_impulse((1.0, 0.0))))
     run(world, 5)
     assert rigid.linear_velocity.tolist() == [2.5, 0.0]
-
-
-# -- apply_force ---------------------------------------------------------------------------------
 
 
 @all_methods

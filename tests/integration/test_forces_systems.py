@@ -14,8 +14,6 @@ from carom.framework import Component, ForceSystem, Phase, StepError, column
 
 pytestmark = pytest.mark.plain
 
-# -- force systems -------------------------------------------------------------------------------
-
 
 class Charge(Component):
     value = column(default=0.0)
@@ -162,9 +160,6 @@ def test_an_error_in_a_force_system_names_it_and_takes_the_step_back():
     world.remove_system(broken)
     world.step()
     assert velocity(world, 1)[1] == pytest.approx(-20 * DT, rel=1e-14)
-
-
-# -- energy --------------------------------------------------------------------------------------
 
 
 def test_energies_and_momentum():

@@ -16,8 +16,6 @@ from worlds import EPS, make_world
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem
 
-# -- constant force: A7 (a) (b), B1, C7 -----------------------------------------------------------
-
 
 def throw(method, dt, steps, *, v0, g, vx=0.0, d=2, **settings):
     """Positions and velocities of one body thrown upwards from the origin, (steps + 1, d)."""
@@ -125,9 +123,6 @@ def test_substeps_never_change_free_flight(method):
     paths = [throw(method, 1 / 60, 50, v0=12.0, g=9.81, substeps=n)[0] for n in (1, 4, 32)]
     assert np.array_equal(paths[0], paths[1])
     assert np.array_equal(paths[0], paths[2])
-
-
-# -- springs: A7 (c) (d), B2, B3 -----------------------------------------------------------------
 
 
 def energy_ratio(positions, velocities, stiffness):

@@ -15,8 +15,6 @@ from carom.framework import ForceSystem
 
 pytestmark = pytest.mark.early
 
-# -- orbits: B4, B5 ------------------------------------------------------------------------------
-
 
 class NewtonianGravity(ForceSystem):
     """A sun of GM = 1 at the origin, or (``mutual``) bodies of mass 1 that attract each other, G = 1."""

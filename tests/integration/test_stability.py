@@ -24,8 +24,6 @@ from worlds import EPS, make_world
 from carom.components import RigidBody, Transform
 from carom.framework import ForceSystem
 
-# -- stability: B6, C16 --------------------------------------------------------------------------
-
 # limits of z = omega dt without damping, of drag dt without spring, and of z at three damping ratios
 LIMITS = {
     "explicit_euler": (0, 2, 0.1, 1.0, 2.0),
@@ -134,9 +132,6 @@ def test_what_explodes_is_reported():
     assert any(f"entity {entity}:" in fault for fault in world.faults)
     assert not any(f"entity {entity + 1}:" in fault for fault in world.faults)
     assert np.array_equal(world.bodies.position[1], alone.bodies.position[0])
-
-
-# -- drag: B7 ------------------------------------------------------------------------------------
 
 TAU, G = 0.8, 9.81
 V_T = G * TAU  # terminal speed
@@ -272,9 +267,6 @@ class SpringForce(ForceSystem):
 
     def add_forces(self, bodies, time):
         bodies.force[:] -= bodies.oscillator.stiffness[:, None] * bodies.position
-
-
-# -- time reversal: B8 ---------------------------------------------------------------------------
 
 
 class Network(ForceSystem):

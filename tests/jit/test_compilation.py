@@ -109,9 +109,6 @@ def test_the_garbage_collector_is_as_it_was_after_compiling_and_after_failing(mo
         gc.enable()
 
 
-# -- the hash --------------------------------------------------------------------------------------------------------
-
-
 def summing(helper, shift=0.0, options=part):
     @options
     def total(x):

@@ -273,9 +273,6 @@ def test_processes_that_compile_at_once_share_the_folder(program):
     assert program.run()[:4] == (9.0, 109.0, 0, 2)
 
 
-# -- messages --------------------------------------------------------------------------------------------------------
-
-
 def test_the_first_wait_says_in_one_line_what_is_happening_and_later_ones_nothing(program):
     program.run()
     (line,) = program.stderr.splitlines()  # two kernels were compiled

@@ -12,8 +12,6 @@ from carom.framework import Phase, System
 
 pytestmark = pytest.mark.plain
 
-# -- sensors -------------------------------------------------------------------------------------
-
 
 @both_dimensions
 @pytest.mark.parametrize("shape", [ball, box])
@@ -131,9 +129,6 @@ def test_a_body_may_become_a_sensor_and_back_between_steps():
     run(world, 200)
     assert position(world, body)[1] == pytest.approx(0.5, abs=0.01)
     assert {event[0] for event in told} == {"stay"}
-
-
-# -- layers and masks ----------------------------------------------------------------------------
 
 
 @both_dimensions

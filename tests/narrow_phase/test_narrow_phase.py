@@ -142,9 +142,6 @@ def test_crowd_equals_the_oracle_pair_by_pair(d):
     assert len(pairs) > 100
 
 
-# -- cases that the oracle leaves undefined ------------------------------------------------------
-
-
 @both_dimensions
 @pytest.mark.parametrize("first", [ball, box])
 @pytest.mark.parametrize("second", [ball, box])
@@ -225,9 +222,6 @@ def test_rotation_is_read_again_in_every_step():
         world.component_for_entity(turning, Transform).rotation = angle
         world.run(Phase.NARROW)
         assert world.contacts.entity_b.tolist() == [expected_partner]
-
-
-# -- layers, masks, sensors ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("maker", [ball, box])

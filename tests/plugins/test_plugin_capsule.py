@@ -28,9 +28,6 @@ capsules = capsule.plugin.pairs[CapsuleCollider, CapsuleCollider].function
 spheres = capsule.plugin.pairs[CapsuleCollider, SphereCollider].function
 
 
-# -- the pairs against brute force -----------------------------------------------------------------
-
-
 @kernel
 def meet_all(sizes, axes_a, axes_b, offsets, hits, depths, normals, points, like):
     """sizes (n, 4): radius and half height of the first, of the second; a half height below 0 makes it a sphere."""
@@ -185,9 +182,6 @@ def test_a_sphere_on_the_axis_leaves_sideways():
     assert depth == 0.75
     assert normal[1] == 0.0
     assert point == pytest.approx((0.125 * normal[0], 1.0, 0.125 * normal[2]))
-
-
-# -- in worlds --------------------------------------------------------------------------------------
 
 
 def make_world(d, others=True, **settings):

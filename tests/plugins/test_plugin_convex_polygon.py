@@ -168,9 +168,6 @@ def test_a_triangle_is_no_shape_of_a_3d_world():
         world.step()
 
 
-# -- in a world ---------------------------------------------------------------------------------------------------
-
-
 def make_world(gravity=(0, -10), others=False):
     """With polygons alone, or always with spheres and boxes: few kinds of worlds, so that they share compiled code."""
     world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)

@@ -29,9 +29,6 @@ def box_rounding(shape):
     return shape.radius
 
 
-# -- the pair against its definition ----------------------------------------------------------------
-
-
 @kernel
 def meet_all(normal, axes, half, radius, offsets, hits, depths, normals, points, like):
     for i in range(len(offsets)):
@@ -98,9 +95,6 @@ def test_in_plain_python_it_is_the_same():
     assert hit  # turned by a quarter its normal points to the left
     assert (depth, normal, point) == (0.25, (-1.0, 0.0), (0.125, 7.0))
     assert two_half_spaces(None, None, (1.0, 0.0))[:2] == (False, -math.inf)
-
-
-# -- in worlds --------------------------------------------------------------------------------------
 
 
 def at(d, *place):

@@ -56,9 +56,6 @@ def run(world, seconds, *entities):
     return np.array(heights)
 
 
-# -- through from below, held from above ------------------------------------------------------------
-
-
 @each_shape
 def test_a_jump_passes_and_lands(shape):
     """As high as without the platform, to the bit; then it stands on it, with a single begin."""
@@ -167,9 +164,6 @@ def test_a_stack_stands_on_it_however_heavy():
     world.close()
 
 
-# -- ends, sides, angles ----------------------------------------------------------------------------
-
-
 @each_shape
 def test_a_body_from_the_side_passes(shape):
     """At any height of its centre below half its own: the end of a platform is not a wall."""
@@ -253,9 +247,6 @@ def test_a_slope_to_slide_down():
     world.close()
 
 
-# -- moving platforms -------------------------------------------------------------------------------
-
-
 @each_shape
 def test_a_lift_carries_and_is_jumped_through(shape):
     """It rises at 2 m/s; a body jumps through it by its velocity relative to the lift, and rides on it."""
@@ -293,9 +284,6 @@ def test_a_ferry_takes_along_by_friction():
     assert place_of(world, rider)[0] == pytest.approx(3.0, abs=0.2)
     assert velocity_of(world, rider)[0] == pytest.approx(1.5, abs=1e-6)
     world.close()
-
-
-# -- other cases ------------------------------------------------------------------------------------
 
 
 def test_dropping_through_by_the_mask():

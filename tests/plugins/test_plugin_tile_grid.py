@@ -20,9 +20,6 @@ from carom.plugins.tile_grid.sweep import first_touch
 pytestmark = pytest.mark.slow  # its scenes compile for long
 
 
-# -- maps ---------------------------------------------------------------------------------------------------------
-
-
 def test_a_map_is_drawn_from_top_to_bottom():
     drawn = TileGridCollider("""
         #..
@@ -62,9 +59,6 @@ def test_other_values_that_are_refused():
         TileGridCollider(((1,), (1,)), 1.0).centre_of(2, 0)
     with pytest.raises(ValueError, match="must keep its shape"):
         TileGridCollider(((1,), (1,)), 1.0).cells = ((1,),)
-
-
-# -- poses against brute force ------------------------------------------------------------------------------------
 
 Grid = namedtuple("Grid", "sums tile_size faces")
 Polygon = namedtuple("Polygon", "vertices corner_radius axes")
@@ -183,9 +177,6 @@ def test_moving_polygons_touch_when_the_first_cell_says_so():
             assert abs(depths[met & (start < 0)]).max() < 1e-13
         assert depths[~met].max() < 0
         assert depths[met & (start < 0)].max() < 1e-13
-
-
-# -- queries ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

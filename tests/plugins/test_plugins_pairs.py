@@ -15,8 +15,6 @@ from carom.plugins import Physics
 
 pytestmark = pytest.mark.plain
 
-# -- pairs that are missing -----------------------------------------------------------------------
-
 
 def lonely_plugin():
     plugin = Plugin("lonely")
@@ -139,9 +137,6 @@ def test_a_flat_shape_is_not_for_3d():
     world.close()
 
 
-# -- errors at run time ---------------------------------------------------------------------------
-
-
 def fragile_plugin():
     """Works for all inputs of the checks, and fails for sizes between."""
     plugin, fragile = lonely_plugin()
@@ -200,9 +195,6 @@ def test_a_sweep_that_fails_names_itself():
         world.step()
     assert world.state_hash() == state
     world.close()
-
-
-# -- other errors at run time ---------------------------------------------------------------------
 
 
 def odd_plugin(what):

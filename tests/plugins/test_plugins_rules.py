@@ -39,9 +39,6 @@ def test_an_integrator_registered_again_is_seen_at_the_next_step():
     world.close()
 
 
-# -- rules, filters, broad phases, systems --------------------------------------------------------
-
-
 def approaching(world, distance=1.9, **collider):
     for x, speed in ((0.0, 1.0), (distance, -1.0)):
         world.create_entity(

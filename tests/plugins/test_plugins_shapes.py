@@ -106,9 +106,6 @@ def test_a_rod_turns_with_its_body():
     world.close()
 
 
-# -- arrays ---------------------------------------------------------------------------------------
-
-
 class CloudCollider(Collider):
     """Points around the centre: for contacts, a sphere through the farthest one."""
 

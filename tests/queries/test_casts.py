@@ -75,9 +75,6 @@ def test_casts_through_many_bodies(d, n, sizes):
     world.close()
 
 
-# -- closed forms ---------------------------------------------------------------------------------
-
-
 def swept_sphere(y, z=0.0, radius=1.0):
     """B13: a sphere that flies from x = -5 with (2, 0, 0) at the box [-1, 1]^3; its cast, in units of time."""
     world = make_world(3)
@@ -292,9 +289,6 @@ def test_geometry_setting_counts():
     assert world.ray_cast((0, 0), (1, 0))[0].distance == 3.5
     world.close()
 
-
-# -- geometry at random ---------------------------------------------------------------------------
-
 numbers = st.floats(-3, 3, allow_subnormal=False)
 vectors = st.tuples(numbers, numbers, numbers)
 sizes = st.tuples(*(st.floats(0, 2, allow_subnormal=False),) * 3)
@@ -328,9 +322,6 @@ def test_any_pair_meets_where_the_oracle_says(d, body, mover, way):
         assert np.linalg.norm(hits[0].normal) == pytest.approx(1.0, abs=1e-12)
         if hits[0].distance > 0.0:
             assert hits[0].normal @ way < 0.0
-
-
-# -- errors ---------------------------------------------------------------------------------------
 
 WRONG = {
     "ray_cast: origin": lambda w: w.ray_cast("here", (1, 0)),

@@ -86,9 +86,6 @@ def test_a_query_names_the_plugin_too():
     ]
 
 
-# -- rules of mixing --------------------------------------------------------------------------------
-
-
 def test_rules_of_plugins_mix_behind_the_standard_ones():
     plugin = Plugin("rules")
 

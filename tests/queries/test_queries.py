@@ -104,9 +104,6 @@ def test_neighbours_of_many_bodies(d, n):
     world.close()
 
 
-# -- common rules of all queries ------------------------------------------------------------------
-
-
 @both_dimensions
 def test_ties_go_to_the_smaller_id(d):
     world = make_world(d)
@@ -267,9 +264,6 @@ def test_neighbours_without_colliders():
     with pytest.raises(KeyError, match="no body"):
         world.neighbours(1.0, of=[birds[0], 99])
     world.close()
-
-
-# -- errors ---------------------------------------------------------------------------------------
 
 WRONG = {
     "query_point: point": lambda w: w.query_point((0, math.nan)),

@@ -15,8 +15,6 @@ from carom.framework.vectors import divided, length, replace, scale
 from carom.plugins import Physics
 from carom.systems.queries import batch
 
-# -- batches --------------------------------------------------------------------------------------
-
 
 def answers(world, points, ways):
     """Everything that a world finds for some queries, as arrays."""
@@ -87,9 +85,6 @@ def test_queries_grow_with_the_world():
             assert world.query_aabb((-9, -9), (99, 9)) == sorted(world.bodies.entity.tolist())
             assert len(world.ray_cast((-9, 0), (1, 0))) == k + 1
             assert world.neighbours(1000.0).counts.tolist() == [k] * (k + 1)
-
-
-# -- errors of plugins ----------------------------------------------------------------------------
 
 RAISES, NOT_FINITE, LATE_SWEEP = 1.0, 2.0, 3.0
 

@@ -29,9 +29,6 @@ def solid_depths(world):
     return np.maximum(np.asarray(world.contacts.depth), 0.0)
 
 
-# -- impacts ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
 def test_as_many_balls_fly_off_as_arrive(gap, dt):
@@ -70,9 +67,6 @@ def test_the_blocks_count_the_digits_of_pi(digits, settings, seconds):
         assert 0 <= light <= heavy  # no more to come
 
 
-# -- at rest ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("name", "n", "dimensions", "seconds"), [("pile2d", 400, 2, 10.0), ("pile3d", 343, 3, 20.0)])
 def test_a_pile_comes_to_rest(name, n, dimensions, seconds):
     """The requirements on piles of 10,000, on small ones: less than 1e-4 m g d per body, mean overlap below 2 %.
@@ -102,9 +96,6 @@ def test_crates_come_to_rest_on_the_platforms():
         for start, end, height in platforms.PLATFORMS:  # no centre inside one, and a crate on each
             assert not ((x > start) & (x < end) & (y > height - platforms.THICKNESS) & (y < height)).any()
             assert ((x > start) & (x < end) & (y > height) & (y < height + 2)).any()
-
-
-# -- carried ------------------------------------------------------------------------------------
 
 
 def test_the_lift_and_the_ferry_take_their_crates_along():

@@ -30,9 +30,6 @@ def run(world, seconds):
     return world
 
 
-# -- spring ----------------------------------------------------------------------------------------
-
-
 def test_spring_swings_as_velocity_verlet_does_to_rounding():
     """x_n = cos(n theta) with cos theta = 1 - (omega dt)^2 / 2, which is the method's own closed form."""
     with spring.build() as world:
@@ -63,9 +60,6 @@ def test_spring_has_the_energy_of_its_amplitude():
         assert world.potential_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-15)
         assert energy(run(world, 0.25)) == pytest.approx(OMEGA**2 / 2, rel=1e-9)
         assert world.kinetic_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-9)  # a quarter period: at the centre
-
-
-# -- orbit -----------------------------------------------------------------------------------------
 
 
 def return_error(method, steps, eccentricity):
@@ -114,9 +108,6 @@ def test_orbit_keeps_its_energy_with_its_own_settings():
         assert x * v - y * u == pytest.approx(0.8, rel=1e-12)
 
 
-# -- bouncing --------------------------------------------------------------------------------------
-
-
 def test_bouncing_keeps_its_energy_with_verlet_and_swept_impacts():
     """A1: the mean of (E - E0)^2 of a ball below 1e-16 J^2; ten bounces in 20 s, one every 2 sqrt(2 (5 - 0.1) / g)."""
     with bouncing.build() as world:
@@ -144,9 +135,6 @@ def test_bouncing_from_another_height():
         np.testing.assert_allclose(hits.time, [math.sqrt(2 * 7.9 / 9.81)] * 2, rtol=1e-12)
 
 
-# -- oblique ---------------------------------------------------------------------------------------
-
-
 @each_mode
 @pytest.mark.parametrize("dt", [1 / 240, 1 / 60, 3 / 43, 1.0])
 def test_oblique_equal_and_elastic(mode, dt):
@@ -167,9 +155,6 @@ def test_oblique_with_another_mass_and_restitution():
         velocities = np.array([(0.28, 0.54), (0.24, -0.18)])
         np.testing.assert_allclose(world.bodies.linear_velocity, velocities, atol=1e-12)
         np.testing.assert_allclose(world.bodies.position, [(-0.8, 0.6), (0, 0)] + 0.8 * velocities, atol=1e-12)
-
-
-# -- thermal_gas -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("n", "eta", "seed"), [(400, 0.3, 0), (400, 0.3, 7), (4, 0.01, 0), (100, 0.78, 1)])
@@ -219,9 +204,6 @@ def test_thermal_gas_keeps_energy_and_bodies(mode):
         assert energy(world) == pytest.approx(100.0, rel=1e-11)
         position = world.bodies.dynamic.position
         assert ((position > 0) & (position < thermal_gas.side(100, 0.3))).all()
-
-
-# -- drops -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("mode", "dt", "restitution"), pairwise(MODES, (1 / 240, 1 / 60), (0.8, 0.9, 1.0)))

@@ -18,9 +18,6 @@ from carom.framework import Phase, System
 ROOT = Path(__file__).resolve().parents[2]
 
 
-# -- a pair hits if every level hits -------------------------------------------------------------
-
-
 def depth_of(shape_a, shape_b):
     """Depth of two shapes (kind, centre, size), by the oracle."""
     if (shape_a[0], shape_b[0]) == ("box", "sphere"):
@@ -217,9 +214,6 @@ def test_a_level_that_is_outgrown_keeps_them_apart(restitution):
         flying = ball(world, (nearest - 1.0, nearest + 1.0), (1.0, -1.0), radius=0.01)
         run(world, 120)
         assert (velocity(world, flying).tolist() == [1.0, -1.0]) == bool(spheres)
-
-
-# -- bounds: the first level alone ---------------------------------------------------------------
 
 
 def test_bounds_stops_at_the_first_level():

@@ -16,8 +16,6 @@ from carom.framework.errors import UnhandledPairError
 from carom.framework.vectors import divided
 from carom.plugins import Physics
 
-# -- enclosure -----------------------------------------------------------------------------------
-
 
 @both_dimensions
 @pytest.mark.parametrize("scale", [1.0, 1e-9, 1e9])
@@ -122,9 +120,6 @@ def test_sensor_and_solid_do_not_mix():
     world.component_for_entity(entity, SphereCollider).sensor = True
     world.step()
     assert world.step_count == 2
-
-
-# -- plugin shapes -------------------------------------------------------------------------------
 
 
 class DiscCollider(Collider):

@@ -158,9 +158,6 @@ def test_shapes_without_a_pair_never_hit():
     assert (cases.depth == -math.inf).all()
 
 
-# -- functions of plugins that fail ---------------------------------------------------------------
-
-
 def test_an_exception_arrives_with_its_values_plugin_and_entities():
     scene, _ = failing_plugin(raising)
     with pytest.raises(ValueError, match="not done yet") as caught:

@@ -22,9 +22,6 @@ pytestmark = pytest.mark.early
 MODES = ("discrete", "continuous", "event_driven")
 
 
-# -- C16: at the limits of stability ---------------------------------------------------------------
-
-
 def sprung(rate, **settings):
     """A body of 1 kg on a linear spring of angular frequency ``rate``, 1/s, stretched by 1 m."""
     springs = Springs()
@@ -58,9 +55,6 @@ def test_c16_the_world_says_that_a_spring_is_too_stiff(mode):
         assert any("spring" in str(fault) for fault in world.faults) == told
 
 
-# -- C19: crowds created in each other -------------------------------------------------------------
-
-
 def crowd(count, d, mode, side=10.0):
     world = make_world(d, collision=mode)
     places = np.random.default_rng(19).uniform(0.0, side, (count, d))
@@ -88,9 +82,6 @@ def test_c19_a_crowd_parts_slowly(mode, d):
     assert counted["impacts"] == counted["rounds"] == 0
     assert counted["resting_contacts"] <= counted["candidates"] < 4 * 1.2 * near
     np.testing.assert_allclose(world.momentum(), 0.0, rtol=0, atol=1e-9)
-
-
-# -- C23: from a moving frame ----------------------------------------------------------------------
 
 
 @both_dimensions

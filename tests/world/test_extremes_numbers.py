@@ -16,9 +16,6 @@ from carom.framework import Settings
 nowhere = pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 
 
-# -- mass and restitution ------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("mass", [0.0, -1.0, math.nan, math.inf, 1e-320])
 def test_c8_masses_that_cannot_be_are_rejected(mass):
     with pytest.raises(ValueError, match=r"RigidBody\.mass must"):
@@ -56,9 +53,6 @@ def test_c9_restitution_above_one_gains():
     a = ball(world, -1.01, 1.0, restitution=1.5)
     run(world, 3)
     assert velocity(world, a)[0] == -1.5
-
-
-# -- numbers at the ends of their range ----------------------------------------------------------
 
 
 @makers
@@ -177,9 +171,6 @@ def test_c6_head_on_far_from_the_origin(offset):
     run(world, 30)
     assert (velocity(world, a)[0], velocity(world, b)[0]) == (-1.0, 1.0)
     assert position(world, a)[0] - offset == pytest.approx(-0.5 - (0.5 - 0.1), abs=40 * EPS * (1 + offset))
-
-
-# -- points, empty boxes, touching ---------------------------------------------------------------
 
 
 def test_c13_sizes_that_cannot_be_are_rejected():

@@ -9,8 +9,6 @@ from helpers_extremes import DT, makers
 from helpers_pairwise import pairwise
 from worlds import EPS, Conserved, ball, both_dimensions, box, make_world, position, run, velocity
 
-# -- coincident and overlapping ------------------------------------------------------------------
-
 
 @both_dimensions
 @makers
@@ -66,9 +64,6 @@ def test_c21_overlapping_with_equal_velocities(maker, e):
     kept.check()
 
 
-# -- places --------------------------------------------------------------------------------------
-
-
 @both_dimensions
 @pytest.mark.parametrize("spacing", [1.0, 2.0**-30, 2.0**30])
 def test_c18_on_split_lines_on_edges_and_outside(d, spacing):
@@ -108,9 +103,6 @@ def test_c20_one_ulp_apart(d):
         ball(world, place, radius=0.0)
     world.step()
     assert len(world.contacts) == 1
-
-
-# -- creation and deletion -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("immediate", [False, True])

@@ -56,9 +56,6 @@ def assert_like_deleted(broken, healthy, steps=8, entity=VICTIM):
         assert rest_of(broken, entity) == rest_of(healthy, entity), f"step {step}"
 
 
-# -- all others go on ----------------------------------------------------------------------------
-
-
 @mostly_2d
 @each_mode
 @pytest.mark.compiled
@@ -201,9 +198,6 @@ def test_many_among_many():
     np.testing.assert_array_equal(broken.bodies.position[stay], healthy.bodies.position)
 
 
-# -- in and out ----------------------------------------------------------------------------------
-
-
 def test_it_stands_still_until_it_is_mended():
     world = make_world(gravity=9.81)
     box(world, (0.0, -0.5), half=(9.0, 0.5), kind="static")
@@ -304,9 +298,6 @@ def test_a_failed_step_and_a_snapshot():
     for world in (broken, other):
         run(world, 4)
     assert broken.state_hash() == other.state_hash()
-
-
-# -- far away ------------------------------------------------------------------------------------
 
 
 @both_dimensions

@@ -18,9 +18,6 @@ esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, ar
 NO_PHYSICS = "no physics in this world: World(Physics(...))"
 
 
-# -- without physics -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "use",
     [
@@ -53,9 +50,6 @@ def test_a_world_without_physics_still_steps_its_processors():
     world.step()
     assert world.advance(0.6) == 2
     assert (counter.count, world.step_count, world.time) == (3, 3, 0.75)
-
-
-# -- time ----------------------------------------------------------------------------------------
 
 
 def test_settings_are_replaced_between_steps_and_time_goes_on():

@@ -23,9 +23,6 @@ class Tag:
     pass
 
 
-# -- the verbs -----------------------------------------------------------------------------------
-
-
 def test_the_verbs_mean_what_esper_means():
     world = World()
     name, tag = Name("a"), Tag()
@@ -105,9 +102,6 @@ def test_entities_may_be_deleted_while_iterating():
         world.delete_entity(e, immediate=transform.x > 12)
     world.step()
     assert len(world.bodies) == 0
-
-
-# -- traps of esper ------------------------------------------------------------------------------
 
 
 def test_deleting_and_then_deleting_at_once():
