@@ -17,10 +17,6 @@ pytestmark = pytest.mark.plain
 world = helpers_adoption.world  # a fixture
 
 
-class Health:
-    """A component that is not carom's."""
-
-
 @pytest.mark.parametrize("plain", [False, True], ids=["facade", "plain esper"])
 def test_components_are_replaced_removed_and_added_again(world, plain):
     verbs = esper if plain else world
@@ -100,26 +96,6 @@ def test_ids_used_again_after_clear_database_are_new_bodies(world):
     assert matches_esper(world)
 
 
-def test_ids_used_again_in_bulk_are_new_bodies(world):
-    world.create_entities(3, Transform.many(0.0), RigidBody.many(mass=1.0))
-    world.step()
-    with world:
-        esper.clear_database()
-    world.create_entities(3, Transform.many(5.0), RigidBody.many(mass=2.0))
-    world.step()
-    assert world.bodies.mass.tolist() == [2.0] * 3
-    assert world.bodies.position.tolist() == [[5.0, 5.0]] * 3
-
-
-def test_a_cleared_world_is_empty(world):
-    ball(world, 0.0)
-    world.step()
-    with world:
-        esper.clear_database()
-    world.step()
-    assert len(world.bodies) == 0
-
-
 @pytest.mark.parametrize("component", [RigidBody, lambda: SphereCollider(1.0)], ids=["RigidBody", "SphereCollider"])
 @pytest.mark.parametrize("plain", [False, True], ids=["facade", "plain esper"])
 def test_a_body_without_transform_is_an_error_that_names_the_entity_until_it_is_mended(world, component, plain):
@@ -196,18 +172,6 @@ def test_the_kind_changes_at_run_time():
     np.testing.assert_array_equal(world.component_for_entity(e, Transform).position, place + np.array([1.0, 0.0]))
 
 
-@pytest.mark.parametrize("old", ["dynamic", "kinematic", "static"])
-@pytest.mark.parametrize("new", ["dynamic", "kinematic", "static"])
-def test_a_replaced_body_has_the_kind_of_the_new_one(world, old, new):
-    e = ball(world, 0.0, kind=old)
-    ball(world, 9.0)
-    world.step()
-    world.add_component(e, RigidBody(kind=new))
-    world.step()
-    assert matches_esper(world)
-    assert world.bodies.static.entity.tolist() == ([e] if new == "static" else [])
-
-
 def test_a_collider_alone_is_static_and_changes_with_its_body(world):
     e = world.create_entity(Transform((0, 0)), SphereCollider(1.0))
     assert world.bodies.static.entity.tolist() == [e]
@@ -258,15 +222,3 @@ def test_custom_components_need_no_body_and_join_it_when_it_comes(world):
     world.add_component(lone, RigidBody())
     world.step()
     assert matches_esper(world)
-
-
-def test_components_of_others_are_none_of_the_tables_business(world):
-    e = ball(world, 0.0)
-    world.step()
-    version = world.physics.table.version
-    world.add_component(e, Health())
-    world.remove_component(e, Health)
-    empty = world.create_entity(Health())
-    world.delete_entity(empty)
-    world.step()
-    assert world.physics.table.version == version

@@ -87,19 +87,6 @@ def test_entities_created_inside_a_step_join_at_the_next(world):
     assert world.component_for_entity(made[0], Transform).x == 6.0
 
 
-@pytest.mark.compiled
-def test_a_body_created_inside_another_parts_from_it(world):
-    """ACCURACY C25."""
-    ball(world, 0.0)
-    world.step()
-    ball(world, 0.1)
-    for _ in range(600):
-        world.step()
-    gap = np.linalg.norm(world.bodies.position[0] - world.bodies.position[1])
-    assert 0.97 < gap < 1.05
-    assert np.isfinite(world.bodies.position).all()
-
-
 def test_components_changed_inside_a_step_count_from_the_next(world):
     e = ball(world, 0.0, 60.0)
 

@@ -108,16 +108,3 @@ def test_a_step_that_fails_has_its_arrays_back():
         world.step()
     assert world.state_hash() == hashed
     assert np.array_equal(world.component_for_entity(body, ConvexPolygonCollider).vertices, polygon(-6))
-
-
-def test_many_arrays_at_once_are_all_there():
-    """More than the pool has room for, so that it grows several times meanwhile."""
-    world = make_world(2)
-    world.add_plugin(convex_polygon)
-    shapes = [polygon(-100 - k, corners=40) for k in range(300)]
-    ids = world.create_entities(
-        300, Transform.many(np.arange(600.0).reshape(300, 2) * 5), ConvexPolygonCollider.many(shapes)
-    )
-    world.step()
-    for entity, vertices in zip(ids, shapes, strict=True):
-        assert np.array_equal(world.component_for_entity(entity, ConvexPolygonCollider).vertices, vertices)

@@ -67,17 +67,6 @@ def test_bodies_nobody_looks_at_have_no_handles(handles):
     assert handles == [Transform, RigidBody, SphereCollider]
 
 
-def test_contacts_make_no_handles(handles):
-    world = make_world()
-    rng = np.random.default_rng(1)
-    world.create_entities(200, Transform.many(rng.uniform(0, 8, (200, 2))), RigidBody.many(), SphereCollider.many(0.5))
-    world.step()
-    rows = list(world.contacts.pairs(SphereCollider, RigidBody))
-    assert len(rows) == len(world.contacts.between(SphereCollider, RigidBody).rows) > 100
-    assert list(world.contacts.pairs(SphereCollider, AABBCollider)) == []
-    assert handles == []
-
-
 @either
 def test_a_handle_is_the_same_each_time_and_shares_the_columns(adopted):
     world, ids = crowd(adopted)
@@ -159,30 +148,6 @@ def test_components_come_and_go_as_with_any_entity(adopted):
     assert matches_esper(world)
 
 
-@either
-def test_a_handle_of_theirs_cannot_be_given_to_another(adopted):
-    world, ids = crowd(adopted)
-    world.add_component(ids[1], world.component_for_entity(ids[0], RigidBody))
-    with pytest.raises(ValueError, match="use copy"):
-        world.step()
-    world.add_component(ids[1], world.component_for_entity(ids[0], RigidBody).copy())
-    world.step()
-    assert world.bodies.mass[:3].tolist() == [1.0, 1.0, 3.0]
-
-
-def test_kinds_and_other_types_among_them():
-    world = make_world()
-    kinds = ["dynamic", "static", "kinematic", "dynamic"] * 5
-    ids = world.create_entities(20, Transform.many(np.arange(40.0).reshape(20, 2)), RigidBody.many(kind=kinds))
-    boxes = world.create_entities(3, Transform.many(-5.0), AABBCollider.many((1.0, 1.0)))
-    world.step()
-    for kind in ("dynamic", "static", "kinematic"):
-        expected = [e for e, k in zip(ids, kinds, strict=True) if k == kind] + list(boxes) * (kind == "static")
-        assert getattr(world.bodies, kind).entity.tolist() == expected
-    assert world.component_for_entity(ids[1], Transform).position.tolist() == [2.0, 3.0]
-    assert matches_esper(world)
-
-
 def test_a_batch_without_a_transform_is_refused_until_it_is_mended():
     world, ids = crowd(True)
     more = world.create_entities(2, RigidBody.many())
@@ -196,32 +161,6 @@ def test_a_batch_without_a_transform_is_refused_until_it_is_mended():
     world.step()
     assert world.bodies.entity.tolist() == [*ids, more[0]]
     assert matches_esper(world)
-
-
-def test_a_batch_that_is_no_body_becomes_one():
-    world = make_world()
-    ids = world.create_entities(4, Transform.many(np.arange(8.0).reshape(4, 2)), Charge.many([1.0, 2.0, 3.0, 4.0]))
-    world.step()
-    assert len(world.bodies) == 0
-    world.add_component(ids[2], RigidBody())
-    world.step()
-    assert world.bodies.entity.tolist() == [ids[2]]
-    assert world.bodies.charge.value.tolist() == [3.0]
-    assert world.component_for_entity(ids[3], Charge).value == 4.0
-    assert matches_esper(world)
-
-
-def test_levels_of_a_batch_are_checked():
-    world = make_world()
-    first = world.create_entities(
-        3, Transform.many(0.0), SphereCollider.many([2.0, 1.0, 1.0]), AABBCollider.many((1.0, 1.0))
-    )[0]
-    with pytest.raises(ValueError, match=rf"entity {first + 1}: its SphereCollider .*\(1 more entities likewise\)"):
-        world.step()
-    world.delete_entity(first + 1, immediate=True)
-    world.component_for_entity(first + 2, SphereCollider).radius = 3.0
-    world.step()
-    assert world.bodies.entity.tolist() == [first, first + 2]
 
 
 def test_created_looked_at_and_deleted_inside_a_step():

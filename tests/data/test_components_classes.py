@@ -35,13 +35,6 @@ def test_constructors_say_what_they_take():
             column(0.0, **wrong)
 
 
-def test_misspelt_fields_of_built_in_components_are_errors():
-    with pytest.raises(AttributeError):
-        RigidBody().linear_velocty = (1, 2)
-    with pytest.raises(TypeError):
-        RigidBody(masss=1)
-
-
 def test_classes_without_slots_may_keep_more_than_columns():
     class Player(Component):
         score = column(0, dtype=int)

@@ -10,7 +10,6 @@ from helpers_components import Everything, full
 from worlds import ball, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import System
 
 pytestmark = pytest.mark.plain
 
@@ -84,16 +83,6 @@ def test_vectors_are_views_of_the_row_both_ways():
     assert column_of_all.tolist() == [[5.0, 4.0]]
 
 
-def test_x_y_z_in_three_dimensions():
-    world = make_world(3)
-    e = world.create_entity(Transform((1, 2, 3)), RigidBody())
-    world.step()
-    transform = world.component_for_entity(e, Transform)
-    transform.z = 9
-    assert (transform.x, transform.y, transform.z) == (1.0, 2.0, 9.0)
-    assert world.bodies.position.tolist() == [[1.0, 2.0, 9.0]]
-
-
 def test_one_number_stands_for_a_whole_vector():
     world = make_world(3)
     e = world.create_entity(Transform((2, 2, 2)), RigidBody(linear_velocity=1.5))
@@ -113,17 +102,6 @@ def test_static_bodies_are_read_only_but_for_assignment():
     assert world.bodies.static.position.tolist() == [[3.0, 4.0]]
     assert world.query_point((3.0, 4.5)) == [e]
     assert world.query_point((0.0, 0.0)) == []
-
-
-def test_assigning_a_position_is_a_teleport():
-    world = make_world(dt=1.0)
-    e = ball(world, 0.0, 2.0)
-    world.step()
-    world.advance(0.5)
-    transform = world.component_for_entity(e, Transform)
-    assert transform.interpolated_position.tolist() == [1.0, 0.0]
-    transform.position = (10.0, 0.0)
-    assert transform.interpolated_position.tolist() == [10.0, 0.0]
 
 
 @pytest.mark.compiled
@@ -182,16 +160,6 @@ def test_copies_are_unbound_and_share_nothing():
     assert body.copy().applied_force.tolist() == [1.0, 0.0]
 
 
-def test_a_prefab_is_copied_for_each_entity():
-    world = make_world()
-    prefab = RigidBody(mass=3.0, linear_velocity=(1.0, 0.0))
-    for x in range(3):
-        world.create_entity(Transform((x, 0)), prefab.copy())
-    world.step()
-    assert world.bodies.mass.tolist() == [3.0, 3.0, 3.0]
-    assert prefab.entity is None
-
-
 @pytest.mark.parametrize("adopted_before", [False, True])
 def test_a_prefab_used_twice_is_an_error_that_says_copy(adopted_before):
     world = make_world()
@@ -222,17 +190,3 @@ def test_a_component_of_another_world_is_an_error_that_says_copy():
     there.close()  # then it can be used
     here.step()
     assert len(here.bodies) == 2
-
-
-def test_handles_are_read_and_written_inside_a_system():
-    class Push(System):
-        def process(self, dt):
-            for _, (transform, body) in self.world.get_components(Transform, RigidBody):
-                body.linear_velocity = (transform.x, 0.0)
-
-    world = make_world(dt=1.0)
-    ball(world, 1.0)
-    world.add_system(Push())
-    for _ in range(3):
-        world.step()
-    assert world.bodies.position.tolist() == [[4.0, 0.0]]

@@ -11,7 +11,6 @@ from helpers_components import INF, NAN, Everything
 from worlds import ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Component, column
 
 pytestmark = pytest.mark.plain
 
@@ -135,17 +134,6 @@ def test_a_rotation_in_three_dimensions_is_a_quaternion():
     assert world.component_for_entity(e, Transform).rotation.tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
-def test_a_component_from_a_world_of_other_dimensions_is_refused():
-    flat, deep = make_world(2), make_world(3)
-    e = ball(flat, 0.0)
-    flat.step()
-    body = flat.component_for_entity(e, RigidBody)
-    flat.delete_entity(e)
-    flat.step()
-    with pytest.raises(ValueError, match=r"RigidBody\.linear_velocity must have 3 components"):
-        deep.create_entity(Transform((0, 0, 0)), body)
-
-
 @pytest.mark.parametrize("call", ["apply_force", "apply_impulse"])
 @pytest.mark.parametrize("value", [(NAN, 0), (INF, 0), (1, 2, 3), ((1, 2), (3, 4)), "hard", None])
 def test_forces_and_impulses_are_checked(call, value):
@@ -170,17 +158,6 @@ def test_a_bare_number_is_no_position():
     """Transform(3, 7) would mean position (3, 3) and a rotation of 7 rad."""
     with pytest.raises(ValueError, match=r"Transform\.position must be 2 or 3 numbers, got 3"):
         Transform(3, 7)  # type: ignore[arg-type]
-
-
-def test_misspelt_fields_of_own_components_are_refused():
-    class Fuel(Component):
-        litres = column(1.0)
-
-    fuel = Fuel()
-    with pytest.raises(AttributeError, match="Fuel has no field 'liters': did you mean 'litres'"):
-        fuel.liters = 3.0
-    fuel.litres = 3.0
-    assert fuel.litres == 3.0
 
 
 def test_vectors_are_whole_as_soon_as_the_entity_exists():

@@ -2,72 +2,11 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
-from helpers_determinism import Charge, settled, state
-from worlds import ball, floor, make_world
+from helpers_determinism import Charge, settled
+from worlds import ball, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
-
-
-def pile():
-    world = settled()
-    floor(world)
-    rng = np.random.default_rng(2)
-    for x in range(30):
-        ball(world, (0.9 * (x % 6), 1.0 + 0.95 * (x // 6)), rng.normal(size=2) * 2, restitution=0.7)
-    for _ in range(20):
-        world.step()
-    return world
-
-
-def log_events(world, log):
-    def note(name, c):
-        log.append((name, c.entity_a, c.entity_b, c.step, c.depth, c.normal_impulse))
-
-    for name in ("contact_begin", "contact_stay", "contact_end", "impact"):
-        world.on(name, functools.partial(note, name))
-
-
-def test_a_restored_snapshot_goes_on_with_the_same_bits_and_events():
-    world, log = pile(), []
-    log_events(world, log)
-    snapshot = world.snapshot()
-    at = (world.state_hash(), world.time, world.step_count, state(world))
-
-    def go_on():
-        log.clear()
-        states = []
-        for _ in range(40):
-            world.step()
-            states.append(state(world))
-        return states, list(log), world.state_hash()
-
-    first = go_on()
-    assert len({name for name, *_ in first[1]}) == 4
-    for _ in range(2):  # it can be restored repeatedly
-        world.restore(snapshot)
-        assert (world.state_hash(), world.time, world.step_count, state(world)) == at
-        assert go_on() == first
-        world.contacts.enabled[:] = False  # what is written into the world's contacts is not written into the snapshot
-
-
-def test_a_snapshot_holds_kinds_and_components_of_ones_own():
-    world = make_world(dt=1.0)
-    a, b = ball(world, 0.0, 1.0), ball(world, 9.0, 1.0)
-    world.add_component(b, Charge(3.0))
-    snapshot, digest = world.snapshot(), world.state_hash()
-    world.component_for_entity(a, RigidBody).kind = "static"
-    world.component_for_entity(b, Charge).value = 4.0
-    world.step()
-    assert world.bodies.entity.tolist() == [b, a]
-    world.restore(snapshot)
-    assert world.state_hash() == digest
-    assert world.bodies.dynamic.entity.tolist() == [a, b]
-    world.step()
-    assert world.bodies.position[:, 0].tolist() == [1.0, 10.0]
-    assert world.component_for_entity(b, Charge).value == 3.0
 
 
 def test_settings_stay_when_a_snapshot_is_restored():

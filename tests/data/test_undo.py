@@ -76,19 +76,6 @@ def test_a_step_of_built_in_systems_that_fails_leaves_no_trace(monkeypatch, syst
         assert world.state_hash() == straight
 
 
-@pytest.mark.parametrize("system", [ForceAccumulation, Integration, Response])
-def test_a_phase_alone_that_fails_leaves_no_trace(monkeypatch, system):
-    with busy_world(colliders=True) as world:
-        world.step()
-        before = columns(world)
-        fail_after(monkeypatch, world, system)
-        with pytest.raises(StepError, match="no more"):
-            world.run(system.phase)
-        after = columns(world)
-        for name in KEPT:
-            np.testing.assert_array_equal(after[name], before[name], err_msg=name)
-
-
 def test_without_the_built_in_integration_all_is_kept(monkeypatch):
     """Everything must be saved: the response overwrites the positions of overlapping bodies."""
     with make_world(gravity=9.81) as world:
