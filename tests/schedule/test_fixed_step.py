@@ -8,7 +8,7 @@ from fractions import Fraction
 import esper
 import numpy as np
 import pytest
-from helpers_motion import FRAME_RATES, Oscillator, SpringAndDrag, all_methods, record
+from helpers_motion import FRAME_RATES, Oscillator, SpringAndDrag, all_methods
 from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, Transform
@@ -265,6 +265,8 @@ def test_nothing_of_this_can_be_done_inside_a_step():
                 world.step()
             with pytest.raises(CaromError, match="between steps"):
                 world.advance(1.0)
+            with pytest.raises(CaromError, match="inside"):
+                esper.process(dt)
             assert world.clock.state() == before
 
     world = make_world()
@@ -307,19 +309,3 @@ def test_c7_extreme_steps_of_the_clock(dt):
     assert [world.advance(2.5 * dt) for _ in range(4)] == [2, 3, 2, 3]
     assert world.time == 10 * dt
     assert world.bodies.linear_velocity[0, 1] == pytest.approx(-9.81 * 10 * dt, rel=1e-14)
-
-
-@pytest.mark.parametrize("arguments", [(), (1 / 30,), (0.0,), (1 / 60, 1), (math.nan,)])
-def test_plain_esper_with_another_step_is_refused(arguments):
-    """It raises, names advance(), and the world can go on."""
-    world = busy_world()
-    world.step()
-    before = world.state_hash()
-    with world, pytest.raises(ValueError, match=r"advance\(seconds\)"):
-        esper.process(*arguments)
-    assert (world.step_count, world.state_hash()) == (1, before)
-    with world:
-        esper.process(1 / 60)
-    other = busy_world()
-    record(other, 2)
-    assert (world.step_count, world.state_hash()) == (2, other.state_hash())

@@ -10,18 +10,8 @@ import pytest
 from helpers_extremes import DT, makers
 from worlds import EPS, Conserved, ball, both_dimensions, box, make_world, position, run, velocity
 
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.components import RigidBody
 from carom.framework import Settings
-
-nowhere = pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-
-
-@pytest.mark.parametrize("mass", [0.0, -1.0, math.nan, math.inf, 1e-320])
-def test_c8_masses_that_cannot_be_are_rejected(mass):
-    with pytest.raises(ValueError, match=r"RigidBody\.mass must"):
-        RigidBody(mass=mass)
-    with pytest.raises(ValueError, match=r"RigidBody\.mass must"):
-        make_world().create_entities(2, Transform.many(np.zeros((2, 2))), RigidBody.many(mass=[1.0, mass]))
 
 
 @pytest.mark.parametrize("ratio", [1e12, 1e-12, 1e15, 1e-15])
@@ -37,13 +27,6 @@ def test_c8_mass_ratios_between_walls(ratio, e):
     assert position(world, light)[0] > 0.5
     assert position(world, heavy)[0] > position(world, light)[0]
     kept.check(momentum=False)
-
-
-@pytest.mark.parametrize("restitution", [-0.1, math.nan, math.inf])
-def test_c9_restitution_that_cannot_be_is_rejected(restitution):
-    for make in (lambda **e: SphereCollider(1.0, **e), lambda **e: AABBCollider((1, 1), **e)):
-        with pytest.raises(ValueError, match=r"\.restitution must"):
-            make(restitution=restitution)
 
 
 def test_c9_restitution_above_one_gains():
@@ -81,62 +64,10 @@ def test_c10_denormal_masses():
     assert (velocity(world, a)[0], velocity(world, b)[0]) == (-1.0, 1.0)
 
 
-@nowhere
-def test_c11_rejected_at_the_call(bad):
-    """Position, velocity, force, impulse, size, step: the error names the field; for an adopted body the entity too."""
-    for make in (
-        lambda: Transform((bad, 0.0)),
-        lambda: RigidBody(linear_velocity=(0.0, bad)),
-        lambda: RigidBody(constant_force=(0.0, bad)),
-        lambda: SphereCollider(bad),
-        lambda: AABBCollider((1.0, bad)),
-        lambda: SphereCollider(1.0, offset=(bad, 0.0)),
-        lambda: Settings(dt=bad),
-    ):
-        with pytest.raises(ValueError, match="must"):
-            make()
-    world = make_world()
-    entity = ball(world, 0.0)
-    world.step()
-    body = world.component_for_entity(entity, RigidBody)
-    with pytest.raises(ValueError, match=f"entity {entity}"):
-        world.component_for_entity(entity, Transform).position = (bad, 0.0)
-    with pytest.raises(ValueError, match=f"entity {entity}"):
-        body.linear_velocity = (bad, 0.0)
-    for push in (body.apply_force, body.apply_impulse):
-        with pytest.raises(ValueError, match="finite"):
-            push((bad, 0.0))
-    with pytest.raises(ValueError, match="finite"):
-        world.advance(bad)
-    run(world, 2)
-    assert (position(world, entity) == 0).all()
-
-
-@pytest.mark.parametrize("dt", [0.0, -1 / 60])
+@pytest.mark.parametrize("dt", [0.0, -1 / 60, math.nan, math.inf, "fast"])
 def test_c11_steps_must_be_positive(dt):
     with pytest.raises(ValueError, match=r"Settings\.dt"):
         Settings(dt=dt)
-
-
-@nowhere
-@pytest.mark.parametrize("name", ["position", "linear_velocity"])
-def test_c11_written_into_columns_it_stays_with_its_body(bad, name):
-    """Columns are not checked when written: the fault is reported, all others move as without that body."""
-    worlds = [make_world(), make_world()]
-    for world in worlds:
-        rng = np.random.default_rng(6)
-        for k in range(40):
-            ball(world, rng.uniform(-3, 3, 2), rng.normal(size=2), restitution=1.0, mask=2 if k == 7 else -1)
-    broken, healthy = worlds
-    getattr(broken.bodies, name)[7, 0] = bad
-    run(broken, 30)
-    run(healthy, 30)
-    others = np.arange(40) != 7
-    for column in ("position", "linear_velocity"):
-        found, expected = getattr(broken.bodies, column)[others], getattr(healthy.bodies, column)[others]
-        np.testing.assert_array_equal(found, expected)
-    assert any(f"entity {broken.bodies.entity[7]}" in fault for fault in broken.faults)
-    assert not any("entity" in fault for fault in healthy.faults)
 
 
 @both_dimensions
@@ -171,19 +102,6 @@ def test_c6_head_on_far_from_the_origin(offset):
     run(world, 30)
     assert (velocity(world, a)[0], velocity(world, b)[0]) == (-1.0, 1.0)
     assert position(world, a)[0] - offset == pytest.approx(-0.5 - (0.5 - 0.1), abs=40 * EPS * (1 + offset))
-
-
-def test_c13_sizes_that_cannot_be_are_rejected():
-    for make in (
-        lambda: SphereCollider(-1.0),
-        lambda: AABBCollider((1.0, -1e-300)),
-        lambda: AABBCollider.from_bounds((0.0, 1.0), (1.0, 0.0)),
-    ):
-        with pytest.raises(ValueError, match=r"Collider\.(radius|half_extents) must|lower must not exceed"):
-            make()
-    SphereCollider(0.0)
-    AABBCollider((0.0, 0.0))
-    AABBCollider.from_bounds((1.0, 1.0), (1.0, 1.0))
 
 
 @both_dimensions

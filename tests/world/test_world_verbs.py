@@ -6,7 +6,6 @@ import gc
 import itertools
 
 import esper
-import helpers_world
 import pytest
 from helpers_world import Counter, Name
 from worlds import ball, make_world
@@ -15,8 +14,6 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import World
 
 pytestmark = pytest.mark.plain
-
-esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
 
 
 class Tag:
@@ -124,33 +121,6 @@ def test_the_same_with_plain_calls_does_not_stop_the_facade(twice):
             esper.delete_entity(e, immediate=True)
     world.step()
     assert len(world.bodies) == (0 if twice else 1)
-
-
-class Plain(esper.Processor):
-    def __init__(self, log, label):
-        self.log, self.label = log, label
-
-    def process(self, dt):
-        self.log.append(self.label)
-
-
-def test_two_processors_of_one_type_can_be_removed_one_by_one():
-    world, log = World(), []
-    first, second = Plain(log, 1), Plain(log, 2)
-    world.add_processor(first)
-    world.add_processor(second)
-    world.step()
-    assert log == [1, 2]
-    world.remove_processor(Plain)  # the last one added, as in esper
-    world.step()
-    assert log == [1, 2, 1]
-    with world:
-        assert esper.get_processor(Plain) is first
-    world.remove_processor(first)
-    world.step()
-    assert log == [1, 2, 1]
-    with world:
-        assert esper.get_processor(Plain) is None
 
 
 def test_handlers_are_held_strongly_and_called_in_order():
