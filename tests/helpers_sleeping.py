@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from worlds import ball, box, floor, make_world
 
 from carom.components import AABBCollider, RigidBody, Transform
@@ -47,89 +48,41 @@ def two_towers():
     return world, boxes, others, world.snapshot()
 
 
-def push(world, boxes):
-    world.component_for_entity(boxes[1], RigidBody).apply_force((30.0, 0.0))
+def part(world, entity, component):
+    return world.component_for_entity(entity, component)
 
 
-def constant(world, boxes):
-    world.component_for_entity(boxes[2], RigidBody).constant_force = (0.5, 0.0)
+def write(world, entity, column, change):
+    values, row = getattr(world.bodies, column), world.bodies.row_of(entity)
+    values[row] = change(values[row])
 
 
-def in_a_column(world, boxes):
-    world.bodies.linear_velocity[world.bodies.row_of(boxes[0])] = (0.5, 0.0)
+def ground(world):
+    return min(world.get_entities())
 
 
-def teleported(world, boxes):
-    world.bodies.position[world.bodies.row_of(boxes[2])] += (0.2, 0.5)
-
-
-def grown(world, boxes):
-    world.component_for_entity(boxes[1], AABBCollider).half_extents = (0.6, 0.6)
-
-
-def heavier(world, boxes):
-    world.bodies.mass[world.bodies.row_of(boxes[2])] = 5.0
-
-
-def other_layer(world, boxes):
-    world.component_for_entity(boxes[0], AABBCollider).layer = 4
-
-
-def sensor(world, boxes):
-    world.component_for_entity(boxes[1], AABBCollider).sensor = True
-
-
-def lighter(world, boxes):
-    world.component_for_entity(boxes[1], RigidBody).gravity_scale = 0.5
-
-
-def gravity(world, boxes):
-    world.gravity = (0.0, -5.0)
-
-
-def settings(world, boxes):
-    world.settings = world.settings.replace(dt=1 / 120)
-
-
-def bottom_deleted(world, boxes):
-    world.delete_entity(boxes[0])
-
-
-def floor_deleted(world, boxes):
-    world.delete_entity(min(world.get_entities()))
-
-
-def floor_moved(world, boxes):
-    world.component_for_entity(min(world.get_entities()), Transform).position = (0.0, -2.0)
-
-
-def floor_without_collider(world, boxes):
-    world.remove_component(min(world.get_entities()), AABBCollider)
-
-
-def without_collider(world, boxes):
-    world.remove_component(boxes[1], AABBCollider)
-
-
-def another_kind(world, boxes):
-    world.component_for_entity(boxes[0], RigidBody).kind = "static"
-
-
-def static_placed(world, boxes):
-    world.create_entity(Transform((0.9, 1.5)), AABBCollider((0.5, 0.2)))
-
-
-def body_placed(world, boxes):
-    ball(world, (0.0, 3.49))
-
-
-def touched(world, boxes):
-    ball(world, (-2.0, 1.5), (40.0, 0.0), radius=0.3)
-
-
-def touched_by_kinematic(world, boxes):
-    box(world, (-1.6, 2.5), (3.0, 0.0), kind="kinematic")
-
-
-def told(world, boxes):
-    world.wake(boxes[1])
+CAUSES = {  # what wakes the tower of these boxes
+    "push": lambda world, boxes: part(world, boxes[1], RigidBody).apply_force((30.0, 0.0)),
+    "constant force": lambda world, boxes: setattr(part(world, boxes[2], RigidBody), "constant_force", (0.5, 0.0)),
+    "in a column": lambda world, boxes: write(world, boxes[0], "linear_velocity", lambda _: (0.5, 0.0)),
+    "teleported": lambda world, boxes: write(world, boxes[2], "position", lambda place: np.add(place, (0.2, 0.5))),
+    "grown": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "half_extents", (0.6, 0.6)),
+    "heavier": lambda world, boxes: write(world, boxes[2], "mass", lambda _: 5.0),
+    "other layer": lambda world, boxes: setattr(part(world, boxes[0], AABBCollider), "layer", 4),
+    "sensor": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "sensor", True),
+    "lighter": lambda world, boxes: setattr(part(world, boxes[1], RigidBody), "gravity_scale", 0.5),
+    "gravity": lambda world, boxes: setattr(world, "gravity", (0.0, -5.0)),
+    "settings": lambda world, boxes: setattr(world, "settings", world.settings.replace(dt=1 / 120)),
+    "bottom deleted": lambda world, boxes: world.delete_entity(boxes[0]),
+    "floor deleted": lambda world, boxes: world.delete_entity(ground(world)),
+    "floor moved": lambda world, boxes: setattr(part(world, ground(world), Transform), "position", (0.0, -2.0)),
+    "floor without collider": lambda world, boxes: world.remove_component(ground(world), AABBCollider),
+    "without collider": lambda world, boxes: world.remove_component(boxes[1], AABBCollider),
+    "another kind": lambda world, boxes: setattr(part(world, boxes[0], RigidBody), "kind", "static"),
+    "static placed": lambda world, boxes: world.create_entity(Transform((0.9, 1.5)), AABBCollider((0.5, 0.2))),
+    "body placed": lambda world, boxes: ball(world, (0.0, 3.49)),
+    "touched": lambda world, boxes: ball(world, (-2.0, 1.5), (40.0, 0.0), radius=0.3),
+    "touched by kinematic": lambda world, boxes: box(world, (-1.6, 2.5), (3.0, 0.0), kind="kinematic"),
+    "told": lambda world, boxes: world.wake(boxes[1]),
+}
+EVERYWHERE = {"gravity", "settings", "floor deleted", "floor moved", "floor without collider"}

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import gc
 import itertools
 
 import esper
 import numpy as np
 import pytest
-from helpers_contacts import EVENTS, ids, listen
+from helpers_contacts import ids, listen
 from worlds import ball, floor, make_world, run
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -133,54 +132,6 @@ def test_an_end_is_always_delivered(how):
     assert len(world.contacts.end) == 0
 
 
-def test_deleting_everything_ends_everything():
-    world = make_world()
-    entities = [ball(world, 0.5 * k) for k in range(5)]
-    world.step()
-    begun = len(world.contacts.begin)
-    for entity in entities:
-        world.delete_entity(entity)
-    world.step()
-    assert len(world.contacts.end) == begun > 0
-    assert len(world.contacts) == 0
-
-
-def test_handlers_run_in_order_and_are_kept_alive():
-    """In the order of addition; a lambda without other references is kept (esper alone would lose it)."""
-    world = make_world()
-    called = []
-    for name in "abc":
-        world.on("contact_begin", lambda contact, name=name: called.append(name))
-    gc.collect()
-    ball(world, 0.0)
-    ball(world, 0.9)
-    world.step()
-    assert called == ["a", "b", "c"]
-
-
-def test_a_handler_may_take_itself_or_others_away():
-    world = make_world()
-    called = []
-
-    def once(contact):
-        called.append("once")
-        world.off("contact_stay", once)
-        world.off("contact_stay", never)
-
-    def never(contact):
-        called.append("never")
-
-    world.on("contact_stay", once)
-    world.on("contact_stay", never)
-    world.on("contact_stay", lambda contact: called.append("always"))
-    ball(world, 0.0)
-    ball(world, 0.9)
-    run(world, 4)
-    assert called == ["once", "always", "always", "always"]
-    with pytest.raises(KeyError, match="no such handler for 'contact_stay'"):
-        world.off("contact_stay", once)
-
-
 @pytest.mark.parametrize("immediate", [False, True])
 def test_a_handler_may_delete_and_create(immediate):
     """Deleting a body while the step's events are delivered is safe; its end comes in the next step."""
@@ -204,44 +155,6 @@ def test_a_handler_may_delete_and_create(immediate):
     assert [pair for name, _, *pair in told if name == "contact_end"] == begun
     assert len(world.bodies) == 4
     assert np.isfinite(world.bodies.position).all()
-
-
-def test_espers_own_handlers_get_the_same_events():
-    world = rain()
-    told, from_esper = [], []
-    listen(world, told)
-    handlers = [
-        lambda contact, name=name: from_esper.append((name, contact.step, contact.entity_a, contact.entity_b))
-        for name in EVENTS
-    ]
-    with world:
-        for name, handler in zip(EVENTS, handlers, strict=True):
-            esper.set_handler(name, handler)
-    run(world, 60)
-    with world:
-        for name, handler in zip(EVENTS, handlers, strict=True):
-            esper.remove_handler(name, handler)
-    assert told == from_esper
-    assert {name for name, *_ in told} == set(EVENTS)
-
-
-def test_a_handler_that_fails_is_named_and_the_step_undone():
-    world = make_world()
-    ball(world, -0.51, 1.0, restitution=1.0)
-    ball(world, 0.51, -1.0)
-    before = world.state_hash()
-
-    def broken(contact):
-        raise ZeroDivisionError("on purpose")
-
-    world.on("impact", broken)
-    with pytest.raises(Exception, match="on purpose"):
-        world.step()
-    assert world.state_hash() == before
-    assert world.step_count == 0
-    world.off("impact", broken)
-    world.step()
-    assert len(world.contacts.begin) == len(world.contacts.impacts) == 1
 
 
 def test_pairs_end_when_their_ids_come_to_mean_others():

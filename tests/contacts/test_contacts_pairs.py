@@ -11,7 +11,6 @@ from worlds import ball, both_dimensions, make_world
 
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, Component, Contact, Phase, System, column
-from carom.framework.world import contacts
 
 LISTS = ("contacts", "begin", "stay", "end", "impacts")
 FIELDS = [field.name for field in dataclasses.fields(Contact)]
@@ -265,31 +264,3 @@ def test_what_is_no_type():
         for wrong in ([], Tag()):
             with pytest.raises(TypeError, match="component types"):
                 verb(Tag, wrong)
-
-
-@pytest.mark.parametrize("first", [RigidBody, Unused])
-def test_contexts_are_not_switched_row_by_row(first, monkeypatch):
-    """To the world's context and back twice at most, however many contacts."""
-    world, _ = crowd(count=400)
-    rows, switches = world.contacts, []
-    assert len(rows) > 1000
-    switch = esper.switch_world
-    monkeypatch.setattr(esper, "switch_world", lambda name: switches.append(name) or switch(name))
-    for ask in (lambda: list(rows.pairs(first, Transform)), lambda: rows.between(first, Transform)):
-        switches.clear()
-        ask()
-        assert len(switches) <= 4
-
-
-def test_records_are_made_of_what_is_found_only(monkeypatch):
-    """between makes none; pairs one for each contact among its own, and not all at once."""
-    world, _ = crowd(count=400)
-    made, make = [], contacts.make_contacts
-    monkeypatch.setattr(contacts, "make_contacts", lambda count, *columns: made.append(count) or make(count, *columns))
-    monkeypatch.setattr(contacts.ContactRows, "row", None)
-    between = world.contacts.between(Missile, Tag)
-    assert made == []
-    next(world.contacts.pairs(Missile, Tag))
-    assert made == [contacts.BLOCK]
-    made.clear()
-    assert len(list(world.contacts.pairs(Missile, Tag))) == sum(made) == len(between.rows) > 2 * contacts.BLOCK

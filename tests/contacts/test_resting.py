@@ -33,18 +33,6 @@ def bits(world):
     return [np.array(column).tobytes() for column in columns]
 
 
-def test_a_snapshot_in_the_midst_of_a_pile_holds_the_impulses():
-    """Restored, also into a world that has continued: the same bits as without."""
-    world = heap()
-    run(world, 90)
-    snapshot = world.snapshot()
-    expected = [bits(world) for _ in range(60) if world.step() is None]
-    for _ in range(2):
-        world.restore(snapshot)
-        assert [bits(world) for _ in range(60) if world.step() is None] == expected
-        run(world, 37)
-
-
 class Fails(System):
     phase = Phase.END
     armed = False

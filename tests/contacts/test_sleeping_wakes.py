@@ -3,37 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from helpers_sleeping import (
-    GRAVITY,
-    MODES,
-    another_kind,
-    body_placed,
-    bottom_deleted,
-    constant,
-    floor_deleted,
-    floor_moved,
-    floor_without_collider,
-    gravity,
-    grown,
-    heavier,
-    in_a_column,
-    is_asleep,
-    lighter,
-    other_layer,
-    push,
-    sensor,
-    settings,
-    sleep,
-    sleepy_world,
-    static_placed,
-    teleported,
-    told,
-    touched,
-    touched_by_kinematic,
-    tower,
-    two_towers,
-    without_collider,
-)
+from helpers_sleeping import CAUSES, EVERYWHERE, GRAVITY, MODES, is_asleep, sleep, sleepy_world, tower, two_towers
 from worlds import ball, floor
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -41,26 +11,19 @@ from carom.framework import ForceSystem, Phase, Settings, System, World
 from carom.plugins import Physics
 from carom.plugins.springs import Springs
 
-CAUSES = (
-    push, constant, in_a_column, teleported, grown, heavier, other_layer, sensor, lighter, gravity, settings,
-    bottom_deleted, floor_deleted, floor_moved, floor_without_collider, without_collider, another_kind, static_placed,
-    body_placed, touched, touched_by_kinematic, told,
-)  # fmt: skip
-EVERYWHERE = gravity, settings, floor_deleted, floor_moved, floor_without_collider
-
 
 @pytest.fixture(scope="module")
 def asleep():
     return two_towers()
 
 
-@pytest.mark.parametrize("cause", CAUSES, ids=lambda cause: cause.__name__)
+@pytest.mark.parametrize("cause", CAUSES)
 def test_what_wakes_an_island(asleep, cause):
     world, boxes, others, snapshot = asleep
     world.settings = world.settings.replace(dt=1 / 60)
     world.restore(snapshot)
-    cause(world, boxes)
-    for _ in range(14 if cause is touched_by_kinematic else 3):
+    CAUSES[cause](world, boxes)
+    for _ in range(14 if cause == "touched by kinematic" else 3):
         world.step()
     left = [entity for entity in boxes if world.entity_exists(entity)]
     bodies = [e for e in left if world.component_for_entity(e, RigidBody).kind == "dynamic"]
@@ -69,16 +32,16 @@ def test_what_wakes_an_island(asleep, cause):
 
 
 def test_an_island_that_is_disturbed_between_falling_asleep_and_the_next_step():
-    for cause in (in_a_column, teleported, grown, bottom_deleted, floor_moved, constant):
+    for cause in ("in a column", "teleported", "grown", "bottom deleted", "floor moved", "constant force"):
         world = sleepy_world()
         boxes = tower(world, 0.0)
         while not is_asleep(world, boxes[1])[0]:
             world.step()
-        cause(world, boxes)
+        CAUSES[cause](world, boxes)
         world.step()
         world.step()
         left = [entity for entity in boxes if world.entity_exists(entity)]
-        assert not any(is_asleep(world, *left)), cause.__name__
+        assert not any(is_asleep(world, *left)), cause
 
 
 def test_the_same_force_in_every_step_lets_sleep():

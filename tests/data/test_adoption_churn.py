@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import esper
 import helpers_adoption
 import numpy as np
@@ -46,27 +44,6 @@ def test_entities_may_be_deleted_in_any_phase(world, where, immediate):
     assert len(world.contacts.end) == 5
     world.step()
     assert matches_esper(world)
-
-
-@pytest.mark.parametrize("immediate", [False, True])
-def test_entities_may_be_deleted_by_an_event_handler(world, immediate):
-    """ACCURACY C25: no contact of deleted entities, and an end for every begin."""
-    ids = [ball(world, 0.9 * x) for x in range(5)]
-    log = []
-
-    def hit(contact):
-        log.append(("begin", contact.entity_a, contact.entity_b))
-        for e in (contact.entity_a, contact.entity_b):
-            if world.entity_exists(e):
-                world.delete_entity(e, immediate=immediate)
-
-    world.on("contact_begin", hit)
-    world.on("contact_end", lambda c: log.append(("end", c.entity_a, c.entity_b)))
-    for _ in range(3):
-        world.step()
-    pairs = list(itertools.pairwise(ids))
-    assert log == [("begin", *pair) for pair in pairs] + [("end", *pair) for pair in pairs]
-    assert len(world.bodies) == 0
 
 
 def test_entities_created_inside_a_step_join_at_the_next(world):

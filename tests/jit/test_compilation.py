@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import logging
+import sys
 import types
 
 import numpy as np
@@ -15,6 +16,7 @@ from carom.framework.compilation import inlined, kernel, packed, part
 from carom.framework.jit import cache as kernel_cache
 from carom.framework.jit.cache import cache_contents, cache_folder, clear_cache
 from carom.framework.jit.hash import deep_hash
+from carom.systems.shapes.linking import source
 
 
 def test_a_folder_that_cannot_be_written_is_passed_over(monkeypatch, tmp_path):
@@ -201,3 +203,10 @@ def test_the_log_counts_and_tells_listeners(monkeypatch, tmp_path):
     assert compilation.log.seconds > 0
     thrice.made._cache.flush()
     assert not list(tmp_path.glob("*.kernel"))
+
+
+def test_a_process_remembers_a_bounded_number_of_generated_modules(monkeypatch):
+    monkeypatch.setattr(source, "MODULES", len(source._made) + 3)
+    names = [source.source_module(f"value = {k}", {}).__name__ for k in range(5)]
+    assert all(name in sys.modules for name in names[-3:])
+    assert sum(name.startswith("carom_shapes_") for name in sys.modules) <= source.MODULES

@@ -133,36 +133,6 @@ def test_levels_change_the_cost_and_not_what_is_found(d):
     assert [plain.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
 
 
-def test_what_the_first_level_hits_is_counted():
-    """Two squares corner to corner: their circles overlap, the squares do not. Then nearer, then far apart."""
-    world = make_world()
-    a = levelled(world, 0.0, kind="kinematic")
-    b = levelled(world, (1.2, 0.5), kind="kinematic")
-    world.step()
-    assert not len(world.contacts)
-    assert [world.stats().counters[name] for name in COUNTERS] == [1, 1, 1]
-    world.component_for_entity(b, Transform).position = (0.9, 0.5)
-    world.step()
-    assert pairs(world) == [(a, b)]
-    assert [world.stats().counters[name] for name in COUNTERS] == [2, 2, 1]
-    world.component_for_entity(b, Transform).position = (9.0, 0.5)
-    world.step()
-    assert [world.stats().counters[name] for name in COUNTERS] == [2, 2, 1]
-    world.reset_stats()
-    assert [world.stats().counters[name] for name in COUNTERS] == [0, 0, 0]
-
-
-def test_bodies_with_one_level_are_tested_once():
-    """A sphere meets a box without levels directly, also in a world where others have several."""
-    world = make_world()
-    levelled(world, 20.0)
-    ball(world, 0.0)
-    box(world, 0.9)
-    world.step()
-    assert len(world.contacts) == 1
-    assert world.stats().counters["first_level_tests"] == 0
-
-
 @both_dimensions
 def test_the_last_level_gives_contact_and_material(d):
     """Restitution, normal and time of impact are the box's: the sphere around it only rejects pairs."""
@@ -263,18 +233,6 @@ def test_a_query_uses_the_last_level():
     world.step()
     assert world.query_point((0.49, 0.49)) == [entity]
     assert world.query_point((0.0, 0.6)) == []  # in the circle, not in the square
-
-
-def test_the_plan_shows_levels():
-    world = make_world()
-    levelled(world, 0.0)
-    world.step()
-    assert "level by level" in str(world.plan())
-    world = make_world()
-    ball(world, 0.0)
-    box(world, 5.0)
-    world.step()
-    assert "level by level" not in str(world.plan())
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import esper
+import helpers_world
 import pytest
 from helpers_world import Counter, Name
 from worlds import ball, make_world
@@ -10,6 +11,8 @@ from worlds import ball, make_world
 from carom.framework import NoPhysicsError, Settings, World
 
 pytestmark = pytest.mark.plain
+
+esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
 
 NO_PHYSICS = "no physics in this world: World(Physics(...))"
 

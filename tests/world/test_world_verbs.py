@@ -6,6 +6,7 @@ import gc
 import itertools
 
 import esper
+import helpers_world
 import pytest
 from helpers_world import Counter, Name
 from worlds import ball, make_world
@@ -14,6 +15,8 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import World
 
 pytestmark = pytest.mark.plain
+
+esper_is_left_as_it_was = helpers_world.esper_is_left_as_it_was  # a fixture, around every test
 
 
 class Tag:
