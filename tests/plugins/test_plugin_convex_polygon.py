@@ -161,13 +161,6 @@ def test_boxes_and_regular_polygons():
         ConvexPolygonCollider(SQUARE, corner_radius=-1)
 
 
-def test_a_triangle_is_no_shape_of_a_3d_world():
-    world = World(Physics(dimensions=3), convex_polygon.plugin)
-    world.create_entity(Transform((0, 0, 0)), ConvexPolygonCollider(SQUARE))
-    with pytest.raises(ValueError, match=r"ConvexPolygonCollider.* 2D"):
-        world.step()
-
-
 def make_world(gravity=(0, -10), others=False):
     """With polygons alone, or always with spheres and boxes: few kinds of worlds, so that they share compiled code."""
     world = World(Physics(dimensions=2, gravity=gravity), convex_polygon.plugin)
@@ -256,20 +249,6 @@ def test_rays_and_moving_shapes_meet_it():
     assert hit.distance == pytest.approx(5 - math.sqrt(2) - 1, abs=1e-12)
     nearest = world.query_nearest((5, 3))
     assert nearest.distance == pytest.approx(3 - math.sqrt(2), abs=1e-12)
-
-
-@pytest.mark.slow
-def test_as_a_second_level_it_decides():
-    """A body with a sphere around a triangle: a body that touches only the sphere has no contact."""
-    world = make_world(gravity=(0, 0), others=True)
-    triangle = ConvexPolygonCollider(((0, 1), (-0.8, -0.6), (0.8, -0.6)))
-    world.create_entity(Transform((0, 0)), SphereCollider(1.0), triangle)
-    ball = world.create_entity(Transform((0.9, 0.6)), RigidBody(), SphereCollider(0.3))
-    world.step()
-    assert len(world.contacts.of(ball)) == 0
-    world.component_for_entity(ball, Transform).position = (0.3, 0.6)
-    world.step()
-    assert len(world.contacts.of(ball)) == 1
 
 
 def test_new_corners_count_from_the_next_step_on():

@@ -15,7 +15,7 @@ from carom.framework import Settings, World
 from carom.framework.compilation import inlined, kernel
 from carom.framework.vectors import row, store
 from carom.plugins import Physics, half_space
-from carom.plugins.half_space import HalfSpaceCollider, half_space_convex, two_half_spaces
+from carom.plugins.half_space import HalfSpaceCollider
 
 G = 10.0
 HalfSpace = namedtuple("HalfSpace", "normal axes")
@@ -85,16 +85,6 @@ def test_the_point_is_in_the_middle_of_a_face_that_lies_on_it(d):
     up, half, place = np.eye(d)[[1]], np.full((1, d), 2.0), np.full((1, d), 1.9)
     _, points = check(up, np.eye(d)[None], half, np.zeros(1), place)
     assert points[0] == pytest.approx([1.9, -0.05, *[1.9] * (d - 2)])
-
-
-def test_in_plain_python_it_is_the_same():
-    sphere = namedtuple("Sphere", "radius")(0.5)
-    hit, depth, normal, point = half_space_convex(
-        HalfSpace((0.0, 3.0), ((0.0, 1.0), (-1.0, 0.0))), sphere, (-0.25, 7.0), SphereCollider.support,
-        SphereCollider.rounding)  # fmt: skip
-    assert hit  # turned by a quarter its normal points to the left
-    assert (depth, normal, point) == (0.25, (-1.0, 0.0), (0.125, 7.0))
-    assert two_half_spaces(None, None, (1.0, 0.0))[:2] == (False, -math.inf)
 
 
 def at(d, *place):
@@ -245,21 +235,6 @@ def test_queries_and_casts_find_it_everywhere(d):
         assert world.query_nearest(at(d, where, 7)).distance == pytest.approx(7)
         fallen = world.shape_cast(AABBCollider(0.5), at(d, where, 8), at(d, 0, -20))[0]
         assert (fallen.entity, fallen.distance) == (1, pytest.approx(7.5))
-    world.close()
-
-
-@mostly_2d
-def test_snapshots_and_hashes_hold_it(d):
-    world = make_world(d)
-    world.create_entity(Transform(at(d, 0, 2)), RigidBody(), SphereCollider(0.5, restitution=0.5))
-    state = world.snapshot()
-    hashes = []
-    for _ in range(2):
-        for _ in range(60):
-            world.step()
-        hashes.append(world.state_hash())
-        world.restore(state)
-    assert hashes[0] == hashes[1]
     world.close()
 
 

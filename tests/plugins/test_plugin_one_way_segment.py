@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Phase, Settings, World
+from carom.framework import Settings, World
 from carom.plugins import Physics, one_way_segment
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.capsule import plugin as capsule
@@ -104,17 +104,6 @@ def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed)
         assert heights[-1] == pytest.approx(0.5, abs=REST)
         assert heights.min() > 0.45
         world.close()
-
-
-@each_shape
-def test_bounces_at_the_right_height(shape):
-    """From 2 m to e^2 2 m; verlet's flight is exact, impacts are at their time: sampling may miss 2e-3."""
-    world, e = make_world(integrator="velocity_verlet"), 0.5
-    bouncer = throw(world, (0, 2.5), shape=shape, restitution=e)
-    fall, rise = math.sqrt(2 * 2 / G), math.sqrt(2 * 2 * e**2 / G)
-    heights = run(world, fall + 2 * rise - 1 / 60, bouncer)[int(60 * fall) + 1 :]
-    assert heights.max() - 0.5 == pytest.approx(2 * e**2, abs=2e-3)
-    world.close()
 
 
 @pytest.mark.parametrize("angle", [0.5, *(pytest.param(angle, marks=pytest.mark.long) for angle in (0.0, -2.0))])
@@ -235,18 +224,6 @@ def test_the_front_turns_with_the_transform(angle, front):
         world.close()
 
 
-def test_a_slope_to_slide_down():
-    """Frictionless at 30 degrees: v = g sin 30 t along it."""
-    angle = math.pi / 6
-    world = make_world((Transform((0, 0), angle), OneWaySegmentCollider((-20, 0), (20, 0))))
-    up = np.array((-math.sin(angle), math.cos(angle)))
-    slider = throw(world, tuple(0.5 * up), shape="ball")
-    run(world, 1.0)
-    assert velocity_of(world, slider) == pytest.approx((-5 * math.cos(angle), -5 * math.sin(angle)), abs=0.02)
-    assert place_of(world, slider) @ up == pytest.approx(0.5, abs=REST)
-    world.close()
-
-
 @each_shape
 def test_a_lift_carries_and_is_jumped_through(shape):
     """It rises at 2 m/s; a body jumps through it by its velocity relative to the lift, and rides on it."""
@@ -273,16 +250,6 @@ def test_a_platform_that_sinks_over_a_body_passes(shape):
     stands = throw(world, (0, 0.5), shape=shape)
     heights = run(world, 2.0, stands)
     assert abs(heights - 0.5).max() < REST
-    world.close()
-
-
-def test_a_ferry_takes_along_by_friction():
-    moves = RigidBody(kind="kinematic", linear_velocity=(1.5, 0))
-    world = make_world((Transform((0, 0)), OneWaySegmentCollider((-2, 0), (2, 0), friction=1.0), moves))
-    rider = throw(world, (0, 0.5), friction=1.0)
-    run(world, 2.0)
-    assert place_of(world, rider)[0] == pytest.approx(3.0, abs=0.2)
-    assert velocity_of(world, rider)[0] == pytest.approx(1.5, abs=1e-6)
     world.close()
 
 
@@ -335,23 +302,6 @@ def test_sensors_and_contacts_switched_off_by_others_are_left_alone():
     world.close()
 
 
-def test_a_snapshot_holds_all_that_decides():
-    """Restored in the middle of passing and standing, the same steps give the same bits."""
-    world = make_world()
-    throw(world, (-1, -0.7), (0, 5.5))
-    throw(world, (1, 0.5))
-    world.create_entity(Transform((1, 1.5)), RigidBody(mass=400.0), AABBCollider(0.5))
-    run(world, 0.25)
-    state = world.snapshot()
-    hashes = []
-    for _ in range(2):
-        run(world, 2.0)
-        hashes.append(world.state_hash())
-        world.restore(state)
-    assert hashes[0] == hashes[1]
-    world.close()
-
-
 def test_the_order_of_ids_does_not_matter():
     """A body created before the segment: the segment is then the second of the pair."""
     results = []
@@ -393,15 +343,6 @@ def test_queries_find_it_from_both_sides():
         assert hit.normal == pytest.approx((0, side))
     assert world.query_sphere((0, 0.4), 0.5) == [1]
     assert world.query_sphere((2.4, 0.4), 0.5) == []
-    world.close()
-
-
-def test_a_scene_without_segments_has_nothing_to_do():
-    world = World(Physics(dimensions=2, gravity=(0, -G)), one_way_segment.plugin)
-    throw(world, (0, 3))
-    world.step()
-    assert str(world.plan()).count("no one-way segments") == 2
-    world.run(Phase.NARROW)
     world.close()
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -93,13 +92,6 @@ while not world.contacts.impacts and world.step_count < 120:
 impact = world.contacts.impacts
 print(json.dumps({"normal": impact.normal[0].tolist(), "step": world.step_count, "a": impact.entity_a.tolist()}))
 """
-SENSOR = START + """
-world.create_entity(Transform((0.5, 0.75)), RigidBody(gravity_scale=0), SphereCollider(0.5, sensor=True))
-world.step()
-found = world.contacts
-print(json.dumps({"depth": found.depth.tolist(), "normal": found.normal.tolist(), "loaded": log.loaded,
-                  "compiled": [name for name, _ in log.compiled]}))
-"""
 
 
 def write_package(folder: Path, name: str, version: str, point: str, value: str, files: dict[str, str]) -> Path:
@@ -184,57 +176,3 @@ def test_a_ball_falls_on_its_shape_and_bounces(python):
     assert said["normal"] == pytest.approx([0.5**0.5, 0.5**0.5])
     height = 1.0 - 0.5 + 0.25 * 2**0.5  # of the ball's centre when it touches
     assert abs(said["step"] - (2 * (2.0 - height) / 9.81) ** 0.5 * 60) <= 1.0
-
-
-@pytest.fixture
-def look(python, site, tmp_path):
-    """Tests a sensor against a copy of the installed package's shape, edited before, with a copy of the cache."""
-    copy, cache = tmp_path / "site", tmp_path / "cache"
-    shutil.copytree(site, copy)
-    kept = Path(os.environ["CAROM_CACHE_DIR"])
-    cache.mkdir()
-    for file in kept.glob("*") if kept.is_dir() else ():
-        shutil.copy2(file, cache)
-
-    def run(edit: tuple[str, str, str] | None = None) -> dict:
-        if edit is not None:
-            name, old, new = edit
-            file = copy / "diamonds_package" / name
-            text = file.read_text(encoding="utf-8")
-            assert old in text
-            file.write_text(text.replace(old, new), encoding="utf-8")
-        result = python("-B", "-c", SENSOR, cache=cache, site=copy)
-        assert result.returncode == 0, result.stderr
-        return json.loads(result.stdout.splitlines()[-1])
-
-    return run
-
-
-def test_its_kernels_are_kept_until_something_they_call_is_edited(look):
-    side = 0.25 / 2**0.5  # m, from the sensor's centre to the line x + y = 1
-    first = look()
-    assert first["depth"] == pytest.approx([0.5 - side])
-
-    again = look()
-    assert again["compiled"] == []
-    assert again["loaded"] > 0
-    assert again["depth"] == first["depth"]
-
-    # The pair's own function.
-    nearer = look(("shapes.py", "depth = b.radius - distance", "depth = b.radius + 0.125 - distance"))
-    assert nearer["compiled"]
-    assert nearer["depth"] == pytest.approx([0.625 - side])
-
-    # A helper in another file: the diamond shrinks by a tenth.
-    smaller = look(("geometry.py", "x, y = abs(d[0]), abs(d[1])", "x, y, size = abs(d[0]), abs(d[1]), 0.9 * size"))
-    assert smaller["compiled"]
-    assert smaller["depth"] == pytest.approx([0.625 - side - 0.1 / 2**0.5])
-
-    # A helper called only by the helper: another normal for ambiguous cases, which do not occur here.
-    turned = look(("geometry.py", "return 1.0 if x >= 0.0 else -1.0", "return 1.0 if x > 0.0 else -1.0"))
-    assert turned["compiled"]
-    assert turned["normal"] == smaller["normal"]
-
-    # A comment changes no byte code: nothing is compiled.
-    commented = look(("geometry.py", "import math\n", "import math  # roots\n"))
-    assert commented["compiled"] == []
