@@ -38,20 +38,6 @@ def test_a9_elastic_drop_that_ends_at_the_floor(mode, integrator):
     assert velocity(world, sphere)[1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_a9_elastic_drop_with_semi_implicit_euler():
-    """It touches after 60 steps (sum of 1 to 60 times g dt^2) and is reflected at the end of that step or at the
-    start of the next, with 60 or 61 times the speed g dt. The apex is that of 59 or of 61: off by at most u dt."""
-    world = mode_world("continuous", gravity=G)
-    floor(world, 1.0)
-    share = G * DT
-    start = 0.5 + 1830 * share * DT
-    sphere = ball(world, (0.0, start), restitution=1.0)
-    run(world, 61)
-    assert velocity(world, sphere)[1] / share == pytest.approx(60, abs=1 + 1e-9)
-    run(world, 59)
-    assert position(world, sphere)[1] == pytest.approx(start, abs=61 * share * DT)
-
-
 @both_dimensions
 @each_mode
 def test_a9_spheres_meet_while_they_fall(mode, d):
@@ -179,15 +165,6 @@ def test_b10_oblique_impact(mode, d, dt, radius):
             np.testing.assert_allclose(positions(world, entities), lanes + origin + np.array(new) * after, atol=5e-12)
 
 
-@pytest.mark.parametrize(("mode", "steps"), [*itertools.product(MODES, (1, 3, 180)), ("discrete", 180)])
-def test_b10_state_at_three_seconds(mode, steps):
-    """(-0.512, 0.984) and (0.512, -0.384), in one step or in many."""
-    world = mode_world(mode, dt=3 / steps)
-    a, b = ball(world, (-3, 0.6), 1.0, restitution=1.0), ball(world, 0.0, restitution=1.0)
-    run(world, steps)
-    np.testing.assert_allclose(positions(world, [a, b]), [(-0.512, 0.984), (0.512, -0.384)], atol=1e-12)
-
-
 @both_dimensions
 @each_mode
 @makers
@@ -276,25 +253,6 @@ def test_what_is_slow_but_tiny_does_not_tunnel(mode):
     run(world, 60)
     assert position(world, speck)[1] == pytest.approx(1e-4, abs=0.02 * 2e-4)
     assert velocity(world, speck)[1] == pytest.approx(0.0, abs=1e-9)
-
-
-@exact
-@pytest.mark.parametrize(("factor", "bounces"), [(1.9, False), (2.1, True)])
-def test_default_threshold_is_twice_gravitys_share(mode, integrator, factor, bounces):
-    """Thrown down from nearby, so that the impact is within the step, at slightly less or more than 2 g dt."""
-    world = mode_world(mode, gravity=G, integrator=integrator)
-    floor(world)
-    gap = G * DT**2 / 2
-    down = math.sqrt((factor * G * DT) ** 2 - 2 * G * gap)
-    mover = ball(world, (0.0, 0.1 + gap), (0.0, -down), radius=0.1, restitution=1.0)
-    fastest = -math.inf
-    for _ in range(12):
-        world.step()
-        fastest = max(fastest, velocity(world, mover)[1])
-    assert (fastest > G * DT) == bounces
-    assert fastest > -1e-9
-    if not bounces:
-        assert fastest < 1e-9
 
 
 @each_mode

@@ -136,22 +136,6 @@ def test_inelastic_collapse_ends(mode, speed):
     kept.check()
 
 
-@pytest.mark.parametrize(("mode", "e", "row"), pairwise(MODES, (0.0, 0.3), ((10, 60.0), (10, 600.0), (4, 1000.0))))
-def test_a_row_collapses_against_a_wall(mode, e, row):
-    """Balls thrown at a wall in a row: most of the energy is lost, no ball passes another or the wall,
-    whose middle is at 20.5: at most half a ball is in it for a moment."""
-    world, (count, speed) = mode_world(mode), row
-    box(world, 20.5, half=(0.5, 5.0), kind="static")
-    line = [bullet(world, 1.1 * k, speed, radius=0.5, restitution=e) for k in range(count)]
-    energy = world.kinetic_energy()
-    for _ in range(120):
-        world.step()
-        x = positions(world, line)[:, 0]
-        assert (np.diff(x) > 0).all()
-        assert x[-1] < 20.0
-    assert world.kinetic_energy() < 0.09 * energy
-
-
 @both_dimensions
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 7, 1.0, 5.0])
 def test_flight_is_the_exact_parabola(d, dt):

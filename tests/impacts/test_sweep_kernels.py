@@ -15,19 +15,15 @@ from carom.framework.jit.records.plain_view import PlainView
 from carom.framework.jit.records.record import make_record
 from carom.systems.broad_phase import boxes
 from carom.systems.ccd import search_bounds, time_of_impact
-from carom.systems.ccd.refresh_pairs import NEW, merge_pairs
-from carom.systems.ccd.search_bounds import CONTINUOUS, DISCRETE, EVENT_DRIVEN, find_margins, leaves_bounds_at
+from carom.systems.ccd.search_bounds import CONTINUOUS, DISCRETE, EVENT_DRIVEN, leaves_bounds_at
 from carom.systems.ccd.time_of_impact import APART, TOUCHES, first_touch
-from carom.systems.codes import OK
 from carom.systems.impacts.heap import heap_pop, heap_push
 from carom.systems.integration import trajectory
-from carom.systems.integration.stages import first_half_kick, second_half_kick
 from carom.systems.records import STATE
 
 pytestmark = pytest.mark.plain
 
 DT = 1 / 60
-MANIFOLD = ("at", "hit", "depth", "normal", "point", "early")
 
 numbers = st.floats(-10, 10).map(lambda x: round(x, 3))
 
@@ -80,69 +76,6 @@ def test_the_heap_against_sorted(orders, seed):
             assert (times[heap[impacts.waiting]], keys[heap[impacts.waiting]]) == earliest
         assert impacts.waiting == len(waiting)
         assert sorted(heap.tolist()) == list(range(room))
-
-
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(st.integers(0, 2**32 - 1), st.integers(2, 9))
-def test_merged_pairs_against_sets(seed, n):
-    """Pairs that crossed, had impacts or hit are kept with their data; of the others the candidates are kept, and only
-    those are looked at that were none before. The queue keeps what holds of the pairs that are left."""
-    rng, state = np.random.default_rng(seed), make_record(STATE, 2)
-    rank = rng.permutation(n)
-    every = sorted(((a, b) for a in range(n) for b in range(n) if rank[a] < rank[b]), key=lambda p: tuple(rank[[*p]]))
-    old, new = ([pair for pair in every if rng.random() < 0.5] for _ in range(2))
-    m, before, merged = len(old), state.pairs, state.merged
-    for pairs, rows in ((before, m), (merged, m + len(new))):
-        solid, near = rng.random((2, rows)) < 0.5
-        impulse, crossed = np.where(rng.random(rows) < 0.3, rng.random(rows), 0.0), rng.random(rows) < 0.2
-        fill(pairs, is_solid=solid, near_contact=near, crossed=crossed, impulse=impulse, depth=rng.random(rows))
-        fill(pairs, struck=rng.random(rows))
-        (at, normal, point), (hit, early) = rng.random((3, rows, 2)), rng.random((2, rows)) < 0.5
-        fill(pairs, at=at, hit=hit, early=early, normal=normal, point=point, parting=rng.integers(0, 3, rows))
-    hits = np.flatnonzero(rng.random(m) < 0.3)
-    disabled, log = hits[::2], hits[::-1]
-    fill(before, a=[a for a, _ in old], b=[b for _, b in old], count=m, place=np.zeros(m))
-    fill(before, hits=hits, found=len(hits), disabled=disabled, disabled_count=len(disabled))
-    merged.reserve(m + len(new), "a", "b", "hits", "disabled", "place")
-    impacts, events = state.impacts, 2 * m
-    fill(impacts, log_pair=log, logged=len(log), heap=np.arange(events), event_pair=np.repeat(np.arange(m), 2))
-    fill(impacts, event_time=rng.random(events), event_key=np.arange(events), event_count_a=np.ones(events))
-    fill(impacts, event_count_b=rng.integers(1, 3, events))
-    for _ in range(events):
-        heap_push(PlainView(impacts))
-    holding = {e: old[e // 2] for e in range(events) if impacts.event_count_b[e] == 1}
-    layers, masks = rng.integers(1, 4, n), rng.integers(0, 4, n)
-    sensors, masses = rng.random(n) < 0.2, np.where(rng.random(n) < 0.3, 0.0, 1.0)
-    fill(state.colliders, layer=[layers], mask=[masks], sensor=[sensors])
-    fill(state.bodies, rank=rank, collider_slot=np.zeros(n), inverse_mass=masses, impact_count=np.ones(n))
-    fill(state.candidates, sorted_a=[a for a, _ in new], sorted_b=[b for _, b in new], count=len(new))
-    state.count = n
-    kept = {old[c] for c in range(m) if before.crossed[c] or before.impulse[c] > 0.0} | {old[c] for c in hits}
-    meet = {(a, b) for a, b in new if layers[a] & masks[b] and layers[b] & masks[a]}
-    assert merge_pairs(PlainView(state), DT) == OK
-    pairs = list(zip(merged.a[: merged.count].tolist(), merged.b[: merged.count].tolist(), strict=True))
-    known = set(old) & set(new)
-    assert pairs == [pair for pair in every if pair in kept | meet | known]
-    assert [pairs[c] for c in np.flatnonzero(merged.place[: len(pairs)] == NEW)] == [
-        pair for pair in every if pair in meet - set(old)
-    ]
-    left, times = impacts.heap[: impacts.waiting].tolist(), impacts.event_time
-    assert {e: pairs[impacts.event_pair[e]] for e in left} == {e: p for e, p in holding.items() if p in pairs}
-    assert all(times[left[(k - 1) // 2]] <= times[left[k]] for k in range(1, len(left)))
-    assert sorted(impacts.heap.tolist()) == list(range(events))
-    assert (merged.found, merged.disabled_count) == (len(hits), len(disabled))
-    for now, then in ((merged.hits, hits), (merged.disabled, disabled), (state.impacts.log_pair, log)):
-        assert [pairs[c] for c in now[: len(then)]] == [old[c] for c in then]
-    for place, (a, b) in enumerate(pairs):
-        if (a, b) in kept:
-            for name in ("is_solid", "near_contact", "crossed", "impulse", "struck", "parting", *MANIFOLD):
-                np.testing.assert_array_equal(getattr(merged, name)[place], getattr(before, name)[old.index((a, b))])
-        else:
-            assert not merged.crossed[place]
-            assert merged.is_solid[place] == (not (sensors[a] or sensors[b]) and masses[a] + masses[b] > 0.0)
-            assert merged.impulse[place] == 0.0
-            assert np.isnan(merged.at[place]).all()
-            assert not merged.early[place]
 
 
 @both_dimensions
@@ -211,22 +144,6 @@ def test_no_body_leaves_its_search_bounds_before_the_stated_time(mode, degree, d
     assert asked > 20
 
 
-@both_dimensions
-@pytest.mark.parametrize("off", [0.0, 1e-10, 0.3])
-def test_bodies_in_a_row_have_room_however_little_they_are_off_it(off, d, plain_zero):
-    """40 balls 2 m apart that fall 0.2 m in the step: each is alone in its search bounds, 0.4 m wide, so no round is
-    needed. A volume of nearly zero must not count as a dense crowd."""
-    n, state = 40, make_record(STATE, d)
-    origin, path = np.zeros((2, n, d))
-    origin[:, 0], path[:, 1] = 2.0 * np.arange(n), -0.2 / DT
-    origin[:, 1:] = off * np.random.default_rng(1).random((n, d - 1))
-    fill(state.bodies, search_lower=origin, path_velocity=path, search_margin=np.empty(n), shape=np.zeros(n))
-    fill(state.bodies, min_extent=np.full(n, 0.2), inverse_mass=np.ones(n), ccd=np.zeros(n))
-    fill(state, moving=n, mode=EVENT_DRIVEN, path_degree=1)
-    assert find_margins(PlainView(state), 0.0, DT) == math.inf
-    assert (state.bodies.search_margin >= 0.2).all()
-
-
 def plain_sphere(state, _, a, __, b, d):
     size, distance = state.bodies.min_extent, math.hypot(*d)
     depth, normal = size[a] + size[b] - distance, tuple(x / distance for x in d)
@@ -280,30 +197,3 @@ def test_first_touch_on_parabolas_against_sampling(shape, d, plain_zero, monkeyp
         np.testing.assert_allclose(at, x0 + x1 * time + x2 * time * time, atol=1e-14)
         found += 1
     assert found > 10
-
-
-@settings(max_examples=100, deadline=None, derandomize=True)
-@given(st.integers(2, 3), st.integers(0, 2**32 - 1), st.booleans())
-def test_flight_against_closed_forms(d, seed, damped):
-    """A parabola under the forces of the start, between two half kicks of damping; then the mean of the forces at both
-    ends. Equal forces at the end change nothing. Tolerance: a few roundings."""
-    rng, h, n = np.random.default_rng(seed), 0.1, 5
-    position, velocity, early, later = rng.normal(size=(4, n, d))
-    inverse_mass, damping = rng.uniform(0.1, 10, n), rng.uniform(0, 3, n) * damped
-    bodies = (state := make_record(STATE, d)).bodies
-    fill(bodies, position=position, linear_velocity=velocity, force=early, inverse_mass=inverse_mass)
-    fill(bodies, linear_damping=damping, flight_velocity=velocity, acceleration=velocity)
-    state.dynamic, state.force_changes = n, True
-    first_half_kick(PlainView(state), h)
-    assert state.damped == damped
-    w, decay = inverse_mass[:, None], np.exp(-0.5 * damping * h)[:, None]
-    start, flown = velocity * decay, bodies.linear_velocity.copy()
-    np.testing.assert_allclose(bodies.flight_velocity, start, rtol=1e-14, atol=1e-14)
-    np.testing.assert_allclose(bodies.acceleration, 0.5 * w * early, rtol=1e-14)
-    np.testing.assert_allclose(bodies.position, position + start * h + 0.5 * w * early * h * h, rtol=1e-14, atol=1e-14)
-    np.testing.assert_allclose(flown, start + h * w * early, rtol=1e-14, atol=1e-14)
-    for force in (early, later):
-        fill(bodies, linear_velocity=flown, force=force)
-        second_half_kick(PlainView(state), h)
-        end = (start + 0.5 * h * w * (early + force)) * decay
-        np.testing.assert_allclose(bodies.linear_velocity, end, rtol=1e-13, atol=1e-13)
