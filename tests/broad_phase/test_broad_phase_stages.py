@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from helpers_boxes import Boxes, overlapping, pair_set
@@ -12,21 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.framework.errors import PluginError
-from carom.framework.settings import Settings
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
 from carom.systems.broad_phase.seekers import MOST_SEEKERS
 from carom.systems.broad_phase.stages import (
     BRUTE_FORCE,
     CANDIDATE_LIMIT,
-    PLUGIN,
     SEEKERS,
     STATIC_GRID,
     TREE,
     UNIFORM_GRID,
 )
 from carom.systems.broad_phase.tree.tree import CandidateLimitError
-from carom.systems.codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS
+from carom.systems.codes import FIND_IN_PYTHON
 
 
 def spread(rng, count, d, half=0.5):
@@ -122,24 +117,6 @@ def test_uneven_boxes_are_left_to_trees(d, moving, static):
     assert boxes.state.pair_search in (UNIFORM_GRID, STATIC_GRID)
 
 
-def test_memory_grows_once_and_static_boxes_are_kept():
-    lower, upper = spread(np.random.default_rng(3), 1500, 2)
-    boxes = Boxes(2)
-    boxes.set(lower, upper, 500)
-    boxes.find()
-    assert {NEED_CELLS, NEED_CANDIDATES} <= set(boxes.asked)
-    boxes.asked.clear()
-    boxes.find()
-    assert boxes.asked == []
-    grid = boxes.state.static_grid
-    assert grid.version == boxes.state.statics_version
-    grid.order[:] = 0  # seen only if the grid is not built again
-    boxes.find()
-    assert not grid.order.any()
-    boxes.set(lower, upper, 500)
-    assert pair_set(*boxes.find()) == overlapping(lower, upper, 500)
-
-
 def test_room_for_one_grid_leaves_the_other_as_it_is():
     """The grid of static boxes is there already when that of the first 193 moving ones needs room."""
     lower, upper = spread(np.random.default_rng(9), 1000, 2)
@@ -161,16 +138,6 @@ def test_one_pair_more_than_there_is_room_for():
         assert pair_set(*boxes.find()) == expected
 
 
-def test_no_colliders_no_candidates():
-    boxes = Boxes(2)
-    lower, upper = spread(np.random.default_rng(5), 100, 2)
-    boxes.set(lower, upper, 100)
-    assert len(boxes.find()[0]) > 0
-    boxes.state.collides = False
-    assert len(boxes.find()[0]) == 0
-    assert boxes.search.describe() == "no colliders: nothing to do"
-
-
 def test_the_limit_of_candidates():
     """Each of 3,000 small boxes meets each of 2,900 that cover everything: the tree counts them and refuses."""
     lower, upper = spread(np.random.default_rng(6), 5900, 2)
@@ -180,45 +147,6 @@ def test_the_limit_of_candidates():
     with pytest.raises(CandidateLimitError, match=f"exceed the limit of {CANDIDATE_LIMIT}"):
         boxes.find()
     assert len(boxes.state.candidates.first) == CANDIDATE_LIMIT
-
-
-def plugin_boxes(answer):
-    """Boxes of 10 bodies, 6 of which move, with a broad phase that answers so."""
-    broad_phase = type("Strange", (), {"pairs": lambda self, lower, upper, moving: answer(lower, upper, moving)})
-    registry = SimpleNamespace(broad_phases={"strange": broad_phase})
-    boxes = Boxes(2, registry, Settings(broad_phase="strange"))
-    lower, upper = spread(np.random.default_rng(7), 10, 2)
-    boxes.set(lower, upper, 6)
-    return boxes
-
-
-def test_a_broad_phase_of_a_plugin():
-    def all_pairs(lower, upper, moving):
-        assert (len(lower), len(upper), moving) == (10, 10, 6)
-        assert not lower.flags.writeable
-        rows = np.triu_indices(len(lower), 1)
-        keep = rows[0] < moving
-        return rows[0][keep], rows[1][keep]
-
-    boxes = plugin_boxes(all_pairs)
-    assert len(pair_set(*boxes.find())) == 45 - 6
-    assert boxes.state.pair_search == PLUGIN
-    assert boxes.search.describe() == "strange, as the settings say"
-
-
-@pytest.mark.parametrize(
-    ("answer", "message"),
-    [
-        (None, "must return two arrays of rows, got None"),
-        (([0.5], [1.5]), "must return two integer arrays of one length"),
-        (([0, 1], [1]), "must return two integer arrays of one length"),
-        (([0], [10]), "returned rows 0 and 10: a pair is of two of the 10 rows"),
-        (([7], [8]), "at least one of them among the 6 that move"),
-    ],
-)
-def test_what_a_plugin_must_not_return(answer, message):
-    with pytest.raises(PluginError, match=message):
-        plugin_boxes(lambda *_: answer).find()
 
 
 @both_dimensions

@@ -97,16 +97,6 @@ print(log.waited - log.seconds > 0.9)
     assert run(FUNCTIONS + hold, tmp_path) == ["True"]
 
 
-def test_only_what_the_game_waits_for_is_announced(tmp_path):
-    """A first run that ends early leaves functions to the second one, which has nothing to wait for."""
-    listen = "import logging; logging.getLogger('carom').addHandler(logging.StreamHandler(sys.stdout))\n"
-    ahead = "link_in_background([adding(1.0)])\nwait()\n"
-    assert run(f"import sys; {listen}{FUNCTIONS}{ahead}", tmp_path) == []
-    lines = run(f"import sys; {listen}{FUNCTIONS}{ahead}adding(2.0).link()", tmp_path)
-    assert len(lines) == 1
-    assert lines[0].startswith("carom: compiling kernels that are not in")
-
-
 def test_it_ends_with_the_program(tmp_path):
     run(FUNCTIONS + THE_END, tmp_path)
     assert len(list(tmp_path.glob("*.kernel"))) < 400

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import logging
 import sys
 import types
 
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from carom.framework import compilation
 from carom.framework.compilation import inlined, kernel, packed, part
 from carom.framework.jit import cache as kernel_cache
 from carom.framework.jit.cache import cache_contents, cache_folder, clear_cache
@@ -75,20 +73,6 @@ def test_the_folder_can_be_counted_and_emptied(monkeypatch, tmp_path):
     assert clear_cache() == (1, 5)
     assert cache_contents() == (0, 0)
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
-
-
-def test_a_listener_replaces_the_output(monkeypatch, tmp_path, caplog):
-    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(compilation.log, "announced", False)
-    monkeypatch.setattr(compilation.log, "listeners", [lambda name: None])
-
-    @kernel
-    def quietly(x):
-        return x + 17.0
-
-    with caplog.at_level(logging.DEBUG, "carom"):
-        quietly(1.0)
-    assert [r.levelname for r in caplog.records if r.name == "carom"] == ["INFO"]
 
 
 def test_the_garbage_collector_is_as_it_was_after_compiling_and_after_failing(monkeypatch, tmp_path):
@@ -170,39 +154,6 @@ def test_a_packed_kernel_is_another_one_with_the_same_bits(monkeypatch, tmp_path
     together(x, y, other)
     assert one.tobytes() == other.tobytes()
     assert one == pytest.approx(x + 0.1 * y)
-
-
-def test_functions_that_call_each_other_have_a_hash():
-    def even(n):
-        return n == 0 or odd(n - 1)
-
-    def odd(n):
-        return n != 0 and even(n - 1)
-
-    assert deep_hash(even) != deep_hash(odd)
-
-
-def test_the_log_counts_and_tells_listeners(monkeypatch, tmp_path):
-    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
-    told = []
-    compilation.log.listeners.append(told.append)
-    before = len(compilation.log.compiled)
-    try:
-
-        @kernel
-        def thrice(x):
-            return 3.0 * x
-
-        assert thrice(2.0) == 6.0
-        assert thrice(3.0) == 9.0
-    finally:
-        compilation.log.listeners.remove(told.append)
-    assert len(told) == 1
-    assert "thrice" in told[0]
-    assert len(compilation.log.compiled) == before + 1
-    assert compilation.log.seconds > 0
-    thrice.made._cache.flush()
-    assert not list(tmp_path.glob("*.kernel"))
 
 
 def test_a_process_remembers_a_bounded_number_of_generated_modules(monkeypatch):

@@ -281,22 +281,3 @@ def test_the_first_wait_says_in_one_line_what_is_happening_and_later_ones_nothin
     assert "carom warm-up" in line
     program.run()
     assert program.stderr == ""
-
-
-def test_logging_silences_the_line_or_shows_every_kernel(program):
-    quiet = "import logging; logging.getLogger('carom').setLevel(logging.ERROR)\n"
-    talkative = "import logging; logging.basicConfig(level=logging.INFO)\n"
-    main = program.main
-    program.main = quiet + main
-    program.run()
-    assert program.stderr == ""
-    clear_folder(program)
-    program.main = talkative + main
-    program.run()
-    assert program.stderr.count("INFO:carom:compiling total (") == 2
-    assert program.stderr.count("WARNING:carom:") == 1
-
-
-def clear_folder(program):
-    for path in program.files():
-        path.unlink()

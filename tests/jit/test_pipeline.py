@@ -10,7 +10,7 @@ import pytest
 from llvmlite.binding import Linkage
 from numba.core.compiler import Compiler
 
-from carom.framework.compilation import Kernel, Part, allocating_kernel, kernel, part
+from carom.framework.compilation import allocating_kernel, kernel, part
 from carom.framework.jit import pipeline
 from carom.framework.jit.cache import machine_code
 from carom.framework.jit.dispatchers import KeptDispatcher
@@ -29,11 +29,6 @@ def rooted(x):
     if x < 0.0:
         raise ValueError("no root of a negative number")
     return math.sqrt(halved(x))
-
-
-@part
-def twice(count):
-    return 2 * count
 
 
 @part
@@ -83,14 +78,6 @@ def test_parts_raise_through_kernels():
 
 @jit
 @tried
-def test_parts_have_no_machine_code():
-    compiled(rooted_kernel)(1.0)
-    (result,) = rooted.made.overloads.values()
-    assert machine_code(result).get_pointer_to_function(result.fndesc.llvm_func_name) == 0
-
-
-@jit
-@tried
 def test_parts_are_private_to_their_kernel():
     """Else the code of two cached kernels could hold two parts of one name, and the first would serve both."""
     made = compiled(long_kernel)
@@ -103,29 +90,5 @@ def test_parts_are_private_to_their_kernel():
 
 
 @jit
-def test_constants_share_the_code_of_numbers():
-    @kernel
-    def doubles(count):
-        return twice(3) + twice(4) + twice(count)
-
-    assert compiled(doubles)(5) == 24
-    assert len(twice.made.overloads) == 1
-
-
-@jit
 def test_functions_with_closures_compile_whole():
     assert compiled(nested)(4) == nested.py_func(4)
-
-
-@jit
-def test_python_runs_a_part_as_written():
-    assert isinstance(halved, Part)
-    assert halved(3.0) == 1.5
-    assert not isinstance(halved, Kernel)
-
-
-def test_versions_that_were_not_tried_compile_as_numba_does():
-    first, last = pipeline.TRIED
-    known = first <= numba.version_info.short <= last
-    assert (pipeline.kernel_compiler is not Compiler) == known
-    assert (pipeline.part_compiler is not Compiler) == known

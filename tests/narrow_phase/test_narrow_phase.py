@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from oracles import narrow_naive
-from worlds import EPS, ball, both_dimensions, box, floor, make_world, run
+from worlds import EPS, ball, both_dimensions, box, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, StepError, System
@@ -252,43 +252,6 @@ def test_layers_and_masks(maker, one, two, meet):
     assert world.bodies.linear_velocity[world.bodies.row_of(b), 0] == -speed
 
 
-def test_layers_may_change_between_steps():
-    world = make_world()
-    ball(world, 0.0)
-    b = ball(world, 0.5)
-    for mask, hits in ((-1, 1), (2, 0), (1, 1)):
-        world.component_for_entity(b, SphereCollider).mask = mask
-        world.step()
-        assert len(world.contacts) == hits
-
-
-@pytest.mark.parametrize("both", [False, True])
-def test_sensors_report_and_do_not_react(both):
-    """A ball flies through a sensor at constant speed; begin, stay and end are sent, no impact, no impulse."""
-    world = make_world()
-    sensor = box(world, 0.0, kind="static", sensor=True, restitution=1.0)
-    flying = ball(world, -2.0, 3.0, radius=0.1, sensor=both, restitution=1.0)
-    told = []
-    for name in ("contact_begin", "contact_stay", "contact_end", "impact"):
-        world.on(name, lambda contact, name=name: told.append((name, contact.normal_impulse)))
-    run(world, 80)
-    assert [name for name, _ in told if name != "contact_stay"] == ["contact_begin", "contact_end"]
-    assert all(impulse == 0 for _, impulse in told)
-    assert 20 < len(told) < 30  # 1.2 m at 0.05 m a step
-    assert world.bodies.linear_velocity[world.bodies.row_of(flying), 0] == 3.0
-    assert world.entity_exists(sensor)
-
-
-def test_static_bodies_do_not_meet_each_other():
-    world = make_world()
-    floor(world)
-    floor(world)
-    box(world, 0.0, kind="static")
-    ball(world, (0.0, 5.0))
-    world.step()
-    assert len(world.contacts) == 0
-
-
 @pytest.mark.parametrize("copied", [False, True])
 def test_contacts_read_late_are_those_of_their_step(copied):
     """Created when first read, although rows have moved and steps have begun since; also those of a snapshot."""
@@ -325,14 +288,3 @@ def test_unread_contacts_outlast_the_start_of_a_step_that_fails():
         world.step()
     assert (world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist()) == ([a], [b])
     np.testing.assert_allclose(world.contacts.depth, 0.1, atol=EPS)
-
-
-def test_a_second_shape_among_no_candidates_finds_room():
-    """The counts of pairs by shapes grow with the number of shapes, also where nothing else does."""
-    world = make_world()
-    for x in range(3):
-        world.create_entity(Transform((9.0 * x, 0.0)), RigidBody(), SphereCollider(0.5))
-    world.step()
-    world.add_component(world.create_entity(Transform((50.0, 0.0))), AABBCollider((1.0, 1.0)))
-    world.step()
-    assert len(world.physics.state.candidates.bucket_starts) >= 6

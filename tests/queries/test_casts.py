@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 from worlds import ball, both_dimensions, box, make_world
 
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
-from carom.framework import Plugin, Settings, World, column
+from carom.framework import Plugin, World, column
 from carom.plugins import Physics
 
 
@@ -75,69 +74,6 @@ def test_casts_through_many_bodies(d, n, sizes):
     world.close()
 
 
-def swept_sphere(y, z=0.0, radius=1.0):
-    """B13: a sphere that flies from x = -5 with (2, 0, 0) at the box [-1, 1]^3; its cast, in units of time."""
-    world = make_world(3)
-    box(world, (0, 0, 0), half=1.0, kind="static")
-    hits = world.shape_cast(SphereCollider(radius), (-5.0, y, z), (20.0, 0.0, 0.0))
-    many = world.shape_casts(SphereCollider(radius), [(-5.0, y, z)], (20.0, 0.0, 0.0))
-    assert (many.entity[0] >= 0) == bool(hits)
-    world.close()
-    return hits
-
-
-@pytest.mark.parametrize(
-    ("y", "z", "time", "normal"),
-    [
-        (0.0, 0.0, 1.5, (-1.0, 0.0, 0.0)),
-        (1.6, 0.0, 1.6, (-0.8, 0.6, 0.0)),
-        (1 + 3 / 7, 1 + 6 / 7, 13 / 7, (-2 / 7, 3 / 7, 6 / 7)),
-    ],
-)
-def test_b13_face_edge_corner(y, z, time, normal):
-    (hit,) = swept_sphere(y, z)
-    assert hit.distance / 2 == pytest.approx(time, rel=1e-12)
-    assert hit.fraction * 10 == pytest.approx(time, rel=1e-12)
-    np.testing.assert_allclose(hit.normal, normal, atol=1e-12)
-    if z == 0.0 and y > 0.0:
-        np.testing.assert_allclose(hit.point, (-1.0, 1.0, 0.0), atol=1e-12)
-
-
-def exact_time(y):
-    """Of the sphere that meets the edge at (-1, 1): (4 - sqrt(1 - (y - 1)^2)) / 2, from the rounded y, in fractions."""
-    rest = 1 - (Fraction(y) - 1) ** 2
-    root = Fraction(math.isqrt(rest.numerator * rest.denominator * 4**200), rest.denominator * 2**200)
-    return float((4 - root) / 2)
-
-
-@pytest.mark.parametrize("below", [1e-3, 1e-6, 1e-9])
-def test_b13_nearly_a_graze(below):
-    (hit,) = swept_sphere(2.0 - below)
-    scale = math.hypot(5.0, 2.0)  # |p|
-    assert hit.distance / 2 == pytest.approx(exact_time(2.0 - below), abs=1e-12 * scale / 2)
-    if below == 1e-9:
-        assert hit.distance / 2 == pytest.approx(1.99997764, abs=5e-9)
-        assert hit.normal[0] == pytest.approx(-4.47e-5, rel=1e-3)
-
-
-def test_b13_tangent_and_beyond():
-    for hit in swept_sphere(2.0):  # hit and miss are both right, the place must be correct
-        nearest = np.clip((-5.0 + hit.distance, 2.0, 0.0), -1.0, 1.0)
-        assert np.linalg.norm((-5.0 + hit.distance, 2.0, 0.0) - nearest) == pytest.approx(1.0, abs=1e-9)
-    assert swept_sphere(2.0 + 1e-9) == []
-
-
-@pytest.mark.parametrize("by", [1e-12, 1e-16])
-def test_c15_grazing_spheres(by):
-    world = make_world()
-    ball(world, (0, 0), radius=0.5)
-    for sign in (-1, 1):
-        y = 1.0 * (1 + sign * by)
-        for hit in world.shape_cast(SphereCollider(0.5), (-10, y), (20, 0)):
-            assert math.hypot(-10 + hit.distance, y) == pytest.approx(1.0, abs=1e-9)
-    world.close()
-
-
 def test_b13_radius_zero_is_a_ray():
     world = make_world(3)
     box(world, (0, 0, 0), half=1.0, kind="static")
@@ -150,28 +86,6 @@ def test_b13_radius_zero_is_a_ray():
         for one, two in zip(ray, sphere, strict=True):
             assert one.distance == pytest.approx(two.distance, rel=1e-14)
             np.testing.assert_allclose(one.point, start + one.distance * way / np.linalg.norm(way), atol=1e-14)
-    world.close()
-
-
-@both_dimensions
-@pytest.mark.parametrize("gap", [1e-15, 1e-12, 1e-6])
-def test_b14_nearly_touching_spheres(d, gap):
-    """The distance is the gap, to the rounding of the start itself."""
-    world = make_world(d)
-    ball(world, 0, radius=1.0)
-    start = np.zeros(d)
-    start[0] = -(2.0 + gap)
-    (hit,) = world.shape_cast(SphereCollider(1.0), start, -start)
-    assert hit.distance == pytest.approx(-start[0] - 2.0, abs=4e-16 * 2)
-    world.close()
-
-
-def test_b14_far_start():
-    world = make_world()
-    ball(world, (0, 0), radius=1.0)
-    for origin in (1e7, 1e9, 1e12):
-        (hit,) = world.ray_cast((-origin, 0.0), (1, 0))
-        assert hit.distance == pytest.approx(origin - 1.0, abs=4e-16 * origin)
     world.close()
 
 
@@ -277,16 +191,6 @@ def test_the_shape_of_a_plugin_is_met_and_casts():
     assert world.query_point((5.4, 0.5)) == [gem]
     assert world.query_point((5.6, 0.5)) == []
     assert world.query_aabb((4, -1), (6, 1)) == []  # there is no pair with boxes
-    world.close()
-
-
-def test_geometry_setting_counts():
-    """Queries use the same level as contacts."""
-    world = World(Physics(), settings=Settings())
-    world.create_entity(Transform((5, 0)), SphereCollider(1.5), AABBCollider((1.0, 1.0)))
-    assert world.ray_cast((0, 0), (1, 0))[0].distance == 4.0
-    world.settings = world.settings.replace(geometry="bounds")
-    assert world.ray_cast((0, 0), (1, 0))[0].distance == 3.5
     world.close()
 
 numbers = st.floats(-3, 3, allow_subnormal=False)

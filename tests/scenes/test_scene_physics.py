@@ -7,8 +7,7 @@ import pytest
 
 from carom import scenes
 from carom.components import AABBCollider
-from carom.framework import Settings
-from carom.scenes import conveyor, cradle, galperin, lift, pile, platforms
+from carom.scenes import conveyor, lift, pile, platforms
 
 G = 9.81
 SLOP = 0.005  # of a size: overlap that the solver does not correct
@@ -27,44 +26,6 @@ def kinetic_energy_per_body(world):
 
 def solid_depths(world):
     return np.maximum(np.asarray(world.contacts.depth), 0.0)
-
-
-@pytest.mark.parametrize("gap", [0.0, 1e-6, 0.01])
-@pytest.mark.parametrize("dt", [1 / 60, 1 / 240])
-def test_as_many_balls_fly_off_as_arrive(gap, dt):
-    """B16: equal masses and e = 1 exchange velocities, one impact at a time, at any gap: only 0 and 1 remain.
-
-    Each line has only its five balls, so all four are tested at once. Rounding: 20 exchanges of 0 and 1.
-    """
-    with cradle.build(Settings(dt=dt), gap=gap) as world:
-        start = world.bodies.dynamic.position.reshape(4, 5, 2).copy()
-        steps(world, 6.0)
-        velocity = world.bodies.dynamic.linear_velocity.reshape(4, 5, 2)
-        position = world.bodies.dynamic.position.reshape(4, 5, 2)
-        for k, line in enumerate(velocity, 1):
-            np.testing.assert_allclose(line[:, 0], np.arange(5) >= 5 - k, rtol=0, atol=1e-12)
-        np.testing.assert_array_equal(velocity[..., 1], 0.0)
-        for k, (was, now) in enumerate(zip(start, position, strict=True), 1):
-            index = np.arange(5)
-            free = was[:, 0] - index  # diameters removed: points that pass through each other
-            points = np.sort(np.where(index < k, free + 6.0 * cradle.SPEED, free))
-            np.testing.assert_allclose(now[:, 0], points + index, rtol=0, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("digits", "settings", "seconds"),
-    [(0, Settings(), 5.0), (1, Settings(), 5.0), (1, Settings(dt=1 / 1000), 5.0), (2, None, 9.0)],
-)
-def test_the_blocks_count_the_digits_of_pi(digits, settings, seconds):
-    """B17: all impacts of a step are handled in order, so even 60 Hz counts right while nothing tunnels."""
-    with galperin.build(settings, digits=digits) as world:
-        counter = next(system for system in world.systems if isinstance(system, galperin.ImpactCounter))
-        energy = world.kinetic_energy()
-        steps(world, seconds)
-        assert counter.count == galperin.impacts(digits)
-        assert world.kinetic_energy() == pytest.approx(energy, rel=1e-12)
-        light, heavy = world.bodies.dynamic.linear_velocity[:, 0]
-        assert 0 <= light <= heavy  # no more to come
 
 
 @pytest.mark.parametrize(("name", "n", "dimensions", "seconds"), [("pile2d", 400, 2, 10.0), ("pile3d", 343, 3, 20.0)])

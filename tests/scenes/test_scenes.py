@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from pathlib import Path
@@ -13,7 +12,7 @@ import pytest
 from carom import scenes
 from carom.components import Transform
 from carom.framework import Settings, World
-from carom.scenes import conveyor, gas, jump, player
+from carom.scenes import conveyor, jump, player
 from carom.scenes.random_numbers import uniform
 
 WITHOUT_CHANCE = {  # any seed gives the same world
@@ -38,30 +37,6 @@ def test_random_numbers_are_the_published_sequence(count):
 
 def test_another_seed_is_another_sequence():
     assert uniform(5, seed=7).tolist() == published_generator(5, 12345 + 7)
-
-
-@pytest.mark.parametrize(("n", "dimensions", "cells"), [(1000, 2, 32), (1000, 3, 10), (10_000, 3, 22), (1, 2, 1)])
-def test_gas_is_drawn_body_by_body_position_before_velocity(n, dimensions, cells):
-    positions, velocities = gas.initial_state(n, dimensions)
-    side = math.sqrt(n * math.pi) if dimensions == 2 else (n * (math.pi / 6) / 0.1) ** (1 / 3)
-    s = side / cells
-    a = 0.45 * (s - 1)
-    u = iter(published_generator(2 * dimensions * min(n, 200)))
-    for k in range(min(n, 200)):
-        cell = [k % cells, k // cells % cells, k // cells**2][:dimensions]
-        expected = [(c + 0.5) * s + a * (2 * next(u) - 1) for c in cell]
-        np.testing.assert_allclose(positions[k], expected, rtol=1e-14)
-        np.testing.assert_allclose(velocities[k], [-5 + 10 * next(u) for _ in range(dimensions)], rtol=1e-14)
-
-
-def test_gas_starts_without_overlap_and_fills_what_it_says():
-    positions, _ = gas.initial_state(1000, 2)
-    distance = np.linalg.norm(positions[:, None] - positions, axis=2) + 9 * np.eye(1000)
-    assert distance.min() > 1.0
-    assert positions.min() > 0.5
-    assert positions.max() < gas.side(1000, 2) - 0.5
-    assert 1000 * math.pi / 4 / gas.side(1000, 2) ** 2 == pytest.approx(0.25)
-    assert 1000 * math.pi / 6 / gas.side(1000, 3) ** 3 == pytest.approx(0.1)
 
 
 def test_names_and_get():
@@ -206,12 +181,6 @@ def test_the_player_sees_what_brute_force_sees_and_pushes_what_it_meets():
     assert surely_near <= set(radar.near) <= perhaps_near | walls
     pushed = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1) > 0.1
     assert 1 < pushed.sum() < 2000
-    world.close()
-
-
-def test_settings_of_a_scene_can_be_replaced():
-    world = scenes.get("billiards").build()
-    assert dataclasses.replace(world.settings, dt=1 / 60) == Settings.balanced()
     world.close()
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from carom import scenes
-from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.scenes import player_query, pyramid, static_world
+from carom.components import AABBCollider, SphereCollider, Transform
+from carom.scenes import player_query, static_world
 from carom.scenes.sizes import ceil_root, floor_root
 
 GENERATORS = ["gas2d", "gas3d", "mixed2d", "fastgas", "pile2d", "pile3d", "static_world", "freefall", "player_query"]
@@ -252,19 +252,6 @@ def test_nothing_overlaps_at_the_start(name, seed):
         assert min(gaps(world).values()) > -1e-12
 
 
-def test_gaps_sees_an_overlap():
-    with make("stack", n=2) as world:
-        upper = int(world.bodies.dynamic.entity[1])
-        for position, gap in (((0.0, 1.5), 0.0), ((0.2, 1.4), -0.1), ((0.9, 1.2), -0.1), ((2.0, 3.0), 1.5)):
-            world.component_for_entity(upper, Transform).position = position
-            assert gaps(world)[upper] == pytest.approx(gap)
-        ball = world.create_entity(Transform((0.0, 6.0)), RigidBody(), SphereCollider(0.5))
-        world.refresh_queries()
-        for position, gap in (((2.0, 5.0), 1.0), ((3.5, 4.5), math.hypot(1, 1) - 0.5), ((2.0, 3.7), -0.3)):
-            world.component_for_entity(ball, Transform).position = position
-            assert gaps(world)[ball] == gaps(world)[upper] == pytest.approx(gap)
-
-
 @pytest.mark.parametrize("name", [*GENERATORS, "maze", "platforms", "conveyor", "stack"])
 @pytest.mark.parametrize(
     ("n", "error", "message"),
@@ -317,9 +304,3 @@ def test_roots_of_whole_numbers_are_exact():
             assert floor_root(m**degree, degree) == ceil_root(m**degree, degree) == m
             assert (floor_root(m**degree + 1, degree), ceil_root(m**degree + 1, degree)) == (m, m + 1)
             assert ceil_root(m**degree - 1, degree) == (m if m > 1 else 0)
-
-
-def test_the_bench_can_have_what_it_wants():
-    assert len(pyramid.initial_positions(50)) == 1275
-    with make("static_world", n=10) as world:
-        assert len(world.bodies.dynamic) == 10
