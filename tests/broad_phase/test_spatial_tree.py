@@ -135,8 +135,7 @@ def test_any_scale_and_any_spread(d, seed, exponent, n):
 @pytest.mark.parametrize("n", [10, 32, 100])
 @pytest.mark.parametrize("spacing", [1.0, 0.25, 2.0**-30, 2.0**40])
 def test_lattice_of_touching_discs(n, spacing):
-    """Touching counts: the boxes of n x n discs at spacing 2 R touch 2 n (n - 1) times along the axes, and
-    2 (n - 1)^2 times at corners. At one ulp less of size none touch."""
+    """Touching counts: n x n discs meet 2 n (n - 1) times along axes and 2 (n - 1)^2 at corners; an ulp less, never."""
     centre = np.stack(np.meshgrid(np.arange(n), np.arange(n)), axis=-1).reshape(-1, 2) * spacing
     lower, upper = centre - spacing / 2, centre + spacing / 2
     first, second = tree_of(lower, upper).pairs_within()

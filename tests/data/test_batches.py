@@ -1,5 +1,4 @@
-"""Entities created in bulk: they have no Python objects before somebody asks for them, and to users they are like any
-other entity."""
+"""Entities created in bulk have no Python objects before somebody asks, and are like any other to users."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""A ball on a floor for a long time, at true impact times: A1, B11 and B12 of the accuracy list. Energy at every step,
-times of impacts, sequences that end (Zeno), and no drift."""
+"""A ball on a floor for a long time: energy, times, sequences that end (Zeno), no drift: A1, B11, B12."""
 
 from __future__ import annotations
 
@@ -46,10 +45,7 @@ def test_a1_energy_at_every_step(mode, integrator, dt, d):
 
 @pytest.mark.parametrize("dt", [1e-3, 4e-3, 1e-2, 4e-2, 0.1])
 def test_a1_bound_of_semi_implicit_euler(dt):
-    """The lag floor (M g dt / 2)^2 (2/3) g (H - R), and the cycle of two bounces on top: 7.5 times the floor at most.
-
-    The floor is the published column of ODE (185.03 at 1e-3 for 49 spheres), and nothing can be below it.
-    """
+    """At least the lag floor (M g dt / 2)^2 (2/3) g (H - R), ODE's published column; at most 7.5 times that."""
     errors, hits = bounce_errors("continuous", "semi_implicit_euler", dt)
     lag = (10 * G * dt / 2) ** 2 * 2 / 3 * G * 4.9
     assert 0.9 * lag < errors.mean() <= 7.5 * lag
@@ -68,8 +64,7 @@ def dropped(mode, integrator, **settings):
 
 @exact
 def test_b11_times_and_flights(mode, integrator):
-    """Impact n at T0 (1 + 2 e (1 - e^(n-1)) / (1 - e)), flight n with the energy of h e^(2n), as long as the approach
-    is above the threshold of 2 g dt. Rounding grows with e = 1.5 as the energy does: relative."""
+    """Impact n at T0 (1 + 2 e (1 - e^(n-1)) / (1 - e)), flight n with the energy of h e^(2n), above 2 g dt."""
     world, balls = dropped(mode, integrator)
     t0, u = math.sqrt(2 * DROP / G), math.sqrt(2 * G * DROP)
     hits = strikes(world, 300)
@@ -112,9 +107,7 @@ HEIGHTS = np.array([4.9, 3.1, 2.7, 6.3, 8.8])
 
 @pytest.mark.parametrize("rate", [60, 240])
 def test_b12_apex_of_even_bounces(rate):
-    """Semi-implicit Euler conserves v^2/2 + g y - g dt v/2 in flight, and so the apex of the flight's parabola. The
-    error of the sweep, which uses the step's own v, is reversed by the next bounce: every second flight is equal to
-    1e-10; the others differ by up to u dt."""
+    """v^2/2 + g y - g dt v/2 of every second flight is equal to 1e-10; others differ by up to u dt."""
     world = mode_world("continuous", gravity=G, dt=1 / rate)
     floor(world)
     rows = rows_of(world, [ball(world, (2.0 * k, h + 0.1), radius=0.1, restitution=1.0) for k, h in enumerate(HEIGHTS)])

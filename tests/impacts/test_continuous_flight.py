@@ -1,5 +1,4 @@
-"""Impacts of bodies on parabolas, at the time of the closed form: on static geometry, at the apex, and
-between two bodies with different accelerations."""
+"""Impacts on parabolas at the time of the closed form: static geometry, the apex, different accelerations."""
 
 from __future__ import annotations
 
@@ -58,8 +57,7 @@ def test_parabolas_onto_static_geometry(method, dt, target, d):
 @pytest.mark.parametrize("dt", [0.25, 1.0])
 @pytest.mark.parametrize("target", ["ball", "box"])
 def test_the_top_of_a_parabola_touches_a_ceiling(mode, dt, target, d):
-    """Its apex would be ``over`` too high: it meets the ceiling at (v0 - sqrt(2 g over)) / g, and not at all if over <
-    0. Rounding of the height, 1e-16, changes the time by that over the speed sqrt(2 g over)."""
+    """An apex ``over`` too high meets the ceiling at (v0 - sqrt(2 g over)) / g, to 1e-16 over the speed there."""
     g, v0, top = 8.0, 0.88, 0.88**2 / 16
     for over in (1e-3, 1e-6, 1e-9, 1e-12, -1e-12, -1e-9):
         world = mode_world(mode, d, g, dt=dt, integrator="velocity_verlet", restitution_threshold=0.0)

@@ -1,5 +1,4 @@
-"""Impacts at their true time, with the step completed: A9, B9, B10, C9 of the accuracy list, kinematic walls and
-the threshold, in the continuous and the event-driven mode; what is slow in discrete worlds too."""
+"""Impacts at their true time, with the step completed: A9, B9, B10, C9, kinematic walls, the threshold."""
 
 from __future__ import annotations
 
@@ -76,10 +75,7 @@ def test_a9_boxes_at_120_metres_a_second(mode, d):
 @every_mode
 @makers
 def test_b9_two_bodies(mode, d, maker):
-    """v1' = v1 - (1+e) m2/(m1+m2) w, v2' = v2 + (1+e) m1/(m1+m2) w: 4 eps of the speeds, of the momentum for it.
-
-    Each pair is on a separate lane; they meet within three steps, and complete these. Discrete ones come slowly.
-    """
+    """v1' = v1 - (1+e) m2/(m1+m2) w, v2' = v2 + (1+e) m1/(m1+m2) w: to 4 eps of the speeds, and the momentum."""
     world, slow = mode_world(mode, d), 0.02 if mode == "discrete" else 1.0
     v1, v2, apart, end = 100.0 * slow, -50.0 * slow, 1.0 + 2.0 * slow, 3 * DT
     pairs, toi = [], 2 / 150
@@ -137,8 +133,7 @@ OBLIQUE = {
     [*pairwise(MODES, (1 / 60, 1 / 3, 1.0, 5.0), (0.5, 0.2)), *pairwise(("discrete",), (1 / 240, 1 / 3), (0.5, 0.2))],
 )
 def test_b10_oblique_impact(mode, d, dt, radius):
-    """Over 16 phases of the step, which may contain the whole scene: time, normal, point and final state to the
-    rounding of lanes up to 600 m away (1e-13). Discrete ones must overlap at the end of a step."""
+    """Over 16 phases of the step: time, normal, point, final state to the rounding of lanes up to 600 m away."""
     start, toi, normal, cases = OBLIQUE[d]
     for e, m2, v1, v2 in cases:
         world = mode_world(mode, d, dt=dt)
@@ -169,10 +164,7 @@ def test_b10_oblique_impact(mode, d, dt, radius):
 @each_mode
 @makers
 def test_a_piston_drives_a_ball(mode, d, maker):
-    """Between a wall and a piston at 5 m/s, speeds go 100, 110, 120...: each impact turns v into 2 V - v.
-
-    Reference: the impacts one by one; 20 of them, several in one step; rounding of 1e-15 each and of the times.
-    """
+    """Between a wall and a piston at 5 m/s each impact turns v into 2 V - v: 100, 110, 120...; several in a step."""
     world = mode_world(mode, d, max_impacts_per_step=50)
     size = {"radius": 0.1} if maker is ball else {"half": 0.1}
     mover = maker(world, 1.0, 100.0, restitution=1.0, **size)
@@ -245,8 +237,7 @@ def test_threshold(mode, d, share, bounces):
 
 @each_mode
 def test_what_is_slow_but_tiny_does_not_tunnel(mode):
-    """Its approach of 0.16 m/s is below the default threshold of 2 g dt, but it moves 3 mm per step, 13 times its
-    size, and the sheet is thinner still: no bounce, it stays on top."""
+    """Below the threshold, but 13 times its size per step, and the sheet is thinner still: it stays on top."""
     world = mode_world(mode, gravity=G, integrator="velocity_verlet")
     box(world, (0.0, -5e-5), half=(1.0, 5e-5), kind="static")
     speck = ball(world, (0.0, 1.2e-3), (0.0, -0.05), radius=1e-4, restitution=0.5)

@@ -1,5 +1,4 @@
-"""Swept bodies against rows of bodies: pushed rows, impacts on rows, seams of floors, tile maps; and damping and
-forces around a bounce."""
+"""Swept bodies against rows: pushed, struck, seams of floors, tile maps; damping and forces around a bounce."""
 
 from __future__ import annotations
 
@@ -21,9 +20,7 @@ G = 10.0
 
 @pytest.mark.parametrize(("mode", "gap", "speed"), pairwise(SWEPT, (0.0, 0.01, 0.5), (10.0, 30.0, 300.0)))
 def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
-    """Five plastic balls are pushed along: none ends up behind it, their order is kept, each is as fast as the ram; or
-    faster where the solver for contacts at rest takes the impact (up to a quarter in rows, docs/limits.md), or a
-    little slower while it closes a gap of less than the margin of contacts, a hundredth of it in each step."""
+    """None ends up behind it, in order, each as fast as the ram, or up to a quarter faster (docs/limits.md)."""
     world = mode_world(mode, max_impacts_per_step=64)
     row = [bullet(world, k * (0.2 + gap), 0.0, radius=0.1) for k in range(5)]
     ram = bullet(world, -0.5, speed, half=(0.02, 1.0), kind="kinematic")
@@ -39,8 +36,7 @@ def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
 @pytest.mark.parametrize("mass", [1.0, 1000.0])
 @pytest.mark.parametrize("speed", [30.0, 300.0])
 def test_a_plastic_impact_on_a_row(mode, mass, speed):
-    """All move together: v M / (M + 5), so the energy is M / (M + 5) of the initial one; momentum to rounding. Where
-    the solver for contacts at rest takes the impact, speeds differ by a few per cent."""
+    """All move together, v M / (M + 5), with that share of the energy; momentum to rounding."""
     world = mode_world(mode)
     row = [bullet(world, 0.2 * k, 0.0, radius=0.1) for k in range(5)]
     ram = bullet(world, -0.5, speed, half=(0.02, 1.0), mass=mass)
@@ -147,8 +143,7 @@ class Spring(ForceSystem):
 
 @pytest.mark.slow
 def test_a_spring_with_a_wall_is_of_second_order_in_event_driven_worlds():
-    """Half an oscillator: an elastic wall at its centre, x = |cos 2t|. Half the step gives a quarter of the error, over
-    12 phases, with some scatter; a first-order method would give a half."""
+    """An elastic wall at its centre, x = |cos 2t|: half the step gives a quarter of the error, with some scatter."""
     errors = []
     for rate in (60, 120, 240):
         square = 0.0

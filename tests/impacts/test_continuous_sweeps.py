@@ -1,5 +1,4 @@
-"""No tunnelling: B13, B15 and C5 of the accuracy list as worlds, bullets against bullets and against static shapes,
-filters and disabled contacts. Continuous, event-driven, and bodies with ``ccd`` in a discrete world."""
+"""No tunnelling: B13, B15, C5 as worlds; bullets that meet, filters, disabled contacts; also single ccd bodies."""
 
 from __future__ import annotations
 
@@ -44,8 +43,7 @@ SWEEPS = [
     ("mode", "unit", "drift", "case"), pairwise(SWEPT, (1.0, 1e-3, 1e4), (0.0, 0.75), range(len(SWEEPS)))
 )
 def test_b13_sphere_against_box(mode, unit, drift, case):
-    """All within one step of 3 s: |dt| <= 1e-12 |p| / |v|, the reflected velocity, the rest of the path. Also with a
-    common velocity added, so that the box moves too; and in 2D where the case is flat."""
+    """Within one step of 3 s: |dt| <= 1e-12 |p| / |v|, the velocity, the rest of the path; also seen in motion."""
     (y, z), toi, normal = SWEEPS[case]
     for d in (3,) if z else (2, 3):
         world = mode_world(mode, d, dt=3.0)
@@ -75,11 +73,7 @@ def test_b13_sphere_against_box(mode, unit, drift, case):
 @both_dimensions
 @each_sweep
 def test_b13_tangent_point_and_overlap(mode, d):
-    """A tangent touches without impulse; a point is a ray; overlapping bodies have their impact at t = 0 if they
-    approach.
-
-    Rounding of the squares gives the tangent a cosine of at most sqrt(eps): 3e-8 of the speed, taken twice, and more.
-    """
+    """A tangent touches without impulse (to sqrt(eps)); a point is a ray; overlapping approach hits at t = 0."""
     world = mode_world(mode, d, dt=3.0)
     box(world, along(d), half=1.0, kind="static")
     tangent = bullet(world, along(d, -5.0, 2.0), 2.0, radius=1.0, restitution=1.0)
@@ -105,8 +99,7 @@ def test_b13_tangent_point_and_overlap(mode, d):
 @both_dimensions
 @each_sweep
 def test_c5_thin_wall(mode, d):
-    """R = 0.1, wall 0.1 thick, 1 to 1e6 m/s, e = 1 and 0, four phases of the step: all bounce or stop, where and when
-    they should (eps of the way, which is up to 2e4 m a step)."""
+    """R = 0.1, wall 0.1 thick, 1 to 1e6 m/s, four phases: all bounce or stop where and when they should."""
     world = mode_world(mode, d)
     box(world, 0.05, half=along(d, 0.05, 1e3, 1e3), kind="static")
     shots = []
@@ -194,12 +187,7 @@ def meet(rng, d, shapes):
 @each_sweep
 @pytest.mark.parametrize("shapes", ["ball, ball", "box, box", "box, ball: face", "box, ball: corner"])
 def test_two_bullets_meet(mode, d, shapes):
-    """40 pairs, traced back from a touch within the step: time, normal, velocities and final positions.
-
-    At 1e3 to 1e5 m/s they come from up to 3 km away and overlap for less than 1e-4 of the step. The tangential planes
-    separate them before, because both are convex. Rounding: eps of the path, divided by the size for the normal of
-    curved shapes, by the cosine of at least 0.3 for the time.
-    """
+    """40 pairs, traced back from a touch within the step, at up to 1e5 m/s; rounding over size and cosine."""
     rng = np.random.default_rng(d)
     world = mode_world(mode, d)
     make = {"ball": {"radius": 0.1}, "box": {"half": 0.1}}
@@ -256,8 +244,7 @@ def field(with_bullets):
 
 
 def test_one_bullet_in_a_discrete_world():
-    """It hits the first plate after 9.94 ms: 1 kg on 3 kg, e = 1: -500 and 500; that plate hits the second, e = 0.
-    The bullet without ccd passes all of them. Slow bodies elsewhere: the same bits as without bullets."""
+    """1 kg on 3 kg, e = 1: -500 and 500; without ccd it passes; slow bodies elsewhere keep their bits."""
     world, slow, plates, bullets = field(True)
     without, same, *_ = field(False)
     np.testing.assert_array_equal(positions(world, slow), positions(without, same))

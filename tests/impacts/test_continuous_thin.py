@@ -1,5 +1,4 @@
-"""Things without thickness stop each other: they touch on the side that they come from, not on the one that rounding
-says."""
+"""Things without thickness stop each other: they touch on the side that they come from."""
 
 from __future__ import annotations
 
@@ -20,8 +19,7 @@ swept = pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 
 
 def crosses(place, velocity, half, axis, reach):
-    """Whether a way of one step from ``place``, as seen from a box without extent along ``axis``, surely leads through
-    it: in exact numbers. reach: (d,) half extents of what moves."""
+    """Whether a step from ``place`` surely leads through a box flat along ``axis``; reach: (d,) of what moves."""
     time = -Fraction(place[axis]) / Fraction(velocity[axis])
     if not 0 < time < Fraction(DT):
         return False
@@ -88,8 +86,7 @@ def test_nothing_passes_through(mode, d, kind, restitution):
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
 @swept
 def test_points_stay_in_a_room_without_walls_thickness(mode, integrator, d):
-    """Under gravity too: curved paths come back to the wall they have left. Without a threshold, as what is too slow to
-    bounce is a contact at rest, and these need some thickness."""
+    """Curved paths come back to the wall they have left; no threshold, as contacts at rest need some thickness."""
     for gravity in (0.0, 9.81):
         rules = {"collision": mode, "integrator": integrator, "max_impacts_per_step": 64, "restitution_threshold": 0.0}
         world = kit.make_world(d, gravity, **rules)

@@ -1,5 +1,4 @@
-"""``Settings(collision="event_driven")``: all impacts of a step in order of time. B16 and B17 of the accuracy list,
-infinite sequences, piles, simultaneous impacts; flight exact under gravity, of second order under other forces."""
+"""``collision="event_driven"``: impacts in order of time (B16, B17), infinite sequences, exact flight."""
 
 from __future__ import annotations
 
@@ -23,11 +22,7 @@ DT, G = 1 / 60, 9.81
     pairwise(("discrete", *MODES), (ball, box), (1.0, 120.0), (0.0, 1e-6, 0.01), (1, 2, 3, 4)),
 )
 def test_b16_cradle(mode, maker, speed, gap, arriving):
-    """k arrive, k leave, one impact after the other at any gap; also at 2 m per step, when all is over within one.
-
-    Equal bodies exchange velocities: apart from their widths they pass through each other, so positions at any time are
-    the sorted free flights plus the widths.
-    """
+    """k arrive, k leave at any gap: positions are the sorted free flights plus the widths of the bodies."""
     world = mode_world(mode, max_impacts_per_step=20)
     speed = 1.0 if mode == "discrete" else speed
     start = np.arange(5) * (1 + gap)
@@ -46,8 +41,7 @@ def test_b16_cradle(mode, maker, speed, gap, arriving):
 
 
 def check_galperin(settings, digits, seconds):
-    """Count ceil(pi / atan(sqrt(m/M))) - 1; impact j at 2 - 1 / (sqrt(M) tan(j atan(sqrt(m/M)))), where the
-    straight line of the unfolded wedge crosses the j-th copy of its side; energy 1e-9."""
+    """ceil(pi / atan(sqrt(m/M))) - 1 impacts, the j-th at 2 - 1 / (sqrt(M) tan(j atan(sqrt(m/M))))."""
     world = galperin.build(settings, digits=digits)
     energy = world.kinetic_energy()
     hits = strikes(world, round(seconds / settings.dt))
@@ -80,8 +74,7 @@ def test_b17_galperin_3141592(digits):
 @both_dimensions
 @each_mode
 def test_impacts_are_reported_in_the_order_of_time(mode, d):
-    """Many fast balls and boxes in a closed room: within each step ordered by (time, a, b), impulses positive,
-    normals of length 1, times within the step."""
+    """In a step ordered by (time, a, b); impulses positive, normals of length 1, times within the step."""
     world = mode_world(mode, d, max_impacts_per_step=1000)
     for axis in range(d):
         for side in (-1, 1):
@@ -114,12 +107,7 @@ def test_impacts_are_reported_in_the_order_of_time(mode, d):
 @each_mode
 @pytest.mark.parametrize("speed", [1.0, 100.0])
 def test_inelastic_collapse_ends(mode, speed):
-    """A line of 20 with e = 0.3 that contracts: infinitely many impacts in a finite time. Bounded work in every
-    step, no body passes another, momentum conserved, energy never raised, and in the end no body approaches another.
-
-    A row that is pressed together overlaps for a moment, the deeper the faster, and is pushed apart a little, as in the
-    discrete mode: a limit of the solver for contacts at rest. No body passes another.
-    """
+    """20 bodies, e = 0.3: bounded work, none passes another, momentum kept, energy not raised, an end."""
     world = mode_world(mode)
     start = 1.2 * np.arange(20)
     line = [bullet(world, x, speed * (1 - x / 11.4), radius=0.5, restitution=0.3) for x in start]
@@ -139,8 +127,7 @@ def test_inelastic_collapse_ends(mode, speed):
 @both_dimensions
 @pytest.mark.parametrize("dt", [1 / 60, 1 / 7, 1.0, 5.0])
 def test_flight_is_the_exact_parabola(d, dt):
-    """Gravity, its scale, constant forces, forces applied for a step: rounding at any dt, the same bits for any
-    integrator setting."""
+    """Gravity, its scale, constant and applied forces: rounding at any dt, the same bits for any integrator."""
     found = []
     for integrator in ("semi_implicit_euler", "rk4"):
         world = make_world(d, G, dt=dt, collision="event_driven", integrator=integrator)
@@ -169,8 +156,7 @@ class Anchor(ForceSystem):
 
 
 def deviation(n, exact, *systems, gravity=0.0, **body):
-    """Deviation from the exact (position, velocity) after 1 s in n steps, of a body of 1 kg from (1, 0) with (0.5,
-    2)."""
+    """Deviation from the exact (position, velocity) after 1 s in n steps, from (1, 0) with (0.5, 2)."""
     world = make_world(gravity=gravity, dt=1 / n, collision="event_driven")
     for system in systems:
         world.add_system(system())
@@ -180,8 +166,7 @@ def deviation(n, exact, *systems, gravity=0.0, **body):
 
 
 def test_other_forces_are_of_second_order():
-    """Spring: half a kick at both ends of the step. Also under gravity and with damping: half the step gives a quarter
-    of the error, within 5 %; without gravity the damped velocity is exact."""
+    """Half the step, a quarter of the error, within 5 %; without gravity the damped velocity is exact."""
     x, v = np.array((1.0, 0.0)), np.array((0.5, 2.0))
     sag = np.array((0.0, -G / 4))
     spring = [

@@ -1,5 +1,4 @@
-"""B20: an elastic gas. Energy alone proves nothing (a gas that misses collisions conserves it too), so the pressure on
-the walls and the collision rate are compared with statistical mechanics."""
+"""B20: an elastic gas against statistical mechanics: pressure on the walls and collision rate."""
 
 from __future__ import annotations
 
@@ -16,10 +15,7 @@ CAP = 100  # impacts per body and step: not tested here
 
 @pytest.mark.parametrize("dt", [0.3, 0.1, 0.03])
 def test_pressure_and_rate_of_an_elastic_gas(dt):
-    """v dt / sigma = dt. Energy to 1e-12. Z and the rate may fall short by 2 v dt / sigma (B20), never exceed.
-
-    Noise: 24 s are 11,500 collisions and 2,200 hits on walls; relative error of Z 2 / sqrt(11500), 3 sigma: 5.6 %.
-    """
+    """Z and the rate fall short by 2 v dt / sigma at most (B20), and never exceed; 3 sigma of the noise are 5.6 %."""
     found = measure(*gas(dt, 1, max_impacts_per_step=CAP), 24.0)
     noise = 0.056
     assert found.drift < 1e-12

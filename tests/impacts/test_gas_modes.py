@@ -17,8 +17,7 @@ pytestmark = pytest.mark.early
 @each_mode
 @pytest.mark.parametrize("dt", [0.3, 0.1])
 def test_pressure_and_rate(mode, dt):
-    """30,000 collisions: relative noise of Z 2 / sqrt(30000), 3 sigma 3.5 %; of the rate less. Energy: 1e-11. Without
-    gravity and with e = 1 there are no contacts at rest, so no overlap: to the rounding of the box's 32 m."""
+    """30,000 collisions: 3 sigma of Z are 3.5 %; energy to 1e-11; nothing rests, so no overlap but rounding."""
     world, side = gas(dt, seed=1, collision=mode, max_impacts_per_step=1000)
     found = measure(world, side, 62.0)
     assert found.collisions > 28_000
@@ -49,9 +48,7 @@ def test_pressure_and_rate_with_many_collisions(mode, dt):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_velocities_at_impact_and_in_the_end(mode):
-    """<v_n^2> = 4 kT / m where two discs meet, kurtosis of a component 3: 12,000 impacts give 4 +- 3 * 4 sqrt(1/12000)
-    (an exponential's spread is its mean); 400 discs at 30 moments 3 +- 3 sqrt(24 / 24000), twice that as they are
-    correlated."""
+    """<v_n^2> = 4 kT / m where two discs meet, kurtosis of a component 3, each within 3 sigma."""
     world, _ = gas(0.1, seed=3, collision=mode)
     squares, fourth, second = [], [], []
     for step in range(340):

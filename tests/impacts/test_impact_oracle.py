@@ -175,8 +175,7 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
 @each_sweep
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
 def test_damping_and_constant_forces(mode, integrator):
-    """They curve the paths, and damp the velocity changes of impacts: on straight paths, parabolas, flights. Both
-    integrators meet each dimension and each gravity, and these each other."""
+    """Curved paths, and impacts that damping fades; each integrator meets each dimension and each gravity."""
     told = Told()
     for seed in range(24) if integrator == "semi_implicit_euler" else range(25, 49):
         rng = np.random.default_rng(seed)
@@ -231,9 +230,7 @@ def test_several_strike_one_at_the_same_time(mode, d):
 
 @pytest.mark.parametrize(("d", "cap", "pillar"), pairwise((2, 3), (1, 2), (False, True)))
 def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
-    """50 separate clusters of three to eight elastic bullets, with one or two impacts each in a step: stopped bodies
-    keep their velocity, so momentum (without a pillar among them) and energy of every cluster are conserved to
-    rounding."""
+    """50 clusters of elastic bullets: stopped bodies keep their velocity, so each keeps momentum and energy."""
     world = mode_world("continuous", d, max_impacts_per_step=cap)
     clusters = []
     for lane in range(50):

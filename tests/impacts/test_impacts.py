@@ -1,5 +1,4 @@
-"""Impacts of the discrete mode against closed forms: B11, B12 of the accuracy list, and two typical
-defects: sticking together, and sending both bodies backwards."""
+"""Impacts of the discrete mode: B11, B12, and two defects: sticking together, sending both backwards."""
 
 from __future__ import annotations
 
@@ -78,11 +77,7 @@ def test_kinematic_bodies_pass_through_each_other_and_through_walls():
 @both_dimensions
 @integrators
 def test_impact_time_on_the_path_of_the_integrator(d, integrator):
-    """A ball falls on a floor: sqrt(2 h / g) where the path is the parabola; a straight line's time, to O(dt), with
-    Euler.
-
-    A lagging Euler height is wrong by g dt t / 2, so the time by dt / 2, and the chord within the step by less than dt.
-    """
+    """sqrt(2 h / g) where the path is the parabola; with Euler to O(dt): half a step of lag, less than one of chord."""
     world = make_world(d, gravity=9.81, integrator=integrator)
     floor(world)
     ball(world, (0, 4.9 + 0.5, 0)[:d], restitution=1.0)
@@ -98,12 +93,7 @@ def test_impact_time_on_the_path_of_the_integrator(d, integrator):
 
 @pytest.mark.parametrize(("integrator", "maker"), list(zip(INTEGRATORS, (ball, box, ball, box, ball), strict=True)))
 def test_bouncing_ball_comes_to_rest(maker, integrator):
-    """Impacts end at T0 (1+e)/(1-e) (Zeno), from any height; then the ball is at rest: no sinking, v = 0.
-
-    An approach below 2 g dt is not a bounce: the omitted bounces last 2 * 2 dt / (1-e) at most. Euler's threshold
-    applies to the speed of the path, up to g dt / 2 from that of the flight. Rest is detected at a step's end: two
-    steps more.
-    """
+    """Impacts end at T0 (1+e)/(1-e) (Zeno), less 2 * 2 dt / (1-e) below the threshold; then rest, without sinking."""
     h, g = np.repeat(np.linspace(0.1, 8.0, 25), 10), 9.81
     e = np.tile(np.arange(10) / 10, 25)
     world = make_world(gravity=g, integrator=integrator)
@@ -142,12 +132,7 @@ def test_a_floor_takes_any_number_of_impacts():
     ("integrator", "rate"), [*((name, 60) for name in INTEGRATORS), *((name, 240) for name in (*LAG, "yoshida4"))]
 )
 def test_no_energy_drift_of_a_bouncing_ball(integrator, rate):
-    """60 s (25 s at 240 Hz) at e = 1 from five heights: the energy that the method conserves in flight may not drift.
-
-    Verlet, RK4 and Yoshida follow the parabola: E = v^2/2 + g y, 1e-10. Euler conserves v^2/2 + g y -+ g dt v/2
-    (explicit, semi-implicit) in flight; a bounce changes it by g u (dt - 2 t), t the time in the step, so up to u dt of
-    the height: a cycle. Drift: mean of the last ten bounces against that of the first ten, 2 % as B12 requires.
-    """
+    """The energy that the method keeps in flight does not drift: 1e-10 on parabolas, Euler's cycle within 2 %."""
     g, dt = 9.81, 1 / rate
     heights = np.array([4.9, 3.1, 2.7, 6.3, 8.8])
     world = make_world(gravity=g, dt=dt, integrator=integrator)

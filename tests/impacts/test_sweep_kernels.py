@@ -1,5 +1,4 @@
-"""The small kernels of sweeps against brute force: roots, the heap, merged pairs, search bounds, touches on curved
-paths, flight."""
+"""The small kernels of sweeps against brute force: roots, the heap, search bounds, touches on curved paths."""
 
 from __future__ import annotations
 
@@ -105,8 +104,7 @@ def test_pairs_that_stay_apart_never_meet(degree, d):
 @pytest.mark.parametrize("mode", [CONTINUOUS, EVENT_DRIVEN, DISCRETE])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_no_body_leaves_its_search_bounds_before_the_stated_time(mode, degree, d, plain_zero, monkeypatch):
-    """100 bodies close together, from slow to 50 sizes per step; each is deflected at some time of the step, and its
-    new path sampled. Bodies that are not swept are left out. Tolerance: rounding of positions."""
+    """100 bodies, slow to 50 sizes per step, each deflected at some time of the step, its new path sampled."""
     rng, state = np.random.default_rng(10 * mode + degree), make_record(STATE, d)
     n, bodies, view = 100, state.bodies, PlainView(state)
     size = 10 ** rng.uniform(-2, 0, n)
@@ -161,8 +159,7 @@ def plain_box(state, _, a, __, b, d):
 @both_dimensions
 @pytest.mark.parametrize("shape", [plain_sphere, plain_box])
 def test_first_touch_on_parabolas_against_sampling(shape, d, plain_zero, monkeypatch):
-    """Touches on curved paths, spheres and boxes of half extents, found at 1000 moments and by bisection between two.
-    Except for grazes, which are ambiguous, times agree to rounding over the slope."""
+    """Against 1000 moments and bisection between two; but for grazes, times agree to rounding over the slope."""
     for name, answer in (("both_convex", True), ("is_corner_touch", False), ("sweep", (False, False, 0.0))):
         monkeypatch.setattr(time_of_impact, name, lambda *_, answer=answer: answer)
     monkeypatch.setattr(time_of_impact, "evaluate", shape)

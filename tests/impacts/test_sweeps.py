@@ -1,6 +1,4 @@
-"""Sweeps in closed form: rational cases (B10, B13, B14, C4, C15), and ten thousand random motions against the depth of
-the pair functions, which test_shipped_pairs tests against an oracle.
-"""
+"""Sweeps in closed form (B13, B14, C15), and ten thousand random motions against the pairs' depth."""
 
 from __future__ import annotations
 
@@ -243,8 +241,7 @@ every_pair = pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: "-".join(ea
 
 @cache
 def ways(pair, d):
-    """(compiled pair, poses, displacements, hit, time): for each pose a displacement, towards the other or anywhere, a
-    fifth along slanted axes, some of zero length."""
+    """(compiled pair, poses, displacements, hit, time): towards the other or anywhere, some slanted, some zero."""
     found = REGISTRY.pair(*pair)
     assert found is not None
     assert found.sweep is not None

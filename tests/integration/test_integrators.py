@@ -188,11 +188,7 @@ def test_damped_spring_is_the_matrix_power(method):
 
 @all_methods
 def test_observed_order(method):
-    """B3: the error after 4/5 of a period falls by 2^p from dt = T/200 to T/400, p within 5 % (a whole period of the
-    undamped spring is a special case: SI's first-order error is periodic).
-
-    Yoshida's composition is of fourth order for forces that do not depend on velocity: undamped only.
-    """
+    """B3: the error after 4/5 of a period falls by 2^p within 5 %; Yoshida's composition only without damping."""
     zetas = DAMPING_RATIOS[:1] if method == "yoshida4" else DAMPING_RATIOS
     drag = 2 * zetas * math.sqrt(STIFFNESS)
     exact = np.array([damped_oscillation(zeta, 0.8) for zeta in zetas])
@@ -214,8 +210,7 @@ class Pushes(ForceSystem):
 
 @all_methods
 def test_forces_that_depend_on_time(method):
-    """Stages use their own time: x'' = 6 t from rest gives x = t^3, which RK4 and Yoshida integrate exactly; the others
-    equal the textbook."""
+    """Stages use their own time: x'' = 6 t gives x = t^3 by RK4 and Yoshida, the textbook's steps by the others."""
     dt, steps = 0.125, 40
     world = make_world(dt=dt, integrator=method)
     world.create_entity(Transform((0, 0)), RigidBody())

@@ -1,7 +1,4 @@
-"""The build that checks every index (CAROM_CHECK=1): the bits are the same, and no kernel leaves its arrays.
-
-Its kernels are compiled once for all tests of this file, in a folder that is empty at first.
-"""
+"""The build that checks every index (CAROM_CHECK=1): the same bits, and no kernel leaves its arrays."""
 
 from __future__ import annotations
 

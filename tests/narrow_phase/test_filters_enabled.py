@@ -68,8 +68,7 @@ def test_only_the_contact_that_is_disabled_is_out(d):
 @pytest.mark.parametrize("shape", [ball, box])
 @pytest.mark.compiled
 def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
-    """At rest, disabled for one step: in it the body falls as in free flight (v = -g dt, without warm start from the
-    support), the pair ends; enabled again it begins and holds, and the body is at its old position."""
+    """Disabled for one step it falls freely (v = -g dt) and the pair ends; then it begins again, and holds."""
     world = make_world(d, gravity=10.0)
     ground = floor(world)
     body = shape(world, up(d, 0.5))
@@ -100,8 +99,7 @@ def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
 
 @pytest.mark.compiled
 def test_a_stack_on_a_disabled_contact_falls_together():
-    """Three boxes; the contact below the lowest is disabled: all fall freely, in contact without impulse. What they had
-    sagged into each other, 2 m g / (m w² / 2) at most, is pushed out at 17.5 times that a second."""
+    """The lowest contact is disabled: all fall freely, in contact without impulse, pushed out by their sag."""
     w, rate = 2 * math.pi * 0.25 * 240, 17.5
     world = make_world(gravity=10.0)
     ground = floor(world)
@@ -117,8 +115,7 @@ def test_a_stack_on_a_disabled_contact_falls_together():
 @pytest.mark.compiled
 @both_dimensions
 def test_a_pair_disabled_from_the_start_never_begins(d):
-    """Forty boxes fall onto a floor that is disabled for them, each a little higher: for any gap at the end of a step,
-    none is stopped, before it overlaps or after. No begin, stay, end; another box is stopped."""
+    """For any gap at the end of a step none of forty boxes is stopped, before it overlaps or after; no event."""
     world = make_world(d, gravity=10.0)
     ground = floor(world)
     places = [(3.0 * k, 1.0 + 0.004 * k, 0.0)[:d] for k in range(40)]

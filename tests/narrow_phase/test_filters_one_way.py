@@ -28,8 +28,7 @@ def one_way_world(**settings):
 @pytest.mark.parametrize("collider", [AABBCollider((0.4, 0.5)), SphereCollider(0.5)], ids=["box", "sphere"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
-    """Up through it as in free flight, for any gap below it at the end of a step; then at rest on it. The contact
-    begins once."""
+    """Free flight up through it, for any gap at the end of a step; then at rest on it, with one begin."""
     world, _, platform, _ = one_way_world()
     world.component_for_entity(platform, AABBCollider).half_extents = (30, 0.25)
     players, speeds = [], 11 + 0.1 * np.arange(20)

@@ -82,8 +82,7 @@ def test_a_sensor_on_a_body_at_rest(d):
 
 
 def test_a_sensor_behind_a_wall_is_not_touched_by_what_bounces_off_it():
-    """At 60 m/s the free flight of the ball would end a metre behind the wall: it is reflected instead, and touches
-    a sensor on the near side."""
+    """Free flight at 60 m/s would end a metre behind: it is reflected, and touches a sensor on the near side."""
     world = make_world()
     wall = box(world, (0.0, 0.0), half=(0.25, 3), kind="static", restitution=1.0)
     for x in (0.8, -0.9):
@@ -112,8 +111,7 @@ def test_sensors_meet_sensors_and_kinematic_bodies_and_are_found_by_queries():
 
 @pytest.mark.compiled
 def test_a_body_may_become_a_sensor_and_back_between_steps():
-    """At rest on the floor; a sensor for ten steps: it falls freely and stays in contact; then solid, it is pushed out
-    upwards without gaining speed."""
+    """As a sensor it falls freely and stays in contact; then solid, it is pushed out without gaining speed."""
     world = make_world(gravity=10.0)
     floor(world)
     body = box(world, (0.0, 0.5))

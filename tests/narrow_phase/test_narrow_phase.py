@@ -71,8 +71,7 @@ def contacts_of(bodies):
 @settings(max_examples=15, deadline=None)
 @given(data=st.data())
 def test_any_pair_equals_the_oracle(d, first, second, data):
-    """hit, depth, unit normal from the smaller entity id to the larger, point. Tolerance: 100 eps of the sizes (< 20);
-    within it of a touch, hit and miss are both right."""
+    """hit, depth, unit normal towards the larger id, point; within 100 eps of a touch hit and miss are right."""
     a, b = data.draw(bodies(d, first)), data.draw(bodies(d, second))
     depth, normal, point = expected(a, b)
     found = contacts_of([a, b])
@@ -91,8 +90,7 @@ def test_any_pair_equals_the_oracle(d, first, second, data):
 
 
 def radius_of(a, b):
-    """Radius of the sphere in a pair with a box: at that depth its centre is on the surface and the normal ill
-    defined."""
+    """At a depth of the sphere's radius its centre is on the surface and the normal ill defined."""
     return next(body[4] for body in (a, b) if body[0] == "sphere")
 
 

@@ -1,5 +1,4 @@
-"""Defects of a plugin are reported at registration, with its name, the function and the cure; nothing is changed,
-and running worlds continue."""
+"""Defects of a plugin are reported at registration, with name, function and cure; nothing is changed."""
 
 from __future__ import annotations
 

@@ -139,8 +139,7 @@ def test_bounces_at_the_right_height_wherever_it_is(d, away):
 
 @mostly_2d
 def test_bodies_rest_on_it_as_on_a_box(d):
-    """The same heights as on a box of any size, within a slop; a point has no size, so its slop on a
-    box is that of the box."""
+    """The same heights as on a box of any size; a point has no size, so its slop is that of the box."""
     colliders = SphereCollider(0.5), AABBCollider(0.5), SphereCollider(0), AABBCollider(at(d, 2, 0.25, 1))
     lows = np.array((0.5, 0.5, 0.0, 0.25))
     heights = []

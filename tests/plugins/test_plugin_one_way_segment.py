@@ -108,8 +108,7 @@ def test_falls_are_stopped_at_any_speed_that_does_not_leap_over_it(shape, speed)
 
 @pytest.mark.parametrize("angle", [0.5, *(pytest.param(angle, marks=pytest.mark.long) for angle in (0.0, -2.0))])
 def test_ten_thousand_bodies_from_everywhere(angle):
-    """Balls that do not meet each other fly at the segment. Compared with their free flight in a world without it: a
-    ball that never was wholly in front flies freely, to the bit; one that came from the front never gets behind it."""
+    """What was never wholly in front flies freely, to the bit; what came from the front never gets behind."""
     rng, n, radius, size, seconds = np.random.default_rng(7), 10_000, 0.3, 4.0, 1.0
     places, speeds = rng.uniform(-5, 5, (n, 2)), rng.uniform(-8, 8, (n, 2))
     paths = []

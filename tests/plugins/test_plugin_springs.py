@@ -40,8 +40,7 @@ def run(world, seconds):
 @pytest.mark.parametrize("dimensions", [2, 3])
 @pytest.mark.compiled
 def test_two_masses_swing_as_the_closed_form_says(dimensions):
-    """Reduced mass mu = m M / (m + M); the length is L + A cos(w t), w^2 = k / mu. Verlet's phase error over time t is
-    w t (w h)^2 / 24: 1.5e-6 here, with a margin of two."""
+    """Length L + A cos(w t), w^2 = k (m + M) / (m M); Verlet's phase error is w t (w h)^2 / 24, 1.5e-6 here."""
     world, springs = make(dimensions, integrator="velocity_verlet", dt=1 / 1000)
     a = body(world, *ORIGIN[dimensions], mass=1.0)
     end = (3.0, 4.0) if dimensions == 2 else (3.0, 0.0, 4.0)

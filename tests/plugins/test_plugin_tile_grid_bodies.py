@@ -1,5 +1,4 @@
-"""Bodies on tile maps: no seams while sliding, no motion at rest in a corner, no body between
-tiles."""
+"""Bodies on tile maps: no seams, no motion at rest in a corner, no body between tiles."""
 
 from __future__ import annotations
 

@@ -30,10 +30,7 @@ def solid_depths(world):
 
 @pytest.mark.parametrize(("name", "n", "dimensions", "seconds"), [("pile2d", 400, 2, 10.0), ("pile3d", 343, 3, 20.0)])
 def test_a_pile_comes_to_rest(name, n, dimensions, seconds):
-    """The requirements on piles of 10,000, on small ones: less than 1e-4 m g d per body, mean overlap below 2 %.
-
-    Spheres without friction slip past each other longer than discs.
-    """
+    """What piles of 10,000 have to keep: less than 1e-4 m g d per body, mean overlap below 2 %."""
     with getattr(scenes, name).build(n=n) as world:
         steps(world, seconds)
         position = world.bodies.dynamic.position
@@ -60,10 +57,7 @@ def test_crates_come_to_rest_on_the_platforms():
 
 
 def test_the_lift_and_the_ferry_take_their_crates_along():
-    """One period and a half: each crate keeps its place on its carrier to a twentieth of its size.
-
-    The load changes between 0.75 and 1.25 of the weight: the compliance of a stack of three is below that.
-    """
+    """Each crate keeps its place on its carrier to a twentieth of its size, under 0.75 to 1.25 of its weight."""
     with lift.build() as world:
         steps(world, 0.5)
         offsets = []

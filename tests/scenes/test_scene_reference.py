@@ -1,7 +1,4 @@
-"""The scenes with results in closed form: spring, orbit, bouncing, oblique, thermal_gas and drops.
-
-Rounding: relative 1e-12 unless a test says otherwise; any larger tolerance follows from the method's order.
-"""
+"""Scenes with results in closed form, to 1e-12 or the order of the method."""
 
 from __future__ import annotations
 
@@ -79,8 +76,7 @@ def test_orbit_closes_with_the_order_of_the_method(method, order):
 
 @pytest.mark.parametrize("eccentricity", [0.0, 0.6])
 def test_orbit_closes(eccentricity):
-    """RK4, 4,000 steps: the angle per step at the perihelion is at most 5 dt = 0.008, its fourth power 4e-9, multiplied
-    by the number of steps there."""
+    """RK4, 4,000 steps: the angle per step at the perihelion is at most 5 dt, its fourth power 4e-9."""
     assert return_error("rk4", 4000, eccentricity) < 1e-7
 
 
@@ -93,8 +89,7 @@ def test_orbit_has_the_energy_and_momentum_of_its_ellipse(eccentricity):
 
 
 def test_orbit_keeps_its_energy_with_its_own_settings():
-    """Ten orbits; Verlet's error returns to its value with every orbit, and is of order (5 dt)^2 = 1e-3 at most.
-    Angular momentum: to the rounding of 10,000 steps."""
+    """Verlet's error returns to its value with every orbit, (5 dt)^2 at most; angular momentum to rounding."""
     with orbit.build() as world:
         worst = 0.0
         assert world.settings.dt * 10_000 == pytest.approx(orbit.SCENE.seconds, rel=1e-15)
@@ -200,8 +195,7 @@ def test_drops_have_the_published_times():
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_drops_come_to_rest(restitution):
-    """The bounces end after T (1 + e) / (1 - e) <= 3 s; then it rests on the floor, no deeper than the slop and a
-    quarter: 0.005 of its diameter of 0.2 m."""
+    """After T (1 + e) / (1 - e) <= 3 s it rests on the floor, no deeper than the slop and a quarter."""
     with drops.build(restitution=restitution) as world:
         run(world, 5.0)
         body = world.bodies.dynamic

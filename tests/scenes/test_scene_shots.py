@@ -35,8 +35,7 @@ def to_and_fro(way):
 @pytest.mark.parametrize("mode", ["continuous", "event_driven"])
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "rk4"])
 def test_what_sweeps_finds_every_ball_where_it_must_be(mode, integrator):
-    """Reflections at planes; two balls that exchange velocities are points that pass through each other, plus
-    diameters; one normal of (7, 24) / 25, by which (1, 0) becomes (527, 336) / 625."""
+    """Reflections at planes, balls as points that pass through each other, one normal of (7, 24) / 25."""
     lanes, world = after_six_steps(collision=mode, integrator=integrator)
     post = np.array((shots.POST, shots.GRAZE - shots.OFF_CENTRE))
     touch = post + (shots.POST_RADIUS + shots.RADIUS) * np.array((-7, 24)) / 25
@@ -58,8 +57,7 @@ def test_what_sweeps_finds_every_ball_where_it_must_be(mode, integrator):
 
 
 def test_discrete_passes_through_thin_things_and_meets_a_ghost():
-    """All fly on straight except the ball that is found inside the target, which takes its velocity, past the
-    shield."""
+    """All fly on but the ball found inside the target, which takes its velocity, past the shield."""
     lanes, world = after_six_steps(collision="discrete")
     met = shots.TARGET - shots.TARGET_RADIUS - shots.RADIUS
     expected = {

@@ -115,10 +115,7 @@ class TestEveryScene:
     ],
 )
 def test_jump_reaches_the_apex_of_its_integrator(integrator, hertz, apex):
-    """x_n = v0 t - g t^2 / 2 with the integrator's own error of -+ g dt t / 2; the apex is the highest x_n.
-
-    The wall in the scene is three tiles high; all these arcs clear it, so they are free flight.
-    """
+    """x_n = v0 t - g t^2 / 2 -+ g dt t / 2; all these arcs clear the wall, so they are free flight."""
     world = scenes.get("jump").build(Settings.balanced().replace(integrator=integrator, dt=1 / hertz))
     heights = []
     for _ in range(round(0.8 * hertz)):

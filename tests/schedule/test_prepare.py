@@ -141,8 +141,7 @@ for integrator in ("semi_implicit_euler", "yoshida4", "rk4", "velocity_verlet", 
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_after_prepare_nothing_compiles_and_nothing_loads(d):
-    """Every integrator; few bodies and hundreds, impacts and rest, levels, sensors, platforms, all queries, a user
-    force system; also deleting the last body of a shape."""
+    """Every integrator, few bodies and hundreds, impacts, rest, levels, sensors, platforms, queries, a force system."""
     result = run_python(GAME, d)
     assert result.returncode == 0, result.stderr[-3000:]
 

@@ -14,8 +14,7 @@ from carom.systems.codes import CHECK_FLIGHT
 
 
 def test_looks_for_impacts_of_fast_bodies():
-    """Each impact is followed by a look at the pairs of two bodies, and a new search by one at the pairs that are new:
-    13 looks an impact; where each search looked at all pairs again it was 37."""
+    """13 looks an impact: pairs of two bodies, and new pairs of a search; looking at all pairs again took 37."""
     with scenes.get("fastgas").build(Settings(collision="continuous"), 1, n=300) as world:
         state = world.physics.state
         for _ in range(30):

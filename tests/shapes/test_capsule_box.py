@@ -167,8 +167,7 @@ def test_depth_is_the_shortest_way_out_or_the_distance(d, family):
 @mostly_2d
 @pytest.mark.parametrize("family", FAMILIES[:3])
 def test_the_contact_is_that_of_the_generic_pair(d, family):
-    """Also its point, but for tilts of about a millionth; and in 3D the generic pair gives parallel ones any point of
-    what they share."""
+    """Also its point, but for tilts of a millionth, and for parallel ones in 3D, which share a line."""
     poses = family(np.random.default_rng(10 + d), 10_000, d)
     met, other = meet(poses), meet(poses, MEET_GENERIC)
     np.testing.assert_allclose(met.normal, other.normal, rtol=0, atol=1e-11)

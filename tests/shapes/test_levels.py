@@ -51,8 +51,7 @@ def crowd(d, turned, seed):
 @both_dimensions
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_pair_hits_if_every_level_hits(d, turned):
-    """Contacts, their depth and the counters, by definition: level k of one against level k of the other; a body with
-    fewer levels uses its last one. Some turned boxes are not inside their spheres."""
+    """By definition: level k against level k, a body with fewer uses its last; some boxes stick out."""
     world, shapes = crowd(d, turned, 5 + d)
     world.run(Phase.NARROW)
     expected, first_hits, wrong, stuck_out = {}, 0, 0, 0
@@ -100,8 +99,7 @@ class Found(System):
 
 @both_dimensions
 def test_levels_change_the_cost_and_not_what_is_found(d):
-    """A heap of boxes, some bouncing, falls together. From the same state every step finds the same bits
-    with spheres around the boxes: contacts and near pairs, depth, normal and point."""
+    """From the same state every step finds the same bits with spheres around the boxes."""
 
     def heap(with_spheres):
         rng = np.random.default_rng(3)
@@ -174,9 +172,7 @@ def test_a_level_off_the_centre_turns_with_the_body(d):
 
 @pytest.mark.parametrize("restitution", [0.0, 1.0])
 def test_a_level_that_is_outgrown_keeps_them_apart(restitution):
-    """A square turned by 45 degrees is enlarged to twice its area; its circle does not enclose the corners. A ball on a
-    line through such a corner, 0.8 from the centre, flies on, at rest speed or bouncing speed; otherwise it could
-    not."""
+    """The circle of an enlarged square leaves its corners out: a ball on a line through one flies on."""
     for spheres in ([SphereCollider(math.sqrt(0.5))], []):
         world = make_world()
         world.create_entity(Transform((0, 0), math.pi / 4), *spheres, AABBCollider((0.5, 0.5), restitution=restitution))
@@ -187,8 +183,7 @@ def test_a_level_that_is_outgrown_keeps_them_apart(restitution):
 
 
 def test_bounds_stops_at_the_first_level():
-    """Corner to corner two squares hit by their circles; the contact is that of the circles, no further test is
-    done."""
+    """Corner to corner two squares hit by their circles; the contact is theirs, no further test is done."""
     world = make_world(geometry="bounds")
     levelled(world, 0.0, layer=2, mask=2, sensor=True, sphere={"sensor": True})
     levelled(world, (1.2, 0.5), layer=2, mask=2, sensor=True, sphere={"sensor": True})

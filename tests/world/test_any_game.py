@@ -223,8 +223,7 @@ class Game(RuleBasedStateMachine):
 
     @rule(number=number)
     def spoil_or_mend(self, number):
-        """What has a velocity that cannot be takes part in nothing from the next step on, until the step after it is
-        mended."""
+        """With a velocity that cannot be it takes part in nothing, until the step after it is mended."""
         entity = self.pick(number, RigidBody)
         if entity is None:
             return

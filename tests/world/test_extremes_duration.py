@@ -1,5 +1,4 @@
-"""Section C of the accuracy list: springs at their limits, very many steps, crowds created in each other, and scenes
-seen from a moving frame."""
+"""Section C: springs at their limits, crowds created in each other, scenes seen from a moving frame."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Section C of the accuracy list: extreme positions, overlapping or far away, and bodies created and deleted;
-in every case no body is lost, momentum is conserved and energy not raised."""
+"""Section C: extreme places, bodies created and deleted: none is lost, momentum kept, energy not raised."""
 
 from __future__ import annotations
 

@@ -15,8 +15,7 @@ DT = 1 / 60
 
 
 def room(number, gravity, speed, collider, restitution, **settings):
-    """Bodies of 1 m on a lattice in a room with walls of 10 cm, thrown in all directions. gravity: m per step and step;
-    speed: m per step. Returns the world, the distance from the middle at which a body is out, and gravity in m/s^2."""
+    """(world, distance at which a body is out, gravity) of a lattice of bodies in a room with thin walls."""
     random = np.random.default_rng([0, number, 1])
     world = World(Physics(dimensions=2, gravity=(0.0, -gravity / DT**2)), capsule.plugin, settings=Settings(**settings))
     count = int(random.integers(10, 31))
