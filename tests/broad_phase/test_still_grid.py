@@ -62,18 +62,6 @@ def test_any_boxes_look_into_even_ones(d, data):
 
 
 @both_dimensions
-def test_walls_stay_outside(d):
-    centre = np.random.default_rng(1).random((2000, d)) * 2000 ** (1 / d)
-    half = np.full((2000, 1), 0.4)
-    half[500:504] = 1e3
-    boxes = grid_of(centre - half, centre + half, 500)
-    boxes.find()
-    assert boxes.state.static_grid.suits
-    assert outside(boxes).tolist() == [500, 501, 502, 503]
-    assert check(centre - half, centre + half, 500) > 100
-
-
-@both_dimensions
 def test_what_does_not_suit(d):
     """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
     rng = np.random.default_rng(2)
@@ -89,21 +77,6 @@ def test_what_does_not_suit(d):
         (centre[:OUTSIDE_MAX], centre[:OUTSIDE_MAX] + 1.0),
     ):
         assert check(lower, upper, 0) is None
-
-
-@both_dimensions
-def test_output_grows(d):
-    """Each of 40 boxes meets all 1,000 in the grid."""
-    centre = np.random.default_rng(3).random((1040, d)) * 2 * 1000 ** (1 / d)
-    lower, upper = centre - 0.1, centre + 0.1
-    lower[:40], upper[:40] = -1.0, 1e3
-    assert check(lower, upper, 40) == 40 * (1000 - len(outside_after(grid_of(lower, upper, 40))))
-
-
-def outside_after(boxes):
-    """The rows that are not in the grid, once it is built."""
-    boxes.find()
-    return outside(boxes)
 
 
 def test_too_many_pairs_are_left_to_the_tree():

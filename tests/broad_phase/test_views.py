@@ -12,7 +12,7 @@ from worlds import both_dimensions
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings
-from carom.systems.broad_phase.views import MOST_SEEN, NOT_KNOWN
+from carom.systems.broad_phase.views import NOT_KNOWN
 
 MOVING, STATIC = 40, 400
 
@@ -64,34 +64,6 @@ def test_bodies_on_their_way_see_what_is_there(d, data):
         assert found == expected
         if turn == 5:
             centre[3:5] = 1.0
-
-
-@both_dimensions
-def test_what_is_inside_of_its_view_does_not_look(d):
-    """The grid is emptied once all have looked: only who leaves its view, or meets too many, finds nothing then."""
-    rng = np.random.default_rng(1)
-    centre, side = lattice(d)
-    half = np.full((MOVING + STATIC, 1), 0.5)
-    half[0] = 5.0
-    centre[:MOVING] = rng.uniform(0.0, side, (MOVING, d))
-    motion = np.full((MOVING, d), 0.05)
-    boxes = Boxes(d)
-    found, expected = look(boxes, centre, motion, half, statics_changed=True)
-    assert found == expected
-    count = boxes.state.views.count[:MOVING]
-    assert count[0] == NOT_KNOWN
-    assert (count[1:] >= 0).all()
-    assert count.max() <= MOST_SEEN
-    boxes.state.static_grid.directory[:] = 0
-    centre[1] = centre[MOVING]  # there is one, and it has not been seen from where the body was
-    for _ in range(8):
-        centre[2:MOVING] += motion[2:]
-        found, expected = look(boxes, centre, motion, half)
-        assert found == {pair for pair in expected if pair[0] > 1 or pair[1] < MOVING}
-        assert expected - found
-    boxes.state.static_grid.version = -1
-    found, expected = look(boxes, centre, motion, half, statics_changed=True)
-    assert found == expected
 
 
 @pytest.mark.parametrize("collision", ["discrete", "continuous"])

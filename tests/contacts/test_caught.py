@@ -10,7 +10,6 @@ from worlds import ball, both_dimensions, box, make_world, velocity
 from carom.components import SphereCollider, Transform
 
 DT = 1 / 60
-MODES = ("discrete", "continuous", "event_driven")
 
 
 @each_mode
@@ -34,48 +33,6 @@ def test_a_ball_in_a_slot_little_wider_than_itself_slides_along_it(d, mode, gap)
     np.testing.assert_allclose(place[1:], [10 * DT * 3.0, *np.zeros(d - 2)], rtol=1e-12)
     np.testing.assert_allclose(np.abs(velocity(world, caught)), speed, rtol=1e-12)
     assert any("beyond" in str(fault) for fault in world.faults)
-
-
-@both_dimensions
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("speed", [2.0, 20.0])
-@pytest.mark.parametrize("maker", [ball, box])
-def test_what_a_moving_wall_squeezes_never_passes_one_that_stands(d, mode, speed, maker):
-    """A plastic body between a kinematic wall and a thin static one stays on its side of the static one, at rest."""
-    world = make_world(d, 9.81, collision=mode, dt=DT)
-    half = np.full(d, 5.0)
-    half[0] = 0.1
-    box(world, np.eye(d)[0] * 3.1, half=half, kind="static")
-    box(world, np.eye(d)[0] * -3.1, np.eye(d)[0] * speed, half=half, kind="kinematic")
-    floor, wide = np.zeros(d), np.full(d, 10.0)
-    floor[1], wide[1] = -1.0, 0.5
-    box(world, floor, half=wide, kind="static")
-    held = maker(world, np.eye(d)[0] * -1.0)
-    size = 0.5
-    for _ in range(round(8.0 / speed / DT)):
-        world.step()
-        assert world.bodies.position[world.bodies.row_of(held)][0] <= 3.0 - size + 0.06
-    assert np.isfinite(velocity(world, held)).all()
-    assert np.abs(velocity(world, held)).max() < 1e-6
-    no_room = f"no room for 1 squeezed bodies, the first is entity {held}"
-    assert any(no_room in fault or "impacts beyond" in fault for fault in world.faults)
-
-
-@each_mode
-@both_dimensions
-def test_what_a_moving_wall_drives_to_and_fro_has_a_last_impact(d, mode):
-    """An elastic ball gains twice the wall's speed per turn, ever sooner: without a bound the step would not end."""
-    world = make_world(d, 0.0, collision=mode, dt=DT)
-    half = np.full(d, 5.0)
-    half[0] = 0.5
-    box(world, np.eye(d)[0] * 2.0, half=half, kind="static", restitution=1.0)
-    box(world, np.eye(d)[0] * -2.0, np.eye(d)[0] * 5.0, half=half, kind="kinematic", restitution=1.0)
-    driven = ball(world, np.zeros(d), np.eye(d)[0] * 3.0, radius=0.5, restitution=1.0)
-    for _ in range(40):
-        world.step()
-        assert len(world.contacts.impacts) <= 1001
-        assert world.bodies.position[world.bodies.row_of(driven)][0] <= 1.05
-    assert world.faults
 
 
 @both_dimensions

@@ -76,15 +76,6 @@ def test_another_step_in_mid_run_makes_no_body_jump(change):
     assert np.abs(heights(world, ids) - before).max() < 0.02
 
 
-def test_what_rests_stays_at_rest_for_a_minute():
-    world = heap()
-    run(world, 1200)
-    before = world.bodies.dynamic.position.copy()
-    run(world, 3600)
-    assert np.abs(world.bodies.dynamic.position - before).max() < 0.005
-    assert speed(world) < 0.01
-
-
 def test_a_slop_of_ones_own_reaches_the_contacts():
     """With 0.05 m contacts at rest begin farther apart: two boxes with a gap of 0.04 are a contact at once."""
     found = []

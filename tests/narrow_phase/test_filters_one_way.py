@@ -72,17 +72,6 @@ def test_a_jump_that_does_not_reach_falls_back(speed):
     assert held_by == [platform if feet > 2.0 else ground]
 
 
-@pytest.mark.parametrize("dt", [1 / 30, 1 / 60, 1 / 240])
-@pytest.mark.parametrize("height", [3.0, 10.0])
-def test_it_holds_what_falls_at_any_step(dt, height):
-    """Landing at 4 to 17 m/s, at 0.6 m to 2 cm per step: stopped, and at rest."""
-    world, _, platform, _ = one_way_world(dt=dt)
-    player = world.create_entity(Transform((0, height)), RigidBody(), AABBCollider((0.4, 0.5)))
-    run(world, round(6 / dt))
-    assert position(world, player)[1] == pytest.approx(2.5, abs=0.01)
-    assert [contact.entity_b for contact in world.contacts.of(player)] == [platform]
-
-
 def test_a_body_on_it_may_drop():
     """For a fifth of a second platforms do not support the player: free fall at once, and down to the floor."""
     world, ground, platform, example = one_way_world()

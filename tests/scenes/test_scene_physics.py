@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from carom import scenes
 from carom.components import AABBCollider
-from carom.scenes import conveyor, lift, pile, platforms
+from carom.scenes import conveyor, lift, platforms
 
 G = 9.81
 SLOP = 0.005  # of a size: overlap that the solver does not correct
@@ -26,21 +24,6 @@ def kinetic_energy_per_body(world):
 
 def solid_depths(world):
     return np.maximum(np.asarray(world.contacts.depth), 0.0)
-
-
-@pytest.mark.parametrize(("name", "n", "dimensions", "seconds"), [("pile2d", 400, 2, 10.0), ("pile3d", 343, 3, 20.0)])
-def test_a_pile_comes_to_rest(name, n, dimensions, seconds):
-    """What piles of 10,000 have to keep: less than 1e-4 m g d per body, mean overlap below 2 %."""
-    with getattr(scenes, name).build(n=n) as world:
-        steps(world, seconds)
-        position = world.bodies.dynamic.position
-        inside = (position > 0.4) & (position < pile.width(n, dimensions) - 0.4)
-        inside[:, pile.UP] = position[:, pile.UP] > 0.4
-        assert inside.all()
-        assert kinetic_energy_per_body(world) < 1e-4
-        assert solid_depths(world).mean() < 0.02
-        touching = np.concatenate([world.contacts.entity_a, world.contacts.entity_b])
-        assert np.isin(world.bodies.dynamic.entity, touching).mean() > 0.99  # no body floats in the air
 
 
 def test_crates_come_to_rest_on_the_platforms():

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from helpers_extremes import DT
 from helpers_motion import METHODS
-from helpers_rest import depths
 from oracles import integrators_naive as naive
 from worlds import ball, both_dimensions, box, make_world, run
 
-from carom.components import RigidBody, SphereCollider, Transform
+from carom.components import RigidBody, Transform
 from carom.framework import Settings, World
 from carom.lab import step_limits
 from carom.plugins import Physics
@@ -52,35 +51,6 @@ def test_c16_the_world_says_that_a_spring_is_too_stiff(mode):
         world, _ = sprung(2.0 * share, collision=mode)
         run(world, 3)
         assert any("spring" in str(fault) for fault in world.faults) == told
-
-
-def crowd(count, d, mode, side=10.0):
-    world = make_world(d, collision=mode)
-    places = np.random.default_rng(19).uniform(0.0, side, (count, d))
-    world.create_entities(count, Transform.many(places), RigidBody.many(), SphereCollider.many(radius=0.5))
-    return world
-
-
-@both_dimensions
-@pytest.mark.parametrize("mode", MODES)
-def test_c19_a_crowd_parts_slowly(mode, d):
-    """Three steps: bounded work in each, at most 1.5 sizes a second, so at most that energy; the overlap only falls."""
-    world = crowd(400, d, mode, side=8.0 if d == 2 else 4.0)
-    places = world.bodies.position
-    near = np.triu((np.abs(places[:, None] - places) <= 1.0).all(axis=2), 1).sum()  # pairs of boxes that meet
-    world.step()
-    before = depths(world).sum()
-    for _ in range(3):
-        world.step()
-        assert np.linalg.norm(world.bodies.linear_velocity, axis=1).max() < 1.5
-        assert world.kinetic_energy() < 0.5 * len(world.bodies) * 1.5**2
-        total = depths(world).sum()
-        assert total < before
-        before = total
-    counted = world.stats().counters
-    assert counted["impacts"] == counted["rounds"] == 0
-    assert counted["resting_contacts"] <= counted["candidates"] < 4 * 1.2 * near
-    np.testing.assert_allclose(world.momentum(), 0.0, rtol=0, atol=1e-9)
 
 
 @both_dimensions
