@@ -9,7 +9,7 @@ from helpers_adoption import Charge, matches_esper
 from worlds import make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import CaromError, Component, MissingComponentError, System
+from carom.framework import CaromError, Component, MissingComponentError
 from carom.framework.data import esper_bridge
 
 COUNT = 12
@@ -159,26 +159,6 @@ def test_a_batch_without_a_transform_is_refused_until_it_is_mended():
     world.delete_entity(more[1], immediate=True)
     world.step()
     assert world.bodies.entity.tolist() == [*ids, more[0]]
-    assert matches_esper(world)
-
-
-def test_created_looked_at_and_deleted_inside_a_step():
-    world, ids = crowd(True)
-    seen = []
-
-    class Act(System):
-        def process(self, dt):
-            if not seen:
-                more = world.create_entities(3, Transform.many(-9.0), RigidBody.many(mass=[1.0, 2.0, 3.0]))
-                seen.extend(world.component_for_entity(entity, RigidBody) for entity in (ids[7], more[1]))
-                world.delete_entity(more[2])
-                world.delete_entity(ids[8], immediate=True)
-
-    world.add_system(Act())
-    world.step()
-    world.step()
-    assert [handle.mass for handle in seen] == [8.0, 2.0]
-    assert world.bodies.entity.tolist() == [*ids[:8], *ids[9:], ids[-1] + 1, ids[-1] + 2]
     assert matches_esper(world)
 
 

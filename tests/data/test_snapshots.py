@@ -1,12 +1,292 @@
-"""Restored snapshots give the same bits and events, and the state hash detects any change."""
+"""Snapshots: a restored world is what it was and goes on as it did; the state hash detects any change."""
 
 from __future__ import annotations
 
+import copy
+import pickle
+import runpy
+from pathlib import Path
+
+import esper
 import numpy as np
+import pytest
 from helpers_determinism import Charge, settled
+from helpers_snapshots import Bullet, Tag, fill, log_events, make, springs_of
 from worlds import ball, make_world
 
-from carom.components import RigidBody, SphereCollider, Transform
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import CaromError, Component, ForceSystem, System, World, column
+from carom.plugins import Physics, convex_polygon
+from carom.plugins.springs import Springs
+
+ROOT = Path(__file__).resolve().parents[2]
+STEPS = 200
+MODES = ("discrete", "continuous", "event_driven")
+
+
+def contents(world):
+    """Entities with their components, in esper's order, without making objects of what is in bulk."""
+    return {
+        "ids": world.get_entities(),
+        "tags": [(e, tag.name) for e, tag in world.get_component(Tag)],
+        "bullets": [(e, bullet.expires) for e, bullet in world.get_component(Bullet)],
+        "counters": dict(world.stats().counters),
+        "clock": world.clock.state(),
+        "gravity": world.gravity.tolist(),
+        "springs": [(s.a, s.b, s.stiffness) for s in springs_of(world)],
+        "touching": world.contacts.entity_a.tolist(),
+    }
+
+
+def go_on(world, log, steps):
+    log.clear()
+    hashes = []
+    for k in range(steps):
+        if k % 3:
+            world.step()
+        else:
+            world.advance(1.1 / 60)
+        if k % 20 == 0:
+            hashes.append(world.state_hash())
+    return hashes, list(log), world.state_hash(), contents(world)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("mode", MODES)
+def test_the_next_steps_and_events_repeat_to_the_bit(mode, d):
+    world, log = make(d, mode), []
+    fill(world)
+    log_events(world, log)
+    go_on(world, log, 40)
+    world.delete_entity(world.get_entities()[-2])
+    springs = list(springs_of(world))
+    snapshot, digest = world.snapshot(), world.state_hash()
+    first = go_on(world, log, STEPS)
+    assert len({name for name, *_ in first[1]}) >= 4
+    world.gravity = (1.0,) * d
+    for entity in world.get_entities()[::2]:
+        world.delete_entity(entity, immediate=True)
+    springs_of(world).clear()
+    world.contacts.enabled[:] = False  # what is written into the world's contacts is not in the snapshot
+    world.restore(snapshot)
+    assert world.state_hash() == digest
+    assert list(springs_of(world)) == springs
+    assert go_on(world, log, STEPS) == first
+    copied = pickle.loads(pickle.dumps(snapshot))
+    world.restore(copied)
+    assert world.state_hash() == digest
+    assert go_on(world, log, 60)[0] == first[0][:3]
+    other, others = make(d, mode), []
+    log_events(other, others)
+    other.restore(copied)
+    assert other.state_hash() == digest
+    assert go_on(other, others, 60)[0] == first[0][:3]
+    assert others == first[1][: len(others)]
+
+
+def test_bodies_that_have_come_or_gone():
+    world = make_world()
+    a, b = ball(world, 0.0), ball(world, 9.0)
+    snapshot, digest = world.snapshot(), world.state_hash()
+    handle = world.component_for_entity(a, SphereCollider)
+    c = ball(world, 4.0)
+    stranger = world.component_for_entity(c, Transform)
+    world.delete_entity(a, immediate=True)
+    world.remove_component(b, SphereCollider)
+    world.add_component(b, AABBCollider((1.0, 1.0)))
+    world.step()
+    world.restore(snapshot)
+    assert world.state_hash() == digest
+    assert world.get_entities() == [a, b]
+    assert world.component_for_entity(a, SphereCollider) is handle
+    handle.radius = 0.75
+    assert world.bodies.row_of(a) == 0
+    assert handle.radius == 0.75
+    assert world.has_component(b, SphereCollider)
+    assert not world.has_component(b, AABBCollider)
+    assert stranger.position.tolist()[0] == 4.0  # it keeps its last values
+    assert ball(world, 5.0) == c  # the id counter too
+    assert stranger.position.tolist()[0] == 4.0
+
+
+def test_pending_deletions_are_as_they_were():
+    world = make_world()
+    a, b = ball(world, 0.0), ball(world, 9.0)
+    world.delete_entity(a)
+    snapshot = world.snapshot()
+    world.delete_entity(b)
+    world.restore(snapshot)
+    world.step()
+    assert world.get_entities() == [b]
+    world.restore(snapshot)
+    assert not world.entity_exists(a)
+    assert world.entity_exists(b)
+    world.step()
+    assert world.get_entities() == [b]
+
+
+def test_ordinary_objects_are_there_by_reference_and_ours_by_value():
+    world = make_world()
+    tag, bullet = Tag("here"), Bullet(1.0)
+    body, loose = ball(world, 0.0), world.create_entity(bullet)
+    world.add_component(body, tag)
+    snapshot = world.snapshot()
+    tag.name, bullet.expires = "there", 2.0
+    world.remove_component(body, Tag)
+    world.delete_entity(loose, immediate=True)
+    world.restore(snapshot)
+    assert world.component_for_entity(body, Tag) is tag
+    assert tag.name == "there"
+    assert world.component_for_entity(loose, Bullet).expires == 1.0
+    assert bullet.expires == 1.0
+
+
+def test_bodies_in_bulk_before_and_after_somebody_has_looked_at_them():
+    world = make_world()
+    ids = world.create_entities(50, Transform.many(np.arange(100.0).reshape(50, 2)), RigidBody.many(), Bullet.many())
+    loose = world.create_entities(5, Bullet.many(expires=np.arange(5.0)))
+    before, digest = world.snapshot(), world.state_hash()
+    for entity in ids[::3]:
+        world.component_for_entity(entity, Transform).position = (0.0, 0.0)
+    world.component_for_entity(loose[2], Bullet).expires = 9.0
+    held = world.component_for_entity(ids[0], Transform)
+    world.delete_entity(ids[4], immediate=True)
+    world.delete_entity(loose[4], immediate=True)
+    world.create_entities(7, Transform.many(np.full((7, 2), 200.0)), RigidBody.many(), SphereCollider.many(radius=1.0))
+    after, changed = world.snapshot(), world.state_hash()
+    for _ in range(2):
+        world.restore(before)
+        assert world.state_hash() == digest
+        assert world.get_entities() == [*ids, *loose]
+        assert [world.component_for_entity(e, Bullet).expires for e in loose] == [0.0, 1.0, 2.0, 3.0, 4.0]
+        assert held.position.tolist() == [0.0, 1.0]
+        world.restore(after)
+        assert world.state_hash() == changed
+        assert len(world.get_entities()) == 60
+        assert world.component_for_entity(loose[2], Bullet).expires == 9.0
+
+
+def test_arrays_of_array_columns_outlive_what_had_them():
+    world = World(Physics(dimensions=2), convex_polygon.plugin)
+    shape = np.array([(0, 0), (1, 0), (0.5, 0.8)])
+    polygon = lambda k: convex_polygon.ConvexPolygonCollider(shape * (1 + 0.01 * k))  # noqa: E731
+    entities = [world.create_entity(Transform((3.0 * k, 0.0)), RigidBody(), polygon(k)) for k in range(5)]
+    snapshot, digest = world.snapshot(), world.state_hash()
+    pickled = pickle.dumps(snapshot)
+    for entity in entities:
+        world.delete_entity(entity, immediate=True)
+    for k in range(5, 300):  # the pool has to make room
+        world.delete_entity(world.create_entity(Transform((0.0, 0.0)), RigidBody(), polygon(k)), immediate=True)
+        world.bodies  # noqa: B018
+    for state in (snapshot, copy.deepcopy(snapshot), pickle.loads(pickled)):
+        world.restore(state)
+        assert world.state_hash() == digest
+        world.step()
+
+
+def test_a_world_that_has_been_emptied_since():
+    world = make_world()
+    a, tag = ball(world, 0.0), Tag("alone")
+    b = world.create_entity(tag)
+    ids = world.create_entities(3, Transform.many(np.eye(3, 2) * 9.0), SphereCollider.many(radius=1.0))
+    snapshot, digest = world.snapshot(), world.state_hash()
+    for entity in world.get_entities():
+        world.delete_entity(entity)
+    world.step()
+    for _ in range(2):
+        world.restore(snapshot)
+        assert world.state_hash() == digest
+        assert world.get_entities() == [a, b, *ids]
+        assert world.component_for_entity(b, Tag) is tag
+        world.step()
+        with world:
+            esper.clear_database()
+        ball(world, 3.0)
+
+
+def test_a_snapshot_of_another_kind_of_world_is_refused_and_nothing_is_disturbed():
+    world = World(Physics(dimensions=2), Springs())
+    ball(world, 0.0)
+    snapshot = world.snapshot()
+    flat, deep = make_world(), World(Physics(dimensions=3), Springs())
+    entity = ball(flat, 1.0)
+    digest = flat.state_hash()
+    with pytest.raises(CaromError, match=r"plugins .* springs"):
+        flat.restore(snapshot)
+    with pytest.raises(CaromError, match=r"2 dimensions; .* has 3"):
+        deep.restore(snapshot)
+    with pytest.raises(TypeError, match=r"what world.snapshot\(\) returns"):
+        flat.restore(None)
+    assert flat.state_hash() == digest
+    assert flat.get_entities() == [entity]
+
+
+@pytest.mark.parametrize("do", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_world_is_not_copied(do):
+    world = make_world()
+    for thing in (world, [world])[: 1 if do is copy.copy else 2]:
+        with pytest.raises(CaromError, match=r"world\.snapshot\(\).*world\.save\(path\)"):
+            do(thing)
+
+
+def test_two_peers_with_delayed_inputs_end_with_the_same_world(capsys):
+    example = runpy.run_path(str(ROOT / "examples" / "rollback.py"), run_name="example")
+    late, at_once = example["play"](90, 8), example["play"](90, 0)
+    hashes = {peer.world.state_hash() for peer in (*late, *at_once)}
+    assert len(hashes) == 1
+    assert {peer.frame for peer in late} == {90}
+    assert [peer.world.get_entities() for peer in late] == [at_once[0].world.get_entities()] * 2
+    assert min(peer.replayed for peer in late) > 8 * 70
+    runpy.run_path(str(ROOT / "examples" / "rollback.py"), run_name="__main__")
+    assert "both worlds" in capsys.readouterr().out
+
+
+class Pointed(Component):
+    size = column(default=1.0)
+
+    def __init__(self, **values):
+        super().__init__(**values)
+        self.names = ["a"]
+        self.itself = self
+
+
+def test_a_deep_copy_of_a_component_shares_nothing():
+    world = make_world()
+    one = Pointed(size=2.0)
+    world.add_component(ball(world, 0.0), one)
+    world.step()
+    shallow, deep = copy.copy(one), copy.deepcopy(one)
+    one.names.append("b")
+    one.size = 3.0
+    assert (shallow.names, deep.names) == (["a", "b"], ["a"])
+    assert (shallow.size, deep.size) == (2.0, 2.0)
+    assert deep.itself is deep
+
+
+class Wind(ForceSystem):
+    def __init__(self):
+        self.strength = [1.0]
+
+
+class Counts(System):
+    def __init__(self):
+        self.seen = []
+
+    def process(self, dt):
+        self.seen.append(dt)
+
+
+@pytest.mark.parametrize("do", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+@pytest.mark.parametrize("make_one", [Wind, Counts])
+def test_a_copy_of_a_system_is_in_no_world(make_one, do):
+    world, one = make_world(), make_one()
+    world.add_system(one)
+    other = do(one)
+    assert not hasattr(other, "world")
+    assert vars(other) == {name: value for name, value in vars(one).items() if name != "world"}
+    assert one.world is world
+    world.add_system(other)
+    assert other.world is world
 
 
 def test_settings_stay_when_a_snapshot_is_restored():

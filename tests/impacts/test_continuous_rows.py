@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import MODES, SWEPT, bullet, each_mode, each_sweep, mode_world, positions, velocities
+from helpers_modes import MODES, SWEPT, bullet, mode_world, positions, velocities
 from helpers_pairwise import pairwise
-from worlds import Conserved, box, run
+from worlds import box, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, World
@@ -30,34 +30,6 @@ def test_a_kinematic_ram_loses_no_body(mode, gap, speed):
     fast = velocities(world, row)[:, 0] / speed
     assert (fast > 0.999).all()
     assert (fast < 1.25).all()
-
-
-@each_mode
-@pytest.mark.parametrize("mass", [1.0, 1000.0])
-@pytest.mark.parametrize("speed", [30.0, 300.0])
-def test_a_plastic_impact_on_a_row(mode, mass, speed):
-    """All move together, v M / (M + 5), with that share of the energy; momentum to rounding."""
-    world = mode_world(mode)
-    row = [bullet(world, 0.2 * k, 0.0, radius=0.1) for k in range(5)]
-    ram = bullet(world, -0.5, speed, half=(0.02, 1.0), mass=mass)
-    kept = Conserved(world)
-    run(world, 10)
-    np.testing.assert_allclose(velocities(world, [ram, *row])[:, 0], speed * mass / (mass + 5), rtol=0.06)
-    assert world.kinetic_energy() == pytest.approx(0.5 * mass * speed**2 * mass / (mass + 5), rel=0.01)
-    kept.check()
-
-
-@each_sweep
-@pytest.mark.parametrize(("shape", "size", "speed"), [("ball", 0.25, 25.0), ("ball", 0.1, 12.0), ("box", 0.1, 50.0)])
-def test_what_rests_on_a_row_of_boxes_does_not_catch_on_its_seams(mode, shape, size, speed):
-    """No friction: speed is kept, and height within the slop of contacts at rest (0.005 of its size)."""
-    world = mode_world(mode, gravity=G)
-    for k in range(-2, 60):
-        box(world, (2.0 * k, -0.5), half=(1.0, 0.5), kind="static")
-    mover = bullet(world, (0.0, size), (speed, 0.0), radius=size, half=size if shape == "box" else None)
-    run(world, 90)
-    assert velocities(world, [mover])[0, 0] == pytest.approx(speed, rel=1e-9)
-    assert positions(world, [mover])[0, 1] == pytest.approx(size, abs=0.01 * size)
 
 
 def tile_world(cells, faces="all", gravity=0.0, **settings):

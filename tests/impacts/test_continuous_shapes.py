@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import MODES, along, bullet, each_sweep, positions, strikes, velocities
+from helpers_modes import bullet, each_sweep, positions, strikes, velocities
 from worlds import position, velocity
 
 from carom.components import AABBCollider, SphereCollider, Transform
@@ -20,7 +20,6 @@ from carom.plugins.one_way_segment import OneWaySegmentCollider
 pytestmark = pytest.mark.slow  # each set of shapes compiles for long
 DT = 1 / 60
 HEXAGON = 0.3 * np.array([(math.cos(k * math.pi / 3), math.sin(k * math.pi / 3)) for k in range(6)])
-SQUARE = 0.2 * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
 FACE = np.array((math.cos(math.pi / 6), 0.5))  # the normal of its first edge
 APOTHEM = 0.3 * math.cos(math.pi / 6)
 
@@ -148,15 +147,3 @@ def test_a_one_way_segment_in_the_way_of_bullets(mode, e):
         np.testing.assert_allclose(world.bodies.dynamic.position[:, 1], place, atol=1e-9 if e else 0.002)
         strikes(world, 10)
         assert (world.bodies.dynamic.position[:, 1] > heights - 0.002).all()
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_a_polygon_that_flies_onto_a_capsule_on_the_ground(mode):
-    """Under gravity, e = 0: all bodies end at rest above the ground, for any pair of shapes."""
-    world = shaped_world(mode, capsule.plugin, convex_polygon.plugin, half_space.plugin, gravity=(0.0, -9.81))
-    world.create_entity(Transform((0.0, 0.0)), HalfSpaceCollider((0.0, 1.0), friction=0.5))
-    lower = bullet(world, (0.0, 0.3), 0.0, collider=SHAPES["capsule"](0.0))
-    upper = bullet(world, (0.0, 20.0), (0.0, -100.0), collider=ConvexPolygonCollider(SQUARE))
-    strikes(world, 240)
-    np.testing.assert_allclose(positions(world, [lower, upper]), [along(2, 0.0, 0.3), along(2, 0.0, 0.8)], atol=0.005)
-    assert np.abs(velocities(world, [lower, upper])).max() < 1e-6

@@ -18,7 +18,6 @@ from oracles.impact_queue import Oracle, assert_agrees
 from worlds import both_dimensions
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Phase, System
 from carom.lab import testing as kit
 
 pytestmark = pytest.mark.early
@@ -347,23 +346,3 @@ def test_the_oracle_sees_impacts_that_are_wrong():
     oracle.impacts.clear()
     with pytest.raises(AssertionError, match=rf"impacts are \[\({a}, {b}\)\], the oracle says \[\]"):
         assert_agrees(world, oracle)
-
-
-class Foreign(System):
-    phase = Phase.END
-
-    def process(self, dt):
-        pass
-
-
-def test_the_oracle_refuses_what_it_does_not_know():
-    with pytest.raises(ValueError, match="the oracle does not know rk4"):
-        Oracle(kit.make_world(integrator="rk4"))
-    world = kit.make_world()
-    world.add_system(Foreign())
-    with pytest.raises(ValueError, match="the oracle does not know Foreign"):
-        Oracle(world)
-    world = kit.make_world()
-    world.create_entity(Transform((0, 0)), RigidBody())
-    with pytest.raises(ValueError, match="the oracle knows spheres and boxes"):
-        Oracle(world)

@@ -20,8 +20,8 @@ print(world.state_hash(), len(log.compiled), log.loaded)
 POISON = "import runpy; runpy.run_module('tests.helpers_poison', run_name='__main__')"
 EXTREMES = (
     "laws/test_grains", "laws/test_bounded", "laws/test_bullets_in_rooms", "contacts/test_caught",
-    "impacts/test_continuous_extremes", "impacts/test_impact_oracle", "world/test_extremes_numbers",
-    "world/test_determinism_histories",
+    "impacts/test_continuous_extremes", "impacts/test_impact_oracle", "world/test_extremes",
+    "world/test_determinism",
 )  # fmt: skip
 TESTS = """
 import pytest, sys

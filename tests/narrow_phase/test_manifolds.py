@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Settings, System, World
 from carom.plugins import Physics, half_space
@@ -102,20 +101,3 @@ def test_a_shape_changed_between_steps_is_seen_at_once():
         world.step()
         (contact,) = world.contacts
         assert contact.depth > 0.09
-
-
-def test_scenes_in_which_bodies_are_put_elsewhere_between_steps():
-    """A body that rested and is taken away rests no more; one that is put back touches again."""
-    with scenes.get("stack").build() as world:
-        for _ in range(120):
-            world.step()
-        count, (body, *_) = len(world.contacts), [e for e, _ in world.get_component(RigidBody)][-1:]
-        transform = world.component_for_entity(body, Transform)
-        before = np.array(transform.position)
-        transform.position = before + 100.0
-        world.step()
-        assert len(world.contacts) < count
-        transform.position = before
-        world.component_for_entity(body, RigidBody).linear_velocity = np.zeros(len(before))
-        world.step()
-        assert len(world.contacts) == count

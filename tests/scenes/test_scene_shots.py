@@ -72,15 +72,3 @@ def test_discrete_passes_through_thin_things_and_meets_a_ghost():
         np.testing.assert_allclose(lanes[height], places, rtol=0, atol=ROUNDING)
     (fault,) = world.faults
     assert "so fast that discrete collisions may miss what it passes" in fault
-
-
-def test_beyond_the_cap_a_ball_loses_the_rest_of_its_steps():
-    """It stops at its second impact of a step, which becomes the first of the next: from plate to plate in a step."""
-    lanes, world = after_six_steps(collision="continuous", max_impacts_per_step=1)
-    way = FREE / 2 + FREE + (STEPS - 1) * FREE
-    np.testing.assert_allclose(
-        lanes[shots.PLATES], [(shots.START + way, to_and_fro(way))], rtol=0, atol=ROUNDING
-    )
-    np.testing.assert_allclose(lanes[shots.FREE], [(FLOWN, shots.FREE)], rtol=0, atol=ROUNDING)
-    (fault,) = world.faults
-    assert fault.endswith(f"({STEPS} times, steps 0 to {STEPS - 1})")

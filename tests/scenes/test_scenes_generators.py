@@ -10,7 +10,7 @@ import pytest
 
 from carom import scenes
 from carom.components import AABBCollider, SphereCollider, Transform
-from carom.scenes import player_query, static_world
+from carom.scenes import static_world
 from carom.scenes.sizes import ceil_root, floor_root
 
 GENERATORS = ["gas2d", "gas3d", "mixed2d", "fastgas", "pile2d", "pile3d", "static_world", "freefall", "player_query"]
@@ -102,21 +102,6 @@ def test_pile2d(n, seed):
         assert world.gravity.tolist() == [0.0, -9.81]
 
 
-@pytest.mark.parametrize(("n", "seed"), [(1, 0), (30, 2), (1000, 0)])
-def test_pile3d(n, seed):
-    width, u = 1.2 * n ** (1 / 3), draws(seed)
-    per_row = max(m for m in range(1, 11) if m**3 <= n)
-    positions = []
-    for k in range(n):
-        i, j, l = k % per_row, k // per_row**2, k // per_row % per_row  # noqa: E741
-        x = width / 2 + (i - (per_row - 1) / 2) * 1.2 + 0.09 * (2 * next(u) - 1)
-        y = 0.6 + 1.2 * j + 0.09 * (2 * next(u) - 1)
-        positions.append((x, y, width / 2 + (l - (per_row - 1) / 2) * 1.2 + 0.09 * (2 * next(u) - 1)))
-    with make("pile3d", n=n, seed=seed) as world:
-        assert_bodies(world, positions, np.zeros((n, 3)), SPHERE)
-        assert world.gravity.tolist() == [0.0, -9.81, 0.0]
-
-
 @pytest.mark.parametrize(("rows", "friction", "spacing"), [(50, 0.6, 1.0), (50, 0.0, 1.1), (3, 0.6, 1.0)])
 def test_pyramid(rows, friction, spacing):
     positions = []
@@ -136,50 +121,12 @@ def test_a_large_pyramid_has_ground_to_stand_on():
         assert np.abs(world.bodies.dynamic.position[:, 0]).max() + 0.5 < half
 
 
-def test_static_world():
-    u = draws()
-    positions, velocities = [], []
-    for k in range(1000):
-        cell = (3 * (k % 33) + 1, 3 * (k // 33) + 1)
-        positions.append([4 * c + 0.5 * (2 * next(u) - 1) for c in cell])
-        velocities.append([-5 + 10 * next(u) for _ in range(2)])
-    with make("static_world") as world:
-        assert_bodies(world, positions, velocities, CIRCLE)
-        centres = {(4 * i + 2.0, 4 * j + 2.0) for i in range(100) for j in range(100)}
-        assert {tuple(p) for p in world.bodies.static.position[4:].tolist()} == centres
-        assert all(material(world, e) == ([0.5, 0.5], 1.0, None) for e in world.bodies.static.entity[4:])
-        assert len(world.bodies.static) == 4 + len(centres)
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 100, 10_000, 100_000])
 def test_static_world_has_room_for_any_number(n):
     positions, _ = static_world.initial_state(n)
     assert positions.min() > 3
     assert positions.max() < 4 * static_world.boxes_a_side(n) - 3
     assert len(np.unique(np.round(positions / 4), axis=0)) == n  # a crossing for each
-
-
-def test_freefall():
-    u = draws()
-    velocities = [[-5 + 10 * next(u) for _ in range(2)] for _ in range(1000)]
-    with make("freefall", n=1000) as world:
-        assert_bodies(world, [(2 * (k % 317), 2 * (k // 317)) for k in range(1000)], velocities, CIRCLE)
-        assert not world.get_components(SphereCollider)
-        assert not world.get_components(AABBCollider)
-        assert world.gravity.tolist() == [0.0, -9.81]
-        for _ in range(60):
-            world.step()
-        assert world.stats().counters["candidates"] == 0
-
-
-def test_player_query_is_the_gas_at_rest_and_asks_inside_of_it():
-    positions, _ = gas(500, 2)
-    with make("player_query", n=500) as world:
-        assert_bodies(world, positions, np.zeros((500, 2)), CIRCLE)
-    places, u = player_query.places(500, 7), draws()
-    for _ in range(4 * 500):
-        next(u)
-    np.testing.assert_allclose(places, [[math.sqrt(500 * math.pi) * next(u) for _ in "xy"] for _ in range(7)])
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_extremes import DT
 from helpers_motion import METHODS
 from oracles import integrators_naive as naive
 from worlds import ball, both_dimensions, box, make_world, run
@@ -18,6 +17,7 @@ from carom.plugins.springs import Springs
 pytestmark = pytest.mark.early
 
 MODES = ("discrete", "continuous", "event_driven")
+DT = 1 / 60
 
 
 def sprung(rate, **settings):

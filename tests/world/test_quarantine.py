@@ -11,7 +11,7 @@ from helpers_poison import column_of, rest_of, told
 from worlds import ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, Phase, StepError, System
+from carom.framework import ForceSystem, Phase, System
 
 pytestmark = pytest.mark.plain
 
@@ -223,30 +223,6 @@ def test_it_stands_still_until_it_is_mended():
     assert len(told(world)) == 1  # it is told anew after it was right
 
 
-@pytest.mark.compiled
-def test_bodies_that_come_and_go_meanwhile():
-    """Rows move; who is out stays out."""
-    broken, healthy = pile(), pile()
-    for world in (broken, healthy):
-        run(world, 3)
-    write(broken, "sphere_collider.radius", math.nan)
-    healthy.delete_entity(VICTIM)
-    run(broken, 2)
-    run(healthy, 2)
-    for world in (broken, healthy):
-        world.delete_entity(3)
-    broken.create_entity(Transform((20.0, 0.0)))  # the same ids in both
-    healthy.create_entity(Transform((20.0, 0.0)))
-    for world in (broken, healthy):
-        ball(world, (1.0, 6.0), (0.0, -3.0))
-        run(world, 40)
-    assert rest_of(broken, VICTIM) == rest_of(healthy, VICTIM)
-    assert len(told(broken)) == 1
-    broken.delete_entity(VICTIM)
-    run(broken, 2)
-    assert not broken.physics.quarantine.told
-
-
 def test_ids_that_mean_other_entities():
     """After esper.clear_database() the ids begin again: the new body is none of those that were out."""
     world = make_world()
@@ -267,37 +243,6 @@ def test_ids_that_mean_other_entities():
             assert told(world) == []
             assert position(world, b)[0] > 0.0
             world.delete_entity(b)
-
-
-@pytest.mark.compiled
-def test_a_failed_step_and_a_snapshot():
-    class Failing(System):
-        fails = False
-
-        def process(self, dt):
-            if self.fails:
-                raise RuntimeError
-
-    broken, healthy = pile(), pile()
-    failing = Failing()
-    broken.add_system(failing)
-    healthy.add_system(Failing())
-    run(broken, 3)
-    run(healthy, 3)
-    sound = broken.snapshot()
-    write(broken, "mass", -1.0)
-    failing.fails = True
-    with pytest.raises(StepError, match="RuntimeError"):
-        broken.step()
-    failing.fails = False
-    assert_like_deleted(broken, healthy, 4)
-    broken.restore(sound)
-    other = pile()
-    other.add_system(Failing())
-    run(other, 3)
-    for world in (broken, other):
-        run(world, 4)
-    assert broken.state_hash() == other.state_hash()
 
 
 @both_dimensions
