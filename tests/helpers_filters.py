@@ -1,8 +1,4 @@
-"""Filters of contacts, observed in every path of a step: which pairs meet, and which have a response.
-
-The paths: contacts found (NARROW), impacts, contacts at rest, begin, stay, end, handlers, ``contacts.of`` and
-``pairs``, queries. A body without response must move exactly as if the other did not exist, to the last bit.
-"""
+"""Which pairs meet, and which have a response, in every path: without one, the motion of a body alone, to the bit."""
 
 from __future__ import annotations
 

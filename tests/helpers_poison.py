@@ -72,11 +72,7 @@ def without(build, entity: int) -> list[list[bytes]]:
 
 
 def complaints(build, victims: slice = slice(None), first: int | None = None) -> Iterator[str]:
-    """What goes wrong when values that cannot be are written, of one entity and column at a time.
-
-    first: each column of a body gets only two of the values, from that one on, the next column and the same column of
-    the next body the two others. None: all values.
-    """
+    """What goes wrong when such values are written, an entity and column at a time; first: two values in turn."""
     world = build()
     for _ in range(BEFORE):
         world.step()

@@ -1,9 +1,4 @@
-"""Brute force for queries and casts: distances and overlaps of many bodies.
-
-The oracle for casts is a bisection: the gap between two convex bodies, one of which moves along a straight line, is a
-convex function of the distance moved, so a ternary search brackets its minimum and a bisection finds its first zero.
-If the minimum is below GRAZE, hit and miss are both right.
-"""
+"""Brute force for queries, and for casts by bisection of the gap, which is convex; below GRAZE any answer is right."""
 
 from __future__ import annotations
 

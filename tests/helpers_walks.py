@@ -24,13 +24,7 @@ STANDS = 60  # steps before it walks: it has landed, and contacts push out what 
 
 @dataclass(frozen=True)
 class Walk:
-    """What a walker did not keep.
-
-    jitter
-        how far it ever was from the height that it stood at, in its world's unit of length
-    lost
-        the largest share of its speed that it did not keep in a step, beyond what friction may take
-    """
+    """The farthest from the height it stood at, in units, and the share of speed lost in a step beyond friction."""
 
     jitter: float
     lost: float

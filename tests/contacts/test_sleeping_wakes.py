@@ -1,20 +1,258 @@
-"""What sleeps wakes as an island, for every reason there is, and nothing else does."""
+"""Sleep in snapshots, files, failed steps and changes; what wakes an island, for every reason, and nothing else."""
 
 from __future__ import annotations
 
+import pickle
+
+import numpy as np
 import pytest
 from helpers_sleeping import CAUSES, EVERYWHERE, GRAVITY, MODES, is_asleep, sleep, sleepy_world, tower, two_towers
 from worlds import ball, floor
 
-from carom.components import RigidBody, SphereCollider, Transform
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, Settings, System, World
-from carom.plugins import Physics
+from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
+from carom.systems import Integration
 
 
 @pytest.fixture(scope="module")
 def asleep():
     return two_towers()
+
+
+def go_on(world: World, boxes: list[int], steps: int = 12) -> list[str]:
+    """Hashes of steps in which a sleeper is pushed."""
+    hashes = []
+    for step in range(steps):
+        if step == 3:
+            world.component_for_entity(boxes[1], RigidBody).apply_impulse((0.4, 0.0))
+        world.step()
+        contacts = world.contacts
+        hashes.append(f"{world.state_hash()} {contacts.normal_impulse.tobytes().hex()} {len(contacts.begin)}")
+    return hashes
+
+
+@pytest.mark.parametrize("when", ["due", "asleep", "woken"])
+def test_snapshots_and_files_go_on_to_the_bit(when, tmp_path):
+    world = World(
+        Physics(2, gravity=(0.0, -GRAVITY)), convex_polygon.plugin, settings=Settings(sleeping=True)
+    )
+    floor(world, friction=0.5)
+    boxes = tower(world, 0.0)
+    corners = ((-0.5, -0.5), (0.5, -0.5), (0.0, 0.5))
+    world.create_entity(Transform((5.0, 0.5)), RigidBody(), convex_polygon.ConvexPolygonCollider(corners))
+    while not is_asleep(world, boxes[1])[0]:
+        world.step()
+    if when != "due":
+        sleep(world, *boxes)
+    if when == "woken":
+        world.wake(boxes[0])
+    snapshot = world.snapshot()
+    world.save(tmp_path / "world.npz")
+    expected = go_on(world, boxes)
+    world.restore(snapshot)
+    assert go_on(world, boxes) == expected
+    world.restore(pickle.loads(pickle.dumps(snapshot)))
+    assert go_on(world, boxes) == expected
+    loaded = World.load(tmp_path / "world.npz", Physics(2), convex_polygon.plugin)
+    assert loaded.settings.sleeping
+    assert go_on(loaded, boxes) == expected
+
+
+def test_a_world_that_does_not_sleep_goes_on_from_a_snapshot_of_one_that_does():
+    world, other = sleepy_world(), sleepy_world(sleeping=False)
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    other.restore(world.snapshot())
+    other.step()
+    assert not any(is_asleep(other, *boxes))
+    assert len(other.contacts) == 3
+    assert len(other.contacts.begin) == len(other.contacts.end) == 0
+    assert "_still" in other.physics.table.arrays
+    world.restore(other.snapshot())
+    assert not any(is_asleep(world, *boxes))
+    sleep(world, *boxes)
+
+
+def test_a_snapshot_from_before_wakes_what_sleeps():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    for _ in range(5):
+        world.step()
+    snapshot = world.snapshot()
+    first = [world.step() or world.state_hash() for _ in range(10)]
+    sleep(world, *boxes)
+    world.restore(snapshot)
+    assert not any(is_asleep(world, *boxes))
+    assert [world.step() or world.state_hash() for _ in range(10)] == first
+
+
+@pytest.mark.parametrize("cause", ["push", "touched", "bottom deleted", "static placed"])
+def test_a_failed_step_is_undone(asleep, cause):
+    class Failing(System):
+        phase = Phase.RESPONSE
+
+        def process(self, dt):
+            raise ValueError("no")
+
+    world, boxes, _, snapshot = asleep
+    world.settings = world.settings.replace(dt=1 / 60)
+    world.restore(snapshot)
+    CAUSES[cause](world, boxes)
+    kept = world.snapshot()
+    world.step()
+    expected = [world.state_hash(), *go_on(world, boxes[1:], 5)]
+    world.restore(kept)
+    failing = Failing()
+    world.add_system(failing)
+    for _ in range(2):
+        with pytest.raises(Exception, match="no"):
+            world.step()
+    world.remove_system(failing)
+    world.step()
+    assert [world.state_hash(), *go_on(world, boxes[1:], 5)] == expected
+
+
+def test_rows_that_move_take_their_sleep_along():
+    world = sleepy_world()
+    first = [ball(world, (-20.0 - 2.0 * k, 0.5)) for k in range(5)]
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes, *first)
+    before = world.bodies.dynamic.position[-3:].copy()
+    for entity in first[::2]:
+        world.delete_entity(entity)
+    for k in range(80):  # the table grows
+        ball(world, (30.0 + 2.0 * k, 5.0))
+    for _ in range(5):
+        world.step()
+    assert all(is_asleep(world, *boxes, *first[1::2]))
+    rows = [world.bodies.row_of(entity) for entity in boxes]
+    assert (world.bodies.position[rows] == before).all()
+    world.delete_entity(boxes[0])
+    world.step()
+    assert not any(is_asleep(world, *boxes[1:]))
+
+
+def test_a_plan_between_falling_asleep_and_the_next_step_changes_nothing():
+    world, other = sleepy_world(), sleepy_world()
+    seen = []
+    for each in (world, other):
+        boxes = tower(each, 0.0)
+        while not is_asleep(each, boxes[1])[0]:
+            each.step()
+        if each is world:
+            assert "rest_sleepers" in str(each.plan())
+        assert len(each.contacts.stay) == len(each.contacts) == 3
+        for _ in range(3):
+            each.step()
+            seen.append((each.state_hash(), len(each.contacts), len(each.contacts.stay)))
+    assert seen[:3] == seen[3:]
+
+
+def test_several_steps_in_one_call_show_the_contacts_that_stay():
+    class Look(System):
+        phase = Phase.START
+
+        def process(self, dt):
+            stays.append(len(self.world.contacts.stay))
+
+    stays = []
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    world.add_system(Look())
+    for _ in range(12):
+        world.advance(5 / 60)
+    assert all(is_asleep(world, *boxes))
+    assert stays[10:].count(0) == len(stays[10::5])  # in the first step of a call nothing has stayed yet
+    assert set(stays[10:]) == {0, 3}
+
+
+def test_a_replaced_integration_lets_nothing_sleep():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    world.remove_system(world.get_processor(Integration))
+    world.step()
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+
+
+def test_without_its_collider_the_last_sleeper_falls():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    sleep(world, *boxes)
+    world.remove_component(boxes[0], AABBCollider)
+    for _ in range(30):
+        world.step()
+    assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
+
+
+def test_turned_off_all_wake():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    world.settings = world.settings.replace(sleeping=False)
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+    assert len(world.contacts) == 3
+    assert len(world.contacts.begin) == len(world.contacts.end) == 0
+    world.component_for_entity(boxes[0], RigidBody).linear_velocity = (1.0, 0.0)
+    world.step()
+    assert world.component_for_entity(boxes[0], Transform).position[0] > 0.0
+
+
+def test_a_body_with_a_value_that_cannot_be_wakes_the_others():
+    world = sleepy_world(on_fault="ignore")
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    world.bodies.position[world.bodies.row_of(boxes[0])] = np.nan
+    for _ in range(30):
+        world.step()
+    assert not any(is_asleep(world, *boxes))
+    assert world.component_for_entity(boxes[1], Transform).position[1] < 1.2
+
+
+def test_queries_find_sleepers():
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    assert world.query_sphere((0.0, 1.5), 0.2) == [boxes[1]]
+    world.step()
+    assert all(is_asleep(world, *boxes))
+
+
+def test_settings_and_wake_are_checked():
+    with pytest.raises(ValueError, match="sleeping"):
+        Settings(sleeping=1)
+    world = sleepy_world()
+    with pytest.raises(KeyError):
+        world.wake(99)
+
+
+def test_the_contacts_of_the_last_sleeper_end_when_nothing_can_move_any_more():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    sleep(world, *boxes)
+    assert len(world.contacts) == 1
+    world.component_for_entity(boxes[0], RigidBody).kind = "static"
+    world.step()
+    assert (len(world.contacts), len(world.contacts.end)) == (0, 1)
+
+
+def test_contacts_that_were_read_before_going_back_are_no_trouble():
+    """With a handler the step asks which contacts have been disabled: of those that are shown now."""
+    world = sleepy_world()
+    world.on("contact_begin", lambda contact: None)
+    empty = world.snapshot()
+    sleep(world, *tower(world, 0.0, 1))
+    full = world.snapshot()
+    for snapshot, count in ((empty, 0), (full, 1), (empty, 0)):
+        list(world.contacts)
+        world.restore(snapshot)
+        assert len(world.contacts) == count
+        world.step()
+        assert len(world.contacts) == count
 
 
 @pytest.mark.parametrize("cause", CAUSES)

@@ -28,21 +28,6 @@ def crosses(place, velocity, half, axis, reach):
     return all(inside for k, inside in enumerate(beside) if k != axis)
 
 
-@swept
-def test_a_point_bounces_off_a_box_of_zero_thickness(mode):
-    """One of the many that passed through."""
-    low, high = -0.0900192, -0.0401312
-    world = kit.make_world(collision=mode)
-    wall = AABBCollider((0.0, 0.5 * (high - low)), restitution=1.0)
-    world.create_entity(Transform((-0.02007897, 0.5 * (low + high))), wall)
-    point = kit.ball(world, (0.12978026, 0.09057735), (-2.178, -2.202), radius=0.0, restitution=1.0)
-    for _ in range(8):
-        world.step()
-    assert kit.velocity(world, point).tolist() == [2.178, -2.202]
-    mirrored = 2 * -0.02007897 - (0.12978026 - 2.178 * 8 * DT)
-    assert np.isclose(kit.position(world, point)[0], mirrored, rtol=0, atol=1e-15)
-
-
 @pytest.mark.parametrize(
     ("mode", "d", "kind", "restitution"),
     pairwise(("continuous", "event_driven"), (2, 3), ("point", "flat box", "box point"), (1.0, 0.5, 0.0)),

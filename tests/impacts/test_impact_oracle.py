@@ -1,8 +1,6 @@
-"""Impacts agree with the oracle, which tests all pairs all the time: the same ones in the same order, the same motion.
+"""Impacts agree with an oracle that tests all pairs all the time: the same ones in order, the same motion.
 
-Steps in which contacts at rest push, or the limit on impacts is reached, are not compared. Impacts of
-curved bodies amplify rounding, tenfold and more each: each step starts from the world's own state, and if accuracy is
-lost within one step, the oracle must also give another result when its start is perturbed by as much.
+Not compared: steps in which contacts push, or the cap is reached; a difference counts unless rounding grows as much.
 """
 
 from __future__ import annotations
@@ -89,11 +87,7 @@ class Told:
 
 
 def scattered(rng, mode, d, count, speed, *, shapes="mixed", gravity=0.0, plain=False, **chosen):
-    """``count`` bodies without overlap, sizes over most of a decade, with that speed in sizes per step.
-
-    All kinds, masses over six decades and e from 0 to 1.2, mostly inside a room with thin walls; ``plain``: only
-    dynamic elastic bodies of equal mass. In discrete worlds the first body has ccd.
-    """
+    """Bodies of most kinds without overlap, with that speed in sizes per step; plain: dynamic, elastic, alike."""
     world = mode_world(mode, d, gravity, max_impacts_per_step=CAP, **chosen)
     width = 0.62 * count ** (1 / d)
     if plain or rng.random() < 0.7:

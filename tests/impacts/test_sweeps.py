@@ -302,17 +302,6 @@ def test_what_is_missed_is_missed_by_something(pair, d):
 
 
 @both_dimensions
-@every_pair
-def test_a_way_four_times_as_long_changes_no_digit(pair, d):
-    """Casts rely on it: their displacements have the next power of two as length."""
-    code, cases, v, hit, time = ways(pair, d)
-    hit_far, time_far = code.sweep(cases.a, cases.b, cases.d, 4.0 * v)
-    np.testing.assert_array_equal(time_far[hit] * 4.0, time[hit])
-    assert hit_far[hit].all()
-    assert (time_far[hit_far & ~hit] > 0.25 * (1.0 - 1e-12)).all()
-
-
-@both_dimensions
 @pytest.mark.parametrize("pair", PAIRS[:3], ids=["spheres", "sphere-box", "boxes"])
 def test_c22_mirrored_and_swapped_the_digits_stay(pair, d):
     """Mirrored along one axis; x and y exchanged in 2D; with exchanged roles for equal shapes."""

@@ -102,15 +102,6 @@ def test_force_applied_in_a_system_acts_for_one_step(method, phase, with_force_s
     assert calls == [1, 2, 5]
 
 
-def test_force_applied_before_integration_acts_in_this_step():
-    """A system placed before Integration, in its phase, is early enough."""
-    world = make_world(dt=DT)
-    rigid = body(world)
-    world.add_system(Calls(Phase.INTEGRATION, lambda: rigid.apply_force((1.0, 0.0))), before="Integration")
-    run(world, 3)
-    assert rigid.linear_velocity[0] == 3 * DT
-
-
 @pytest.mark.parametrize("adopted", [False, True])
 def test_force_applied_outside_is_held_for_the_whole_advance(adopted):
     """In every step of the next advance that takes one, then it clears; an advance of no step keeps it."""

@@ -1,7 +1,4 @@
-"""Integrators under constant force and on springs: A7, B1 to B3, C7 of the accuracy list.
-
-A linear problem's n-step result is a matrix power, so the engine is compared at rounding, not at truncation.
-"""
+"""Integrators under constant force and on springs, to the rounding of matrix powers: A7, B1 to B3, C7."""
 
 from __future__ import annotations
 

@@ -77,26 +77,6 @@ def test_one_function_after_the_other_and_nobody_waits(tmp_path):
     assert lines == ["[True, False, True] 2 0.0", "3", "TypingError"]
 
 
-def test_the_time_until_another_thread_has_compiled_counts_as_waiting(tmp_path):
-    hold = """
-import threading
-from numba.core.compiler_lock import global_compiler_lock
-held, late = threading.Event(), adding(1.0)
-adding(2.0).link()
-
-def hold():
-    with global_compiler_lock:
-        held.set()
-        time.sleep(1.0)
-
-threading.Thread(target=hold).start()
-held.wait()
-late.link()
-print(log.waited - log.seconds > 0.9)
-"""
-    assert run(FUNCTIONS + hold, tmp_path) == ["True"]
-
-
 def test_it_ends_with_the_program(tmp_path):
     run(FUNCTIONS + THE_END, tmp_path)
     assert len(list(tmp_path.glob("*.kernel"))) < 400

@@ -12,20 +12,8 @@ from numba.core.errors import TypingError
 
 from carom.framework.compilation import inlined, kernel, packed, part
 from carom.framework.jit import cache as kernel_cache
-from carom.framework.jit.cache import cache_contents, cache_folder, clear_cache
 from carom.framework.jit.hash import deep_hash
 from carom.systems.shapes.linking import source
-
-
-def test_a_folder_that_cannot_be_written_is_passed_over(monkeypatch, tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("")
-    monkeypatch.setenv("CAROM_CACHE_DIR", str(blocked / "sub"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    assert cache_folder() == tmp_path / "home" / "carom"
-    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path / "chosen"))
-    assert cache_folder() == tmp_path / "chosen"
-    assert (tmp_path / "chosen").is_dir()
 
 
 def test_a_disk_that_fills_up_costs_speed_and_not_the_run(monkeypatch, tmp_path, caplog):
@@ -62,17 +50,6 @@ def test_a_write_that_breaks_off_leaves_nothing_behind(monkeypatch, tmp_path):
 
     assert halved(4.0) == 2.0
     assert not list(tmp_path.iterdir())
-
-
-def test_the_folder_can_be_counted_and_emptied(monkeypatch, tmp_path):
-    monkeypatch.setenv("CAROM_CACHE_DIR", str(tmp_path))
-    (tmp_path / "other.txt").write_text("not a kernel")
-    (tmp_path / "old.kernel").write_bytes(b"12345")  # of another version
-    (tmp_path / "broken.unfinished").write_bytes(b"1")  # of a process that was killed
-    assert cache_contents() == (1, 5)
-    assert clear_cache() == (1, 5)
-    assert cache_contents() == (0, 0)
-    assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
 
 
 def test_the_garbage_collector_is_as_it_was_after_compiling_and_after_failing(monkeypatch, tmp_path):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from helpers_filters import DT, listen, pairs, up
@@ -95,21 +93,6 @@ def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
     assert told == [("stay", ground, body)] * 60
     assert position(world, body)[1] == pytest.approx(height, abs=0.005)
     assert [contact.entity_b for contact in world.contacts.of(body)] == [ground]
-
-
-@pytest.mark.compiled
-def test_a_stack_on_a_disabled_contact_falls_together():
-    """The lowest contact is disabled: all fall freely, in contact without impulse, pushed out by their sag."""
-    w, rate = 2 * math.pi * 0.25 * 240, 17.5
-    world = make_world(gravity=10.0)
-    ground = floor(world)
-    stack = [box(world, (0.0, 0.5 + k)) for k in range(3)]
-    run(world, 120)
-    before = [velocity(world, body)[1] for body in stack]
-    world.add_system(Disable(entity=ground))
-    run(world, 30)
-    for body, speed in zip(stack, before, strict=True):
-        assert velocity(world, body)[1] == pytest.approx(speed - 10 * 30 * DT, abs=rate * 4 * 10 / w**2)
 
 
 @pytest.mark.compiled

@@ -160,20 +160,6 @@ def test_touching_exactly_counts(d, first, second, scale):
 
 
 @both_dimensions
-@pytest.mark.parametrize("first", [ball, box])
-@pytest.mark.parametrize("second", [ball, box])
-def test_coincident_centres_have_a_definite_normal(d, first, second):
-    """No direction between them: a unit normal along the first axis, the full depth, the point at the centre's side."""
-    world = make_world(d)
-    first(world, 0.25)
-    second(world, 0.25)
-    world.run(Phase.NARROW)
-    assert np.abs(world.contacts.normal[0]).tolist() == np.eye(d)[0].tolist()
-    assert world.contacts.depth[0] == 1
-    assert np.isfinite(world.contacts.point).all()
-
-
-@both_dimensions
 def test_points_and_empty_boxes(d):
     """Radius 0 is a point, zero extents a point, a line or a sheet: they touch what they lie on or in."""
     thin = tuple(np.eye(d)[0])  # from -1 to 1 along x

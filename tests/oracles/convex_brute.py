@@ -120,10 +120,7 @@ def meet(a, b):
 
 
 def least_overlap(overlap, d):
-    """The least value of ``overlap`` (units (m, d) -> (m,)) over all directions, by refinement of many directions.
-
-    Works for any convex shapes, separate or overlapping.
-    """
+    """The least ``overlap`` (units (m, d) -> (m,)) of convex shapes over all directions, by refinement of many."""
     if d == 2:
         angle = np.linspace(0, 2 * np.pi, 4001)
         directions = np.stack((np.cos(angle), np.sin(angle)), 1)

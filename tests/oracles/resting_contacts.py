@@ -38,10 +38,7 @@ def _geometry(place_a, half_a, place_b, half_b):
 
 
 def solve(contacts, inverse_masses, gained):
-    """Impulses of the contacts (a, b, normal) against ``gained``, (bodies, d): changes of velocity by forces in a step.
-
-    Returns (impulses; changes of velocity (bodies, d) that are left; whether the impulses are the only ones).
-    """
+    """(impulses, changes of velocity (bodies, d) that are left, whether no others are right) against ``gained``."""
     root = np.sqrt(inverse_masses)
     ways = np.zeros((*np.shape(gained), len(contacts)))
     for k, (a, b, normal) in enumerate(contacts):

@@ -1,4 +1,4 @@
-"""A third-party plugin: a package built, installed, found, checked, used; and its kernels cached."""
+"""A third-party plugin: a package built, installed, found, checked and used."""
 
 from __future__ import annotations
 
@@ -28,13 +28,10 @@ version = "{version}"
 packages = ["{package}"]
 """
 SHAPE = '''
-"""A diamond: all points with |x| + |y| up to its size."""
 from carom.components import SphereCollider
 from carom.components.colliders import Collider
 from carom.framework import Plugin, column
-from carom.framework.vectors import scale, sub
-
-from .geometry import surface
+from carom.framework.vectors import divided, length, scale
 
 plugin = Plugin("diamonds", version="2.5")
 
@@ -47,31 +44,10 @@ class DiamondCollider(Collider):
 
 @plugin.pair(DiamondCollider, SphereCollider)
 def diamond_sphere(a, b, d):
-    distance, normal = surface(a.size, d)
-    depth = b.radius - distance
-    return depth >= 0.0, depth, normal, sub(d, scale(normal, distance + 0.5 * depth))
-'''
-GEOMETRY = '''
-import math
-
-from carom.framework.compilation import inlined
-
-@inlined
-def sign(x):
-    return 1.0 if x >= 0.0 else -1.0
-
-@inlined
-def surface(size, d):
-    """Distance of d from a diamond's surface, negative inside, and the normal there."""
-    x, y = abs(d[0]), abs(d[1])
-    root = math.sqrt(2.0)
-    distance = (x + y - size) / root
-    part = min(max(0.5 * (y - x + size) / size, 0.0), 1.0)  # along the edge from (size, 0) to (0, size)
-    u, v = x - size * (1.0 - part), y - size * part
-    if distance > 0.0 and 0.0 < math.hypot(u, v):
-        distance = math.hypot(u, v)
-        return distance, (sign(d[0]) * u / distance, sign(d[1]) * v / distance)
-    return distance, (sign(d[0]) / root, sign(d[1]) / root)
+    distance = length(d)
+    depth = a.size + b.radius - distance
+    normal = divided(d, distance) if distance > 0.0 else (1.0, 0.0)
+    return depth >= 0.0, depth, normal, scale(normal, a.size - 0.5 * depth)
 '''
 START = """
 import json
@@ -116,7 +92,7 @@ def install(source: Path, target: Path) -> None:
 def site(tmp_path_factory) -> Path:
     """A folder with a good plugin's package and a broken one's."""
     base = tmp_path_factory.mktemp("third-party")
-    files = {"shapes.py": SHAPE, "geometry.py": GEOMETRY}
+    files = {"shapes.py": SHAPE}
     good = write_package(
         base / "good", "diamonds-package", "0.3", "diamonds", "diamonds_package.shapes:plugin", files
     )
@@ -169,10 +145,9 @@ def test_an_installed_plugin_is_checked_by_its_name(python):
 
 
 def test_a_ball_falls_on_its_shape_and_bounces(python):
-    """On the upper right side, x + y = 1: centre 0.5 beside the middle, so the side is met at 0.5 - 0.25 cos 45 deg."""
+    """Half a metre beside the middle of a disc of 1 m: centres 1.25 m apart when a ball of 0.25 m touches."""
     result = python("-c", GAME)
     assert result.returncode == 0, result.stderr
-    said = json.loads(result.stdout.splitlines()[-1])
-    assert said["normal"] == pytest.approx([0.5**0.5, 0.5**0.5])
-    height = 1.0 - 0.5 + 0.25 * 2**0.5  # of the ball's centre when it touches
+    said, height = json.loads(result.stdout.splitlines()[-1]), (1.25**2 - 0.5**2) ** 0.5
+    assert said["normal"] == pytest.approx([0.5 / 1.25, height / 1.25], abs=1e-2)
     assert abs(said["step"] - (2 * (2.0 - height) / 9.81) ** 0.5 * 60) <= 1.0

@@ -107,19 +107,6 @@ def test_registering_late_and_again_is_seen_at_the_next_step():
     world.close()
 
 
-def test_a_plugin_may_join_later():
-    plugin, lonely = lonely_plugin()
-    plugin.pair(lonely, lonely)(lonely_lonely)
-    world = World(Physics())
-    world.create_entity(Transform((0, 0)), RigidBody(), lonely(1.0))
-    with pytest.raises(UnhandledPairError, match="LonelyCollider is a collider that no plugin of this world"):
-        world.step()
-    world.add_plugin(plugin)
-    world.step()
-    assert plugin in world.plugins
-    world.close()
-
-
 def test_a_flat_shape_is_not_for_3d():
     plugin, _ = lonely_plugin()
 

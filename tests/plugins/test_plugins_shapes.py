@@ -9,101 +9,10 @@ import pytest
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.components.colliders import Collider
-from carom.framework import Plugin, PluginError, Settings, World, array_column, column
-from carom.framework.vectors import add, divided, dot, length, negative, scale, sub
+from carom.framework import Plugin, PluginError, World, array_column
 from carom.plugins import Physics
 
 pytestmark = pytest.mark.plain
-
-
-class RodCollider(Collider):
-    """A rounded rod along the body's y axis: a shape that turns, written with the public functions only."""
-
-    rotates = True
-
-    radius = column(positive=True)
-    half_length = column(positive=True)
-
-    def bounds(shape, dimensions):
-        axis = shape.axes[1]
-        x, y = abs(axis[0]) * shape.half_length + shape.radius, abs(axis[1]) * shape.half_length + shape.radius
-        if dimensions == 2:
-            return x, y
-        return x, y, abs(axis[2]) * shape.half_length + shape.radius
-
-    def support(shape, direction):
-        end = scale(shape.axes[1], shape.half_length)
-        return end if dot(end, direction) >= 0.0 else negative(end)
-
-    def rounding(shape):
-        return shape.radius
-
-
-def make_plugin():
-    plugin = Plugin("rods")
-    plugin.shape(cost=2)(RodCollider)
-
-    @plugin.kernel
-    def on_rod(rod, d):
-        """The point of the rod's core that is nearest to d."""
-        along = dot(rod.axes[1], d)
-        return scale(rod.axes[1], max(-rod.half_length, min(rod.half_length, along)))
-
-    @plugin.pair(RodCollider, SphereCollider)
-    def rod_sphere(a, b, d):
-        nearest = on_rod(a, d)
-        gap = sub(d, nearest)
-        distance = length(gap)
-        depth = a.radius + b.radius - distance
-        normal = divided(gap, distance) if distance > 0.0 else a.axes[0]
-        return depth >= 0.0, depth, normal, add(nearest, scale(normal, a.radius - 0.5 * depth))
-
-    return plugin
-
-
-@pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("sphere_first", [True, False])
-def test_a_shape_of_a_plugin_bounces_at_the_right_height(d, sphere_first):
-    """Dropped from h with restitution e a ball returns to e^2 h; here e = 1, over a horizontal rod."""
-    up, here = np.eye(d)[1], np.zeros(d)
-    turned = math.pi / 2 if d == 2 else (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
-    settings = Settings(integrator="velocity_verlet")
-    world = World(Physics(dimensions=d, gravity=-10 * up), make_plugin(), settings=settings)
-
-    def make_ball():
-        return world.create_entity(Transform(5 * up), RigidBody(), SphereCollider(0.5, restitution=1.0))
-
-    ball = make_ball() if sphere_first else None
-    world.create_entity(Transform(here, rotation=turned), RodCollider(1.0, 6.0))
-    ball = make_ball() if ball is None else ball
-    lowest, highest, falling = 5.0, 0.0, True
-    for _ in range(200):
-        world.step()
-        y = world.component_for_entity(ball, Transform).y
-        lowest = min(lowest, y)
-        falling = falling and not world.contacts.impacts.pairs(RodCollider, SphereCollider)
-        highest = highest if world.time < 1.0 else max(highest, y)
-    assert lowest == pytest.approx(1.5, abs=0.2)  # lowest between two steps of up to .14 m
-    assert highest == pytest.approx(5.0, abs=10 / 8 / 60**2 + 1e-9)  # the apex lies between two steps
-    assert world.kinetic_energy() + world.potential_energy() == pytest.approx(50.0, rel=1e-12)
-    world.close()
-
-
-def test_a_rod_turns_with_its_body():
-    world = World(Physics(), make_plugin())
-    rod = world.create_entity(Transform((0, 0)), RodCollider(0.5, 3.0))
-    ball = world.create_entity(Transform((0, 3.9)), RigidBody(), SphereCollider(0.5))
-    world.step()
-    assert [contact.normal.tolist() for contact in world.contacts] == [[0.0, 1.0]]
-    world.component_for_entity(rod, Transform).rotation = math.pi / 2
-    world.component_for_entity(ball, Transform).position = (3.9, 0.0)
-    world.step()
-    (contact,) = world.contacts
-    np.testing.assert_allclose(contact.normal, (1, 0), atol=1e-12)
-    world.component_for_entity(ball, Transform).position = (0.0, 3.9)
-    world.step()
-    assert len(world.contacts) == 0
-    world.close()
 
 
 class CloudCollider(Collider):

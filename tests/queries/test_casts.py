@@ -12,9 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import ball, both_dimensions, box, make_world
 
-from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
-from carom.framework import Plugin, World, column
-from carom.plugins import Physics
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 
 
 def check_cast(hits, one, bodies, way, least, tolerance):
@@ -150,47 +148,6 @@ def test_turned_boxes_are_met_as_they_stand():
     box(world, (5, 0), half=1.0, rotation=math.pi / 4, kind="static", offset=(1.0, 0.0))
     (hit,) = world.ray_cast((0, 0), (1, 0))
     assert hit.distance == pytest.approx(5 + math.sqrt(0.5) - math.sqrt(2), rel=1e-14)  # the offset turns as well
-    world.close()
-
-
-def test_the_shape_of_a_plugin_is_met_and_casts():
-    """One registered pair with spheres serves queries, rays, casts of spheres and casts of the shape itself."""
-    plugin = Plugin("rhombus")
-
-    @plugin.shape(cost=2)
-    class RhombusCollider(Collider):
-        dimensions = (2,)
-        reach = column(positive=True)
-
-        @staticmethod
-        def bounds(shape, dimensions):
-            return (shape.reach, shape.reach)
-
-    @plugin.pair(RhombusCollider, SphereCollider)
-    def rhombus_sphere(a, b, d):
-        """Separating planes along the faces only: a bound of the distance, which plugins may return."""
-        x, y = (1.0 if d[0] >= 0.0 else -1.0), (1.0 if d[1] >= 0.0 else -1.0)
-        normal = (x * 0.7071067811865476, y * 0.7071067811865476)
-        depth = 0.7071067811865476 * (a.reach - abs(d[0]) - abs(d[1])) + b.radius
-        return depth >= 0.0, depth, normal, (d[0] - normal[0] * b.radius, d[1] - normal[1] * b.radius)
-
-    @plugin.pair(RhombusCollider, RhombusCollider)
-    def rhombus_rhombus(a, b, d):
-        x, y = (1.0 if d[0] >= 0.0 else -1.0), (1.0 if d[1] >= 0.0 else -1.0)
-        depth = 0.7071067811865476 * (a.reach + b.reach - abs(d[0]) - abs(d[1]))
-        return depth >= 0.0, depth, (x * 0.7071067811865476, y * 0.7071067811865476), (0.5 * d[0], 0.5 * d[1])
-
-    world = World(Physics(), plugin)
-    gem = world.create_entity(Transform((5, 0)), RhombusCollider(1.0))
-    (hit,) = world.ray_cast((0, 0.5), (1, 0))
-    assert hit.entity == gem
-    assert hit.distance == pytest.approx(4.5, rel=1e-15)
-    np.testing.assert_allclose(hit.normal, (-math.sqrt(0.5), math.sqrt(0.5)))
-    (hit,) = world.shape_cast(RhombusCollider(1.0), (0, 0.5), (10, 0))
-    assert hit.distance == pytest.approx(3.5, rel=1e-15)
-    assert world.query_point((5.4, 0.5)) == [gem]
-    assert world.query_point((5.6, 0.5)) == []
-    assert world.query_aabb((4, -1), (6, 1)) == []  # there is no pair with boxes
     world.close()
 
 numbers = st.floats(-3, 3, allow_subnormal=False)

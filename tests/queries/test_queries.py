@@ -68,18 +68,6 @@ def test_touching_many_bodies(d, n):
 
 
 @both_dimensions
-def test_many_queries_of_few_bodies(d):
-    """Many tests go through a tree; the results are those of single queries."""
-    world, _, side = scene(d, 180, seed=2, kinds=("dynamic",))
-    centres = np.random.default_rng(2).random((1000, d)) * side
-    spheres, nearest = world.query_spheres(centres, 1.0), world.query_nearests(centres)
-    for i in range(0, 1000, 10):
-        assert spheres[i].tolist() == world.query_sphere(centres[i], 1.0)
-        assert nearest.entity[i] == world.query_nearest(centres[i]).entity
-    world.close()
-
-
-@both_dimensions
 @pytest.mark.parametrize("n", [60, 800])
 def test_neighbours_of_many_bodies(d, n):
     world, bodies, side = scene(d, n, seed=9, sizes="clusters")

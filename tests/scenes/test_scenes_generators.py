@@ -10,7 +10,6 @@ import pytest
 
 from carom import scenes
 from carom.components import AABBCollider, SphereCollider, Transform
-from carom.scenes import static_world
 from carom.scenes.sizes import ceil_root, floor_root
 
 GENERATORS = ["gas2d", "gas3d", "mixed2d", "fastgas", "pile2d", "pile3d", "static_world", "freefall", "player_query"]
@@ -82,12 +81,6 @@ def test_mixed2d_is_the_gas_with_boxes_at_the_odd_places(n):
             assert material(world, entity) == ([0.5, 0.5] if k % 2 else [0.5], 1.0, None)
 
 
-def test_fastgas_is_the_gas_thirty_times_as_fast():
-    positions, velocities = gas(1000, 2)
-    with make("fastgas") as world:
-        assert_bodies(world, positions, 30 * velocities, CIRCLE)
-
-
 @pytest.mark.parametrize(("n", "seed"), [(1, 0), (10, 2), (1000, 0), (1024, 0)])
 def test_pile2d(n, seed):
     width, per_row, u = 1.2 * math.sqrt(n), math.isqrt(n), draws(seed)
@@ -119,14 +112,6 @@ def test_a_large_pyramid_has_ground_to_stand_on():
     with make("pyramid", rows=150, spacing=1.1) as world:
         half = material(world, world.bodies.static.entity[0])[0][0]
         assert np.abs(world.bodies.dynamic.position[:, 0]).max() + 0.5 < half
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 100, 10_000, 100_000])
-def test_static_world_has_room_for_any_number(n):
-    positions, _ = static_world.initial_state(n)
-    assert positions.min() > 3
-    assert positions.max() < 4 * static_world.boxes_a_side(n) - 3
-    assert len(np.unique(np.round(positions / 4), axis=0)) == n  # a crossing for each
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,4 @@
-"""Whatever a game does with the public interface, in any order: after each step and each answer, brute force agrees.
-
-Hypothesis plays: it spawns, deletes, gives and takes, writes, asks, snapshots, saves and raises, and shortens the game
-that fails. The machine looks at every body with plain geometry, a pair at a time.
-"""
+"""Whatever a game that hypothesis plays does, in any order: after each step and answer, brute force agrees."""
 
 from __future__ import annotations
 

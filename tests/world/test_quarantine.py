@@ -7,7 +7,7 @@ import math
 import esper
 import numpy as np
 import pytest
-from helpers_poison import column_of, rest_of, told
+from helpers_poison import column_of, complaints, rest_of, scenes, told
 from worlds import ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -266,3 +266,23 @@ def test_too_far_from_the_origin_to_move(d, mode):
     assert position(world, near)[0] > 1e9
     assert position(world, slow)[0] == 5.0
     assert position(world, still)[0] == 1e15
+
+
+# Each mode takes every second or third body, each mode others; every second of these waits for the long run.
+SHARES = {"mixed 2D": 3, "mixed 3D": 2, "platformer": 1}
+
+
+def cases():
+    for name, build in scenes():
+        kind, _, mode = name.rpartition(" ")
+        first, share = MODES.index(mode), SHARES[kind]
+        for part, marks in enumerate(([pytest.mark.slow], [pytest.mark.slow, pytest.mark.long])):
+            victims = slice(first % share + part * share, None, 2 * share)
+            yield pytest.param(build, victims, first, id=f"{name} {part}", marks=marks)
+
+
+@pytest.mark.early
+@pytest.mark.parametrize(("build", "victims", "first"), list(cases()))
+def test_values_that_cannot_be_in_every_column_of_every_body(build, victims, first):
+    """nan, inf, -inf and -1: others stay finite, and as if it was deleted if a fault names the body."""
+    assert list(complaints(build, victims, first)) == []

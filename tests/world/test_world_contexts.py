@@ -226,16 +226,6 @@ def test_plain_process_wants_the_fixed_step_and_names_advance():
     assert world.step_count == 3
 
 
-def test_an_empty_world_and_a_single_body_step():  # ACCURACY C25
-    world = make_world()
-    world.step()
-    assert len(world.bodies) == len(world.contacts) == 0
-    assert world.momentum().tolist() == [0.0, 0.0]
-    ball(world, 0.0, 60.0)
-    world.step()
-    assert world.bodies.position.tolist() == [[1.0, 0.0]]
-
-
 def test_faults_hold_the_last_hundred():
     world = World()
     for index in range(150):

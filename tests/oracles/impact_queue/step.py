@@ -17,11 +17,7 @@ SAME_PLACE = 1e-9  # of the size: a smaller gap counts as none
 
 
 class Oracle:
-    """A copy of a small world between two steps; :meth:`step` advances it without any compiled code.
-
-    world
-        not changed; ValueError for what the oracle does not know
-    """
+    """A copy of a small world between two steps, which :meth:`step` advances; ValueError for what it does not know."""
 
     def __init__(self, world: World) -> None:
         self.settings = world.settings
