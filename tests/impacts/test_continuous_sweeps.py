@@ -329,3 +329,30 @@ def test_bullets_pass_what_they_do_not_meet(mode, why):
     assert len(hits) == 0
     np.testing.assert_array_equal(x, position(free, mover))
     np.testing.assert_array_equal(v, velocity(free, mover))
+
+
+@each_mode
+def test_what_a_step_of_several_searches_has_found_is_told(mode):
+    """A sensor crossed on the way back, a contact disabled, a wall struck: all before pairs are searched again."""
+    for seed in range(3):
+        rng, world = np.random.default_rng(seed), mode_world(mode, max_impacts_per_step=1000)
+        behind = box(world, (7.5, 20.0), half=(0.05, 5.0), kind="static", sensor=True)
+        walls = [box(world, (9.0, y), half=(0.05, 5.0), kind="static") for y in (20.0, 40.0)]
+        flyers = [bullet(world, (8.5, y), (6000.0, 0.0), restitution=1.0) for y in (20.0, 40.0)]
+        for place in rng.uniform(-6, 6, (300, 2)):
+            bullet(world, place, rng.normal(size=2) * 300, radius=0.02, restitution=1.0)
+
+        class Disable(System):
+            phase = Phase.NARROW
+
+            def process(self, dt, off=walls[1]):
+                contacts = self.world.contacts
+                contacts.enabled[contacts.entity_a == off] = False
+
+        world.add_system(Disable())
+        world.step()
+        assert world.stats().counters["rounds"] > 0
+        begin = set(zip(world.contacts.begin.entity_a.tolist(), world.contacts.begin.entity_b.tolist(), strict=True))
+        pairs = [(behind, flyers[0]), (walls[0], flyers[0]), (walls[1], flyers[1])]
+        assert [pair in begin for pair in pairs] == [True, True, False]
+        assert velocities(world, flyers)[:, 0].tolist() == [-6000.0, 6000.0]

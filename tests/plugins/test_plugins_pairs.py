@@ -252,15 +252,16 @@ def approaching(world, distance=1.9, **collider):
 
 
 def test_a_mixing_rule_of_a_plugin():
-    """Both have e = 1, the rule makes .25 of it: relative speed after / before."""
+    """Both have e = 1, the rules make .25 and 0 of it: relative speed after / before."""
     plugin = Plugin("rules")
     plugin.mixing_rule("quarter")(lambda x, y: 0.125 * (x + y))
-    world = World(Physics(), plugin, settings=Settings(restitution_mixing="quarter", restitution_threshold=0.0))
-    approaching(world, 2.01)
-    world.step()
-    world.step()
-    np.testing.assert_allclose(world.bodies.linear_velocity[:, 0], (-0.25, 0.25), rtol=1e-12)
-    world.close()
+    plugin.mixing_rule("nothing")(lambda x, y: 0.0)
+    for rule, e in (("quarter", 0.25), ("nothing", 0.0)):
+        with World(Physics(), plugin, settings=Settings(restitution_mixing=rule, restitution_threshold=0.0)) as world:
+            approaching(world, 2.01)
+            world.step()
+            world.step()
+            np.testing.assert_allclose(world.bodies.linear_velocity[:, 0], (-e, e), rtol=1e-12, atol=1e-12)
     with pytest.raises(ValueError, match=r"Settings.restitution_mixing must be one of average, .*, got 'quarter'"):
         World(Physics(), settings=Settings(restitution_mixing="quarter"))
     with pytest.raises(ValueError, match=r"Settings.friction_mixing must be one of"):
