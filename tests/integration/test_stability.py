@@ -136,16 +136,6 @@ def test_linear_damping_has_the_exact_position(method, staged, dt):
     np.testing.assert_allclose(y, V_T * (t + TAU * np.expm1(-t / TAU)), rtol=1e-11, atol=1e-15)
 
 
-@pytest.mark.parametrize("method", ["explicit_euler", "semi_implicit_euler", "rk4"])
-def test_linear_damping_has_the_methods_order_in_position(method):
-    """B7: the position error falls by 2^p, p within 5 %."""
-    errors = []
-    for steps in (40, 80):
-        y, _ = damped_fall(method, 2.0 / steps, steps, staged=True)
-        errors.append(abs(y[-1] - V_T * (2.0 + TAU * math.expm1(-2.0 / TAU))))
-    assert math.log2(errors[0] / errors[1]) == pytest.approx(ORDERS[method], rel=0.05)
-
-
 @all_methods
 def test_linear_damping_has_the_methods_order_with_a_spring(method):
     """Damping beside a force that depends on position keeps the method's order: exact solution of B3, zeta = 0.5."""

@@ -10,8 +10,11 @@ from helpers_processes import run_python
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import System, World
+from carom.framework.jit.records.record import make_record
+from carom.framework.schedule.stages import Program, Stage
 from carom.plugins import Physics
 from carom.systems import ContactEvents
+from carom.systems.records import STATE
 from carom.systems.stage_list import CLOSING, check_stages
 from studies.page import between_marks
 from studies.stages import table
@@ -100,3 +103,20 @@ def test_without_its_system_the_events_end_and_the_rest_goes_on():
 def test_a_stage_that_the_step_cannot_keep_its_promises_for_is_refused(change, message):
     with pytest.raises(ValueError, match=f"stage check_finite.*{message}"):
         check_stages((dataclasses.replace(CLOSING[-1], **change),))
+
+
+def half_done(state, dt):
+    if dt > 1.0:
+        return 0
+
+
+def of_another_code(state, dt):
+    return 77
+
+
+def test_a_stage_returns_a_code_that_is_known():
+    with pytest.raises(ValueError, match="stage half_done must return a code on every path: 0, or"):
+        Stage(half_done, "nothing")
+    program = Program(make_record(STATE, 2), (Stage(of_another_code, "nothing"),), {3: lambda dt: None}, 32)
+    with pytest.raises(ValueError, match=r"stage of_another_code returned 77, .*: these are 3, and 0 for"):
+        program.run_one("of_another_code", 0.0)
