@@ -217,7 +217,6 @@ def test_rotation_is_read_again_in_every_step():
         ({"layer": 1, "mask": 2}, {"layer": 2, "mask": 4}, False),  # only one accepts
         ({"layer": 1, "mask": 4}, {"layer": 2, "mask": 1}, False),
         ({"mask": 0}, {}, False),
-        ({"layer": 0}, {}, False),
         ({"layer": 6, "mask": 2}, {"layer": 2, "mask": 4}, True),
         ({"layer": 1 << 62, "mask": -1}, {"layer": 1, "mask": 1 << 62}, True),
     ],
