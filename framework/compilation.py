@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from .jit.late import JIT, Late, dispatchers
+from .jit.lazy import JIT, LazyIntrinsic, dispatchers
 from .jit.log import CHECKED, log
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -89,7 +89,7 @@ def _part(function: Any, **options: Any) -> Any:
     return Part(function, options) if JIT else function
 
 
-class Compiled(Late):
+class Compiled(LazyIntrinsic):
     """A function for numba to compile; its dispatcher, :attr:`made`, is made when first called or needed by a kernel.
 
     targetoptions, py_func: numba's names, by which it recognises what it has to inline.
@@ -133,7 +133,7 @@ class Kernel(Compiled):
 class Part(Compiled):
     """A function that kernels call. Python runs it as written, so that it can be tried before anything compiles."""
 
-    __call__ = Late.__call__
+    __call__ = LazyIntrinsic.__call__
 
     def _make(self) -> Any:
         return dispatchers.PartDispatcher(self.py_func, self.targetoptions)

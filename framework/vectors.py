@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from .compilation import inlined
-from .jit.late import JIT, Late, cgutils, operation, types
+from .jit.lazy import JIT, LazyIntrinsic, cgutils, operation, types
 
 
 def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callable[[Any], Any]:
@@ -33,7 +33,7 @@ def _emitted(emit: Callable[..., Any], signature: Callable[..., Any]) -> Callabl
         if not JIT:
             return function
         name, count = function.__name__, function.__code__.co_argcount
-        return Late(lambda: operation(name, count, typing, (function, emit, signature)), function)
+        return LazyIntrinsic(lambda: operation(name, count, typing, (function, emit, signature)), function)
 
     return decorate
 

@@ -76,7 +76,7 @@ _held: weakref.WeakKeyDictionary[World, tuple[int, set[tuple[int, int]]]] = weak
 
 
 @plugin.system
-class WhoStands(System):
+class ContactMemory(System):
     """Records, at the start of a step, the pairs with a one-way segment that touched at the end of the last step."""
 
     phase = Phase.START

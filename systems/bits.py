@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..framework.jit.late import ir, types
+from ..framework.jit.lazy import ir, types
 from ..framework.vectors import _emitted
 
 

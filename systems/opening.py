@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..framework.compilation import part
 from ..framework.vectors import item
-from .broad_phase.seekers import ALL
+from .broad_phase.active_rows import ALL
 from .codes import NEED_SWEEPS, OK, ROTATE
 
 DISCRETE = 0
@@ -45,10 +45,10 @@ def keep_state(state, dt):
     bodies, pairs, impacts = state.bodies, state.pairs, state.impacts
     state.unforced, state.pushed, state.moved = False, True, False
     state.forces_summed = state.candidates_ready = state.contacts_ready = False
-    state.news, state.step_force_kept, state.flight_usual = 0, False, False
+    state.event_count, state.step_force_kept, state.flight_usual = 0, False, False
     pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0
     impacts.logged = impacts.capped = 0
-    state.candidates.count, state.candidates.seeker_count = 0, ALL
+    state.candidates.count, state.candidates.active_count = 0, ALL
     state.row_a, state.unsound = NOTHING_TESTED, 0
     state.all_still, state.sleep_stages = False, 0
     state.kept_rows = state.moving if state.collides and not state.statics_stale else state.count
@@ -71,7 +71,8 @@ def read_bodies(state, dt):
             inverse_mass[i] = 0.0
     for i in range(state.dynamic if len(limit) > 0 else 0):
         limited |= (limit[i] == limit[i]) & (not out[i])
-    for i in range(state.dynamic, state.count if state.statics_unread or state.inverse_masses_lent else state.moving):
+    every = state.statics_unread or state.inverse_masses_exposed
+    for i in range(state.dynamic, state.count if every else state.moving):
         inverse_mass[i] = 0.0
     state.limits_speed = limited
     state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))

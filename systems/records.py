@@ -45,11 +45,11 @@ TABLE_SECTIONS = (
 TABLE_COLUMNS = tuple(name for section in TABLE_SECTIONS for name in section)
 # Columns of the table too, which has them under names that begin with _ and are not shown.
 SLEEP_COLUMNS = Section(
-    "body", "the table", "bodies may sleep: who does, since when, and what they were like then",
+    "body", "the table", "bodies may sleep: which do, since when, and their state then",
     still=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
     rest_steps=ints("int32"),  # for how many steps it has been at rest
     island=ints(),  # entity id of the first body of those that sleep together; 0: none
-    watched=ints(),  # ``prints`` as they were when it came to rest
+    watched=ints(),  # ``checksums`` as they were when it came to rest
     rest_position=vectors(),
     rest_force=vectors(),
     flown_position=vectors(),  # where free flight leads it from there
@@ -84,8 +84,8 @@ COLLISIONS = Section(
 RESTED = "contacts have rested"
 PREDICTED = Section(
     "body", "collisions", RESTED,
-    supported=flags(default=False),  # the resting prediction has changed its velocity
-    support_change=vectors(),
+    warm_started=flags(default=False),  # the resting prediction has changed its velocity
+    warm_start_velocity=vectors(),
     to_hold=vectors(),  # m/s, at which it closes on what pushes it
 )  # fmt: skip
 HELD = Section(
@@ -124,9 +124,9 @@ UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_veloci
 UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors())
 SLEEPING = Section(
     "body", "sleeping", "bodies may sleep: islands, and whether anything has changed them",
-    prints=ints(),  # of what code of the game may change unseen
+    checksums=ints(),  # of what code of the game may change unseen
     rest_root=ints("int32"),
-    restless=flags(),
+    keeps_awake=flags(),
 )  # fmt: skip
 
 BODIES = Schema(
@@ -164,7 +164,7 @@ CHECKED = Schema(
     high=number(),
     optional=flag(),  # nan stands for None
     turns=flag(),  # quaternions
-    lent=flag(),  # code of the game may write its static rows at any time
+    exposed=flag(),  # code of the game may write its static rows at any time
     some=flag(),  # not all of these bodies have the component,
     owned=flags(),  # but these
 )
@@ -224,11 +224,11 @@ CANDIDATES = Schema(
     "Candidates", FOUND, HALVES, Section("pair", "pairs", NEAR, starts=ints("int32")), SORTED,
     Section(
         "pair", "pairs", NEAR,
-        seekers=ints("int32"),  # rows of bodies that look for others, all others being still, ascending
+        active_rows=ints("int32"),  # rows of bodies that look for others, all others being still, ascending
     ),
     count=integer(),
     bucket_starts=ints("int32"),
-    seeker_count=integer(),  # how many; ALL: every body does
+    active_count=integer(),  # how many; ALL: every body does
 )  # fmt: skip
 
 # Pairs whose layers meet, a's entity id the smaller, in canonical order.
@@ -294,11 +294,11 @@ MEMBERS = Section(
     ahead=floats(),
     weight=floats(),
     terms=floats(),
-    rub=vectors(),  # impulses along the surfaces
+    friction_impulse=vectors(),  # impulses along the surfaces
 )  # fmt: skip
 BODIES_OF_MEMBERS = Section(
     "impact", "impacts", BOUNCED,
-    firsts=ints("int32"),
+    first_member=ints("int32"),
     searched_with=ints("int32"),  # where the log has the body's first one
     gained=vectors(),  # change of velocity
 )  # fmt: skip
@@ -321,8 +321,8 @@ IMPACTS = Schema(
     cluster=integer(),
     clusters_version=integer(),  # of the rows, when those of static bodies became clusters
     may_sink=flag(),  # through something thin, at the speed of contacts at rest
-    sunk_pair=integer(),  # the last one of whose bodies landings were searched
-    sunk_by=number(),  # the time of its impact while they are searched, else 0
+    touchdown_pair=integer(),  # the last one of whose bodies landings were searched
+    touchdown_time=number(),  # the time of its impact while they are searched, else 0
     now=number(),
     until=number(),
     # impacts at the same time
@@ -397,7 +397,7 @@ STATE = Schema(
     moving=integer(),  # rows before it move
     version=integer(),  # of the table's rows
     ranks_version=integer(),  # of the rows that ``bodies.rank`` is of
-    support_version=integer(),  # of the rows of which no static one is marked as ``bodies.supported``
+    support_version=integer(),  # of the rows of which no static one is marked as ``bodies.warm_started``
     gravity=vectors(),  # one row
     collides=flag(),
     several_levels=flag(),
@@ -431,7 +431,7 @@ STATE = Schema(
     force_travels=number(),
     step_number=integer(),
     neighbours_known_until=number(),
-    any_support=flag(),
+    any_warm_started=flag(),
     heavy_damping=number(),
     heavy_step=number(),
     rk_stage=integer(),
@@ -439,8 +439,8 @@ STATE = Schema(
     damped=flag(),
     rotation_stale=flag(),  # axes have to be made, whether some body is rotated or not
     statics_unread=flag(),  # their values may be others than in the step before
-    positions_lent=flag(),  # those of static bodies may be written at any time
-    inverse_masses_lent=flag(),
+    positions_exposed=flag(),  # those of static bodies may be written at any time
+    inverse_masses_exposed=flag(),
     statics_stale=flag(),  # their boxes have to be made again
     statics_changed=flag(),  # they were, in this step
     statics_version=integer(),
@@ -453,9 +453,9 @@ STATE = Schema(
     stay_wanted=flag(),  # contact_stay has a handler
     thinnest_static=number(),  # m, the smallest extent of a static body, but for those without any
     thinnest_moving=number(),
-    hasty=flag(),  # a body is so fast that discrete collisions may miss what it passes:
-    hasty_row=integer(),
-    news=integer(),  # events of contacts that Python has to hear of
+    too_fast_for_discrete=flag(),  # a body is so fast that discrete collisions may miss what it passes:
+    too_fast_row=integer(),
+    event_count=integer(),  # events of contacts that Python has to hear of
     finite=flag(),
     # what an error names
     row_a=integer(),

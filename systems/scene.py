@@ -32,7 +32,7 @@ from .shapes.rotation import axes_of
 # Made when the first stage asks for them; then they have a row for each of the table, like all others.
 ON_DEMAND = (*QUARANTINE, *UNDO_FORCE, *PREDICTED, *HELD)
 # What is kept of bodies from step to step, and moves with their rows: static bodies are not boxed again for others. The
-# shape comes first: it tells who has arrived.
+# shape comes first: it tells which bodies have arrived.
 KEPT_COLUMNS = ("shape", "collider_slot", "offset", "half_extents", "min_extent", "lower", "upper", "origin")
 ARRIVED = np.array([-2], np.int8)  # in place of the shape of a body that has come since the last refresh
 # Static bodies do not move: what stands in their rows of these stays 0.

@@ -33,10 +33,10 @@ from .integration.system import Integration
 from .linking.preparation import evaluate_forces, keep_ready, link_needed
 from .linking.steps import StepLinks
 from .narrow_phase.system import NarrowPhase
-from .quarantine.taken_out import Quarantine
+from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
+from .record_buffers import Room
 from .records import STATE
-from .room import Room
 from .scene import Scene
 from .settings import check_settings, gravity_vector, write_settings
 from .shapes.attribution import ErrorAttribution
@@ -172,13 +172,13 @@ class Simulation:
         if not self.links.follows(len(self._world.force_systems)):
             self.link()
         if others_write or words[self._others_write]:
-            self._take_care(others_write)
+            self._begin_user_code(others_write)
 
     def _structure(self) -> int:
         """Another number whenever bodies, their components or plugins come or go."""
         return self.table.version + self.table.members_version + self._world.registry.version
 
-    def _take_care(self, others_write: bool) -> None:
+    def _begin_user_code(self, others_write: bool) -> None:
         """Code of the game runs in this step, or did in the last one."""
         state = self.state
         if others_write != state.others_write:
@@ -210,8 +210,9 @@ class Simulation:
 
     def _follow_lent(self) -> None:
         """Code of the game may write static rows of more columns than before."""
-        lent = self.table.lent
-        self.state.positions_lent, self.state.inverse_masses_lent = "position" in lent, "inverse_mass" in lent
+        exposed = self.table.exposed
+        self.state.positions_exposed = "position" in exposed
+        self.state.inverse_masses_exposed = "inverse_mass" in exposed
         self.quarantine.follow_lent()
 
     def _check(self) -> None:

@@ -11,10 +11,10 @@ from .ccd.time_of_impact import first_touch
 from .contacts.events import ContactEvents
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
+from .impacts.bounds_exit import watch_bounds
 from .impacts.find import is_held_by_edge, kind_beyond_cap
 from .impacts.stages import take_swept_event
-from .impacts.together import take_together
-from .impacts.watch import watch_bounds
+from .impacts.together import resolve_simultaneous
 from .integration.system import Integration
 from .linking.parts import (
     BOUND_SEARCHES,
@@ -31,7 +31,7 @@ from .narrow_phase.system import NarrowPhase
 from .opening import check_finite, keep_state, read_bodies
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS
-from .sleeping.stages import judge_rest, take_prints
+from .sleeping.stages import take_checksums, update_sleep
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
@@ -46,8 +46,8 @@ OPENING = (
 )  # fmt: skip
 CLOSING = (
     Stage(
-        judge_rest, "how long bodies have been at rest; islands fall asleep", ("pairs", "position", "linear_velocity"),
-        ("still", "rest_steps", "linear_velocity"), "sleeping",
+        update_sleep, "how long bodies have been at rest; islands fall asleep",
+        ("pairs", "position", "linear_velocity"), ("still", "rest_steps", "linear_velocity"), "sleeping",
     ),
     Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),
 )  # fmt: skip
@@ -69,7 +69,7 @@ ON_DEMAND = (
     Stage(
         finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",), "colliders"
     ),
-    Stage(take_prints, "what bodies are like, to tell when they change", ("watching",), ("prints",), "sleeping"),
+    Stage(take_checksums, "what bodies are like, to tell when they change", ("watching",), ("checksums",), "sleeping"),
     *Integration.ON_DEMAND,
 )
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
@@ -106,7 +106,7 @@ LINKED_PARTS = {
     KIND_BEYOND_CAP: kind_beyond_cap,
     TAKE_SWEPT: take_swept_event,
     WATCH_BOUNDS: watch_bounds,
-    TAKE_TOGETHER: take_together,
+    TAKE_TOGETHER: resolve_simultaneous,
 }
 
 # The system of each stage; "" for those that open and close a step.

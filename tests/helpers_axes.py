@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from carom.framework.jit.late import cgutils, types
+from carom.framework.jit.lazy import cgutils, types
 from carom.framework.vectors import _emitted, _vector
 
 

@@ -16,7 +16,7 @@ from carom.systems.broad_phase.search import CandidateSearch
 from carom.systems.records import STATE
 
 SEARCH = (
-    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few, stages.test_seekers,
+    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few, stages.test_active_rows,
     stages.search_static_grid,
 )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Keeping the table in step with esper: who has come, gone or changed since the last look.
+"""Keeping the table in step with esper: which entities have come, gone or changed since the last look.
 
 esper's changes are logged as they happen (see watched), so the work here is in proportion to what has changed: the
 handles of the entities concerned are compared with those the table knows, everything is checked, and only then written.
@@ -63,7 +63,7 @@ class Adoption:
         self.anchor = anchor
         self._check_together = check_together
         self._roles: dict[Any, int] = {}  # by component type
-        # Handles of the bodies in the table, but for those of batches that nobody has asked for.
+        # Handles of the bodies in the table, but for those of batches that are not in use.
         self._members: dict[type[Component], Handles] = {}
         self._contents: esper_bridge.Contents | None = None  # of this world's context
         # Changes that have not been taken in yet, as the log has them.
@@ -383,7 +383,7 @@ class Adoption:
         self._members[component].update(handles)
 
     def _adopt_batch(self, batch: Batch) -> None:
-        """Write the values of a batch into the table; handles are made when somebody asks for them."""
+        """Write the values of a batch into the table; handles are made on demand."""
         table, inside = self.table, batch.rows()
         rows = table.run_of(batch.ids())
         for component, store in batch.stores.items():

@@ -1,7 +1,7 @@
 """Entities that were created together and have no Python objects of their own until they are asked for.
 
 Most bodies of a large world are never looked at one by one: their values go from the arrays they were given as into the
-columns. A dict of components and a handle for each of them are made for the entity that somebody asks for.
+columns. A dict of components and a handle for each of them are made on demand, for one entity.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ class Bodies:
             if self._kind == STATIC or name in ("entity", "kind"):
                 view.flags.writeable = False
             elif self._kind is None:
-                self._table.lend(name)
+                self._table.expose(name)
             return view
         prefix = name + "."
         if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..compilation import kernel
-from ..jit.late import JIT
+from ..jit.lazy import JIT
 from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at

@@ -158,7 +158,7 @@ class Contents:
 
 
 def create_many(stores: Stores, count: int) -> range:
-    """``count`` entities with one component of each type; they have no objects before somebody asks for them."""
+    """``count`` entities with one component of each type; their objects are made on demand."""
     if not count:
         return range(0)
     first = next(esper._entity_count)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..compilation import kernel, part
-from ..jit.late import JIT, cgutils, intrinsic, ir, types
+from ..jit.lazy import JIT, cgutils, intrinsic, ir, types
 from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at

@@ -26,7 +26,7 @@ RESERVED = ("asleep", "column_names", "dynamic", "has", "kinematic", "row_of", "
 class Table:
     """Columns of all bodies of one world. Arrays have room for ``capacity`` rows; the first ``count`` are in use.
 
-    A column on demand has an array only once somebody has asked for it with :meth:`make`: to write, or because a view
+    A column on demand has an array only once it has been asked for with :meth:`make`: to write, or because a view
     of it is given away. Until then all rows hold its default. It never goes back.
     """
 
@@ -47,7 +47,7 @@ class Table:
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
         self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
-        self.lent: set[str] = set()  # columns whose static rows code of the game may write unseen
+        self.exposed: set[str] = set()  # columns whose static rows code of the game may write unseen
         self.on_lend: Callable[[], None] = lambda: None  # called when these are more
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
@@ -208,11 +208,11 @@ class Table:
             self.on_make()
         return array
 
-    def lend(self, key: str) -> None:
+    def expose(self, key: str) -> None:
         """A view of all rows of that column is given away. Static rows change in no other way without a new
         ``static_version``, so what is known of them holds for columns that have never been lent."""
-        if key not in self.lent:
-            self.lent.add(key)
+        if key not in self.exposed:
+            self.exposed.add(key)
             self.on_lend()
 
     def write(self, key: str, rows: Any, values: np.ndarray) -> None:

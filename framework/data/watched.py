@@ -50,7 +50,7 @@ class ChangeLog:
 class Members:
     """The entities with one component: those that are listed, and those of batches.
 
-    Logs who enters and leaves, and who enters again (replaced).
+    Logs entities that are added, removed and replaced.
     """
 
     __slots__ = ("_component", "_entities", "_log", "listed")

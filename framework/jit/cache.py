@@ -96,7 +96,7 @@ def _usable(folder: Path) -> bool:
 
 
 def _report(folder: Path, reason: str, wanted: bool = True) -> None:
-    """Say once that a folder is not used; of those that nobody has asked for only at level DEBUG."""
+    """Say once that a folder is not used; of those that no setting names only at level DEBUG."""
     if folder not in _reported:
         _reported.add(folder)
         level = logging.WARNING if wanted else logging.DEBUG
@@ -216,7 +216,7 @@ class KernelCache(_Cache):
                 )  # fmt: skip
 
     @property
-    def reach(self) -> int:
+    def dependency_count(self) -> int:
         """Of how many functions the kernel is made."""
         return self._hashed()[1]
 

@@ -21,15 +21,15 @@ from .pipeline import kernel_compiler, part_compiler
 logger = logging.getLogger("carom")
 
 
-class Wait:
+class CompilerLock:
     """A context manager around compiling and loading: notes the time, and keeps other threads out.
 
     own: seconds without those of waits inside it, once it is over.
     """
 
-    _running: ClassVar[list[Wait]] = []
+    _running: ClassVar[list[CompilerLock]] = []
 
-    def __enter__(self) -> Wait:
+    def __enter__(self) -> CompilerLock:
         asked = time.perf_counter()
         global_compiler_lock.acquire()
         self._asked = asked
@@ -66,7 +66,7 @@ class KeptDispatcher(CPUDispatcher):
         self._cache = KernelCache(self)
 
     def compile(self, sig: Any) -> Any:
-        with Wait() as wait:
+        with CompilerLock() as wait:
             known, loaded = len(self.overloads), self._cache_hits[sig]
             entry_point = super().compile(sig)
             was_loaded = self._cache_hits[sig] > loaded
@@ -79,9 +79,9 @@ class KeptDispatcher(CPUDispatcher):
         return entry_point
 
     @property
-    def reach(self) -> int:
+    def dependency_count(self) -> int:
         """Of how many functions it is made: the more, the longer it takes to compile."""
-        return self._cache.reach
+        return self._cache.dependency_count
 
     def is_kept(self, sig: Any) -> bool:
         """Whether it is kept on disk for that signature, and has only to be loaded."""
@@ -89,12 +89,12 @@ class KeptDispatcher(CPUDispatcher):
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> Any:
         """What numba calls for arguments of new types: looks at them, then compiles."""
-        with Wait():
+        with CompilerLock():
             return super()._compile_for_args(*args, **kws)
 
     def typeof_pyval(self, val: Any) -> Any:
         """Called once per new type of argument; the first time loads a good part of numba."""
-        with Wait():
+        with CompilerLock():
             return super().typeof_pyval(val)
 
 

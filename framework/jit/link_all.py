@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..compilation import log
-from .late import dispatchers
+from .lazy import dispatchers
 from .linking import Called, Linked
 
 CAN_FORK = sys.platform.startswith("linux")  # elsewhere system libraries do not survive it
@@ -30,8 +30,8 @@ def link_all(functions: Iterable[Linkable]) -> None:
         return
     from .cache import cache_folder  # loads numba
 
-    with dispatchers.Wait():
-        missing = list(dict.fromkeys(function for function in functions if not function.at_hand))
+    with dispatchers.CompilerLock():
+        missing = list(dict.fromkeys(function for function in functions if not function.is_cached))
         helpers = min(log.processes, len(missing) // 2) - 1
         shared = helpers > 0 and CAN_FORK and cache_folder() is not None
         try:
@@ -50,7 +50,7 @@ def _compile(functions: Sequence[Linkable], numbers: Iterable[int]) -> None:
 
 def _compile_together(functions: Sequence[Linkable], helpers: int) -> None:
     """This process and others each take the next function until none is left; those that take longest come first."""
-    functions = sorted(functions, key=lambda function: -function.reach)
+    functions = sorted(functions, key=lambda function: -function.dependency_count)
     context: Any = multiprocessing.get_context("fork")
     following, compiled = context.Value("i", 0), context.SimpleQueue()
     started = [

@@ -14,10 +14,10 @@ from operator import attrgetter
 from typing import Any
 
 from ..compilation import linked_dispatcher
-from .late import JIT, Late, cgutils, operation, types
+from .lazy import JIT, LazyIntrinsic, cgutils, operation, types
 
 # So many generated functions of each kind are kept at hand for worlds to come; worlds hold those that they use.
-KEPT = 1024
+CACHE_SIZE = 1024
 
 # With the JIT off an address is a place in this list.
 _plain: list[Callable[..., Any]] = [lambda *_: None]
@@ -52,14 +52,14 @@ class Linked:
         return self._address != 0
 
     @property
-    def at_hand(self) -> bool:
+    def is_cached(self) -> bool:
         """Whether linking it compiles nothing."""
         return self.ready or not JIT or self._dispatcher.is_kept(self.signature)
 
     @property
-    def reach(self) -> int:
+    def dependency_count(self) -> int:
         """Of how many functions it is made: the more, the longer it takes to compile."""
-        return self._dispatcher.reach
+        return self._dispatcher.dependency_count
 
     def link(self) -> None:
         """Compile or load it now."""
@@ -90,14 +90,14 @@ class Called:
         return self._linked
 
     @property
-    def at_hand(self) -> bool:
+    def is_cached(self) -> bool:
         """Whether linking it compiles nothing."""
         return self.ready or self._kernel.made.is_kept(self._types)
 
     @property
-    def reach(self) -> int:
+    def dependency_count(self) -> int:
         """Of how many functions it is made."""
-        return self._kernel.made.reach
+        return self._kernel.made.dependency_count
 
     def link(self) -> None:
         """Compile or load it now."""
@@ -110,7 +110,7 @@ def linked_call(signature_of: Callable[[], Any]) -> Any:
     """The function call(address, *arguments) that calls what stands at an address, of that signature."""
     if not JIT:
         return lambda address, *values: _plain[address](*values)
-    return Late(lambda: _compiled_call(signature_of()))
+    return LazyIntrinsic(lambda: _compiled_call(signature_of()))
 
 
 def _compiled_call(signature: Any) -> Any:

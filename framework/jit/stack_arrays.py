@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..vectors import _emitted
-from .late import arrayobj, cgutils, ir, types
+from .lazy import arrayobj, cgutils, ir, types
 
 
 def _sign_stack_array(count: Any, like: Any) -> Any:

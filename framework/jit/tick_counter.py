@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from ..compilation import untimed_kernel
-from .late import JIT, cgutils, intrinsic, ir, types
+from .lazy import JIT, cgutils, intrinsic, ir, types
 from .linking import Called
 
 _HAS_CYCLES = platform.machine().lower() in ("x86_64", "amd64", "i686", "x86")  # elsewhere reading it may be forbidden

@@ -113,7 +113,7 @@ class Plugin:
         it can. ``second`` may be :class:`Convex`, all shapes with a support function: the function then gets that and
         the rounding as further arguments.
 
-        ``corner(a, b, d, slop)`` may tell a touch of two corners, which pushes nobody: what slides over a row of such
+        ``corner(a, b, d, slop)`` may tell a touch of two corners, which pushes nothing: what slides over a row of such
         shapes would catch there.
         """
 

@@ -11,7 +11,7 @@ from ..errors import FaultError, PhysicsWarning
 from ..settings import Settings
 from .clock import Clock
 
-KEPT = 100  # different texts
+MOST_TEXTS = 100  # different texts
 TOLD_AT_ONCE = 10  # in one step; a world that breaks as a whole does not fill the screen
 REMEMBERED = 10_000  # kinds and bodies; beyond it everything may be told once more
 
@@ -54,7 +54,7 @@ class Faults:
         line = f"{text} ({count + 1} times, {when})" if count else text
         if line not in self.texts:
             self.texts.append(line)
-        del self.texts[:-KEPT]
+        del self.texts[:-MOST_TEXTS]
         if counts:
             if len(self._lines) >= REMEMBERED:
                 self._lines.clear()

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..compilation import entry_point, log, untimed_kernel
-from ..jit.late import types
+from ..jit.lazy import types
 from ..jit.linking import Called, Linked, linked_call
 from ..jit.records.record import Record
 from ..jit.records.record_type import record_at, record_type

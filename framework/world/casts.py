@@ -61,7 +61,7 @@ class CastVerbs:
     ) -> CastHits:
         """The nearest hit of each of m rays, as columns.
 
-        origins (m, d); directions (m, d) or one for all; max_distances and exclude: one for all or (m,), and nobody is
+        origins (m, d); directions (m, d) or one for all; max_distances and exclude: one for all or (m,), and nothing is
         excluded where that is -1.
         """
         services = self._synchronized()

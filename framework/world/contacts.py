@@ -221,7 +221,7 @@ class ContactRows:
         return [contact if contact.entity_a == entity else contact.flipped() for contact in found]
 
     def _counts(self, index: int) -> bool:
-        """Whether that row is a contact for those who ask pair by pair: a disabled one counts as not touching."""
+        """Whether that row is a contact for queries pair by pair: a disabled one counts as not touching."""
         enabled = self._columns.get("enabled")
         return enabled is None or bool(enabled[index])
 
@@ -311,7 +311,7 @@ class Contacts(ContactRows):
         return self._source.lively(self._own_columns)
 
     def defer(self, record: Callable[[], None]) -> None:
-        """Let ``record`` be called when somebody reads the events, or before they are lost; most are never read."""
+        """Let ``record`` be called when the events are read, or before they are lost; most are never read."""
         self._deferred = record
 
     def take_deferred(self) -> None:

@@ -40,7 +40,7 @@ class Events:
     def on(self, name: str, handler: Handler) -> Handler:
         """Call ``handler`` on every event of that name from now on; returns it, so it serves as a decorator's core.
 
-        ValueError for an event that nobody has defined.
+        ValueError for an event that is not defined.
         """
         if name not in self._known:
             raise ValueError(

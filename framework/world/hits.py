@@ -49,7 +49,7 @@ class Hits(Sequence[np.ndarray]):
 
 
 class Neighbours(Hits):
-    """Who is near whom: ``hits[i]`` are the neighbours of ``askers[i]``, whose row is ``asker_rows[i]``."""
+    """Entities that are near others: ``hits[i]`` are the neighbours of ``askers[i]``, in row ``asker_rows[i]``."""
 
     def __init__(
         self, askers: np.ndarray, asker_rows: np.ndarray, offsets: np.ndarray, entities: np.ndarray, rows: np.ndarray

@@ -96,8 +96,8 @@ class QueryVerbs(CastVerbs):
 
         Distances are between the positions of the Transforms, so it needs no collider, and whoever is a neighbour has
         its asker as a neighbour too. ``mask`` chooses layers; bodies without a collider are in none and found only with
-        the mask -1. ``of``: the ids of those who ask, each once, in this order; all bodies by default, ascending.
-        KeyError if one of them is no body.
+        the mask -1. ``of``: the ids of those whose neighbours are wanted, each once, in this order; all bodies by
+        default, ascending. KeyError if one of them is no body.
         """
         services = self._synchronized()
         size = check.distance(radius, "neighbours: radius")

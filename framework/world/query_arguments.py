@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-NOBODY = -1  # in arrays of entities to leave out
+NO_ENTITY = -1  # in arrays of entities to leave out
 
 
 def point(value: Any, name: str, dimensions: int) -> tuple[float, ...]:
@@ -77,9 +77,9 @@ def mask(value: Any, name: str) -> int:
 
 
 def excluded(value: Any, name: str, count: int) -> np.ndarray:
-    """(m,) ids to leave out, from None, one id, or one for each query (-1: nobody)."""
+    """(m,) ids to leave out, from None, one id, or one for each query (-1: none)."""
     if value is None:
-        return np.full(count, NOBODY)
+        return np.full(count, NO_ENTITY)
     made = np.asarray(value)
     if made.dtype.kind not in "iu" or made.shape not in ((), (count,)):
         raise ValueError(f"{name} must be None, an entity or {count} of them, got {value!r}")

@@ -29,10 +29,10 @@ from ..settings import Settings
 from .snapshots import Snapshot
 
 FORMAT = 2  # of the files; a reader refuses others
-KEPT = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
+PARTS = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
 ARRAY = "#array"
 PART = ".carom-part-"  # and a random number: a file that is being written
-LEFT_ALONE = 3600  # s, after which nobody writes it any more
+LEFT_ALONE = 3600  # s, after which no process writes it any more
 DAMAGE = (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError)  # by what is not as written
 
 
@@ -49,7 +49,7 @@ def write(path: str | os.PathLike[str], snapshot: Snapshot, settings: Settings, 
         "format": FORMAT,
         "settings": dataclasses.asdict(settings),
         "components": [_described(component) for component in types],
-        **{name: getattr(snapshot, name) for name in KEPT},
+        **{name: getattr(snapshot, name) for name in PARTS},
         "population": _population(population, number),
         "loose": _numbered(snapshot.loose.__getstate__(), number),
         "table": _numbered(snapshot.table.__getstate__(), number),
@@ -275,7 +275,7 @@ class SavedFile:
         population = _population_of(contents["population"], types)
         return Snapshot(
             owner=None, population=population, loose=loose, table=table, kept=contents["kept"],
-            **{name: contents[name] for name in KEPT},
+            **{name: contents[name] for name in PARTS},
         )  # fmt: skip
 
 

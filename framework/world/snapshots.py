@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..data import esper_bridge
-from ..data.saved.population import LooseValues, Population, Return
+from ..data.saved.population import LooseValues, Population, PopulationRestore
 from ..data.saved.table import SavedTable
 from ..errors import CaromError
 from .services import PhysicsServices
@@ -92,12 +92,12 @@ def restore_world(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> N
         adoption.know(component)
     for key in snapshot.table.columns:
         table.make(key)
-    going = Return(population, contents, adoption)
-    going.let_go()
+    going = PopulationRestore(population, contents, adoption)
+    going.release()
     moved = snapshot.table.put_back(table)
     snapshot.loose.put_into_batches(population, table.dimensions)
     with world._context():
-        going.arrive()
+        going.apply()
         esper_bridge.go_on_from(snapshot.next_id)
     snapshot.loose.put_into_handles(population, contents.entities)
     contents.dead.clear()

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...components import RigidBody, SphereCollider, Transform
 from ...framework import CaromError, Convex, Plugin, PluginError, Settings, World
-from ...framework.jit.late import errors
+from ...framework.jit.lazy import errors
 from ...framework.plugins.checks import check_mixed
 from ...framework.plugins.registry import Pair, Registry, Shape
 from ...plugins import Physics

@@ -110,7 +110,7 @@ def measure_frame(state):
 def statics_moved(state):
     """Whether a static body stands elsewhere than when its box was made: code of the game has written its place."""
     bodies, moving, moved = state.bodies, state.moving, False
-    for i in range(moving, state.count if state.positions_lent else moving):
+    for i in range(moving, state.count if state.positions_exposed else moving):
         here, before = bodies.position[i], bodies.static_position[i - moving]
         for k in range(len(here)):
             moved |= (item(here, k) != item(before, k)) & (item(here, k) == item(here, k))  # nan has not moved

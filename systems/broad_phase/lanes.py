@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from ...framework.compilation import CHECKED
-from ...framework.jit.late import cgutils, ir, types
+from ...framework.jit.lazy import cgutils, ir, types
 from ...framework.jit.records.record_type import record_code
 from ...framework.vectors import _emitted
 

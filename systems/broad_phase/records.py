@@ -44,7 +44,7 @@ STATIC_GRID = _grid("broad phase, static grid", "more static bodies than are tes
 
 MOST_SEEN = 8  # static bodies that a view remembers; what sees more looks into the grid in every step
 
-# What moving bodies remember of the static grid, see :mod:`.views`; one entry per moving body.
+# What moving bodies remember of the static grid, see :mod:`.static_neighbours`; one entry per moving body.
 VIEWS = Schema(
     "Views",
     Section(

@@ -10,15 +10,15 @@ from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.settings import AUTOMATIC, Settings
 from ..codes import NEED_CANDIDATES, NEED_CELLS
+from .active_rows import ALL, MOST_ACTIVE
 from .boxes import FRAME_SIZE
 from .plan import reason_of
 from .plugin_broad_phase import PluginBroadPhase
-from .seekers import ALL, MOST_SEEKERS
 from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_count
 from .static_grid import NEVER_BUILT, OUTSIDE_MAX, reserve_static_grid
+from .static_neighbours import reserve_static_neighbours
 from .tree.tree import SpatialTree
 from .uniform_grid import reserve_grid
-from .views import reserve_views
 
 
 class CandidateSearch:
@@ -40,8 +40,8 @@ class CandidateSearch:
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
             grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
-        state.candidates.reserve(MOST_SEEKERS, "seekers")
-        state.candidates.seeker_count = ALL
+        state.candidates.reserve(MOST_ACTIVE, "active_rows")
+        state.candidates.active_count = ALL
         state.static_grid.version = NEVER_BUILT
         state.pair_search = NO_SEARCH
         self.read_settings()
@@ -65,7 +65,7 @@ class CandidateSearch:
         elif code == NEED_CELLS:
             static, searches_static = state.count - state.moving, state.pair_search == STATIC_GRID
             if searches_static and len(state.views.count) < state.moving:
-                reserve_views(state.views, state.moving)
+                reserve_static_neighbours(state.views, state.moving)
             elif searches_static and len(state.static_grid.keys) < static:
                 reserve_static_grid(state.static_grid, static)
             else:

@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from ...framework.compilation import packed, part
 from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
+from .active_rows import ALL
 from .boxes import FRAME_SIZE
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
-from .seekers import ALL
 from .static_grid import build_static_grid, follow_rows
+from .static_neighbours import follow_statics, test_known_statics
 from .uniform_grid import FULL, build_grid, look_around, look_inside, test_notes
-from .views import follow_statics, look_at_statics
 
 # 8 million candidates: with everything that is kept of a pair about 4 gigabytes. A game has 1 to 50 per body.
 CANDIDATE_LIMIT = 1 << 23
@@ -35,7 +35,7 @@ UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 BLOCK = 64  # boxes that are ruled out together
 
 # Values of ``state.pair_search``: what finds the candidates of this step.
-NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN, SEEKERS = range(7)
+NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN, ACTIVE_ROWS = range(7)
 
 
 @part
@@ -56,8 +56,8 @@ def choose_search(state, dt):
         state.pair_search = PLUGIN
         return FIND_IN_PYTHON
     state.pair_search = choose_by_count(state.moving, state.count - state.moving)
-    if state.candidates.seeker_count != ALL and state.pair_search != STATIC_GRID:
-        state.pair_search = SEEKERS
+    if state.candidates.active_count != ALL and state.pair_search != STATIC_GRID:
+        state.pair_search = ACTIVE_ROWS
     return OK
 
 
@@ -146,7 +146,7 @@ def use_uniform_grid(state):
 @packed
 def search_uniform_grid(state, dt):
     """Many bodies move."""
-    if state.moving < UNIFORM_GRID_MIN or state.candidates.seeker_count != ALL:
+    if state.moving < UNIFORM_GRID_MIN or state.candidates.active_count != ALL:
         return OK
     if state.pair_search != UNIFORM_GRID and state.pair_search != STATIC_GRID:
         return OK
@@ -171,7 +171,7 @@ def test_few(state, dt):
     """Few bodies move: every pair of them, and they with all static bodies that are in no grid."""
     moving, candidates, grid, all_static = state.moving, state.candidates, state.static_grid, True
     if state.pair_search == STATIC_GRID:
-        if candidates.seeker_count != ALL or (moving >= UNIFORM_GRID_MIN and state.grid.suits):
+        if candidates.active_count != ALL or (moving >= UNIFORM_GRID_MIN and state.grid.suits):
             return OK
         all_static = False
     elif state.pair_search != BRUTE_FORCE:
@@ -205,28 +205,28 @@ def test_blocks(state, i, start, stop, found):
 
 @part
 def test_others(state, s, stop, found):
-    """Pairs of seeker s and all rows before ``stop`` but the seekers before it, which have looked at it."""
-    seekers, start = state.candidates.seekers, 0
-    i = seekers[s]
+    """Pairs of active row s and all rows before ``stop`` but the active ones before it, which have looked at it."""
+    active_rows, start = state.candidates.active_rows, 0
+    i = active_rows[s]
     for earlier in range(s + 1):
         if found != FULL:
-            found = test_blocks(state, i, start, seekers[earlier], found)
-        start = seekers[earlier] + 1
+            found = test_blocks(state, i, start, active_rows[earlier], found)
+        start = active_rows[earlier] + 1
     return found if found == FULL else test_blocks(state, i, start, stop, found)
 
 
-def test_seekers(state, dt):
+def test_active_rows(state, dt):
     """A few bodies are awake: they look at all others but for static ones that are in a grid."""
     candidates, grid, found = state.candidates, state.static_grid, 0
-    all_static = state.pair_search == SEEKERS
-    if candidates.seeker_count == ALL or not (all_static or state.pair_search == STATIC_GRID):
+    all_static = state.pair_search == ACTIVE_ROWS
+    if candidates.active_count == ALL or not (all_static or state.pair_search == STATIC_GRID):
         return OK
-    for s in range(candidates.seeker_count):
+    for s in range(candidates.active_count):
         if found != FULL:
             found = test_others(state, s, state.count if all_static else state.moving, found)
         for k in range(0 if all_static else grid.outside_count):
             if found != FULL:
-                found = test_row(state, candidates.seekers[s], grid.outside[k], grid.outside[k] + 1, found)
+                found = test_row(state, candidates.active_rows[s], grid.outside[k], grid.outside[k] + 1, found)
     if found == FULL:
         return need_more_room(state)
     candidates.count = found
@@ -238,10 +238,10 @@ def search_static_grid(state, dt):
     if state.pair_search != STATIC_GRID:
         return OK
     candidates, found = state.candidates, state.candidates.count
-    every = candidates.seeker_count == ALL
+    every = candidates.active_count == ALL
     follow_statics(state)
-    for k in range(state.moving if every else candidates.seeker_count):
-        found = look_at_statics(state, k if every else candidates.seekers[k], found)
+    for k in range(state.moving if every else candidates.active_count):
+        found = test_known_statics(state, k if every else candidates.active_rows[k], found)
         if found == FULL:
             return need_more_room(state)
     state.candidates.count = found

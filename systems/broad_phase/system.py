@@ -20,8 +20,8 @@ from .stages import (
     place_statics,
     search_static_grid,
     search_uniform_grid,
+    test_active_rows,
     test_few,
-    test_seekers,
 )
 
 BOXES = ("lower", "upper")
@@ -60,7 +60,7 @@ class BroadPhase(StagedSystem):
             ("candidates",), "colliders", f"less than {UNIFORM_GRID_MIN} bodies move",
         ),
         Stage(
-            test_seekers, "the few bodies that are awake, with all others but for static ones in a grid", BOXES,
+            test_active_rows, "the few bodies that are awake, with all others but for static ones in a grid", BOXES,
             ("candidates",), "sleeping", "few bodies are awake",
         ),
         Stage(

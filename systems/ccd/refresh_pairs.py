@@ -16,7 +16,7 @@ from ..impacts.heap import heap_push
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
 
-KEPT, GONE, NEW = -1, -2, -3  # in ``pairs.place``; from 0 on it is the place in the other list
+SURVIVED, GONE, NEW = -1, -2, -3  # in ``pairs.place``; from 0 on it is the place in the other list
 
 
 @part
@@ -24,16 +24,16 @@ def mark_kept(state):
     """place[c] = KEPT for the pairs that something has come of in this step, GONE for the others."""
     pairs = state.pairs
     for c in range(pairs.count):
-        pairs.place[c] = KEPT if pairs.crossed[c] or pairs.impulse[c] > 0.0 else GONE
+        pairs.place[c] = SURVIVED if pairs.crossed[c] or pairs.impulse[c] > 0.0 else GONE
     for h in range(pairs.found):
-        pairs.place[pairs.hits[h]] = KEPT
+        pairs.place[pairs.hits[h]] = SURVIVED
 
 
 @part
 def keep_pair(state, j, found):
     """Pair j of the list until now becomes pair ``found`` of the new one."""
     old, new = state.pairs, state.merged
-    old.place[j], new.place[found] = found, KEPT
+    old.place[j], new.place[found] = found, SURVIVED
     new.a[found], new.b[found] = old.a[j], old.b[j]
     new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
     new.crossed[found] = old.crossed[j]
@@ -102,11 +102,11 @@ def merge_pairs(state, dt):
         if j < old.count:
             old_key = rank[old.a[j]] * n + rank[old.b[j]]
         if old_key <= new_key:
-            if old.place[j] == KEPT:
+            if old.place[j] == SURVIVED:
                 keep_pair(state, j, found)
             elif old_key == new_key:
                 add_pair(state, old.a[j], old.b[j], found)
-                old.place[j], new.place[found] = found, KEPT
+                old.place[j], new.place[found] = found, SURVIVED
             found += 1 if old.place[j] >= 0 else 0
             i += 1 if old_key == new_key else 0
             j += 1

@@ -26,7 +26,7 @@ from ..integration.trajectory import (
 )
 from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..shapes.tolerances import contact_margin, smaller_extent
-from .time_of_impact import APART, stays_apart
+from .time_of_impact import APART, bounds_stay_disjoint
 
 DISCRETE, CONTINUOUS, EVENT_DRIVEN = range(3)
 MODES = {"discrete": DISCRETE, "continuous": CONTINUOUS, "event_driven": EVENT_DRIVEN}
@@ -198,7 +198,7 @@ def sweep_pairs(state, dt):
         if not pairs.near_contact[c]:
             path = relative_path(state, a, b)
             travel = travel_of(path, dt)
-            if not is_swept(state, a, b, travel) or stays_apart(state, a, b, path, 0.0, dt):
+            if not is_swept(state, a, b, travel) or bounds_stay_disjoint(state, a, b, path, 0.0, dt):
                 continue
             small = FAST * smaller_extent(bodies, a, b)
             limits = min(contact_margin(state, dt, a, b), small), small / travel * dt, 0.0

@@ -27,14 +27,14 @@ from ..shapes.tolerances import smaller_extent
 
 MOST_STRIDES = 4096  # looks at concave shapes in a step
 LOOKS = 100  # a graze takes about 30; whatever is still closing in after that counts as touching
-GENEROUS, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
+SAFETY_FACTOR, FAR_ROUNDING = 1.001, 1e-12  # more than all rounding: of an extent, of a distance
 CLEAR = 64.0 * ROUNDING  # of the distances in a path: farther off a touch rounding does not turn its normal round
 DEPTH = 0.25  # of the extent: what is deeper in is there, however coarse the numbers are
 APART, TOUCHES, AT_CORNER = range(3)
 
 
 @part
-def stays_apart(state, a, b, path, since, until):
+def bounds_stay_disjoint(state, a, b, path, since, until):
     """Whether the boxes around the two are surely apart between two times, as those of most pairs are.
 
     Either along one axis, or the way does not lead through the ball around both.
@@ -42,7 +42,7 @@ def stays_apart(state, a, b, path, since, until):
     bodies, start, end = state.bodies, along(path, since), along(path, until)
     bend = bend_of(path[2], path[3], until) if state.path_degree > 1 else 0.0
     far = add(absolute(bodies.origin[a]), absolute(bodies.origin[b]))
-    reach = add_scaled(scale(add(bodies.half_extents[a], bodies.half_extents[b]), GENEROUS), far, FAR_ROUNDING)
+    reach = add_scaled(scale(add(bodies.half_extents[a], bodies.half_extents[b]), SAFETY_FACTOR), far, FAR_ROUNDING)
     apart = False
     for k in range(len(end)):
         room = item(reach, k) + bend
@@ -51,7 +51,7 @@ def stays_apart(state, a, b, path, since, until):
         return apart
     v = sub(end, start)
     ahead, way = dot(start, v), dot(v, v)
-    return dot(start, start) * way - ahead * ahead > GENEROUS * dot(reach, reach) * way
+    return dot(start, start) * way - ahead * ahead > SAFETY_FACTOR * dot(reach, reach) * way
 
 
 def first_touch(state, a, b, path, straight, since, until, limits):

@@ -9,7 +9,8 @@ velocities of bodies in contact, the impulses for the next step, and contact eve
 4. ``gather``, ``linearise``, ``match_warm_start``: their bodies and rows, the plane of each where the step starts, and
    the impulses of the last step.
 5. ``solve_contacts``: the solver, see ``solving``.
-6. ``put_back``, ``obey_statics``: results to the bodies; what was pushed into something fixed is put back.
+6. ``put_back``, ``resolve_static_penetration``: results to the bodies; what was pushed into something fixed is put
+   back.
 7. ``store_warm_start``, ``find_touching``, ``publish_contacts``: impulses and contacts that the next step and the game
    read.
 

@@ -6,7 +6,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, length, sub
 from ..integration.trajectory import ROUNDING, along, relative_path
-from ..narrow_phase.manifolds import between, between_at_start, meet
+from ..narrow_phase.manifolds import centre_offset, centre_offset_at_start, evaluate_pair
 from ..shapes.dispatch import both_convex, both_sharp, has_corner_rule, is_corner_touch
 from ..shapes.tolerances import slop_of
 
@@ -22,29 +22,29 @@ def meets_at_corner(state, a, b, d, slop):
     if not has_corner_rule(state, shape[a], shape[b]):
         if not both_sharp(state, shape[a], shape[b]):
             return False
-        travel = sub(between(bodies, a, b), between_at_start(bodies, a, b))
+        travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
         if length(travel) < STAYS_SLOPS * slop:
             return False
     return is_corner_touch(state, shape[a], a, shape[b], b, d, slop)
 
 
 @part
-def leg_start(state, a, b):
+def segment_start(state, a, b):
     """From a's centre to b's where the last stretch of their way begins: at the later of their last impacts if they are
     apart there, else at the start of the step. Nothing holds what rests between two impacts.
     """
     bodies = state.bodies
-    start = between_at_start(bodies, a, b)
+    start = centre_offset_at_start(bodies, a, b)
     if state.impacts.sweeps and (bodies.impact_count[a] > 0 or bodies.impact_count[b] > 0):
         since = max(0.0, bodies.last_impact[a], bodies.last_impact[b])
         d = along(relative_path(state, a, b), since)
-        if meet(state, a, b, d)[1] <= slop_of(state, a, b):
+        if evaluate_pair(state, a, b, d)[1] <= slop_of(state, a, b):
             return d
     return start
 
 
 @part
-def touch_on_way(state, a, b, d, travel, edge):
+def first_touch_on_segment(state, a, b, d, travel, edge):
     """(whether they touch on the way from d to d + travel and get deeper than ``edge``; gap at d and normal of that),
     by conservative advancement; of concave shapes by their distance, as what comes next may have another normal.
     A touch of corners is none, nor one that only is the edge of the next thing in a row that one of them slides along.
@@ -52,7 +52,7 @@ def touch_on_way(state, a, b, d, travel, edge):
     shape, t, nothing = state.bodies.shape, 0.0, zero_of(state)
     way, slop = length(travel), slop_of(state, a, b)
     convex = both_convex(state, shape[a], shape[b])
-    _, depth, normal, _ = meet(state, a, b, d)
+    _, depth, normal, _ = evaluate_pair(state, a, b, d)
     for _ in range(LOOKS):
         rate = dot(travel, normal)
         if convex and not rate < 0.0:
@@ -62,12 +62,12 @@ def touch_on_way(state, a, b, d, travel, edge):
             further = t + 2.0 * slop / way
             if rate < 0.0 and not meets_at_corner(state, a, b, at, slop):
                 ahead = t - 2.0 * edge / rate
-                if ahead < 1.0 and meet(state, a, b, add_scaled(d, travel, ahead))[1] > edge:
+                if ahead < 1.0 and evaluate_pair(state, a, b, add_scaled(d, travel, ahead))[1] > edge:
                     return True, -depth - t * rate, normal
                 if convex:
                     break
         if not further < 1.0:
             break
         t = further
-        _, depth, normal, _ = meet(state, a, b, add_scaled(d, travel, t))
+        _, depth, normal, _ = evaluate_pair(state, a, b, add_scaled(d, travel, t))
     return False, 0.0, nothing

@@ -63,8 +63,8 @@ def gather(state, dt):
             if inverse_mass[i] > 0.0:
                 x = sub(bodies.origin[i], bodies.previous_position[i])
                 a = sub(bodies.linear_velocity[i], v)
-                if bodies.supported[i]:
-                    a = sub(a, bodies.support_change[i])
+                if bodies.warm_started[i]:
+                    a = sub(a, bodies.warm_start_velocity[i])
                 a = scale(a, 1.0 / dt)
                 if state.impacts.sweeps and bodies.impact_count[i] > 0:
                     x = start_of_flight(state, i, v, a, dt)
@@ -78,7 +78,7 @@ def put_back(state, dt):
     for r in range(solver.contacts):
         k = solver.slot[r]
         pairs.impulse[pairs.resting[r]] += solver.total[k]
-        if solver.worked[k]:
+        if solver.had_impulse[k]:
             bodies.held[solver.body_row[solver.first[k]]] = True
             bodies.held[solver.body_row[solver.second[k]]] = True
     for q in range(solver.bodies if solver.contacts > 0 else 0):
@@ -87,6 +87,6 @@ def put_back(state, dt):
         if bodies.held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]
-    if state.any_support:
+    if state.any_warm_started:
         drop_support(state, dt)
     return OK

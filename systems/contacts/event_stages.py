@@ -92,7 +92,8 @@ def compare_contacts(state, dt):
     state.ids_changed = False
     contacts.ends, contacts.begins, contacts.stays[now] = ends, begins, stays
     solver = state.solver
-    faults = state.impacts.capped + state.impacts.halted + state.hasty
+    faults = state.impacts.capped + state.impacts.halted + state.too_fast_for_discrete
     faults += solver.squeezed + solver.overloaded + solver.restrained
-    state.news = ends + begins + state.impacts.logged + faults + (stays + contacts.stored if state.stay_wanted else 0)
+    staying = stays + contacts.stored if state.stay_wanted else 0
+    state.event_count = ends + begins + staying + state.impacts.logged + faults
     return OK

@@ -209,13 +209,13 @@ class ContactEvents(StagedSystem):
         state = self._state
         if not state.others_write:  # nor has any event a handler
             return [self.segment()]
-        tell = Check(state.words, state.word_of("news"), PythonPart(self.name, self._tell))
+        tell = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._tell))
         return [PythonPart(self.name, self._take_disabled), self.segment(), tell]
 
     def closing(self) -> list[Any]:
         """What follows the last stage of all, so that the step is one call where no code of the game runs in it."""
         state = self._state
-        defer = Check(state.words, state.word_of("news"), PythonPart(self.name, self._defer))
+        defer = Check(state.words, state.word_of("event_count"), PythonPart(self.name, self._defer))
         return [] if state.others_write else [defer]
 
     def _take_disabled(self, dt: float) -> None:
@@ -228,19 +228,19 @@ class ContactEvents(StagedSystem):
             contacts.enabled[contacts.now, : len(enabled)] = enabled
 
     def _defer(self, dt: float) -> None:
-        """Nobody looks within the step: what has happened is recorded when it is read."""
+        """No code looks within the step: what has happened is recorded when it is read."""
         self._report_faults()
         self._contacts.defer(self._record)
 
     def _report_faults(self) -> None:
         state, impacts, solver = self._state, self._impacts, self._state.solver
         entity = state.bodies.entity
-        if state.hasty:
-            hasty = int(entity[state.hasty_row])
+        if state.too_fast_for_discrete:
+            fast = int(entity[state.too_fast_row])
             self.world.report_fault(
-                f"entity {hasty}: so fast that discrete collisions may miss what it passes: set its ccd, or "
+                f"entity {fast}: so fast that discrete collisions may miss what it passes: set its ccd, or "
                 f"Settings.collision = 'continuous', or use smaller steps",
-                kind="hasty", entity=hasty,
+                kind="too fast", entity=fast,
             )  # fmt: skip
         if solver.squeezed:
             self.world.report_fault(

@@ -16,12 +16,12 @@ from ..staged import StagedSystem
 from .bodies import gather, put_back
 from .event_stages import publish_contacts
 from .events import disabled_pairs
-from .last_word import obey_statics
 from .response_stages import begin_response
 from .resting import find_resting, find_touching, linearise
 from .solving.prediction import predict_rest
 from .solving.solver import solve_contacts
 from .solving.warm_start import match_warm_start, store_warm_start
+from .static_penetration import resolve_static_penetration
 
 MOTION = ("position", "linear_velocity", "path_velocity")
 NEAR, REST, RESTED = "bodies are near each other", "contacts rest", "contacts rested in the step before"
@@ -65,8 +65,8 @@ class Response(StagedSystem):
         ),
         Stage(put_back, "where the resting bodies are at the end", ("solver",), MOTION, "colliders", REST),
         Stage(
-            obey_statics, "what the solver has pushed into or through what cannot be moved is put back", ("pairs",),
-            MOTION, "colliders", REST,
+            resolve_static_penetration, "what the solver has pushed into or through what cannot be moved is put back",
+            ("pairs",), MOTION, "colliders", REST,
         ),
         Stage(store_warm_start, "the impulses, for the next step", ("solver",), ("warm_start",), "colliders", REST),
         Stage(find_touching, "which pairs touch in the end", MOTION, ("pairs",), "colliders", NEAR),

@@ -7,22 +7,22 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, dot, item, length, replace, sub
 from ..ccd.search_bounds import FAST, is_swept
 from ..codes import OK
-from ..impacts.impulses import STOPPED, is_caught
+from ..impacts.impulses import STOPPED, is_rattling
 from ..narrow_phase.manifolds import (
-    between,
-    between_at_start,
+    centre_offset,
+    centre_offset_at_start,
     deepest_possible,
     depth_at,
     depth_by_plane,
+    evaluate_pair,
     forget_manifold,
     has_manifold,
     is_at_manifold,
     make_manifold,
-    meet,
 )  # fmt: skip
 from ..shapes.dispatch import both_convex, mix, mix_friction
 from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent
-from .approach import leg_start, meets_at_corner, touch_on_way
+from .approach import first_touch_on_segment, meets_at_corner, segment_start
 
 ENTRY_ITERATIONS = 24
 APART = 1e-11  # of the extent: a smaller gap is none, not even as seen past a round corner
@@ -31,20 +31,20 @@ STAYS, PARTS_SLOWLY, PARTS = range(3)  # what an elastic pair does at the end of
 
 
 @part
-def far_touch(state, dt, a, b, end):
-    """As :func:`touch_on_way`, on the last stretch of the way of a pair, to ``end``, that goes so far on it that its
-    end may say nothing; the gap is that at the start of the step.
+def touch_of_long_way(state, dt, a, b, end):
+    """As :func:`first_touch_on_segment`, on the last stretch of the way of a pair, to ``end``, that goes so far on it
+    that its end may say nothing; the gap is that at the start of the step.
 
-    In a discrete world only as far as forces lead: who is faster than that passes through what is thin.
+    In a discrete world only as far as forces lead: what is faster than that passes through what is thin.
     """
     bodies, edge, nothing = state.bodies, FAST * smaller_extent(state.bodies, a, b), zero_of(state)
-    d, margin = leg_start(state, a, b), contact_margin(state, dt, a, b)
+    d, margin = segment_start(state, a, b), contact_margin(state, dt, a, b)
     travel = sub(end, d)
     way = length(travel)
     if not (way > edge and (is_swept(state, a, b, way) or way <= margin)):
         return False, 0.0, nothing
-    found, gap, normal = touch_on_way(state, a, b, d, travel, min(edge, margin))
-    return found, gap + dot(sub(between_at_start(bodies, a, b), d), normal), normal
+    found, gap, normal = first_touch_on_segment(state, a, b, d, travel, min(edge, margin))
+    return found, gap + dot(sub(centre_offset_at_start(bodies, a, b), d), normal), normal
 
 
 @part
@@ -53,9 +53,9 @@ def deepest(state, dt, c, d):
     way there; else by its manifold or its function."""
     pairs, bodies = state.pairs, state.bodies
     a, b = pairs.a[c], pairs.b[c]
-    far, gap, normal = far_touch(state, dt, a, b, d)
+    far, gap, normal = touch_of_long_way(state, dt, a, b, d)
     if far:
-        return -gap - dot(sub(d, between_at_start(bodies, a, b)), normal), normal, True
+        return -gap - dot(sub(d, centre_offset_at_start(bodies, a, b)), normal), normal, True
     may_bounce = state.impacts.active
     depth, normal = depth_at(state, c, d, smaller_extent(bodies, a, b), may_bounce)
     return depth, normal, False
@@ -72,7 +72,7 @@ def still_bounces(state, dt, c, depth, normal):
     e = mix(state, state.restitution_rule, restitution[slot[a], a], restitution[slot[b], b])
     if not e > 0.0:
         return False
-    if e == 1.0 and state.impacts.sweeps and is_caught(state, a, b):
+    if e == 1.0 and state.impacts.sweeps and is_rattling(state, a, b):
         return True
     slop, fixed, extent = slop_of(state, a, b), state.restitution_threshold, smaller_extent(bodies, a, b)
     threshold = fixed if fixed >= 0.0 else (contact_margin(state, dt, a, b) - slop) / dt
@@ -83,7 +83,7 @@ def still_bounces(state, dt, c, depth, normal):
     if speed > 0.0:
         pairs.parting[c] = PARTS if speed > threshold and speed * dt > slop else PARTS_SLOWLY
     if pairs.impulse[c] > 0.0 and speed > threshold:
-        before, _ = depth_at(state, c, between_at_start(bodies, a, b), extent, True)
+        before, _ = depth_at(state, c, centre_offset_at_start(bodies, a, b), extent, True)
         return before < 0.0  # on its way out
     return False
 
@@ -96,10 +96,10 @@ def is_resting(state, dt, c):
     if count[a] >= STOPPED or count[b] >= STOPPED:
         pairs.near_contact[c] = True  # they may touch where they are now
         return False
-    hit, carried = count[a] > 0 or count[b] > 0, bodies.supported[a] or bodies.supported[b]
+    hit, carried = count[a] > 0 or count[b] > 0, bodies.warm_started[a] or bodies.warm_started[b]
     if not pairs.near_contact[c] and not hit and not carried:
         return False
-    margin, d = contact_margin(state, dt, a, b), between(bodies, a, b)
+    margin, d = contact_margin(state, dt, a, b), centre_offset(bodies, a, b)
     if pairs.early[c] and not hit and is_at_manifold(pairs, c, d, smaller_extent(bodies, a, b)):  # usual
         depth, normal, far = depth_by_plane(pairs, c, d), pairs.normal[c], False
     else:
@@ -140,7 +140,7 @@ def entry(state, a, b, d, travel, at_end, slop):
     normal, depth, chosen = zero_of(state), 0.0, 0.0
     for look in range(ENTRY_ITERATIONS):
         at = add_scaled(d, travel, t)
-        _, depth_now, n, _ = meet(state, a, b, at)
+        _, depth_now, n, _ = evaluate_pair(state, a, b, at)
         if meets_at_corner(state, a, b, at, slop):
             depth_now = min(depth_now, -slop)  # so that the search goes on
         if look == 0 or depth_now >= 0.0:  # the end, or a time in touch
@@ -163,7 +163,7 @@ def normal_varies(state, a, b, d, normal):
     """Whether the normal is another one a little beside, so that it stands for several faces of a concave shape."""
     near, varies = BESIDE * smaller_extent(state.bodies, a, b), False
     for k in range(len(d)):
-        _, _, beside, _ = meet(state, a, b, replace(d, k, item(d, k) + near))
+        _, _, beside, _ = evaluate_pair(state, a, b, replace(d, k, item(d, k) + near))
         varies |= dot(beside, normal) < 1.0 - EVEN
     return varies
 
@@ -175,8 +175,8 @@ def linearise(state, dt):
     for r in range(solver.contacts):  # in the order of the pairs, for the caches
         c, k = pairs.resting[r], solver.slot[r]
         a, b, parting = pairs.a[c], pairs.b[c], pairs.parting[c]
-        extent, d = smaller_extent(bodies, a, b), between_at_start(bodies, a, b)
-        slop, end, struck_along = slop_for(state, extent), between(bodies, a, b), pairs.normal[c]
+        extent, d = smaller_extent(bodies, a, b), centre_offset_at_start(bodies, a, b)
+        slop, end, struck_along = slop_for(state, extent), centre_offset(bodies, a, b), pairs.normal[c]
         if not is_at_manifold(pairs, c, d, extent):
             make_manifold(state, c, d)
         gap, normal = -depth_by_plane(pairs, c, d), pairs.normal[c]
@@ -184,7 +184,7 @@ def linearise(state, dt):
         solver.varies[k] = not convex and normal_varies(state, a, b, d, normal)
         moves = not is_at_manifold(pairs, c, end, extent)
         if moves and (apart or parting != STAYS or meets_at_corner(state, a, b, d, slop)):
-            far, gap, normal = far_touch(state, dt, a, b, end)
+            far, gap, normal = touch_of_long_way(state, dt, a, b, end)
             if not far or parting != STAYS:
                 gap, normal = entry(state, a, b, d, sub(end, d), parting != STAYS, slop)
             forget_manifold(pairs, c)
@@ -221,7 +221,7 @@ def find_touching(state, dt):
         if solid and not pairs.near_contact[c] and not crossed:
             continue
         a, b, pushed, normal = pairs.a[c], pairs.b[c], pairs.impulse[c] > 0.0, pairs.normal[c]
-        d, extent = between(bodies, a, b), smaller_extent(bodies, a, b)
+        d, extent = centre_offset(bodies, a, b), smaller_extent(bodies, a, b)
         if not is_at_manifold(pairs, c, d, extent):
             if solid and not pushed and not crossed and deepest_possible(pairs, c, d) < -SAME_PLACE * extent:
                 continue

@@ -9,7 +9,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, length, negative, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST, is_swept
-from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, clear_of_rounding, stays_apart
+from ..ccd.time_of_impact import APART, AT_CORNER, TOUCHES, bounds_stay_disjoint, clear_of_rounding
 from ..integration.trajectory import (
     ROUNDING,
     along,
@@ -33,7 +33,7 @@ from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .heap import heap_push
-from .impulses import BOUNCE, CROSS, FREE, LAND, SLIDE, STICK, STOP, STOPPED, is_caught, is_deflected
+from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
 
 TIME_ITERATIONS = 80
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
@@ -161,15 +161,15 @@ def is_held_by_edge(state, a, b, path, touch, speed, dt):
 def passes_unseen(state, a, b, path, touch, dt):
     """Whether so slow an approach leads through something thin before or after an impact: contacts at rest know only
     the way after the last one."""
-    bodies, sunk_by = state.bodies, state.impacts.sunk_by
+    bodies, touchdown_time = state.bodies, state.impacts.touchdown_time
     count, inverse_mass = bodies.impact_count, bodies.inverse_mass
     if not state.impacts.sweeps:
         return False
     until, (_, normal, _, start) = dt, touch
     if count[a] == 0 and count[b] == 0:
-        if not (sunk_by > 0.0 and inverse_mass[a] * inverse_mass[b] == 0.0):
+        if not (touchdown_time > 0.0 and inverse_mass[a] * inverse_mass[b] == 0.0):
             return False
-        until = sunk_by
+        until = touchdown_time
     return dot(sub(start, along(path, until)), normal) > FAST * smaller_extent(bodies, a, b)
 
 
@@ -183,8 +183,8 @@ def closing_speed(state, a, b, path, touch, kind, dt):
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
     if not speed < -(threshold + rounding):  # a contact at rest
         return LANDING if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
-    supported = kind == SWEPT and (bodies.supported[a] or bodies.supported[b])
-    if supported and call_held_by_edge(state.links[HELD_BY_EDGE], state, a, b, path, touch, speed, dt):
+    warm_started = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
+    if warm_started and call_held_by_edge(state.links[HELD_BY_EDGE], state, a, b, path, touch, speed, dt):
         return NONE, speed
     return IMPACT, speed
 
@@ -197,7 +197,7 @@ def correct_speed(state, a, b, touch, speed, dt):
     bodies, (t, normal, _, _) = state.bodies, touch
     velocity, start = bodies.linear_velocity, bodies.start_velocity
     bend = dot(sub(sub(velocity[b], start[b]), sub(velocity[a], start[a])), normal)
-    if state.any_support and (bodies.supported[a] or bodies.supported[b]):  # what pushed in the last step is no force
+    if state.any_warm_started and (bodies.warm_started[a] or bodies.warm_started[b]):  # that push is no force
         forced = bodies.force_speed_change[a] + bodies.force_speed_change[b]
         bend = min(max(bend, -forced), forced)
     return min(0.0, speed + bend * (t / dt - 0.5))
@@ -214,7 +214,7 @@ def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     far = travel_of(path, dt - t) > FAST * smaller_extent(bodies, a, b)
     if not (far or is_deflected(state, a) or is_deflected(state, b)):
         return -1
-    if restitution == 1.0 and is_caught(state, a, b):
+    if restitution == 1.0 and is_rattling(state, a, b):
         return SLIDE
     one, two = bodies.cluster_root[a], bodies.cluster_root[b]
     movable = one != two and bodies.cluster_inverse_mass[one] + bodies.cluster_inverse_mass[two] > 0.0
@@ -242,7 +242,7 @@ def counts_for_cap(state, a, b, t, restitution):
 def is_beyond_cap(state, a, b):
     """Whether one of the two has had all the impacts it may have in a step."""
     counted, cap = state.bodies.counted_impacts, state.max_impacts
-    if state.impacts.sweeps and is_caught(state, a, b):
+    if state.impacts.sweeps and is_rattling(state, a, b):
         return True
     return counted[a] >= cap or counted[b] >= cap or state.impacts.looked >= MOST_LOOKS
 
@@ -274,7 +274,7 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
 
 
 @part
-def consider(state, c, dt):
+def queue_next_impact(state, c, dt):
     """Put the pair's next impact into the queue, if it has one: a touch, and a fast approach.
 
     A pair that is not solid only has its crossing noted, if it is swept.
@@ -282,7 +282,7 @@ def consider(state, c, dt):
     pairs, bodies, impacts = state.pairs, state.bodies, state.impacts
     a, b, passive = pairs.a[c], pairs.b[c], not pairs.is_solid[c]
     path = relative_path(state, a, b)
-    if impacts.sweeps and stays_apart(state, a, b, path, impacts.now, dt):
+    if impacts.sweeps and bounds_stay_disjoint(state, a, b, path, impacts.now, dt):
         return
     slot, restitutions = bodies.collider_slot, state.colliders.restitution
     e = mix(state, state.restitution_rule, restitutions[slot[a], a], restitutions[slot[b], b])
@@ -317,7 +317,7 @@ def consider(state, c, dt):
                 return
     event_kind = CROSS if passive else counts_for_cap(state, a, b, t, e)
     if approach == LANDING:
-        event_kind = LAND
+        event_kind = TOUCHDOWN
     if not passive and is_beyond_cap(state, a, b):
         event_kind = -1
         if impacts.sweeps:

@@ -32,15 +32,16 @@ SHOT = 2.0  # times the fastest change of speed that its impacts ask for: a body
 
 @part
 def sum_pushes(state, i, rubs):
-    """What the impulses ``ahead`` of its impacts add to body i's velocity; also those of ``rub`` along the surfaces?"""
+    """What the impulses ``ahead`` of its impacts add to body i's velocity; with those of ``friction_impulse``, if rubs.
+    """
     impacts, terms, total = state.impacts, state.impacts.terms, zero_of(state)
     for k in range(len(total)):
-        count, entry = 0, impacts.firsts[i]
+        count, entry = 0, impacts.first_member[i]
         while entry >= 0:
             m = entry // 2
             push = item(impacts.event_normal[impacts.member[m]], k) * impacts.ahead[m]
             if rubs:
-                push += item(impacts.rub[m], k)
+                push += item(impacts.friction_impulse[m], k)
             terms[count] = push if entry % 2 == 1 else -push
             count, entry = count + 1, impacts.next_member[entry]
         total = replace(total, k, exact_sum(terms, count))
@@ -56,14 +57,14 @@ def push_bodies(state, count, rubs):
         c = impacts.event_pair[impacts.member[m]]
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            if inverse_mass[i] > 0.0 and impacts.firsts[i] == 2 * m + side:  # once each
+            if inverse_mass[i] > 0.0 and impacts.first_member[i] == 2 * m + side:  # once each
                 impacts.gained[i] = sum_pushes(state, i, rubs)
 
 
 @part
 def count_coupled(state, m, i):
     """Impacts of body i, member m among them, whose normals are not at right angles to that of m."""
-    impacts, entry, count = state.impacts, state.impacts.firsts[i], 0
+    impacts, entry, count = state.impacts, state.impacts.first_member[i], 0
     normal = impacts.event_normal[impacts.member[m]]
     while entry >= 0:
         count += abs(dot(normal, impacts.event_normal[impacts.member[entry // 2]])) > ORTHOGONAL
@@ -161,10 +162,10 @@ def keep_energy(state, count):
 
 
 @part
-def is_shot(state, i):
+def is_ejected(state, i):
     """Whether the group gives body i far more speed than any of its impacts asks for: it is pinched between others at a
     small angle, which in truth opens on the way."""
-    impacts, fastest, entry = state.impacts, 0.0, state.impacts.firsts[i]
+    impacts, fastest, entry = state.impacts, 0.0, state.impacts.first_member[i]
     while entry >= 0:
         fastest = max(fastest, impacts.event_change[impacts.member[entry // 2]])
         entry = impacts.next_member[entry]
@@ -179,14 +180,16 @@ def shoots(state, count):
         c = impacts.event_pair[impacts.member[impacts.group[g]]]
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            any_shot |= inverse_mass[i] > 0.0 and is_shot(state, i)
+            any_shot |= inverse_mass[i] > 0.0 and is_ejected(state, i)
     return any_shot
 
 
 @part
-def rub_group(state, count):
-    """Find the impulses of friction, into ``rub``; returns whether there are any. Bodies are taken to be split among
-    their impacts, so that these together never do more than stop what slides."""
+def solve_friction(state, count):
+    """Find the impulses of friction, into ``friction_impulse``; returns whether there are any.
+
+    Bodies are taken to be split among their impacts, so that these together never do more than stop what slides.
+    """
     impacts, pairs, rubs = state.impacts, state.pairs, False
     friction, slot, inverse_mass = state.colliders.friction, state.bodies.collider_slot, state.bodies.inverse_mass
     for g in range(count):
@@ -194,7 +197,7 @@ def rub_group(state, count):
         c = impacts.event_pair[impacts.member[m]]
         a, b, normal = pairs.a[c], pairs.b[c], impacts.event_normal[impacts.member[m]]
         mu = mix_friction(state, state.friction_rule, friction[slot[a], a], friction[slot[b], b])
-        impacts.rub[m] = zero_of(state)
+        impacts.friction_impulse[m] = zero_of(state)
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = rate_along(relative_path(state, a, b), impacts.now)
             w = add(w, sub(impacts.gained[b], impacts.gained[a]))
@@ -202,11 +205,11 @@ def rub_group(state, count):
             fast, light = length(sliding), 0.0
             for side in range(2):
                 i = a if side == 0 else b
-                entry = impacts.firsts[i] if inverse_mass[i] > 0.0 else -1
+                entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
                 while entry >= 0:
                     light, entry = light + inverse_mass[i], impacts.next_member[entry]
             if fast > 0.0:
-                impacts.rub[m] = scale(sliding, -min(1.0 / light, mu * impacts.ahead[m] / fast))
+                impacts.friction_impulse[m] = scale(sliding, -min(1.0 / light, mu * impacts.ahead[m] / fast))
                 rubs = True
     return rubs
 
@@ -216,7 +219,7 @@ def push_group(state, count, dt):
     """Give the bodies of a group their impulses, all at once, and note these."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     inverse_mass, caught = bodies.inverse_mass, bodies.caught
-    if rub_group(state, count):
+    if solve_friction(state, count):
         push_bodies(state, count, True)
     for g in range(count):
         m = impacts.group[g]
@@ -224,7 +227,7 @@ def push_group(state, count, dt):
         c = impacts.event_pair[event]
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            if inverse_mass[i] > 0.0 and impacts.firsts[i] == 2 * m + side:
+            if inverse_mass[i] > 0.0 and impacts.first_member[i] == 2 * m + side:
                 deflect(state, i, impacts.gained[i], impacts.now, dt)
             if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
                 bodies.impact_count[i] += 1

@@ -21,7 +21,7 @@ STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a
 
 # Kinds of events: an impact, one that no cap counts, one that is too slow to bounce, two beyond the cap, a crossing of
 # what does not push, and one of what is caught between two walls.
-BOUNCE, FREE, LAND, STICK, STOP, CROSS, SLIDE = range(7)
+BOUNCE, FREE, TOUCHDOWN, STICK, STOP, CROSS, SLIDE = range(7)
 FEW, CAUGHT = 16, 1000  # impacts of a body in a step, one after the other with what stands still
 
 
@@ -183,7 +183,7 @@ def is_deflected(state, i):
 
 
 @part
-def is_caught(state, a, b):
+def is_rattling(state, a, b):
     """Whether one of the two bounces for ever between things that stand still, of which the other is one."""
     bodies, caught = state.bodies, state.bodies.caught
     most = CAUGHT if state.mode == EVENT_DRIVEN else max(FEW, min(CAUGHT, state.max_impacts))

@@ -11,12 +11,12 @@ from ..codes import NEED_EVENTS, NEED_TOGETHER, OK, REFRESH_PAIRS
 from ..linking.parts import TAKE_SWEPT, TAKE_TOGETHER, call_take_swept, call_take_together
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import find_hasty
-from .find import consider
+from .bounds_exit import update_bounds_exit_time
+from .find import queue_next_impact
 from .heap import heap_pop
-from .impulses import CROSS, LAND, SLIDE, STICK, STOPPED, bounce, can_stick, slide, stick, stop
-from .looks import HITS, LANDINGS, MEMBERS, NONE, choose_looks, link_pairs, look_at_landings
+from .impulses import CROSS, SLIDE, STICK, STOPPED, TOUCHDOWN, bounce, can_stick, slide, stick, stop
+from .selection import HITS, LANDINGS, MEMBERS, NONE, link_pairs, look_at_landings, select_pairs
 from .together import EQUAL, holds, put_back
-from .watch import watch_again
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
 FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
@@ -59,7 +59,7 @@ def begin_impacts(state, dt):
         bodies.impact_count[i], bodies.counted_impacts[i] = 0, 0
     for c in range(pairs.count):
         pairs.crossed[c] = False
-    if pairs.found == 0 and not state.any_support and not (impacts.sweeps and state.neighbours_known_until < dt):
+    if pairs.found == 0 and not state.any_warm_started and not (impacts.sweeps and state.neighbours_known_until < dt):
         return OK
     impacts.active = impacts.sweeps or any_restitution(state)
     impacts.may_sink = impacts.sweeps and may_sink(state, dt)
@@ -86,7 +86,7 @@ def begin_search(state, last_pair, now):
     """The queue is empty, and the pairs may be others than before."""
     impacts = state.impacts
     impacts.waiting, impacts.last_pair, impacts.linked = 0, last_pair, False
-    impacts.sunk_pair, impacts.sunk_by = -1, 0.0
+    impacts.touchdown_pair, impacts.touchdown_time = -1, 0.0
     impacts.searching = impacts.search_end = 0
     impacts.now, impacts.until = now, state.neighbours_known_until if impacts.sweeps else math.inf
 
@@ -121,9 +121,9 @@ def take_swept_event(state, event, dt):
         impacts.last_pair = MEMBERS
         i = impacts.cluster
         while i >= 0:
-            watch_again(state, i, dt)
+            update_bounds_exit_time(state, i, dt)
             i = bodies.cluster_next[i]
-    elif kind in (SLIDE, LAND):
+    elif kind in (SLIDE, TOUCHDOWN):
         impacts.capped += 1 if kind == SLIDE else 0
         a, b = pairs.a[c], pairs.b[c]
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
@@ -140,19 +140,19 @@ def take_swept_event(state, event, dt):
 
 
 @part
-def lands_first(state, event):
+def touches_down_first(state, event):
     """Whether a body of this impact may have to land on something thin before: then that is searched, and the impact
     once more."""
     impacts = state.impacts
     c, kind, now = impacts.event_pair[event], impacts.event_kind[event], impacts.event_time[event]
-    looked, impacts.sunk_by = impacts.sunk_pair == c, 0.0
-    if looked or not impacts.may_sink or kind in (LAND, CROSS):
+    looked, impacts.touchdown_time = impacts.touchdown_pair == c, 0.0
+    if looked or not impacts.may_sink or kind in (TOUCHDOWN, CROSS):
         return False
     if not impacts.linked:
         link_pairs(state)
     if look_at_landings(state, c, now) == 1:
         return False
-    impacts.sunk_pair, impacts.sunk_by, impacts.last_pair, impacts.now = c, now, LANDINGS, 0.0
+    impacts.touchdown_pair, impacts.touchdown_time, impacts.last_pair, impacts.now = c, now, LANDINGS, 0.0
     return True
 
 
@@ -160,14 +160,14 @@ def lands_first(state, event):
 def take_event(state, event, dt):
     """Carry an event out, with all impacts at the same time; a code if these need something first."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
-    if lands_first(state, event):
+    if touches_down_first(state, event):
         return OK
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.last_pair, impacts.now = c, impacts.event_time[event]
-    if kind > LAND:
+    if kind > TOUCHDOWN:
         call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
         return OK
-    if kind != LAND and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
+    if kind != TOUCHDOWN and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:
             put_back(impacts, event)
             return NEED_TOGETHER
@@ -175,12 +175,12 @@ def take_event(state, event, dt):
         if taken >= 0:
             return taken
     bounce(state, event, dt)
-    if kind == LAND:
+    if kind == TOUCHDOWN:
         call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
     for side in range(2 if impacts.sweeps else 0):
         i = pairs.a[c] if side == 0 else pairs.b[c]
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
-            watch_again(state, i, dt)
+            update_bounds_exit_time(state, i, dt)
     return OK
 
 
@@ -238,7 +238,7 @@ def resolve_impacts(state, dt):
         if len(impacts.looks) <= 2 * pairs.count or len(impacts.heads) < state.count:
             state.needed = 2 * pairs.count
             return NEED_EVENTS
-        wanted = choose_looks(state)
+        wanted = select_pairs(state)
         if impacts.waiting + wanted > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
             state.needed = impacts.waiting + wanted
             return NEED_EVENTS
@@ -250,7 +250,7 @@ def resolve_impacts(state, dt):
             if far and q + AHEAD < wanted:
                 request_bodies(state, impacts.looks[q + AHEAD])
             if pairs.is_solid[c] or impacts.sweeps:
-                consider(state, c, dt)
+                queue_next_impact(state, c, dt)
         if not is_searched(state):
             continue
         event = next_event(state)

@@ -14,11 +14,11 @@ from ...framework.vectors import dot
 from ..ccd.time_of_impact import clear_of_rounding
 from ..codes import NEED_EVENTS, OK
 from ..integration.trajectory import rate_along, relative_path
+from .bounds_exit import update_bounds_exit_time
 from .group import WORK, is_affordable, push_group, shoots, solve_group
 from .heap import heap_pop, heap_push
 from .impulses import BOUNCE, CROSS, FREE, bounce
-from .looks import NONE, link_pairs, look_at_landings
-from .watch import watch_again
+from .selection import NONE, link_pairs, look_at_landings
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
 
@@ -83,7 +83,7 @@ def put_back(impacts, event):
     heap_push(impacts)
 
 
-def take_together(state, event, dt):
+def resolve_simultaneous(state, event, dt):
     """Carry out all impacts at the time of ``event``, which has been taken off the queue, if there are others.
 
     Returns OK; NEED_EVENTS if there is no room, and nothing has changed then; -1 if there is none besides it, or no
@@ -95,7 +95,8 @@ def take_together(state, event, dt):
     most = 1
     for k in range(impacts.waiting):
         most += impacts.event_time[impacts.heap[k]] - now <= EQUAL * dt
-    if most > len(impacts.member) or impacts.logged + most > len(impacts.log_pair) or state.count > len(impacts.firsts):
+    room = min(len(impacts.member), len(impacts.log_pair) - impacts.logged)
+    if most > room or state.count > len(impacts.first_member):
         impacts.together, state.needed = most, 0
         put_back(impacts, event)
         return NEED_EVENTS
@@ -126,19 +127,19 @@ def link_members(state, members):
         c = impacts.event_pair[impacts.member[m]]
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            impacts.firsts[i], impacts.searched_with[i], impacts.gained[i] = -1, -1, zero_of(state)
+            impacts.first_member[i], impacts.searched_with[i], impacts.gained[i] = -1, -1, zero_of(state)
     for m in range(members):
         c = impacts.event_pair[impacts.member[m]]
         a, b = pairs.a[c], pairs.b[c]
-        entry = impacts.firsts[a if inverse_mass[a] > 0.0 else b]
+        entry = impacts.first_member[a if inverse_mass[a] > 0.0 else b]
         while entry >= 0 and impacts.event_pair[impacts.member[entry // 2]] != c:
             entry = impacts.next_member[entry]
         impacts.is_left[m] = entry < 0
         for side in range(2 if entry < 0 else 0):
             i = a if side == 0 else b
             if inverse_mass[i] > 0.0:
-                impacts.next_member[2 * m + side] = impacts.firsts[i]
-                impacts.firsts[i] = 2 * m + side
+                impacts.next_member[2 * m + side] = impacts.first_member[i]
+                impacts.first_member[i] = 2 * m + side
 
 
 @part
@@ -166,7 +167,7 @@ def find_group(state, m):
         done += 1
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            entry = impacts.firsts[i] if inverse_mass[i] > 0.0 else -1
+            entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
             while entry >= 0:
                 if impacts.is_left[entry // 2]:
                     impacts.is_left[entry // 2] = False
@@ -207,4 +208,4 @@ def take_group(state, m, dt):
             if bodies.inverse_mass[i] > 0.0 and impacts.searched_with[i] < 0:
                 impacts.searched_with[i] = k
                 if impacts.sweeps:
-                    watch_again(state, i, dt)
+                    update_bounds_exit_time(state, i, dt)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from ...framework.jit.late import types
+from ...framework.jit.lazy import types
 from ...framework.jit.linking import Linked
 from ...framework.jit.records.record_type import record_type
 from ..records import STATE

@@ -83,7 +83,7 @@ def needed_functions(
 def link_possible(*kind: Any) -> None:
     """Load what is kept on disk of all that such a world may call, and compile the rest while it runs."""
     functions = list(dict.fromkeys(needed_functions(*kind)))
-    link_all(function for function in functions if function.at_hand)
+    link_all(function for function in functions if function.is_cached)
     link_in_background(functions)
 
 

@@ -8,7 +8,7 @@ from ...framework.vectors import add, sub
 from ..codes import OK
 from ..shapes.dispatch import evaluate
 from ..shapes.tolerances import contact_margin
-from .manifolds import between
+from .manifolds import centre_offset
 
 
 @part
@@ -55,7 +55,7 @@ def evaluate_levels(state, dt):
         dropped, hit, depth, normal, point = evaluate_levels_of(state, a, b, margin)
         pairs.a[kept], pairs.b[kept], pairs.is_solid[kept] = a, b, solid
         pairs.hit[kept], pairs.depth[kept] = hit, depth
-        pairs.at[kept], pairs.normal[kept], pairs.point[kept] = between(state.bodies, a, b), normal, point
+        pairs.at[kept], pairs.normal[kept], pairs.point[kept] = centre_offset(state.bodies, a, b), normal, point
         pairs.early[kept] = False
         kept += 0 if dropped else 1
     pairs.count = kept

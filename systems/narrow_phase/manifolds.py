@@ -17,21 +17,21 @@ from ..shapes.tolerances import FLAT_SLOPS, PLANE_SIZES, SAME_PLACE, contact_mar
 
 
 @inlined
-def between(bodies, a, b):
+def centre_offset(bodies, a, b):
     """From the centre of a's shape to that of b's, where they are now."""
     position, offset = bodies.position, bodies.offset
     return sub(add(position[b], offset[b]), add(position[a], offset[a]))
 
 
 @inlined
-def between_at_start(bodies, a, b):
+def centre_offset_at_start(bodies, a, b):
     """The same where the step starts."""
     position, offset = bodies.previous_position, bodies.offset
     return sub(add(position[b], offset[b]), add(position[a], offset[a]))
 
 
 @part
-def meet(state, a, b, d):
+def evaluate_pair(state, a, b, d):
     """The answer of the pair's function: (hit, depth, normal, point)."""
     shape = state.bodies.shape
     return evaluate(state, shape[a], a, shape[b], b, d)
@@ -41,7 +41,7 @@ def meet(state, a, b, d):
 def make_manifold(state, c, d):
     """The manifold of pair c where the centres are d apart."""
     pairs = state.pairs
-    hit, depth, normal, point = meet(state, pairs.a[c], pairs.b[c], d)
+    hit, depth, normal, point = evaluate_pair(state, pairs.a[c], pairs.b[c], d)
     pairs.at[c], pairs.hit[c], pairs.depth[c], pairs.normal[c], pairs.point[c] = d, hit, depth, normal, point
 
 
@@ -102,7 +102,7 @@ def depth_at(state, c, d, extent, exact):
     pairs = state.pairs
     if is_at_manifold(pairs, c, d, extent) or (not exact and plane_tells(state, c, d, extent)):
         return depth_by_plane(pairs, c, d), pairs.normal[c]
-    _, depth, normal, _ = meet(state, pairs.a[c], pairs.b[c], d)
+    _, depth, normal, _ = evaluate_pair(state, pairs.a[c], pairs.b[c], d)
     return depth, normal
 
 
@@ -144,7 +144,7 @@ def move_to_end(state, dt):
     for h in range(pairs.found):
         c, near = pairs.hits[h], True
         if pairs.early[c]:
-            make_manifold(state, c, between(bodies, pairs.a[c], pairs.b[c]))
+            make_manifold(state, c, centre_offset(bodies, pairs.a[c], pairs.b[c]))
             near = pairs.hit[c] or is_near(state, dt, c)
         if near:
             pairs.hits[found] = c
@@ -154,11 +154,11 @@ def move_to_end(state, dt):
 
 @part
 def move_to_start(state):
-    """The response finds what it would have found if nobody had read the contacts."""
+    """The response finds what it would have found if the contacts had not been read."""
     pairs, bodies = state.pairs, state.bodies
     for c in range(pairs.count if state.found_at_end else 0):
         if pairs.early[c]:
-            make_manifold(state, c, between_at_start(bodies, pairs.a[c], pairs.b[c]))
+            make_manifold(state, c, centre_offset_at_start(bodies, pairs.a[c], pairs.b[c]))
 
 
 def finish_found(state, dt):

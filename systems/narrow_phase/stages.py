@@ -153,7 +153,7 @@ def find_hasty(state, dt):
             extent = bodies.min_extent[i]
             beyond = length(bodies.start_velocity[i]) * dt - extent
             if beyond > max(farthest, thinnest):
-                farthest, state.hasty, state.hasty_row = beyond, True, i
+                farthest, state.too_fast_for_discrete, state.too_fast_row = beyond, True, i
 
 
 def select_pairs(state, dt):
@@ -166,7 +166,7 @@ def select_pairs(state, dt):
     changed = state.moved and (state.limits_speed or not state.drifted)
     for i in range(state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
-    state.hasty = False
+    state.too_fast_for_discrete = False
     find_hasty(state, dt)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...framework.data.component import Component
 from ...framework.errors import PluginError
-from ...framework.jit.late import errors
+from ...framework.jit.lazy import errors
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry, Shape
 from .linking.signatures import ALONE, OUT_OF_TIME

@@ -49,7 +49,7 @@ def in_order(registry: Registry, colliders: Iterable[type[Component]]) -> list[t
 def arrange(has: np.ndarray) -> np.ndarray:
     """(levels, n) indices of types, cheapest first, the last one repeated where a body has fewer; -1 for none.
 
-    has (types, n): who has which of the types, these being in order.
+    has (types, n): which of the types each has, these being in order.
     """
     place = np.zeros(has.shape[1], np.int8)  # of the next type among the body's own
     count = max(1, int(has.sum(axis=0, dtype=np.int8).max(initial=0)))
@@ -76,7 +76,7 @@ class LevelCheck:
         members: Mapping[type[Component], Handles],
         gone: Mapping[type[Component], set[int]],
     ) -> None:
-        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: who loses them."""
+        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: those that lose them."""
         for component, handles in fresh.items():
             if issubclass(component, Collider):
                 self._check_dimensions(component, next(iter(handles)))

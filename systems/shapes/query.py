@@ -15,7 +15,7 @@ import numpy as np
 
 from ...framework.compilation import inlined
 from ...framework.data.component import Component
-from ...framework.jit.linking import KEPT, Linked
+from ...framework.jit.linking import CACHE_SIZE, Linked
 from ...framework.jit.records.record import Record
 from ...framework.jit.records.schema import Schema, flags, integer, ints
 from ...framework.plugins.registry import Registry, Shape
@@ -129,6 +129,6 @@ class LinkedQuery:
         return addresses(getattr(pair, name, None) for pair in self.pairs)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _made(asking: Shape, linked: LinkedShapes, pairs: tuple[Any, ...]) -> LinkedQuery:
     return LinkedQuery(asking, linked, pairs)

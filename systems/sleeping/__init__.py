@@ -3,7 +3,7 @@
 The chapter's design:
 
 1. An island, bodies joined by pairs that push each other or nearly do, falls asleep when all of its bodies have been
-   slow for half a second, relative to what forces change in a step, and stand on nothing that moves (``judge_rest``).
+   slow for half a second, relative to what forces change in a step, and stand on nothing that moves (``update_sleep``).
 2. Forces and integrators treat all bodies alike. After the flight each sleeper is compared with what the same flight
    made of it when it fell asleep. If these bits are the same, nothing has pushed, moved or changed it, and it is put
    back to where it rests (``rest_sleepers``); if not, its island is awake, with the flight that it has just had.

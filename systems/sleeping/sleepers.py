@@ -1,4 +1,4 @@
-"""The Python side of sleeping: who falls asleep and who wakes, in the few steps in which that changes."""
+"""The Python side of sleeping: which bodies fall asleep and wake, in the few steps in which that changes."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
-from ..broad_phase.seekers import ALL
+from ..broad_phase.active_rows import ALL
+from ..record_buffers import Room
 from ..records import SLEEP_COLUMNS, SLEEPING
-from ..room import Room
 from ..scene import Scene
 from ..tracking import CONTACTS as CONTACT_NUMBERS
 from ..tracking import WARM_START, put_rows_back, saved_rows
@@ -29,7 +29,7 @@ def add_columns(table: Table) -> None:
 
 
 class Sleepers:
-    """Who sleeps in one world.
+    """Which bodies sleep in one world.
 
     contacts, impulses
         of pairs of which both bodies are still
@@ -68,7 +68,7 @@ class Sleepers:
     # -- a step -----------------------------------------------------------------------------------
 
     def begin_step(self) -> None:
-        """The scene is up to date: follow who has come or gone, and let fall asleep who is due."""
+        """The scene is up to date: follow bodies that have come or gone, and let those fall asleep that are due."""
         words, table = self._words, self._table
         if self._all_wake:
             self._wake_all()
@@ -85,7 +85,7 @@ class Sleepers:
             self._fall_asleep(table.stops[1])
 
     def end_step(self) -> None:
-        """Note what those stand on who fall asleep; nothing may change until the next step."""
+        """Note what those stand on that fall asleep; nothing may change until the next step."""
         self.kept = None
         if self._state.due < 0:
             self._all_wake, self._state.due = True, 0
@@ -98,7 +98,7 @@ class Sleepers:
         return table.version, table.members_version, table.static_version, table.generation
 
     def _follow(self, structure: tuple[int, ...]) -> None:
-        """Bodies have come, gone or changed: who was about to sleep does not; islands that miss something wake."""
+        """Bodies have come, gone or changed: what was about to sleep does not; islands that miss something wake."""
         before, self._followed = self._followed, structure
         if self._state.due:
             self._keep()
@@ -119,13 +119,13 @@ class Sleepers:
         self._wake(np.concatenate(islands))
 
     def _fall_asleep(self, moving: int) -> None:
-        """Who is due is still from now on; so is all that cannot move."""
+        """What is due is still from now on; so is all that cannot move."""
         self._keep()
         state, table, bodies = self._state, self._table, self._state.bodies
-        self._program.run_one("take_prints", 0.0)
+        self._program.run_one("take_checksums", 0.0)
         fixed = slice(moving, table.count)
         bodies.still[fixed] = STILL
-        bodies.watched[fixed], bodies.rest_position[fixed] = bodies.prints[fixed], bodies.position[fixed]
+        bodies.watched[fixed], bodies.rest_position[fixed] = bodies.checksums[fixed], bodies.position[fixed]
         state.due = state.fresh_statics = 0
         self._exchange()
 
@@ -155,7 +155,7 @@ class Sleepers:
         if still is not None:
             rows = rows[(rows >= 0) & (rows < self._table.stops[0])]
             still[rows[still[rows] > AWAKE]] = DISTURBED
-            self._state.candidates.seeker_count = ALL  # within a step they look for others already
+            self._state.candidates.active_count = ALL  # within a step they look for others already
 
     def wake_disturbed(self, dt: float) -> np.ndarray:
         """Those that are marked, and their islands; returns the rows of the dynamic ones."""
@@ -228,7 +228,7 @@ class Sleepers:
     def _exchange(self) -> None:
         """The pairs of which both are still are kept here, the others in the records; if nothing sleeps, nothing is."""
         state, memory, still = self._state, self._state.warm_start, self._still()
-        state.candidates.seeker_count = ALL  # in this step more are awake than were noted
+        state.candidates.active_count = ALL  # in this step more are awake than were noted
         state.asleep = int(np.count_nonzero(still[: self._table.stops[0]] > AWAKE))
         if not state.asleep:
             still[still > AWAKE] = AWAKE

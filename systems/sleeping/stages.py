@@ -1,4 +1,4 @@
-"""The stages of sleeping: who has been at rest for long enough, who still is, and what touches these."""
+"""The stages of sleeping: what has been at rest for long enough, what still is, and what touches these."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import record_at, zero_of
 from ...framework.vectors import dot, item, length, sub
+from ..broad_phase.active_rows import ALL, add_active
 from ..broad_phase.boxes import statics_moved
-from ..broad_phase.seekers import ALL, seek
 from ..codes import OK, WAKE, WAKE_TOUCHED
 from ..forces.stages import is_zero
 from ..islands import root_of
@@ -22,7 +22,7 @@ AWAKE, STILL, FALLING, DISTURBED = 0, 1, 2, -1
 
 # Stages without which nothing can sleep, as bits of ``state.sleep_stages``: a game may have replaced their systems.
 RESTED, LEFT_OUT, TOUCHED = 1, 2, 4
-EVERYBODY = -1  # in place of the number of those that fall asleep: all wake
+ALL_BODIES = -1  # in place of the number of those that fall asleep: all wake
 
 REST_TIME = 0.5  # s at rest before sleep,
 REST_STEPS = 8  # and at least so many steps
@@ -56,34 +56,34 @@ def rotated_bits(word, by):
 
 
 @part
-def add_prints(watched, prints, start, stop):
+def add_to_checksums(watched, checksums, start, stop):
     """The column's share in the prints of rows start..stop-1; none where it holds the default."""
     words, small, width = watched.words, watched.small, watched.width
     for k in range(width):
         by, default = 1 + (watched.turn + 13 * k) % 62, watched.defaults[k]
         for i in range(start, stop if len(words) > 0 else start):
-            prints[i] ^= rotated_bits(words[i * width + k] ^ default, by)
+            checksums[i] ^= rotated_bits(words[i * width + k] ^ default, by)
         for i in range(start, stop if len(small) > 0 else start):
-            prints[i] ^= rotated_bits(np.int64(small[i * width + k]) ^ default, by)
+            checksums[i] ^= rotated_bits(np.int64(small[i * width + k]) ^ default, by)
 
 
 @part
 def print_rows(state, start, stop):
     """prints[i]: all that is watched of rows start..stop-1, each in one number that changes with any of it."""
-    prints, watching = state.bodies.prints, state.watching
+    checksums, watching = state.bodies.checksums, state.watching
     for i in range(start, stop):
-        prints[i] = 0
+        checksums[i] = 0
     for q in range(len(watching)):
-        add_prints(_watched_at(watching[q]), prints, start, stop)
+        add_to_checksums(_watched_at(watching[q]), checksums, start, stop)
 
 
-def take_prints(state, dt):
+def take_checksums(state, dt):
     """The prints of all rows."""
     print_rows(state, 0, state.count)
     return OK
 
 
-# -- who sleeps on -----------------------------------------------------------------------------------------------------
+# -- what sleeps on ----------------------------------------------------------------------------------------------------
 
 
 @part
@@ -96,7 +96,7 @@ def sleeps_on(state, i, dt):
     bodies, free = state.bodies, state.has_force_systems or state.others_write
     if not (same(bodies.previous_position[i], bodies.rest_position[i]) and is_zero(bodies.start_velocity[i])):
         return False
-    if bodies.prints[i] != bodies.watched[i]:
+    if bodies.checksums[i] != bodies.watched[i]:
         return False
     if bodies.still[i] == FALLING:
         push = length(sub(bodies.force[i], bodies.rest_force[i])) * bodies.inverse_mass[i] * dt
@@ -116,7 +116,7 @@ def stands(state, i):
     at, before = bodies.position[i], bodies.previous_position[i] if i < state.moving else bodies.rest_position[i]
     moves = i < state.moving and not is_zero(bodies.linear_velocity[i])
     at_place = same(at, bodies.rest_position[i]) and same(before, bodies.rest_position[i])
-    return at_place and not moves and bodies.prints[i] == bodies.watched[i]
+    return at_place and not moves and bodies.checksums[i] == bodies.watched[i]
 
 
 @part
@@ -140,11 +140,11 @@ def find_disturbed(state, dt):
 def put_to_rest(state):
     """Sleepers are where they rest, without speed; notes whether anything moves that could meet another."""
     bodies, still, zero, lively, fresh = state.bodies, state.bodies.still, zero_of(state), False, 0
-    state.candidates.seeker_count = 0
+    state.candidates.active_count = 0
     for i in range(state.moving):
         if still[i] == AWAKE:
             lively |= bodies.shape[i] >= 0
-            seek(state, i)
+            add_active(state, i)
             continue
         still[i] = STILL
         if i < state.dynamic:
@@ -155,7 +155,7 @@ def put_to_rest(state):
     for i in range(state.moving, state.count):
         fresh += still[i] == AWAKE
     if fresh > 0:  # sleepers have to look at these
-        state.candidates.seeker_count = ALL
+        state.candidates.active_count = ALL
     state.fresh_statics = fresh
     state.all_still = not lively and fresh == 0
 
@@ -231,7 +231,7 @@ def find_touched(state, dt):
     return WAKE_TOUCHED if disturbed > 0 else OK
 
 
-# -- who falls asleep --------------------------------------------------------------------------------------------------
+# -- what falls asleep -------------------------------------------------------------------------------------------------
 
 
 @inlined
@@ -295,16 +295,16 @@ def join_islands(state, dt, needed):
     Those do of which a body has not been at rest for long enough, or has nothing that holds it, or slides on and on, or
     stands on something that moves, or that a system disables the contact with.
     """
-    bodies, pairs, root, restless = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.restless
+    bodies, pairs, root, keeps_awake = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.keeps_awake
     still = bodies.still
     for i in range(state.dynamic):
-        root[i], restless[i] = i, bodies.rest_steps[i] < needed or not is_unmoved(state, i, dt)
+        root[i], keeps_awake[i] = i, bodies.rest_steps[i] < needed or not is_unmoved(state, i, dt)
     for c in range(pairs.count):
         a, b = pairs.a[c], pairs.b[c]
         if pairs.is_solid[c] and pairs.near_contact[c]:
             for i in (a, b):
                 if i < state.dynamic and bodies.rest_steps[i] >= needed:
-                    restless[i] = goes_on(state, i, dt)
+                    keeps_awake[i] = goes_on(state, i, dt)
     for c in range(pairs.count):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
         awake = b < state.dynamic and still[a] == AWAKE and still[b] == AWAKE
@@ -314,32 +314,32 @@ def join_islands(state, dt, needed):
     for k in range(pairs.disabled_count):
         for i in (pairs.a[pairs.disabled[k]], pairs.b[pairs.disabled[k]]):
             if i < state.dynamic:
-                restless[i] = True
+                keeps_awake[i] = True
     for i in range(state.dynamic):
-        if restless[i]:
-            restless[root_of(root, i)] = True
+        if keeps_awake[i]:
+            keeps_awake[root_of(root, i)] = True
     for c in range(pairs.count):
         a, b = min(pairs.a[c], pairs.b[c]), max(pairs.a[c], pairs.b[c])
         carried = a < state.dynamic and state.dynamic <= b < state.moving
         if carried and pairs.is_solid[c] and pairs.near_contact[c] and bodies.rest_steps[b] < needed:
-            restless[root_of(root, a)] = True
+            keeps_awake[root_of(root, a)] = True
 
 
 @part
-def lay_down(state, i):
+def put_to_sleep(state, i):
     """Row i is still from the next step on, if nothing changes until then."""
     bodies = state.bodies
-    bodies.still[i], bodies.watched[i], bodies.rest_position[i] = FALLING, bodies.prints[i], bodies.position[i]
+    bodies.still[i], bodies.watched[i], bodies.rest_position[i] = FALLING, bodies.checksums[i], bodies.position[i]
     bodies.linear_velocity[i] = zero_of(state)
 
 
-def judge_rest(state, dt):
+def update_sleep(state, dt):
     """Count the steps that bodies have been at rest; islands that have been for long enough fall asleep."""
     bodies, due = state.bodies, 0
     if state.unsound != 0:
         return OK
     if not state.moved or state.sleep_stages != RESTED | LEFT_OUT | TOUCHED:
-        state.due = EVERYBODY if state.asleep > 0 else 0
+        state.due = ALL_BODIES if state.asleep > 0 else 0
         return OK
     needed = max(REST_STEPS, math.ceil(REST_TIME / dt))
     if not count_rest(state, dt, needed) or state.step_number % LOOK_EVERY != 0:
@@ -348,13 +348,13 @@ def judge_rest(state, dt):
     print_rows(state, 0, state.moving)
     for i in range(state.dynamic):
         first = root_of(bodies.rest_root, i)
-        if bodies.still[i] == AWAKE and not bodies.restless[first]:
-            lay_down(state, i)
+        if bodies.still[i] == AWAKE and not bodies.keeps_awake[first]:
+            put_to_sleep(state, i)
             bodies.rest_force[i], bodies.island[i] = bodies.force[i], bodies.entity[first]
             due += 1
     for i in range(state.dynamic, state.moving if due > 0 or state.asleep > 0 else state.dynamic):
         if bodies.still[i] == AWAKE and bodies.rest_steps[i] >= needed:
-            lay_down(state, i)
+            put_to_sleep(state, i)
             due += 1
     state.due = due
     return OK

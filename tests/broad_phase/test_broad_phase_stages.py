@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
+from carom.systems.broad_phase.active_rows import MOST_ACTIVE
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.seekers import MOST_SEEKERS
 from carom.systems.broad_phase.stages import (
+    ACTIVE_ROWS,
     BRUTE_FORCE,
     CANDIDATE_LIMIT,
-    SEEKERS,
     STATIC_GRID,
     TREE,
     UNIFORM_GRID,
@@ -58,21 +58,21 @@ def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
 @both_dimensions
 @pytest.mark.parametrize("crowd", [spread, mixed])
 @pytest.mark.parametrize(("moving", "static"), [(1, 0), (40, 10), (300, 20), (300, 400)])
-@pytest.mark.parametrize("count", [0, 1, 2, MOST_SEEKERS])
+@pytest.mark.parametrize("count", [0, 1, 2, MOST_ACTIVE])
 def test_a_few_bodies_look_for_all_others(d, crowd, moving, static, count):
     rng = np.random.default_rng(7)
     lower, upper = crowd(rng, moving + static, d)
-    seekers = np.sort(rng.choice(moving, min(count, moving), replace=False))
+    active = np.sort(rng.choice(moving, min(count, moving), replace=False))
     boxes = Boxes(d)
     boxes.set(lower, upper, moving)
     candidates = boxes.state.candidates
-    candidates.seekers[: len(seekers)], candidates.seeker_count = seekers, len(seekers)
-    expected = {pair for pair in overlapping(lower, upper, moving) if set(pair) & set(seekers.tolist())}
+    candidates.active_rows[: len(active)], candidates.active_count = active, len(active)
+    expected = {pair for pair in overlapping(lower, upper, moving) if set(pair) & set(active.tolist())}
     found = pair_set(*boxes.find())
     if boxes.state.pair_search == TREE:  # of all, as no grid suits the static boxes
-        found = {pair for pair in found if set(pair) & set(seekers.tolist())}
+        found = {pair for pair in found if set(pair) & set(active.tolist())}
     else:
-        assert boxes.state.pair_search == (STATIC_GRID if static > max(moving, BRUTE_FORCE_MAX) else SEEKERS)
+        assert boxes.state.pair_search == (STATIC_GRID if static > max(moving, BRUTE_FORCE_MAX) else ACTIVE_ROWS)
     assert found == expected
 
 

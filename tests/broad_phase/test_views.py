@@ -12,7 +12,7 @@ from worlds import both_dimensions
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import Settings
-from carom.systems.broad_phase.views import NOT_KNOWN
+from carom.systems.broad_phase.static_neighbours import NOT_KNOWN
 
 MOVING, STATIC = 40, 400
 

@@ -13,8 +13,8 @@ from worlds import ball, box, make_world
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, Settings, System, World
 from carom.plugins import Physics
-from carom.systems.broad_phase.seekers import MOST_SEEKERS
-from carom.systems.broad_phase.stages import SEEKERS, UNIFORM_GRID
+from carom.systems.broad_phase.active_rows import MOST_ACTIVE
+from carom.systems.broad_phase.stages import ACTIVE_ROWS, UNIFORM_GRID
 
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 
@@ -38,7 +38,7 @@ def test_off_by_default_and_nothing_sleeps():
     assert not any(is_asleep(world, *boxes))
     assert not world.bodies.asleep.any()
     assert "_still" not in world.physics.table.arrays
-    assert not any(name in str(world.plan()) for name in ("rest_sleepers", "judge_rest", "leave_out_still"))
+    assert not any(name in str(world.plan()) for name in ("rest_sleepers", "update_sleep", "leave_out_still"))
 
 
 @pytest.mark.parametrize(
@@ -306,7 +306,9 @@ class WakeWithinTheStep(System):
             self.world.wake(self.entity)
 
 
-@pytest.mark.parametrize(("balls", "search"), [(3, SEEKERS), (MOST_SEEKERS, SEEKERS), (MOST_SEEKERS + 1, UNIFORM_GRID)])
+@pytest.mark.parametrize(
+    ("balls", "search"), [(3, ACTIVE_ROWS), (MOST_ACTIVE, ACTIVE_ROWS), (MOST_ACTIVE + 1, UNIFORM_GRID)]
+)
 def test_a_few_balls_above_a_sleeping_crowd_are_tested_alone(balls, search):
     """The search for pairs costs work for the few that are awake; what they do is the same as where nothing sleeps."""
     places = []

@@ -93,7 +93,7 @@ def test_pairs_that_stay_apart_never_meet(degree, d):
         times = np.linspace(since, until, 200)[:, None]
         places = path[0] + times * (path[1] + times * (path[2] + times * path[3]))
         meets = bool((np.abs(places) <= half.sum(axis=0)).all(axis=1).any())
-        apart = time_of_impact.stays_apart(view, 0, 1, tuple(tuple(x.tolist()) for x in path), since, until)
+        apart = time_of_impact.bounds_stay_disjoint(view, 0, 1, tuple(tuple(x.tolist()) for x in path), since, until)
         assert not (apart and meets)
         met, known = met + meets, known + apart
     assert met > 20

@@ -13,7 +13,7 @@ from pathlib import Path
 import helpers_zoo
 import pytest
 
-from carom.framework.jit.late import JIT
+from carom.framework.jit.lazy import JIT
 
 pytestmark = [
     pytest.mark.plain, pytest.mark.last, pytest.mark.skipif(JIT, reason="the kernels are compiled in this run"),

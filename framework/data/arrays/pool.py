@@ -14,15 +14,15 @@ import numpy as np
 from ...errors import CaromError
 
 ROOM = 64  # rows, and numbers, of a new pool
-IN_FLIGHT = 16  # more than one component takes; who asks for many at once uses ``kept``
+IN_FLIGHT = 16  # more than one component takes; for many at once there is ``kept``
 
 
 class Pool:
     """Arrays (k, width), end to end in ``data``; number i is rows starts[i] to starts[i + 1].
 
     Equal arrays have one number, and no number is ever used for another array. When there is no room left, arrays that
-    no holder has are forgotten, and the others move together in new memory: who works with the old one, which stays as
-    it is, may go on.
+    no holder has are forgotten, and the others move together in new memory: code that works with the old one, which
+    stays as it is, may go on.
     """
 
     def __init__(self, width: int) -> None:
@@ -42,7 +42,7 @@ class Pool:
 
     @property
     def digests(self) -> np.ndarray:
-        """Of the contents: hashes must not depend on who came first."""
+        """Of the contents: hashes must not depend on their order of arrival."""
         return self._digests[: self._count]
 
     def number_of(self, array: np.ndarray) -> int:
@@ -58,7 +58,7 @@ class Pool:
         return number
 
     def array(self, number: int) -> np.ndarray:
-        """A copy nobody can write to; CaromError if it has been forgotten."""
+        """A copy that cannot be written to; CaromError if it has been forgotten."""
         if number and self._starts[number] == self._starts[number + 1]:
             raise CaromError(f"array {number} is forgotten: what keeps its number must be among the pool's holders")
         array = self.data[self._starts[number] : self._starts[number + 1]].copy()
@@ -100,7 +100,7 @@ class Pool:
             self.data = grown
 
     def _collect(self) -> None:
-        """Forget what nobody holds."""
+        """Forget what has no holder."""
         live = np.zeros(self._count, bool)
         self._replaced = [entry for entry in self._replaced if _may_be_put_back(*entry)]
         live[[0, *self._in_flight, *(number for _, _, number in self._replaced)]] = True

@@ -167,8 +167,8 @@ def _columns_of(stores: dict[type[Component], RowStore]) -> dict[type[Component]
     }
 
 
-class Return:
-    """Takes one world back to a population. Between :meth:`let_go` and :meth:`arrive` the table gets its rows.
+class PopulationRestore:
+    """Takes one world back to a population. Between :meth:`release` and :meth:`apply` the table gets its rows.
 
     wanted
         by entity that has come, gone or changed since, the components it is to have
@@ -208,7 +208,7 @@ class Return:
         if population.batches:
             for entity in [entity for entity in self._gone if dict.__contains__(entities, entity)]:
                 batch = next((batch for batch in population.batches if batch.has(entity)), None)
-                if batch is not None:  # somebody may hold the objects
+                if batch is not None:  # the objects may be in use
                     self._out[entity] = {component: self._handle(component, entity) for component in batch.types}
             self._gone -= self._out.keys()
             wanted.update(self._out)
@@ -226,11 +226,11 @@ class Return:
         handle._bind(None, None)
         return handle
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Handles that are not wanted keep the values that they have now."""
         self._adoption.keep_only(self._by_type, self._wanted, self._gone)
 
-    def arrive(self) -> None:
+    def apply(self) -> None:
         """Give esper the entities, and bind the handles; called in the world's context."""
         entities, members = self._entities, self._entities.members
         if not self._needed:

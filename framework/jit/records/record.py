@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..late import JIT
+from ..lazy import JIT
 from .plain_view import remember
 from .schema import WORD, Column, Schema
 

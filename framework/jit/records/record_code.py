@@ -25,7 +25,7 @@ from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, inf
 from numba.np.arrayobj import populate_array
 from numba.np.numpy_support import from_dtype
 
-from ..late import intrinsic, operation
+from ..lazy import intrinsic, operation
 from ..log import CHECKED
 from .schema import WORD, Column, Schema
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..late import JIT, Late, LateModule
+from ..lazy import JIT, LazyIntrinsic, LazyModule
 from .plain_view import plain_view_at
 from .schema import Schema
 
 if TYPE_CHECKING:
     from . import record_code
 else:
-    record_code = LateModule(f"{__package__}.record_code")
+    record_code = LazyModule(f"{__package__}.record_code")
 
 
 def record_type(schema: Schema, dimensions: int) -> record_code.RecordType:
@@ -21,7 +21,7 @@ def record_type(schema: Schema, dimensions: int) -> record_code.RecordType:
 
 def record_at(schema: Schema, dimensions: int) -> Any:
     """The function (address) -> record of that schema in worlds of that many dimensions."""
-    return Late(lambda: record_code.record_at(record_type(schema, dimensions))) if JIT else plain_view_at
+    return LazyIntrinsic(lambda: record_code.record_at(record_type(schema, dimensions))) if JIT else plain_view_at
 
 
 def _plain_rows(column: Any, start: int, stop: int) -> Any:
@@ -29,7 +29,7 @@ def _plain_rows(column: Any, start: int, stop: int) -> Any:
 
 
 # rows_of(column, start, stop): those rows as a numpy array that shares the column's memory.
-rows_of: Any = Late(lambda: record_code.compiled_rows.made, _plain_rows) if JIT else _plain_rows
+rows_of: Any = LazyIntrinsic(lambda: record_code.compiled_rows.made, _plain_rows) if JIT else _plain_rows
 
 
 def _plain_request(column: Any, index: int) -> None:
@@ -37,7 +37,7 @@ def _plain_request(column: Any, index: int) -> None:
 
 
 # request(column, i): row i of the column will be read soon; the processor may fetch it meanwhile. It never fails.
-request: Any = Late(lambda: record_code.compiled_request.made, _plain_request) if JIT else _plain_request
+request: Any = LazyIntrinsic(lambda: record_code.compiled_request.made, _plain_request) if JIT else _plain_request
 
 
 def _plain_zero(record: Any) -> tuple[float, ...]:
@@ -45,4 +45,4 @@ def _plain_zero(record: Any) -> tuple[float, ...]:
 
 
 # The zero vector of the world that a record belongs to: a tuple of 2 or 3 floats.
-zero_of: Any = Late(lambda: record_code.compiled_zero.made, _plain_zero) if JIT else _plain_zero
+zero_of: Any = LazyIntrinsic(lambda: record_code.compiled_zero.made, _plain_zero) if JIT else _plain_zero

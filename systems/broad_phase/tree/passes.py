@@ -7,7 +7,7 @@ from functools import cache, cached_property
 from typing import Any
 
 from ....framework.compilation import kernel
-from ....framework.jit.late import types
+from ....framework.jit.lazy import types
 from ....framework.jit.linking import Called, Linked, linked_call
 from ....framework.jit.records.record_type import record_at, record_type
 from ..records import TREE

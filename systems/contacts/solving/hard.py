@@ -1,4 +1,4 @@
-"""Hard contacts do not give way: those of a body that nobody presses on, with what cannot be moved.
+"""Hard contacts do not give way: those of a body that nothing presses on, with what cannot be moved.
 
 Soft contacts sag, by an amount that depends on how many there are. A body that slides over floors which lie flush would
 rise and sink at each seam, and meet the next floor's corner below its own underside.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ....framework.compilation import part
 from ....framework.vectors import add, dot, sub
-from ..approach import between, between_at_start
+from ..approach import centre_offset, centre_offset_at_start
 from ..constants import ALONG, IDLE, LOAD, OPEN, UNREACHED
 
 
@@ -25,12 +25,12 @@ def presses(solver, k, dt):
 
 @part
 def choose_hard(state, dt, nothing):
-    """Contacts with what cannot be moved are hard if their body has rested until now, and nobody presses on it.
+    """Contacts with what cannot be moved are hard if their body has rested until now, and nothing presses on it.
 
     Not those that push against the sum of its normals: no impulse is high enough for what is squeezed. Nor one that
     stands for several faces: how much it overlaps each of them says which way it pushes.
     """
-    solver, supported = state.solver, state.bodies.supported
+    solver, warm_started = state.solver, state.bodies.warm_started
     inverse_mass, way, shared = solver.inverse_mass, solver.way, solver.shared
     for q in range(solver.bodies):
         way[q], shared[q] = nothing, False
@@ -48,7 +48,7 @@ def choose_hard(state, dt, nothing):
         solver.hard[k] = False
         if inverse_mass[a] == 0.0 or inverse_mass[b] == 0.0:
             body, along = (b, dot(way[b], n)) if inverse_mass[b] > 0.0 else (a, -dot(way[a], n))
-            rested = state.any_support and supported[solver.body_row[body]]
+            rested = state.any_warm_started and warm_started[solver.body_row[body]]
             hard = rested and along > ALONG and not (shared[body] or solver.varies[k])
             solver.hard[k] = hard
             any_hard |= hard
@@ -76,7 +76,7 @@ def leave_out_of_reach(state):
         if solver.hard[k] and solver.apart[k]:
             body = solver.first[k] if solver.inverse_mass[solver.first[k]] > 0.0 else solver.second[k]
             a, b = pairs.a[solver.pair[k]], pairs.b[solver.pair[k]]
-            travel = sub(between(bodies, a, b), between_at_start(bodies, a, b))
+            travel = sub(centre_offset(bodies, a, b), centre_offset_at_start(bodies, a, b))
             if held[body] > 0.0 and solver.gap[k] + dot(travel, solver.normal[k]) > OPEN * solver.extent[k]:
                 solver.gap[k] += UNREACHED * solver.extent[k]
 

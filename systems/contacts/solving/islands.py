@@ -82,7 +82,7 @@ def number_islands(state):
     """``island`` becomes the number of each body's island, in the order of their first bodies; -1 for what cannot be
     moved. What is known of its bodies is summed up."""
     solver, bodies, island, count = state.solver, state.bodies, state.solver.island, 0
-    velocity, start, supported = bodies.linear_velocity, bodies.start_velocity, bodies.supported
+    velocity, start, warm_started = bodies.linear_velocity, bodies.start_velocity, bodies.warm_started
     for q in range(solver.bodies):
         i = solver.body_row[q]
         w = bodies.inverse_mass[i]
@@ -99,8 +99,8 @@ def number_islands(state):
             solver.size_of[t], solver.leader[t] = 0, i
         solver.number[q] = t
         change = sub(velocity[i], start[i])
-        if supported[i]:
-            change = sub(change, bodies.support_change[i])
+        if warm_started[i]:
+            change = sub(change, bodies.warm_start_velocity[i])
         speed = math.sqrt(dot(change, change))
         solver.lightest[t], solver.most_change[t] = min(solver.lightest[t], w), max(solver.most_change[t], speed)
         solver.mass_of[t] += 1.0 / w

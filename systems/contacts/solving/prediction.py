@@ -42,7 +42,7 @@ def find_closing(state):
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
     velocity, to_hold, nothing = bodies.linear_velocity, bodies.to_hold, zero_of(state)
     for i in range(state.moving):
-        bodies.support_change[i] = velocity[i]  # of all, so that no branch asks which are supported
+        bodies.warm_start_velocity[i] = velocity[i]  # of all, so that no branch asks which are supported
         to_hold[i] = nothing
     for m in range(memory.counts[now]):
         if not memory.off[m]:
@@ -64,18 +64,18 @@ def apply_remembered(state):
             a, b, push = memory.first[now, m], memory.second[now, m], memory.push[now, m]
             w_a, w_b = inverse_mass[a], inverse_mass[b]
             if w_a > 0.0:  # storing what stays as it is would make contacts with one floor wait for each other
-                bodies.supported[a], velocity[a] = True, add_scaled(velocity[a], push, -w_a)
+                bodies.warm_started[a], velocity[a] = True, add_scaled(velocity[a], push, -w_a)
             if w_b > 0.0:
-                bodies.supported[b], velocity[b] = True, add_scaled(velocity[b], push, w_b)
+                bodies.warm_started[b], velocity[b] = True, add_scaled(velocity[b], push, w_b)
 
 
 @part
 def forget_support(state):
     """Nothing is supported yet; what cannot move never is, but other rows may have been there."""
-    supported = state.bodies.supported
-    if len(supported) > 0:
+    warm_started = state.bodies.warm_started
+    if len(warm_started) > 0:
         for i in range(state.moving if state.support_version == state.version else state.count):
-            supported[i] = False
+            warm_started[i] = False
         state.support_version = state.version
 
 
@@ -87,30 +87,30 @@ def predict_rest(state, dt):
     velocity: what the integrator makes of a force.
     """
     bodies, memory = state.bodies, state.warm_start
-    state.any_support = False
+    state.any_warm_started = False
     forget_support(state)
     if state.response_idle or memory.counts[memory.now] == 0:
         return OK
-    if len(bodies.support_change) == 0:
+    if len(bodies.warm_start_velocity) == 0:
         return NEED_COLUMNS
     scale_to(state, dt)
     find_rows(state)
-    state.any_support = True
+    state.any_warm_started = True
     state.force_travels = 0.5 if state.path_degree > 1 else (0.0 if state.moves_with_old_velocity else 1.0)
     mark_disabled(state)
     find_closing(state)
     apply_remembered(state)
     travels = state.force_travels
     for i in range(state.moving):
-        if bodies.supported[i]:
-            before = bodies.support_change[i]
+        if bodies.warm_started[i]:
+            before = bodies.warm_start_velocity[i]
             dv = sub(bodies.linear_velocity[i], before)
             given, forced = length(dv), length(sub(before, bodies.start_velocity[i]))
             most = max(forced, dot(dv, bodies.to_hold[i]) / given if given > 0.0 else 0.0)
             if given > most:
                 dv = scale(dv, most / given)
                 bodies.linear_velocity[i] = add(before, dv)
-            bodies.support_change[i] = dv
+            bodies.warm_start_velocity[i] = dv
             bodies.position[i] = add_scaled(bodies.position[i], dv, travels * dt)
             if state.path_degree > 1:
                 bodies.path_second[i] = add_scaled(bodies.path_second[i], dv, travels / dt)
@@ -125,8 +125,8 @@ def drop_support(state, dt):
     that this has given it: beside it there may be a wall."""
     bodies, travels = state.bodies, state.force_travels
     for i in range(state.moving):
-        if bodies.supported[i] and not bodies.held[i]:
-            dv = bodies.support_change[i]
+        if bodies.warm_started[i] and not bodies.held[i]:
+            dv = bodies.warm_start_velocity[i]
             if bodies.impact_count[i] == 0:
                 bodies.position[i] = add_scaled(bodies.position[i], dv, -travels * dt)
             bodies.linear_velocity[i] = sub(bodies.linear_velocity[i], dv)

@@ -65,7 +65,7 @@ def measure(solver, h, bias_rate, dt, stiff, ends, span):
                 room = max(room / (h * bias_rate), -deep)
             pushing = bias_rate * room
             soft = not (stiff or hard)
-        solver.worked[k] |= solver.impulse[k] > 0.0
+        solver.had_impulse[k] |= solver.impulse[k] > 0.0
         solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
 
 
@@ -211,7 +211,7 @@ def solve_substep(solver, spring, most, dt, h, kind, ends, span):
     finish_substep(solver, bias_rate, any_struck, h, dt, span)
     for k in range(start, stop):
         solver.total[k] += solver.impulse[k]
-        solver.worked[k] |= solver.impulse[k] > 0.0
+        solver.had_impulse[k] |= solver.impulse[k] > 0.0
 
 
 @part
@@ -323,7 +323,7 @@ def solve_contacts(state, dt):
         return OK
     for k in range(solver.contacts):
         solver.mass[k] = effective_mass(solver, k)
-        solver.total[k], solver.worked[k] = 0.0, False
+        solver.total[k], solver.had_impulse[k] = 0.0, False
     solver.visits, solver.usual = 0, state.substeps
     omega = 2.0 * math.pi * FREQUENCY * state.substeps / dt
     solver.push_rate = omega / (2.0 * DAMPING_RATIO + omega * dt / state.substeps)

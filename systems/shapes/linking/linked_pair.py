@@ -12,7 +12,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from ....framework.compilation import inlined
-from ....framework.jit.linking import KEPT, Linked
+from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.jit.records.record_type import record_at
 from ....framework.plugins.registry import Convex, Pair, Shape
 from .batches import batch_by_address, checked, in_given_order, in_order_of_shapes, make_batch
@@ -143,7 +143,7 @@ class LinkedPair:
         return [as_argument(user_function(helper)) for helper in self.pair.helpers]
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def linked_pair(first: Shape, second: Shape, pair: Pair, dimensions: int) -> LinkedPair:
     """The functions of two shapes in the order of the pair, the same ones for all worlds of this process.
 
@@ -158,12 +158,12 @@ def linked_pair(first: Shape, second: Shape, pair: Pair, dimensions: int) -> Lin
     return _shared_pair(one, two, replace(pair, **names, helpers=(None,) * len(pair.helpers)), dimensions)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _shared_pair(first: Shape | None, second: Shape | None, pair: Pair, dimensions: int) -> LinkedPair:
     return LinkedPair(first, second, pair, dimensions)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def convex_sides(first: Shape, second: Shape, pair: Pair) -> tuple[bool, bool]:
     """Which of the two the pair takes by the addresses of support and rounding."""
     if not pair.helpers or not is_long(pair.function) or pair.corner is not None:  # a corner may look at any field
@@ -175,6 +175,6 @@ def convex_sides(first: Shape, second: Shape, pair: Pair) -> tuple[bool, bool]:
     return pair.helpers[0] is first.support, pair.helpers[0] is second.support
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _batch_by_address(dimensions: int) -> Linked:
     return Linked(named(batch_by_address), batch_signature(dimensions))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....framework.compilation import kernel
 from ....framework.data.arrays.column import ArrayColumn
-from ....framework.jit.linking import KEPT, Called, Linked
+from ....framework.jit.linking import CACHE_SIZE, Called, Linked
 from ....framework.jit.records.record import make_record
 from ....framework.jit.records.record_type import record_at, rows_of
 from ....framework.jit.records.schema import Schema, vectors
@@ -115,7 +115,7 @@ class LinkedShape:
         return source_module(title + "\n    ".join([header, *lines]) + "\n", scope)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def linked_shape(shape: Shape, dimensions: int) -> LinkedShape:
     """The functions of that shape, the same ones for all worlds of this process."""
     return LinkedShape(shape, dimensions)

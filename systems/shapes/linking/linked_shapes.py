@@ -10,7 +10,7 @@ import numpy as np
 
 from ....framework.data.arrays.column import ArrayColumn
 from ....framework.data.component import Component
-from ....framework.jit.linking import KEPT, Linked
+from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.jit.records.record import Record
 from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
@@ -46,7 +46,7 @@ class LinkedShapes:
         self.shapes, self.dimensions = shapes, dimensions
         self.functions: tuple[LinkedShape, ...] = tuple(linked_shape(shape, dimensions) for shape in shapes)
         self.pairs: dict[tuple[int, int], LinkedPair | None] = {}
-        self.supported: set[int] = set()  # shapes that some pair takes by the address of their support
+        self.warm_started: set[int] = set()  # shapes that some pair takes by the address of their support
         self._flipped = np.zeros(len(shapes) ** 2, bool)
         for (i, j), pair in pairs.items():
             if pair is None:
@@ -57,7 +57,7 @@ class LinkedShapes:
             self.pairs[i, j] = linked_pair(shapes[first], shapes[second], pair, dimensions)
             self._flipped[i * len(shapes) + j] = flipped
             sides = convex_sides(shapes[first], shapes[second], pair)
-            self.supported.update(number for number, side in zip((first, second), sides, strict=True) if side)
+            self.warm_started.update(number for number, side in zip((first, second), sides, strict=True) if side)
         self._rules = tuple(linked_rule(rule) for rule in rules)
         self._tables: dict[str, np.ndarray] = {}
 
@@ -94,7 +94,7 @@ class LinkedShapes:
     def all_functions(self, sweeps: bool) -> Iterator[Linked]:
         """Everything that a step may call for these shapes; sweeps: where there are swept bodies."""
         for number, function in enumerate(self.functions):
-            yield from function.all_functions(by_address=number in self.supported)
+            yield from function.all_functions(by_address=number in self.warm_started)
         yield from self._rules
         for pair in self.pairs.values():
             if pair is not None:
@@ -111,7 +111,7 @@ class LinkedShapes:
         return self._tables[name]
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _made(shapes: tuple[Shape, ...], pairs: tuple[Any, ...], rules: tuple[Any, ...], dimensions: int) -> LinkedShapes:
     return LinkedShapes(shapes, dict(pairs), rules, dimensions)
 
@@ -131,7 +131,7 @@ class ParameterRecords:
         self._linked = linked
         self.own = [make_parameter_record(shape, linked.dimensions) for shape in linked.shapes]
         self.world = list(self.own)
-        for number in linked.supported:
+        for number in linked.warm_started:
             self.need_support(number)
 
     def bind(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....framework.compilation import inlined
-from ....framework.jit.linking import KEPT, Linked
+from ....framework.jit.linking import CACHE_SIZE, Linked
 from ....framework.plugins.registry import Registry
 from ....framework.settings import MIXING_RULES
 from .signatures import call_mixing, mixing_signature, named
@@ -45,7 +45,7 @@ def mix_friction(state, rule, a, b):
     return mix(state, rule, a, b) if a == a else 0.0
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def linked_rule(function: Any) -> Linked:
     """A plugin's rule, its answers checked."""
     rule = user_function(function)

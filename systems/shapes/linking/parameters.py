@@ -16,7 +16,7 @@ import numpy as np
 
 from ....framework.compilation import pasted
 from ....framework.data.arrays.column import ArrayColumn
-from ....framework.jit.linking import KEPT
+from ....framework.jit.linking import CACHE_SIZE
 from ....framework.jit.records.record import Record, make_record
 from ....framework.jit.records.record_type import rows_of
 from ....framework.jit.records.schema import Column, Schema, axes, floats, integer, table, vectors
@@ -34,7 +34,7 @@ def array_of(numbers, data, starts, i):
     return rows_of(data, starts[number], starts[number + 1])
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def parameter_schema(shape: Shape) -> Schema:
     """The schema of the shape's parameter record."""
     fields: dict[str, Any] = dict(HEADER_FIELDS)
@@ -59,7 +59,7 @@ def _field(column: Any) -> Column:
     return floats() if np.dtype(column.dtype) == np.float64 else Column(np.dtype(column.dtype).name)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def parameter_tuple(shape: Shape) -> Any:
     """The named tuple that the shape's functions get."""
     return collections.namedtuple(shape.component.__name__, shape.parameters)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
 
-from ....framework.jit.late import JIT, Late, operation, types
+from ....framework.jit.lazy import JIT, LazyIntrinsic, operation, types
 from ....framework.jit.linking import linked_call
 from ....framework.jit.records.record_type import record_code, record_type
 from ...records import STATE
@@ -100,7 +100,7 @@ def call_in_dimension(signature_of: Callable[[int], Any]) -> Any:
         depends_on = tuple(call.carom_depends_on for call in calls.values())
         return operation("call", 1 + len(signature_of(2).args), typing, depends_on)
 
-    return Late(make)
+    return LazyIntrinsic(make)
 
 
 call_evaluate = call_in_dimension(evaluate_signature)

@@ -6,7 +6,7 @@ import weakref
 from typing import Any
 
 from ....framework.compilation import allocating_part
-from ....framework.jit.late import Late, operation, types
+from ....framework.jit.lazy import LazyIntrinsic, operation, types
 from ....framework.plugins.plugin import checked_support
 
 _compiled: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
@@ -55,7 +55,7 @@ def _without_address(function: Any) -> Any:
         return found.return_type(*found.args), emit
 
     plain = function.py_func
-    return Late(lambda: operation(plain.__name__, plain.__code__.co_argcount, typing, function), plain)
+    return LazyIntrinsic(lambda: operation(plain.__name__, plain.__code__.co_argcount, typing, function), plain)
 
 
 def is_long(function: Any) -> bool:

@@ -11,7 +11,7 @@ from ..framework.jit.records.record import Record
 from ..framework.jit.records.schema import Column
 from . import codes, records
 from .broad_phase.search import CandidateSearch
-from .impacts.looks import FRESH
+from .impacts.selection import FRESH
 from .scene import Scene
 
 COLOURS = 64
@@ -102,7 +102,7 @@ class Room:
             rows = _with_spare(impacts.together)
             impacts.reserve(rows, "member", *records.MEMBERS)
             impacts.reserve(2 * rows, "next_member")
-        if impacts.together > 0 and len(impacts.firsts) < state.count:
+        if impacts.together > 0 and len(impacts.first_member) < state.count:
             impacts.reserve(self._scene.table.capacity, *records.BODIES_OF_MEMBERS)
         impacts.together = 0
         impacts.linked = False
@@ -149,7 +149,7 @@ class Room:
         state.pairs, state.merged = state.merged, state.pairs
         impacts = state.impacts
         impacts.last_pair, impacts.linked = FRESH, False
-        impacts.sunk_pair, impacts.sunk_by = -1, 0.0
+        impacts.touchdown_pair, impacts.touchdown_time = -1, 0.0
         impacts.now, impacts.until = now, state.neighbours_known_until
 
 

@@ -74,7 +74,7 @@ def look_ahead(state, i, found):
 
 
 @part
-def look_at_statics(state, i, found):
+def test_known_statics(state, i, found):
     """The static bodies in the grid whose boxes overlap that of body i; returns the number of candidates, or FULL."""
     bodies, views, candidates = state.bodies, state.views, state.candidates
     low, high, count = bodies.lower[i], bodies.upper[i], views.count[i]
@@ -89,7 +89,7 @@ def look_at_statics(state, i, found):
     return found
 
 
-def reserve_views(views, count):
+def reserve_static_neighbours(views, count):
     """Room for so many moving bodies, which know nothing yet. Called from Python, by the owner of the record."""
     views.reserve(count * 3 // 2, "lower", "upper", "count", "seen")
     views.version = NOT_KNOWN

@@ -35,14 +35,14 @@ def link_pairs(state):
 @part
 def look_at_hits(state):
     """The pairs of supported bodies, and the contacts of all others; returns how many."""
-    pairs, looks, supported, wanted = state.pairs, state.impacts.looks, state.bodies.supported, 0
-    for c in range(pairs.count if state.any_support else 0):
-        if supported[pairs.a[c]] or supported[pairs.b[c]]:
+    pairs, looks, warm_started, wanted = state.pairs, state.impacts.looks, state.bodies.warm_started, 0
+    for c in range(pairs.count if state.any_warm_started else 0):
+        if warm_started[pairs.a[c]] or warm_started[pairs.b[c]]:
             looks[wanted] = c
             wanted += 1
     for h in range(pairs.found):
         c = pairs.hits[h]
-        if not (supported[pairs.a[c]] or supported[pairs.b[c]]):
+        if not (warm_started[pairs.a[c]] or warm_started[pairs.b[c]]):
             looks[wanted] = c
             wanted += 1
     return wanted
@@ -116,7 +116,7 @@ def look_at_landings(state, c, now):
 
 
 @part
-def choose_looks(state):
+def select_pairs(state):
     """Which pairs are searched now: at first what may have met, later the pairs of the two bodies of an impact."""
     impacts = state.impacts
     c = impacts.last_pair
@@ -129,5 +129,5 @@ def choose_looks(state):
     if not impacts.linked:
         link_pairs(state)
     if c == LANDINGS:
-        return look_at_landings(state, impacts.sunk_pair, impacts.sunk_by)
+        return look_at_landings(state, impacts.touchdown_pair, impacts.touchdown_time)
     return look_at_members(state) if c == MEMBERS else look_at_partners(state, c)

@@ -60,7 +60,7 @@ class Checked:
 
 
 class Quarantine:
-    """Who is out in one world, and why.
+    """Which bodies are out in one world, and why.
 
     told
         by entity, the field that was named in a fault; until the body takes part again
@@ -69,7 +69,7 @@ class Quarantine:
     def __init__(self, state: Record, table: Table, scene: Scene, report_fault: Callable[..., None]) -> None:
         self._state, self._table, self._scene, self.report_fault = state, table, scene, report_fault
         self.told: dict[int, str] = {}
-        self._far: set[int] = set()  # who has been told to be too far from the origin
+        self._far: set[int] = set()  # those that a fault has called too far from the origin
         self._checked: list[Checked] = []
         self._bound: Any = None  # what the list was made for
         self._generation = table.generation
@@ -113,7 +113,7 @@ class Quarantine:
     def follow_lent(self) -> None:
         """The stages look at static rows of these columns in every step."""
         for checked in self._checked:
-            checked.record.lent = checked.column.key in self._table.lent
+            checked.record.exposed = checked.column.key in self._table.exposed
 
     def _find_columns(self) -> Iterator[Checked]:
         """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
@@ -157,7 +157,7 @@ class Quarantine:
     # -- what the stages ask for ------------------------------------------------------------------
 
     def check_columns(self, dt: float) -> None:
-        """At the start of a step: take out whose values cannot be, and in again who is mended."""
+        """At the start of a step: take out bodies with values that cannot be, and take in again what is mended."""
         self._scene.take_out(self._find_bad())
         self._state.quarantining = bool(self.told)
 

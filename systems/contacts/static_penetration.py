@@ -14,10 +14,10 @@ from ..ccd.search_bounds import FAST
 from ..codes import OK
 from ..impacts.impulses import STOPPED
 from ..integration.trajectory import along, path_of
-from ..narrow_phase.manifolds import between, deepest_possible, meet
+from ..narrow_phase.manifolds import centre_offset, deepest_possible, evaluate_pair
 from ..narrow_phase.stages import is_solid_pair, layers_meet
 from ..shapes.tolerances import smaller_extent
-from .approach import leg_start, touch_on_way
+from .approach import first_touch_on_segment, segment_start
 from .bodies import note_squeezed
 
 ALLOWED = 0.05  # of the extent: overlap with what cannot be moved; what was deeper may stay so
@@ -30,18 +30,18 @@ KNOWN = 0.05  # of the extent: so far around its foreseen motion the neighbours 
 def how_deep(state, c, a, b):
     """(by how much they overlap more than they may, normal) at the end of the step; c: the pair, or NO_PAIR."""
     bodies, extent = state.bodies, smaller_extent(state.bodies, a, b)
-    d, start = between(bodies, a, b), leg_start(state, a, b)
+    d, start = centre_offset(bodies, a, b), segment_start(state, a, b)
     travel = sub(d, start)
     way, allowed = length(travel), ALLOWED * extent
     found, depth, normal = False, 0.0, travel
     if way > FAST * extent:
-        found, gap, normal = touch_on_way(state, a, b, start, travel, FAST * extent)
+        found, gap, normal = first_touch_on_segment(state, a, b, start, travel, FAST * extent)
         depth = -gap - dot(travel, normal)
     elif c != NO_PAIR and deepest_possible(state.pairs, c, d) <= allowed:  # usual
         return 0.0, normal
     if not found:
-        _, depth, normal, _ = meet(state, a, b, d)
-    deep = meet(state, a, b, start)[1] if depth > allowed else 0.0
+        _, depth, normal, _ = evaluate_pair(state, a, b, d)
+    deep = evaluate_pair(state, a, b, start)[1] if depth > allowed else 0.0
     return depth - max(deep, allowed), normal
 
 
@@ -65,12 +65,12 @@ def keep_out(state, c, a, b):
 
 
 @part
-def is_led(state, i):
+def is_moved_by_solver(state, i):
     """Whether contacts at rest have moved body i, now or in the prediction, and no impact has stopped it."""
     bodies = state.bodies
     if bodies.impact_count[i] >= STOPPED:
         return False
-    return (state.any_support and bodies.supported[i]) or (state.solver.contacts > 0 and bodies.held[i])
+    return (state.any_warm_started and bodies.warm_started[i]) or (state.solver.contacts > 0 and bodies.held[i])
 
 
 @part
@@ -97,17 +97,17 @@ def keep_out_of_all(state, i):
     return moved
 
 
-def obey_statics(state, dt):
+def resolve_static_penetration(state, dt):
     """Put the bodies that the solver has moved out of what cannot be moved."""
     pairs = state.pairs
-    if state.solver.contacts == 0 and not state.any_support:
+    if state.solver.contacts == 0 and not state.any_warm_started:
         return OK
     for turn in range(ROUNDS):
         first, moved = state.moving if turn == ROUNDS - 1 else state.dynamic, False
         for c in range(pairs.count):
             a, b = pairs.a[c], pairs.b[c]
             fixed, i = max(a, b), min(a, b)  # dynamic rows come first
-            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_led(state, i)):
+            if not (fixed >= first and i < state.dynamic and pairs.is_solid[c] and is_moved_by_solver(state, i)):
                 continue
             if keep_out(state, c, a, b):
                 moved = True
@@ -116,7 +116,7 @@ def obey_statics(state, dt):
         if not moved:
             break
     for i in range(state.dynamic if not state.pairs_filtered else 0):
-        if state.bodies.shape[i] >= 0 and is_led(state, i) and is_astray(state, i, dt):
+        if state.bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
             for _ in range(ROUNDS):
                 if not keep_out_of_all(state, i):
                     break

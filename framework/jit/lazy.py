@@ -2,7 +2,7 @@
 
 Loading numba and llvmlite takes longer than all the rest of an import of carom, and a program that only asks for help,
 or lists scenes, compiles nothing. So what stands in modules is light: a function to be compiled, or an operation that
-is written in LLVM's language, is a :class:`Late` object. numba asks it for its type when a kernel that names it
+is written in LLVM's language, is a :class:`LazyIntrinsic`. numba asks it for its type when a kernel that names it
 compiles; only then it is made. Code that runs while kernels compile finds numba's modules here: ``types``,
 ``cgutils``, ``ir`` and so on.
 """
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 JIT = os.environ.get("NUMBA_DISABLE_JIT", "").strip() in ("", "0")
 
 
-class LateModule:
+class LazyModule:
     """A module that is imported when something of it is first asked for."""
 
     def __init__(self, name: str) -> None:
@@ -40,12 +40,12 @@ if TYPE_CHECKING:
 
     from . import dispatchers
 else:
-    ir, arrayobj = LateModule("llvmlite.ir"), LateModule("numba.np.arrayobj")
-    cgutils, errors, types = (LateModule(f"numba.core.{name}") for name in ("cgutils", "errors", "types"))
-    dispatchers = LateModule(f"{__package__}.dispatchers")
+    ir, arrayobj = LazyModule("llvmlite.ir"), LazyModule("numba.np.arrayobj")
+    cgutils, errors, types = (LazyModule(f"numba.core.{name}") for name in ("cgutils", "errors", "types"))
+    dispatchers = LazyModule(f"{__package__}.dispatchers")
 
 
-class Late:
+class LazyIntrinsic:
     """Something that numba knows, made when a kernel that names it compiles.
 
     make
@@ -92,13 +92,13 @@ class Late:
             raise NotImplementedError("only kernels can call this")
         return self.plain(*args)
 
-    def __deepcopy__(self, memo: Any) -> Late:  # numba copies the statements that name it
+    def __deepcopy__(self, memo: Any) -> LazyIntrinsic:  # numba copies the statements that name it
         return self
 
 
 def intrinsic(function: Callable[..., Any]) -> Any:
     """numba's decorator of that name: ``function(typing_context, *types)`` gives (signature, code generator)."""
-    return Late(lambda: _made_intrinsic(function, function))
+    return LazyIntrinsic(lambda: _made_intrinsic(function, function))
 
 
 def operation(name: str, count: int, typing: Callable[..., Any], depends_on: Any) -> Any:

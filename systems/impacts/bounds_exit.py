@@ -16,6 +16,6 @@ def watch_bounds(state, i, dt):
 
 
 @part
-def watch_again(state, i, dt):
+def update_bounds_exit_time(state, i, dt):
     """The same from another function."""
     return call_watch_bounds(state.links[WATCH_BOUNDS], state, i, dt)
