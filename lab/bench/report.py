@@ -63,8 +63,10 @@ def quality(rows: list[Row]) -> TextTable:
     """Quality of the states reached in the timed steps, carom first."""
     cells = []
     for row in rows:
-        kept = [f"{100 * one['kinetic_end'] / one['kinetic_start']:.3f}" for one in row.quality.values()]
-        energy = f"{' / '.join(kept)} %" if row.energy == "kept" else f"{of_both(row, 'kinetic_end')} J"
+        energy = f"{of_both(row, 'kinetic_end')} J"
+        if row.energy == "kept":  # else it may be 0 at the start
+            kept = [f"{100 * one['kinetic_end'] / one['kinetic_start']:.3f}" for one in row.quality.values()]
+            energy = f"{' / '.join(kept)} %"
         overlaps = (of_both(row, name, 100, 2) for name in ("overlap_mean", "overlap_max"))
         escaped = " / ".join(f"{one['escaped']:.0f}" for one in row.quality.values())
         cells.append((row.label, energy, *overlaps, escaped))

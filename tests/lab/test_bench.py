@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import sys
 
 import helpers_cli
@@ -206,3 +207,9 @@ def test_ctrl_c_stops_with_one_line(carom, monkeypatch):
     done = carom("bench")
     assert done.exit_code == 130
     assert done.stderr.strip().splitlines()[-1] == "carom: stopped"
+
+
+def test_a_scene_that_begins_at_rest_shows_what_energy_is_left(carom):
+    result = carom("bench", "--scenes", "pyramid", "--no-peer", "--repeats", "1")
+    assert result.exit_code == 0, result.stderr
+    assert re.search(r"pyramid.* J ", result.stdout)
