@@ -108,15 +108,14 @@ def refine_smooth(pair, d, surface, count, best, depth, size):
         found, least = refine_direction(pair, d, start, math.inf, size)
         if least < depth:
             best, depth = found, least
-        lowest = math.inf
+        lowest, other = math.inf, 0
         for f in range(count):
             normal = row(normals, f, d)
             if max(dot(normal, start), dot(normal, found)) > SAME_WAY:
                 waiting[f] = math.inf
-            lowest = min(lowest, waiting[f])
-        for f in range(count):
-            if waiting[f] == lowest:
-                start = row(normals, f, d)
+            if waiting[f] < lowest:
+                lowest, other = waiting[f], f
+        start, waiting[other] = row(normals, other, d), math.inf  # once each, whatever its normal is
     return best, depth
 
 
