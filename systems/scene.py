@@ -9,7 +9,7 @@ import numpy as np
 
 from ..components import AABBCollider, Collider
 from ..framework.data.row_moves import MovedColumns, RowPlan
-from ..framework.data.table import Table
+from ..framework.data.table import FEW, Table
 from ..framework.jit.records.record import Record
 from ..framework.plugins.registry import Registry
 from ..framework.settings import Settings
@@ -75,6 +75,7 @@ class Scene:
         self._columns_version = self._shapes_version = -1  # of the table, when its columns were bound
         self._built_for: Any = None  # what the scene was made for, beside the rows
         self._several = False  # bodies have several colliders
+        self._arrived, self._arrived_in = np.empty(0, np.int64), -1  # rows, and the table's version that they are of
         table.on_rows_moved = self._move_rows
 
     @property
@@ -143,6 +144,9 @@ class Scene:
             self._bind_kept()
         if self._keeps:
             self._moved.move(plan)
+            self._arrived, self._arrived_in = plan.fresh, -1
+            if self.structure == self.table.version + self.table.members_version + self.registry.version:
+                self._arrived_in = self.table.version + 1  # all that have come since the last refresh
         else:
             self._built_for = None
 
@@ -162,19 +166,31 @@ class Scene:
         shapes, slots = state.bodies.shape[:count], state.shapes.slots
         if len(self._taken_out[0]) or (self.linked and count - moving > len(state.bodies.static_position)):
             return False
-        arrived = (shapes == ARRIVED).nonzero()[0]
-        shapes[arrived] = -1
-        for index, shape in enumerate(self.linked.shapes if self.linked else ()):
-            rows = arrived[table.has_mask(shape.component)[arrived]]
-            if np.count_nonzero(shapes[rows] >= 0):
-                return False
-            shapes[rows] = index
-        state.collides = bool(np.count_nonzero(shapes[:moving] >= 0))
+        arrived = self._arrived if self._arrived_in == table.version else (shapes == ARRIVED).nonzero()[0]
+        colliders = [] if self.linked is None else [table.has_mask(shape.component) for shape in self.linked.shapes]
+        if len(arrived) <= FEW:
+            for row in arrived.tolist():
+                own = [index for index, mask in enumerate(colliders) if mask.item(row)]
+                if len(own) > 1:
+                    return False
+                shapes[row] = own[0] if own else -1
+                if self.linked is not None:
+                    state.bodies.collider_slot[row] = slots[shapes[row]]
+        else:
+            shapes[arrived] = -1
+            for index, mask in enumerate(colliders):
+                rows = arrived[mask[arrived]]
+                if np.count_nonzero(shapes[rows] >= 0):
+                    return False
+                shapes[rows] = index
+            if self.linked is not None:
+                state.bodies.collider_slot[arrived] = slots[shapes[arrived]]
+        state.collides = bool(moving and shapes[:moving].max() >= 0)
         if self.linked is not None:
-            state.bodies.collider_slot[arrived] = slots[shapes[arrived]]
             if self._shapes_version != table.columns_version or self.linked.has_array_columns:
                 self._bind_shapes()
-            state.rotation_stale |= self.rotated or self.linked.needs_axes
+            if self.rotated or self.linked.needs_axes:
+                state.rotation_stale = True
         return True
 
     def forget(self) -> None:

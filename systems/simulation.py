@@ -11,7 +11,7 @@ from ..components import RigidBody, Transform
 from ..framework.data.adoption import Adoption
 from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
-from ..framework.data.esper_bridge import Contents, Membership
+from ..framework.data.esper_bridge import Membership
 from ..framework.data.table import Table
 from ..framework.jit.records.record import make_record
 from ..framework.schedule.phases import System
@@ -64,7 +64,7 @@ class Simulation:
         self.table.forces_are_summed = lambda: self.state.forces_summed
         self.set_gravity(gravity)
         self.scene = Scene(self.state, self.table, world.registry, lambda: world.settings)
-        self.adoption = Adoption(self.table, Transform, LevelCheck(self.table, world.registry))
+        self.adoption = Adoption(self.table, Transform, world._contents(), LevelCheck(self.table, world.registry))
         self.bodies = Bodies(self.table)
         source = RecordedContacts(self.state)
         self.contacts = Contacts(dimensions, self._membership, self._running_step, source)
@@ -138,10 +138,10 @@ class Simulation:
 
     # -- a step -----------------------------------------------------------------------------------
 
-    def synchronize(self, contents: Contents) -> None:
+    def synchronize(self) -> None:
         """Bring the table in step with esper."""
         self.take_deferred()
-        self.adoption.synchronize(contents)
+        self.adoption.synchronize()
 
     def open_window(self, step: int) -> None:
         self.contacts.open_window(step)
@@ -419,8 +419,7 @@ class Simulation:
         return self._world.step_count if self.table.in_step else None
 
     def _membership(self) -> Membership:
-        with self._world:
-            return Membership()
+        return Membership(self._world._contents())
 
 
 def _make_table(dimensions: int) -> Table:

@@ -1,13 +1,12 @@
-"""Keeping the table in step with esper: which entities have come, gone or changed since the last look.
+"""Bringing the table up to date with what has come, gone or changed since the last time.
 
-esper's changes are logged as they happen (see watched), so the work here is in proportion to what has changed: the
-handles of the entities concerned are compared with those the table knows, everything is checked, and only then written.
-Entities that were created in bulk (batches) come as arrays and have no handles.
+Changes are logged as they happen (see entities), so the work here is in proportion to what has changed: it is looked at,
+everything is checked, and only then written. Between two looks the table is the truth about all that is not in the log.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Set
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import compress
 from typing import Any
@@ -15,17 +14,24 @@ from typing import Any
 import numpy as np
 
 from ..errors import MissingComponentError
-from . import esper_bridge
-from .batches import Batch
+from .change_log import Arrival
 from .component import Component
+from .esper_bridge import Contents
 from .handles import bind_handles, write_handles
-from .table import STATIC, Table
-from .watched import ChangeLog
+from .table import FEW, HAS_OBJECTS, STATIC, Table
 
 Ids = set[int]
-Handles = dict[int, Component]
 ByType = Mapping[type[Any], tuple[list[int], list[Any]]]  # entities that have one of the type, and these
 OTHER, OURS, PARTNER = range(3)  # component types: not carom's; with columns; such that make a body with the anchor
+
+
+@dataclass
+class Fresh:
+    """Handles of one type to adopt: their entities, and these one's rows (-1: it is no body yet)."""
+
+    entities: list[int] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
+    handles: list[Any] = field(default_factory=list)
 
 
 @dataclass
@@ -33,21 +39,21 @@ class Changes:
     """What has to be done so that the table knows what esper has.
 
     come, left
-        ids that become bodies, ids that cease to be; ascending
-    fresh
-        handles to adopt, by type and ascending id
-    gone
-        ids that lose a handle, by type
-    batches, deleted
-        whose entities become bodies; ids that cease to be and have no handles
+        ids that become bodies, ascending; rows of those that cease to be
+    fresh, missing
+        handles to adopt, and rows that stay and lose the component, by type
+    detached
+        handles of entities that cease to be bodies and keep them
+    arrivals
+        with the ids of those of them that are to become bodies
     """
 
     come: list[int] = field(default_factory=list)
     left: list[int] = field(default_factory=list)
-    fresh: dict[type[Component], Handles] = field(default_factory=dict)
-    gone: dict[type[Component], Ids] = field(default_factory=dict)
-    batches: list[Batch] = field(default_factory=list)
-    deleted: list[np.ndarray] = field(default_factory=list)
+    fresh: dict[type[Component], Fresh] = field(default_factory=dict)
+    missing: dict[type[Component], list[int]] = field(default_factory=dict)
+    detached: list[Component] = field(default_factory=list)
+    arrivals: list[tuple[Arrival, np.ndarray]] = field(default_factory=list)
 
 
 class Adoption:
@@ -58,42 +64,29 @@ class Adoption:
         :class:`~carom.systems.shapes.geometry_levels.LevelCheck`
     """
 
-    def __init__(self, table: Table, anchor: type[Component], check_together: Any) -> None:
-        self.table = table
-        self.anchor = anchor
+    def __init__(self, table: Table, anchor: type[Component], contents: Contents, check_together: Any) -> None:
+        self.table, self.anchor = table, anchor
+        self._contents, self._log, self._entities = contents, contents.log, contents.entities
         self._check_together = check_together
         self._roles: dict[Any, int] = {}  # by component type
-        # Handles of the bodies in the table, but for those of batches that are not in use.
-        self._members: dict[type[Component], Handles] = {}
-        self._contents: esper_bridge.Contents | None = None  # of this world's context
-        # Changes that have not been taken in yet, as the log has them.
-        self._touched: Ids = set()
-        self._batches: list[Batch] = []
-        self._deleted: list[np.ndarray] = []
-        self._cleared = False
+        contents.entities.table = table
 
     def settled(self) -> bool:
         """Whether nothing has changed since the last synchronize."""
-        return not (self._contents is None or self._contents.log.dirty or self._waiting())
+        return not (self._log.dirty or self.table.kind_changed)
 
-    def _waiting(self) -> bool:
-        return bool(self._touched or self._batches or self._deleted or self._cleared or self.table.kind_changed)
-
-    def synchronize(self, contents: esper_bridge.Contents) -> bool:
+    def synchronize(self) -> bool:
         """Bring the table up to date with what is in the world's context; True if anything has changed.
 
         Raises MissingComponentError or ValueError, naming the entity, before anything has been written; what is amiss
         is looked at again the next time.
         """
-        self._contents = contents
         if self.settled():
             return False
-        self._gather(contents.log)
         changes = self._find_changes()
         self._check(changes)
-        cleared = self._cleared
-        self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
-        return self._apply(changes, cleared)
+        self._apply(changes)
+        return True
 
     def register(self, components: Iterable[type[Component]]) -> None:
         """Columns of these types exist from now on, whether a body has them or not; ValueError for taken names."""
@@ -103,34 +96,32 @@ class Adoption:
 
     def release(self) -> None:
         """Let all handles go: the world closes, they keep their last values, and so do arrays of columns."""
-        for component, members in self._members.items():
-            entities = set(members)
-            self._let_go(component, entities, entities)
+        self._let_go([*self._log.lost, *(h for own in dict.values(self._entities) for h in own.values())])
 
     # -- going back to what was -------------------------------------------------------------------
 
     def know(self, component: type[Component]) -> None:
         """There are columns for that type from now on."""
-        if component not in self._members:
+        if component not in self.table.mask_names:
             self.table.add_component_type(component)
             self.table.members_version += 1
-            self._members[component] = {}
 
     def loose(self, component: type[Component], listed: Ids) -> Collection[int]:
         """Those of the entities with handles of a component that are no bodies."""
-        adopted = self._members.get(component, {})
-        return () if len(adopted) == len(listed) else listed - adopted.keys()
+        table = self.table
+        if component in table.mask_names:
+            adopted = table.has_mask(component)[: table.count] & table.column(HAS_OBJECTS)
+            if np.count_nonzero(adopted) == len(listed):
+                return ()
+        return [entity for entity in listed if self._entities[entity][component]._store is not table]
 
-    def pending(self, log: ChangeLog) -> Ids:
+    def pending(self) -> Ids:
         """Entities that have changed since the last synchronize."""
-        if log.cleared or self._cleared:
-            return set().union(*self._members.values(), self._touched, log.touched)
-        return self._touched | log.touched
+        return self._log.touched | self._log.deleted
 
-    def forget_pending(self, log: ChangeLog) -> None:
+    def forget_pending(self) -> None:
         """What has changed since the last synchronize does not count."""
-        log.take()
-        self._touched, self._batches, self._deleted, self._cleared = set(), [], [], False
+        self._log.clear()
 
     def keep_only(self, by_type: ByType, wanted: Mapping[int, Mapping[type[Any], Any]], others: Ids) -> None:
         """Let go of all other handles of these entities, of all if they are to be no bodies; the rows stay.
@@ -138,13 +129,12 @@ class Adoption:
         others: entities of which no handles are wanted.
         """
         bodies = self._bodies_of(by_type)
-        for component, members in self._members.items():
-            gone = members.keys() & others
-            for entity in members.keys() & wanted.keys():
-                if entity not in bodies or wanted[entity].get(component) is not members[entity]:
-                    gone.add(entity)
-            if gone:
-                self._let_go(component, gone, gone)
+        kept = {id(h) for entities, handles in by_type.values() for e, h in zip(entities, handles, strict=True)
+                if e in bodies}  # fmt: skip
+        now = [*self._log.lost]
+        for entity in (*others, *wanted):
+            now += dict.get(self._entities, entity, {}).values()
+        self._let_go([handle for handle in now if id(handle) not in kept])
 
     def adopt_again(self, by_type: ByType) -> None:
         """Bind those of these handles that belong to bodies: the table has their rows."""
@@ -155,22 +145,12 @@ class Adoption:
                 are = list(map(bodies.__contains__, entities))
                 entities, handles = list(compress(entities, are)), list(compress(handles, are))
             if role != OTHER:
-                self._members[component].update(zip(entities, handles, strict=True))
                 bind_handles(self.table, entities, handles)
 
     def _bodies_of(self, by_type: ByType) -> Ids:
         return set().union(*(entities for c, (entities, _) in by_type.items() if self._role(c) == PARTNER))
 
     # -- what has changed -------------------------------------------------------------------------
-
-    def _gather(self, log: ChangeLog) -> None:
-        touched, batches, deleted, cleared = log.take()
-        if cleared:
-            self.table.generation += 1
-            self._touched, self._batches, self._deleted, self._cleared = set(), [], [], True
-        self._touched = self._touched | touched if self._touched else touched
-        self._batches += batches
-        self._deleted += deleted
 
     def _role(self, component: Any) -> int:
         role = self._roles.get(component)
@@ -180,58 +160,49 @@ class Adoption:
         return role
 
     def _find_changes(self) -> Changes:
-        changes = Changes(deleted=self._deleted)
-        known = self._members
-        if self._cleared:  # whatever has been, the ids mean other entities now
-            changes.gone = {component: set(members) for component, members in known.items() if members}
-            known = {}
-        for entity in sorted(self._touched):
-            self._compare(entity, self._contents.components_of(entity), known, changes)
-        for batch in self._batches:
-            partners = [component for component in batch.types if self._role(component) == PARTNER]
-            if batch.left and partners:
-                if self.anchor not in batch.types:
-                    self._refuse_without_anchor(int(batch.ids()[0]), partners[0])
-                changes.batches.append(batch)
-        return changes
-
-    def _compare(
-        self, entity: int, now: Mapping[type[Any], Any], known: dict[type[Component], Handles], changes: Changes
-    ) -> None:
-        """Of one entity, the components that esper has with the handles that the table has."""
-        roles, anchors = self._roles, known.get(self.anchor)
-        was, partner = anchors is not None and entity in anchors, None
-        for component in now:
-            role = roles.get(component)
-            if role == PARTNER or (role is None and self._role(component) == PARTNER):
-                partner = component
-        if partner is None:
-            if was:
-                changes.left.append(entity)
-                self._lose(entity, (), known, changes)
-            return
-        if self.anchor not in now:
-            self._refuse_without_anchor(entity, partner)
-        if was:
-            self._lose(entity, now, known, changes)
-        else:
-            changes.come.append(entity)
-        for component, handle in now.items():
-            if roles[component] == OTHER:
+        changes, log, table, entities, roles = Changes(), self._log, self.table, self._entities, self._roles
+        touched = sorted(log.touched)
+        rows = [-1] * len(touched)
+        if touched and table.count and not log.cleared:  # else the ids mean other entities now
+            few = len(touched) <= FEW
+            rows = [table.row_of(e) for e in touched] if few else table.rows_of(np.array(touched, np.int64)).tolist()
+        for entity, row in zip(touched, rows, strict=True):
+            now: Any = dict.get(entities, entity, ())
+            partner = None
+            for component in now:
+                role = roles.get(component)
+                if role == PARTNER or (role is None and self._role(component) == PARTNER):
+                    partner = component
+            if partner is None:
+                if row >= 0:
+                    changes.left.append(row)
+                    changes.detached += now and now.values()
                 continue
-            old = known[component].get(entity) if was and component in known else None
-            if old is not handle:
-                changes.fresh.setdefault(component, {})[entity] = handle
-                if old is not None:
-                    changes.gone.setdefault(component, set()).add(entity)
-
-    def _lose(
-        self, entity: int, kept: Collection[type[Any]], known: dict[type[Component], Handles], changes: Changes
-    ) -> None:
-        """The handles that a body has lost: all but those of the types that are kept."""
-        for component, members in known.items():
-            if component not in kept and entity in members:
-                changes.gone.setdefault(component, set()).add(entity)
+            if self.anchor not in now:
+                self._refuse_without_anchor(entity, partner)
+            if row < 0:
+                changes.come.append(entity)
+            else:
+                for component in table.types_in(row):
+                    if component not in now:
+                        changes.missing.setdefault(component, []).append(row)
+            for component, handle in now.items():
+                if roles[component] != OTHER and (row < 0 or handle._store is not table or handle._entity != entity):
+                    fresh = changes.fresh.get(component)
+                    if fresh is None:
+                        fresh = changes.fresh[component] = Fresh()
+                    fresh.entities.append(entity)
+                    fresh.rows.append(row)
+                    fresh.handles.append(handle)
+        for arrival in log.arrivals:
+            ids = np.arange(arrival.first, arrival.stop)
+            if log.deleted:
+                ids = np.setdiff1d(ids, np.fromiter(log.deleted, np.int64), assume_unique=True)
+            if len(ids):
+                if self.anchor not in arrival.stores:
+                    self._refuse_without_anchor(int(ids[0]), next(c for c in arrival.stores if c.makes_body))
+                changes.arrivals.append((arrival, ids))
+        return changes
 
     def _refuse_without_anchor(self, entity: int, component: type[Component]) -> None:
         raise MissingComponentError(
@@ -242,26 +213,29 @@ class Adoption:
     # -- checks: every error is found before anything is written ----------------------------------
 
     def _check(self, changes: Changes) -> None:
-        table, dimensions = self.table, self.table.dimensions
-        for component, handles in changes.fresh.items():
+        table, dimensions, fits = self.table, self.table.dimensions, -self.table.dimensions
+        for component, fresh in changes.fresh.items():
             table.check_component_type(component)
-            if len(handles) > 1 and len(set(map(id, handles.values()))) < len(handles):
-                self._refuse_second_use(component, handles)
-            for entity, handle in handles.items():
+            handles = fresh.handles
+            if len(handles) > 1 and len(set(map(id, handles))) < len(handles):
+                self._refuse_second_use(component, fresh)
+            for entity, handle in zip(fresh.entities, handles, strict=True):
                 if type(handle) is not component:
                     self._refuse_other_type(component, handle, entity)
                 if handle._entity is not None:
                     self._check_owner(component, handle, entity)
-                handle.check_dimensions(dimensions, entity)
-        self._check_together(changes.fresh, self._members, changes.gone)
-        for batch in changes.batches:
-            for component in batch.types:
+                if handle._version != fits:
+                    handle.check_dimensions(dimensions, entity)
+        if changes.fresh:
+            self._check_together(changes.fresh, self._contents.components_of)
+        for arrival, ids in changes.arrivals:
+            for component in arrival.stores:
                 table.check_component_type(component)
-            self._check_together.batch(batch.stores, batch.ids(), batch.rows())
+            self._check_together.batch(arrival.stores, ids, ids - arrival.first)
 
-    def _refuse_second_use(self, component: type[Component], handles: Handles) -> None:
+    def _refuse_second_use(self, component: type[Component], fresh: Fresh) -> None:
         seen: dict[int, int] = {}
-        for entity, handle in handles.items():
+        for entity, handle in zip(fresh.entities, fresh.handles, strict=True):
             other = seen.setdefault(id(handle), entity)
             if other != entity:
                 raise ValueError(_second_use(component, f"entities {other} and {entity}"))
@@ -282,82 +256,44 @@ class Adoption:
 
     # -- bringing the table up to date ------------------------------------------------------------
 
-    def _apply(self, changes: Changes, cleared: bool) -> bool:
-        table, fresh, gone, batches = self.table, changes.fresh, changes.gone, changes.batches
-        for component in (*fresh, *(component for batch in batches for component in batch.types)):
+    def _apply(self, changes: Changes) -> None:
+        table, log, fresh = self.table, self._log, changes.fresh
+        lost, deleted, cleared = log.lost, log.deleted, log.cleared
+        log.clear()
+        for component in (*fresh, *(component for arrival, _ in changes.arrivals for component in arrival.stores)):
             self.know(component)
-        leaving = set().union(*gone.values()) if cleared else set(changes.left)
-        for component, entities in gone.items():
-            self._let_go(component, entities, leaving)
-        kinds_changed = self._other_kinds(fresh, changes.come)
+        if lost or changes.detached:
+            self._let_go([*changes.detached, *(handle for handle in lost if cleared or not self._has(handle))])
+        for component, rows in changes.missing.items():
+            self._empty(component, np.array(rows))
+        carriers = fresh.get(table.kind_carrier)
+        if carriers is not None and max(carriers.rows) >= 0:
+            self._other_kinds(carriers)
+        stays = bool(changes.missing)  # some body that stays has other components
         places: dict[int, int] = {}
-        if changes.come or changes.left or batches or changes.deleted or cleared or kinds_changed:
-            places = self._move_rows(changes, cleared)
-        stays = False  # some body that stays has other components
-        for component, handles in fresh.items():
-            stays = stays or not handles.keys() <= places.keys()
-            self._adopt(component, handles, places)
-        for batch in batches:
-            self._adopt_batch(batch)
-        if stays or any(not entities <= leaving for entities in gone.values()):
+        if changes.come or changes.left or changes.arrivals or deleted or cleared or table.kind_changed:
+            places = self._move_rows(changes, carriers, deleted, cleared)
+        for component, own in fresh.items():
+            stay = max(own.rows) >= 0
+            own.rows = [places[e] if e in places else table.find(e) for e in own.entities]
+            self._adopt(component, own, not stay)
+            stays = stays or stay
+        made = table.arrays[HAS_OBJECTS]
+        for row in places.values():
+            made[row] = True
+        for arrival, ids in changes.arrivals:
+            self._adopt_arrival(arrival, ids)
+        if stays:
             table.members_version += 1
             table.static_version += 1
-        return True
 
-    def _other_kinds(self, fresh: dict[type[Component], Handles], come: list[int]) -> bool:
-        """Write the kinds of bodies that stay and get another carrier of it; True if any has to move for it."""
+    def _has(self, handle: Any) -> bool:
+        """Whether the entity that a handle is bound to has it (again)."""
+        return self._contents.components_of(handle._entity).get(type(handle)) is handle
+
+    def _empty(self, component: type[Component], rows: np.ndarray) -> None:
+        """Rows that lose a component fall back to the defaults."""
         table = self.table
-        carriers = fresh.get(table.kind_carrier, {})
-        if len(carriers) > len(come) or not carriers.keys() <= set(come):
-            staying = [entity for entity in carriers if entity not in come]
-            rows = np.array([table.find(entity) for entity in staying])
-            table.set_kinds(rows, np.array([_kind_of(carriers[entity]) for entity in staying]))
-        return table.kind_changed
-
-    def _move_rows(self, changes: Changes, cleared: bool) -> dict[int, int]:
-        """Rows leave and others come; returns the rows of bodies that come one by one, by id."""
-        table, come, carriers = self.table, changes.come, changes.fresh.get(self.table.kind_carrier, {})
-        added = np.array(come, np.int64)
-        kinds = np.array([_kind_of(carriers[e]) if e in carriers else STATIC for e in come], np.int64)
-        removed = np.arange(table.count) if cleared else table.rows_of(np.array(changes.left, np.int64))
-        if changes.deleted:
-            removed = np.concatenate((removed, *(table.rows_of(ids) for ids in changes.deleted)))
-        if changes.batches:
-            added = np.concatenate((added, *(batch.ids() for batch in changes.batches)))
-            kinds = np.concatenate((kinds, *(self._kinds_of(batch) for batch in changes.batches)))
-        added, rows = table.rebuild(removed, added, kinds)
-        if not come:
-            return {}
-        if len(added) > len(come):
-            added, rows = np.array(come), table.rows_of(np.array(come))
-        return dict(zip(added.tolist(), rows.tolist(), strict=True))
-
-    def _kinds_of(self, batch: Batch) -> np.ndarray:
-        """(left,) kinds of the bodies of a batch."""
-        carrier = self.table.kind_carrier
-        if carrier not in batch.types:
-            return np.full(batch.left, STATIC, np.int64)
-        return batch.stores[carrier].values(carrier.columns["kind"].key, batch.rows()).astype(np.int64)
-
-    def _let_go(self, component: type[Component], entities: Ids, leaving: Set[int] = frozenset()) -> None:
-        """Handles of removed components keep their last values; the rows fall back to the defaults.
-
-        leaving: entities whose rows go anyway.
-        """
-        members, table = self._members[component], self.table
-        ids = _array(entities)
-        rows = table.rows_of(ids)
-        store = table.take_out(component, rows)
-        version = store.version
-        for index, entity in enumerate(ids.tolist()):
-            handle = members.pop(entity)
-            if handle._store is table and handle._entity == entity:
-                handle._store = store
-                handle._entity = None
-                handle._row = index
-                handle._version = version
-        if entities <= leaving:
-            return
         for column in component.columns.values():
             if column.key in table.arrays:
                 table.arrays[column.key][rows] = column.empty_value(table.dimensions)
@@ -365,43 +301,83 @@ class Adoption:
         if component is table.kind_carrier:
             table.set_kinds(rows, np.full(len(rows), STATIC))
 
-    def _adopt(self, component: type[Component], handles: Handles, places: dict[int, int]) -> None:
-        """Write the handles' values into their rows and bind the handles; places: rows that hold the defaults."""
-        table, version = self.table, self.table.version
-        rows = [places[entity] if entity in places else table.find(entity) for entity in handles]
-        write_handles(table, component, list(handles.values()), rows, handles.keys() <= places.keys())
-        at: Any = rows[0] if len(rows) == 1 else np.array(rows)  # one is much faster by its number
+    def _other_kinds(self, carriers: Fresh) -> None:
+        """Write the kinds of bodies that stay and get another carrier of it."""
+        staying = [(row, _kind_of(h)) for row, h in zip(carriers.rows, carriers.handles, strict=True) if row >= 0]
+        self.table.set_kinds(*map(np.array, zip(*staying, strict=True)))
+
+    def _move_rows(self, changes: Changes, carriers: Fresh | None, deleted: Ids, cleared: bool) -> dict[int, int]:
+        """Rows leave and others come; returns the rows of bodies that come one by one, by id."""
+        table, come = self.table, changes.come
+        kind_of = {} if carriers is None else dict(zip(carriers.entities, map(_kind_of, carriers.handles), strict=True))
+        added, kinds = np.array(come, np.int64), np.array([kind_of.get(e, STATIC) for e in come], np.int64)
+        removed = np.array(changes.left, np.int64)
+        if cleared:
+            removed = np.arange(table.count)
+            table.generation += 1  # ids mean other entities now
+        elif deleted:
+            rows = table.rows_of(np.fromiter(deleted, np.int64, len(deleted)))
+            removed = np.concatenate((removed, rows[rows >= 0]))
+        if changes.arrivals:
+            added = np.concatenate((added, *(ids for _, ids in changes.arrivals)))
+            kinds = np.concatenate((kinds, *(self._kinds_of(*each) for each in changes.arrivals)))
+        added, rows = table.rebuild(removed, added, kinds)
+        if not come:
+            return {}
+        if len(added) > len(come):
+            added, rows = np.array(come), table.rows_of(np.array(come))
+        return dict(zip(added.tolist(), rows.tolist(), strict=True))
+
+    def _kinds_of(self, arrival: Arrival, ids: np.ndarray) -> np.ndarray:
+        """(n,) kinds of the bodies of an arrival."""
+        carrier = self.table.kind_carrier
+        if carrier not in arrival.stores:
+            return np.full(len(ids), STATIC, np.int64)
+        return arrival.stores[carrier].values(carrier.columns["kind"].key, ids - arrival.first).astype(np.int64)
+
+    def _let_go(self, handles: Iterable[Any]) -> None:
+        """Handles that are bound to rows keep their last values, and belong to no entity."""
+        table = self.table
+        by_type: dict[type[Component], dict[int, Component]] = {}
+        for handle in handles:
+            if isinstance(handle, Component) and handle._store is table:
+                by_type.setdefault(type(handle), {})[id(handle)] = handle
+        for component, own in by_type.items():
+            entities = np.array([handle._entity for handle in own.values()], np.int64)
+            store = table.take_out(component, table.rows_of(entities))
+            for index, handle in enumerate(own.values()):
+                handle._bind(store, None, index, store.version)
+
+    def _adopt(self, component: type[Component], own: Fresh, fresh: bool) -> None:
+        """Write the handles' values into their rows and bind the handles; fresh: the rows hold the defaults."""
+        table, version, handles, rows = self.table, self.table.version, own.handles, own.rows
+        write_handles(table, component, handles, rows, fresh)
+        at: Any = rows[0] if len(rows) == 1 else rows  # one is much faster by its number
         if component is self.anchor and "previous_position" in table.arrays:
             table.arrays["previous_position"][at] = table.arrays["position"][at]
         table.has_mask(component)[at] = True
-        for (entity, handle), row in zip(handles.items(), rows, strict=True):
+        for handle, entity, row in zip(handles, own.entities, rows, strict=True):
             handle._store = table
             handle._entity = entity
             handle._row = row
             handle._version = version
             handle._values = None
-        self._members[component].update(handles)
 
-    def _adopt_batch(self, batch: Batch) -> None:
-        """Write the values of a batch into the table; handles are made on demand."""
-        table, inside = self.table, batch.rows()
-        rows = table.run_of(batch.ids())
-        for component, store in batch.stores.items():
+    def _adopt_arrival(self, arrival: Arrival, ids: np.ndarray) -> None:
+        """Write the values of an arrival into the table; handles are made when somebody asks for them."""
+        table, inside = self.table, slice(None)
+        rows = table.run_of(ids)
+        if len(ids) < arrival.stop - arrival.first:
+            inside = ids - arrival.first  # type: ignore[assignment]
+        for component, store in arrival.stores.items():
             for column in component.columns.values():
                 if column.key in store.arrays:
                     table.write(column.key, rows, store.arrays[column.key][inside])
                 else:
                     table.write_one(column.key, rows, store.constants[column.key][1])
             table.has_mask(component)[rows] = True
-        if self.anchor in batch.types and "previous_position" in table.arrays:
+        if "previous_position" in table.arrays:
             table.arrays["previous_position"][rows] = table.arrays["position"][rows]
-        batch.adopted(self.make_handle)
-
-    def make_handle(self, component: type[Component], entity: int) -> Component:
-        """A handle of a body in the table that has had none."""
-        handle = self._members[component][entity] = component.__new__(component)
-        handle._bind(self.table, entity)
-        return handle
 
 
 def _kind_of(carrier: Component) -> int:
@@ -409,10 +385,6 @@ def _kind_of(carrier: Component) -> int:
     column = type(carrier).columns["kind"]
     store = carrier._store
     return carrier._values["kind"] if store is None else int(store.values(column.key, carrier._row))
-
-
-def _array(entities: Any) -> np.ndarray:
-    return np.array(sorted(entities), np.int64)
 
 
 def _second_use(component: type[Component], owners: str) -> str:

@@ -237,7 +237,10 @@ class Column:
             return self
         store = handle._store
         if store is None:
-            return self.shown(handle._values[self.name])
+            value = handle._values[self.name]
+            if type(value) is float and handle._version < -1 and self.item_shape(-handle._version):
+                value = handle._values[self.name] = self.whole(value, -handle._version)
+            return self.shown(value)
         row = handle._row if handle._version == store.version else handle._locate()
         array = store.arrays.get(self.key)
         if array is None:
@@ -256,6 +259,7 @@ class Column:
         store = handle._store
         if store is None:
             handle._values[self.name] = value
+            handle._version = -1
             return
         self.check_dimensions(value, store.dimensions, handle._entity)
         row = handle._row if handle._version == store.version else handle._locate()

@@ -171,13 +171,13 @@ class Component:
             if type(value) is not float or column.item == "rotation":  # a number stands for any vector
                 column.check_dimensions(value, dimensions, entity)
 
-    def expand(self, dimensions: int) -> None:
-        """Make whole vectors of single numbers that stand for one, now that the dimensions are known."""
+    def fit(self, dimensions: int, entity: int | None = None) -> None:
+        """Whole vectors, of that many dimensions, from now on; ValueError if one has others."""
+        if self._version == -dimensions:  # it does, since a world has looked at it
+            return
+        self.check_dimensions(dimensions, entity)
         if self._store is None:
-            for column in self._shaped:
-                value = self._values[column.name]
-                if type(value) is float and column.item_shape(dimensions):
-                    self._values[column.name] = column.whole(value, dimensions)
+            self._version = -dimensions  # single numbers become whole vectors when they are read
 
     def copy(self) -> Self:
         """An unbound component with the same values, for another entity (prefabs)."""

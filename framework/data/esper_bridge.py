@@ -11,12 +11,13 @@ from typing import Any
 import esper
 import numpy as np
 
-from .batches import Batch, Stores
-from .watched import ChangeLog, Entities, WatchedComponents, among
+from .change_log import ChangeLog, Stores
+from .entities import Counter, Entities, WatchedComponents, among
 
 _NONE: dict[type[Any], Any] = {}
 _NAMES = (
-    "_components", "_context_map", "_dead_entities", "_entities", "_entity_count", "_processors", "_processors_dict",
+    "_components", "_context_map", "_dead_entities", "_entities", "_entity_count", "_get_component_cache",
+    "_get_components_cache", "_processors", "_processors_dict",
 )  # fmt: skip
 for _name in _NAMES:
     if not hasattr(esper, _name):
@@ -115,8 +116,10 @@ def leave(before: str) -> None:
 
 def watch(base: type[Any]) -> None:
     """Log changes of components derived from ``base`` in the current context; what is there already counts as new."""
-    esper._entities = Entities(esper._entities)
-    esper._components = WatchedComponents(esper._components, esper._entities, ChangeLog(base))  # type: ignore[assignment]
+    counter = Counter(next(esper._entity_count), esper)
+    esper._entities = Entities(esper._entities, ChangeLog(base))
+    esper._components = WatchedComponents(esper._components, esper._entities, counter)  # type: ignore[assignment]
+    counter.install(counter.next)
 
 
 def watched() -> bool:
@@ -128,122 +131,91 @@ def unwatch() -> None:
     """Give esper plain containers back."""
     esper._components = {component: set(entities) for component, entities in esper._components.items()}
     esper._entities = dict(esper._entities.items())
+    esper._entity_count = itertools.count(esper._entity_count.next)  # type: ignore[attr-defined]
 
 
 class Contents:
-    """What is in the current context, later too: it can be read without switching to that context.
+    """What is in the current context, later too: it can be read and changed without switching to that context.
 
     entities, dead
-        esper's own dict of all entities' components, and its set of those whose deletion is pending: do not change them
+        esper's own dict of all entities' components, and its set of those whose deletion is pending
     members
         esper's own dict of the entities that have each component: do not change it
     log
         what has changed
     """
 
-    __slots__ = ("dead", "entities", "log", "members")
+    __slots__ = ("_caches", "counter", "dead", "entities", "log", "members")
 
     def __init__(self) -> None:
         self.entities: Entities = esper._entities  # type: ignore[assignment]
         self.dead: set[int] = esper._dead_entities
         self.members: Mapping[type[Any], Any] = esper._components
-        self.log: ChangeLog = esper._components.log  # type: ignore[attr-defined]
+        self.log: ChangeLog = self.entities.log
+        self.counter: Counter = esper._components.counter  # type: ignore[attr-defined]
+        self._caches = esper._get_component_cache, esper._get_components_cache
+
+    def forget_queries(self) -> None:
+        """What esper has looked up before does not hold any more."""
+        for cache in self._caches:
+            cache.clear()
 
     def components_of(self, entity: int) -> Mapping[type[Any], Any]:
-        """Those of an entity that is in no batch, empty for what is none."""
+        """Those of an entity with objects, empty for what is none."""
         return dict.get(self.entities, entity, _NONE)
 
+    def create(self, components: dict[type[Any], Any]) -> int:
+        entity = next(self.counter)
+        self.entities.create(entity, components)
+        self.forget_queries()
+        return entity
 
-# -- entities ------------------------------------------------------------------------------------
+    def create_many(self, stores: Stores, count: int) -> range:
+        """``count`` entities with one component of each type; their objects are made on demand."""
+        first = self.counter.next
+        if count:
+            self.counter.next = first + count
+            self.entities.create_many(first, count, stores)
+            self.forget_queries()
+        return range(first, first + count)
 
+    def delete(self, entities: Iterable[int]) -> None:
+        self.forget_queries()
+        self.entities.delete(entities)
 
-def create_many(stores: Stores, count: int) -> range:
-    """``count`` entities with one component of each type; their objects are made on demand."""
-    if not count:
-        return range(0)
-    first = next(esper._entity_count)
-    esper._entity_count = itertools.count(first + count)
-    for component in stores:
-        if component not in esper._components:
-            esper._components[component] = set()
-    batch = Batch(first, count, stores)
-    contents = Contents()
-    entities, log = contents.entities, contents.log
-    entities.note(())  # not inside of its dict
-    entities.batches.add(batch)
-    log.batches.append(batch)
-    log.dirty = True
-    esper.clear_cache()
-    return range(first, first + count)
+    def clear_dead(self) -> None:
+        """What ``esper.clear_dead_entities`` does, for all at once."""
+        if self.dead:
+            self.delete(self.dead)
+            self.dead.clear()
+
+    def go_on_from(self, number: int) -> None:
+        """Give the next entity that id; what esper has looked up before no longer holds."""
+        self.counter.next = self.entities.stop = number
+        self.forget_queries()
 
 
 class Membership:
-    """Which entities of the current context have which components; later too, without switching to that context.
+    """Which entities of a context have which components."""
 
-    dead
-        esper's own set of the entities whose deletion is pending: do not change it
-    """
+    __slots__ = ("_entities", "dead", "types_of")
 
-    __slots__ = ("_members", "dead", "types_of")
-
-    def __init__(self) -> None:
-        self._members: Any = esper._components
-        self.types_of: Callable[[int], Collection[type[Any]]] = esper._entities.types_of  # type: ignore[attr-defined]
-        self.dead: set[int] = esper._dead_entities
+    def __init__(self, contents: Contents) -> None:
+        self._entities = contents.entities
+        self.types_of: Callable[[int], Collection[type[Any]]] = contents.entities.types_of
+        self.dead: set[int] = contents.dead
 
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
         """(n,) which of these ids (n,) are living entities that have the component."""
-        members = self._members.get(component)
-        mask = np.zeros(len(entities), bool) if members is None else members.mask(entities)
+        members = self._entities.members.get(component)
+        if members is None:
+            return np.zeros(len(entities), bool)
+        mask = among(entities, members.listed)
+        if members.ours:
+            mask |= self._entities.mask(entities, component)
         if self.dead:
             mask &= ~among(entities, self.dead)
         return mask
-
-
-def next_id() -> int:
-    """The id that the next entity of the current context gets."""
-    number = next(esper._entity_count)
-    esper._entity_count = itertools.count(number)
-    return number
-
-
-def go_on_from(number: int) -> None:
-    """Give the next entity of the current context that id; what esper has looked up before no longer holds."""
-    esper._entity_count = itertools.count(number)
-    esper.clear_cache()
-
-
-def forget_death(entity: int) -> None:
-    """Take back a deferred deletion: after an immediate one esper would fail on it in every later process."""
-    esper._dead_entities.discard(entity)
-
-
-def clear_dead() -> None:
-    """What ``esper.clear_dead_entities`` does, for all at once; what does not exist (any more) is no error."""
-    dead = esper._dead_entities
-    if not dead:
-        return
-    contents = Contents()
-    entities, log = contents.entities, contents.log
-    own = [entity for entity in dead if dict.__contains__(entities, entity)]
-    entities.note(own)
-    if len(own) < len(dead) and entities.batches:
-        ids = [int(entity) for entity in dead if hasattr(entity, "__index__")]
-        for batch in entities.batches.around(ids):
-            deleted = batch.take_out_many(np.array(ids, np.int64))
-            if len(deleted) and batch.make_handle is not None:
-                log.deleted.append(deleted)
-                log.dirty = True
-    by_type: dict[type[Any], list[int]] = {}
-    for entity in own:
-        for component in entities.pop(entity):
-            by_type.setdefault(component, []).append(entity)
-    for component, gone in by_type.items():
-        esper._components[component].discard_many(gone)  # type: ignore[attr-defined]
-    for component in [component for component, members in esper._components.items() if not members]:
-        del esper._components[component]
-    dead.clear()
-    esper.clear_cache()
 
 
 # -- processors and events -----------------------------------------------------------------------
@@ -336,12 +308,15 @@ def _check_that_nothing_escapes() -> None:
     """ImportError if this esper changes components in a way that the log does not see."""
 
     class Probe:
+        makes_body = True
+
         def _bind(self, *_: Any) -> None:
             pass
 
     def expect(action: Any, *entities: int) -> None:
         action()
-        touched, _, _, cleared = log.take()
+        touched, cleared = log.touched, log.cleared
+        log.clear()
         if touched != set(entities) or cleared != (not entities):
             raise ImportError(f"carom cannot work with esper {esper.version}: it hides changes of components")
 
@@ -358,18 +333,19 @@ def _check_that_nothing_escapes() -> None:
         expect(esper.process, 2)
         expect(lambda: esper.create_entity(Probe()), 3)
         expect(esper.clear_database)
-        _check_batches(Probe)
+        _check_arrivals(Probe)
     esper.delete_world("carom is looking at esper")
 
 
 
-def _check_batches(probe: Any) -> None:
-    """ImportError if this esper looks at its containers in a way that does not see what is in batches."""
-    first = create_many({probe: None}, 4)[0]  # type: ignore[dict-item]
+def _check_arrivals(probe: Any) -> None:
+    """ImportError if this esper looks at its containers in a way that does not see what has no objects."""
+    contents = Contents()
+    first = contents.create_many({probe: None}, 4)[0]  # type: ignore[dict-item]
     seen = [esper.entity_exists(first), len(list(esper.get_entities())) == 4, bool(esper.try_component(first, probe))]
     esper.delete_entity(first, immediate=True)
     esper.delete_entity(first + 1)
-    esper.clear_dead_entities()
+    contents.clear_dead()
     esper.add_component(first + 2, 1.0)
     left = [entity for entity, _ in esper.get_components(probe, float)], [e for e, _ in esper.get_component(probe)]
     if not all(seen) or left != ([first + 2], [first + 2, first + 3]):

@@ -19,6 +19,9 @@ from .row_moves import MovedColumns, RowPlan
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
+MANY = 200  # look-ups for which a table of all ids is worth its making
+FEW = 4  # look-ups one by one take as long as one for all
+HAS_OBJECTS = "has:objects"  # mask of the rows whose entity has a dict of components in esper
 # Attributes of Bodies:
 RESERVED = ("asleep", "column_names", "dynamic", "has", "kinematic", "row_of", "rows", "rows_of", "static")
 
@@ -43,6 +46,10 @@ class Table:
         self.generation = 0  # counts esper.clear_database(): after it, ids mean other entities
         self.frame = 0  # counts the calls of step() and advance()
         self.kind_changed = False
+        self._types: dict[int, list[type[Component]]] = {}
+        self._types_version: Any = None
+        self._by_id, self._by_id_version = np.empty(0, np.int64), -1
+        self._next_row = 0  # after the one that was looked up last
         self.arrays: dict[str, np.ndarray] = {}  # those there are
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
         self.columns_version = 0  # changes whenever a column gets another array
@@ -54,7 +61,7 @@ class Table:
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
         self.component_types: list[type[Component]] = []
-        self._mask_names: dict[type[Component], str] = {}
+        self.mask_names: dict[type[Component], str] = {}  # of those that have columns
         self.kind_carrier: type[Component] | None = None  # the component type with the field ``kind``
         self._fills: dict[str, Any] = {}  # what rows of a column hold that have no value of their own
         self._default_bits: dict[str, bytes] = {}
@@ -62,6 +69,7 @@ class Table:
         self._stack_rows: dict[str, tuple[str, int]] = {}  # column key -> (stack, slot)
         self._stacked_types: dict[str, list[type[Component]]] = {}
         self.add_array("entity", dtype=np.int64)
+        self.add_array(HAS_OBJECTS, dtype=bool, fill=False)
 
     # -- columns ----------------------------------------------------------------------------------
 
@@ -98,13 +106,13 @@ class Table:
         if "kind" in component.columns and not component.prefix:
             self.kind_carrier = component
         hold_arrays(self, component._pooled)
-        self._mask_names[component] = self.mask_name(component)
+        self.mask_names[component] = self.mask_name(component)
         self.add_array(self.mask_name(component), dtype=bool, fill=False)
         self.component_types.append(component)
 
     def check_component_type(self, component: type[Component]) -> None:
         """ValueError if its columns would go by the name of others."""
-        if component in self.component_types:
+        if component in self.mask_names:
             return
         for other in self.component_types:
             if self.mask_name(other) == self.mask_name(component):
@@ -129,7 +137,7 @@ class Table:
 
     def has_mask(self, component: type[Component]) -> np.ndarray:
         """Full-capacity mask of the rows whose entity has that component."""
-        return self.arrays[self._mask_names[component]]
+        return self.arrays[self.mask_names[component]]
 
     def _add_to_stack(self, stack: str, slot: int, column: Column) -> None:
         """The field of one more type. The whole stack has an array or none."""
@@ -270,17 +278,45 @@ class Table:
 
     def find(self, entity: int) -> int:
         """The row of that entity; KeyError if it has none."""
-        ids = self.arrays["entity"]
-        start = 0
+        row = self.row_of(entity)
+        if row < 0:
+            raise KeyError(entity)
+        return row
+
+    def row_of(self, entity: int) -> int:
+        """The row of that entity; -1 if it has none."""
+        ids, start, row = self.arrays["entity"], 0, self._next_row
+        if row < self.count and ids.item(row) == entity:  # most ask for one after the other
+            self._next_row = row + 1
+            return row
+        if self._by_id_version == self.version:
+            return self._by_id.item(entity) if 0 <= entity < len(self._by_id) else -1
         for stop in self.stops:
-            row = start + int(ids[start:stop].searchsorted(entity))
-            if row < stop and ids[row] == entity:
-                return row
+            if start < stop and ids.item(stop - 1) >= entity:  # what has come last is in no block
+                row = start + int(ids[start:stop].searchsorted(entity))
+                if ids.item(row) == entity:
+                    self._next_row = row + 1
+                    return row
             start = stop
-        raise KeyError(entity)
+        return -1
+
+    def types_in(self, row: int) -> list[type[Component]]:
+        """The types of the components of a body: do not change it."""
+        version = self.version, self.members_version, len(self.mask_names)
+        if version != self._types_version:
+            self._types_version, self._types = version, {}
+        types = self._types.get(row)
+        if types is None:
+            names = self.mask_names.items()
+            types = self._types[row] = [component for component, name in names if self.arrays[name].item(row)]
+        return types
 
     def rows_of(self, entities: np.ndarray) -> np.ndarray:
         """The rows of entities, -1 for what has none, vectorised."""
+        if len(entities) <= FEW:
+            return np.array(list(map(self.row_of, entities.tolist())), np.int64)
+        if len(entities) > MANY and self.count and int(self.arrays["entity"][: self.count].max()) < 8 * self.count:
+            return self._rows_by_id(entities)
         rows = np.full(len(entities), -1, np.int64) if len(entities) else entities
         start = 0
         for stop in self.stops if len(entities) else ():
@@ -291,6 +327,16 @@ class Table:
                 rows[found] = place[found] + start
             start = stop
         return rows
+
+    def _rows_by_id(self, entities: np.ndarray) -> np.ndarray:
+        """The same with a table of all ids, which is made again when rows have moved."""
+        if self._by_id_version != self.version:
+            ids = self.column("entity")
+            self._by_id = np.full(int(ids.max()) + 2, -1, np.int64)
+            self._by_id[ids] = np.arange(self.count)
+            self._by_id_version = self.version
+        last = len(self._by_id) - 1  # of no entity
+        return self._by_id[np.where((entities < 0) | (entities > last), last, entities)]
 
     def run_of(self, entities: np.ndarray) -> Any:
         """The rows of entities (n,) that all have one, ascending ids: a slice if they stand next to each other."""

@@ -111,9 +111,10 @@ class Pipeline(esper.Processor):
                 if k:
                     self.physics.take_deferred()
                 others_write = self.others_write()
-                if others_write or self.contents.dead or self.processors.changed:  # code of the game needs its context
+                if self.contents.dead:
+                    self.contents.clear_dead()
+                if others_write or self.processors.changed:  # code of the game needs its context
                     with esper_bridge.context(self.world.name):
-                        esper_bridge.clear_dead()
                         esper.process(self.clock.dt)
                 else:
                     self._run(self.clock.dt, False)
@@ -252,7 +253,7 @@ class Pipeline(esper.Processor):
     def synchronize(self) -> None:
         """Bring the table in step with esper, unless a step is running: its rows stand still."""
         if not self.in_step and not self.physics.settled():
-            self.physics.synchronize(self.contents)
+            self.physics.synchronize()
 
     def run(self, phase: Phase) -> None:
         """One phase alone; the clock stands still. If it raises, all is as it was before."""

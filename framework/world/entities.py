@@ -35,13 +35,14 @@ class EntityVerbs:
         ValueError if a component's vectors do not fit the world's dimensions, or if there are two of a type; nothing is
         created then.
         """
+        contents = self._contents()
         self._check(components, None)
-        if len(set(map(type, components))) < len(components):
+        by_type = {type(component): component for component in components}
+        if len(by_type) < len(components):
             types = [type(component).__name__ for component in components]
             twice = next(name for name in types if types.count(name) > 1)
             raise ValueError(f"create_entity: one component of each type, got {types.count(twice)} {twice}")
-        with self._context():
-            return esper.create_entity(*components)
+        return contents.create(by_type)
 
     def create_entities(self, count: int, *many: Many) -> range:
         """``count`` new entities with components from arrays (``Component.many``); their ids, which are consecutive.
@@ -60,9 +61,7 @@ class EntityVerbs:
         dimensions = self.dimensions
         if dimensions is None:
             raise NoPhysicsError("no physics in this world: World(Physics(...))")
-        stores = {one.component: one.store(count, dimensions) for one in many}
-        with self._context():
-            return esper_bridge.create_many(stores, count)
+        return self._contents().create_many({one.component: one.store(count, dimensions) for one in many}, count)
 
     def delete_entity(self, entity: int, immediate: bool = False) -> None:
         """Delete at the start of the next step, or at once; KeyError if there is no such entity."""
@@ -72,9 +71,8 @@ class EntityVerbs:
         if not immediate:
             contents.dead.add(entity)
             return
-        with self._context():
-            esper.delete_entity(entity, immediate=True)
-            esper_bridge.forget_death(entity)
+        contents.delete((entity,))
+        contents.dead.discard(entity)  # else esper would fail on it in every later process
 
     def delete_entities(self, entities: Iterable[int]) -> None:
         """Delete all these at the start of the next step; KeyError, and none is deleted, if one does not exist."""
@@ -179,8 +177,7 @@ class EntityVerbs:
         for component in components:
             if isinstance(component, Component):
                 if dimensions is not None:
-                    component.check_dimensions(dimensions, entity)
-                    component.expand(dimensions)
+                    component.fit(dimensions, entity)
             elif isinstance(component, type):
                 raise TypeError(f"components are instances: {component.__name__}(...), got the class itself")
             elif isinstance(component, (list, tuple, Many)):

@@ -22,7 +22,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..data.component import Component
-from ..data.saved.population import LooseValues, Population, SavedBatch, is_ours
+from ..data.saved.population import LooseValues, Population, is_ours
 from ..data.saved.table import SavedTable
 from ..errors import CaromError
 from ..settings import Settings
@@ -120,10 +120,6 @@ def _population(population: Population, number: dict[type, int]) -> dict[str, An
         "entities": np.array(list(population.entities), np.int64),
         "group": np.array(group, np.int64),
         "groups": list(groups),
-        "batches": [
-            [batch.first, batch.count, [number[c] for c in batch.types], batch.inside, batch.stores is None]
-            for batch in population.batches
-        ],
         "loose": [[entity, number[component]] for entity, component in population.loose],
     }
 
@@ -270,8 +266,7 @@ class SavedFile:
             "stops": tuple(contents["table"]["stops"]),
         })  # fmt: skip
         _check_columns(table, contents["dimensions"])
-        batches = [{types[n]: columns for n, columns in batch or ()} for batch in contents["loose"]["batches"]]
-        loose.__setstate__({**contents["loose"], "batches": batches})
+        loose.handles = contents["loose"]["handles"]
         population = _population_of(contents["population"], types)
         return Snapshot(
             owner=None, population=population, loose=loose, table=table, kept=contents["kept"],
@@ -297,12 +292,8 @@ def _with_arrays(value: Any, arrays: dict[str, np.ndarray]) -> Any:
 def _population_of(saved: dict[str, Any], types: list[type[Component]]) -> Population:
     groups = [[types[n] for n in group] for group in saved["groups"]]
     entities, group = saved["entities"].tolist(), saved["group"].tolist()
-    batches = [
-        SavedBatch(first, count, tuple(types[n] for n in numbers), inside, None if in_table else {})
-        for first, count, numbers, inside, in_table in saved["batches"]
-    ]
     return Population(
-        {entity: dict.fromkeys(groups[n]) for entity, n in zip(entities, group, strict=True)}, batches,
+        {entity: dict.fromkeys(groups[n]) for entity, n in zip(entities, group, strict=True)},
         [(entity, types[n]) for entity, n in saved["loose"]], [types[n] for n in saved["types"]], [], set(entities),
     )  # fmt: skip
 

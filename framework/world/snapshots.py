@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..data import esper_bridge
 from ..data.saved.population import LooseValues, Population, PopulationRestore
 from ..data.saved.table import SavedTable
 from ..errors import CaromError
@@ -56,14 +55,13 @@ class Snapshot:
         """Of a world whose table is up to date with esper; shares with it what is not carom's."""
         contents = world._contents()
         population = Population.of(contents.entities, physics.adoption)
-        with world._context():
-            next_id = esper_bridge.next_id()
         kept = {plugin.name: plugin.saved(world) for plugin in world.plugins}
         saved = physics.saved()
         return cls(
             owner=physics, dimensions=physics.dimensions, plugins={p.name: p.version for p in world.plugins},
             population=population, loose=LooseValues.of(population, contents.entities), dead=list(contents.dead),
-            next_id=next_id, table=SavedTable.of(physics.table), contacts=physics.contacts.saved(), physics=saved,
+            next_id=contents.counter.next, table=SavedTable.of(physics.table),
+            contacts=physics.contacts.saved(), physics=saved,
             kept={name: state for name, state in kept.items() if state is not None}, clock=world.clock.state(),
             steps=world._pipeline.profiler.steps,
         )  # fmt: skip
@@ -92,13 +90,11 @@ def restore_world(snapshot: Snapshot, world: Any, physics: PhysicsServices) -> N
         adoption.know(component)
     for key in snapshot.table.columns:
         table.make(key)
-    going = PopulationRestore(population, contents, adoption)
+    going = PopulationRestore(population, snapshot.table, contents, adoption)
     going.release()
     moved = snapshot.table.put_back(table)
-    snapshot.loose.put_into_batches(population, table.dimensions)
-    with world._context():
-        going.apply()
-        esper_bridge.go_on_from(snapshot.next_id)
+    going.apply()
+    contents.go_on_from(snapshot.next_id)
     snapshot.loose.put_into_handles(population, contents.entities)
     contents.dead.clear()
     contents.dead.update(snapshot.dead)

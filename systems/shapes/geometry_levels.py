@@ -6,16 +6,16 @@ that it never hides a contact; that is checked here when the colliders are adopt
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
-from ...framework.data.batches import Stores
+from ...framework.data.adoption import Fresh
+from ...framework.data.change_log import Stores
 from ...framework.data.component import Component
-from ...framework.data.handles import Sources
+from ...framework.data.handles import as_column, stored
 from ...framework.data.table import Table
 from ...framework.errors import UnhandledPairError
 from ...framework.plugins.registry import Registry
@@ -27,7 +27,6 @@ COUNTERS = ("first_level_tests", "first_level_hits", "false_positives")
 # Of the outer level's size, which may stick out: sizes that were computed or stored in single precision still enclose.
 TOLERANCE = 1e-6
 
-Handles = Mapping[int, Component]
 Values = dict[str, np.ndarray]  # columns by name, a row for each of some entities
 
 
@@ -71,36 +70,33 @@ class LevelCheck:
         self._registry = registry
 
     def __call__(
-        self,
-        fresh: Mapping[type[Component], Handles],
-        members: Mapping[type[Component], Handles],
-        gone: Mapping[type[Component], set[int]],
+        self, fresh: Mapping[type[Component], Fresh], components_of: Callable[[int], Mapping[type[Any], Any]]
     ) -> None:
-        """fresh, members: the handles to adopt and those adopted, by type and entity; gone: those that lose them."""
-        for component, handles in fresh.items():
-            if issubclass(component, Collider):
-                self._check_dimensions(component, next(iter(handles)))
-        types = [c for c in dict.fromkeys((*fresh, *members)) if issubclass(c, Collider)]
+        new = [component for component in fresh if issubclass(component, Collider)]
+        for component in new:
+            self._check_dimensions(component, fresh[component].entities[0])
+        types = {*new, *self._table.stacked_types(Collider.stack)}
         if len(types) < 2:
             return
-        holders = {c: (fresh.get(c, {}).keys(), members.get(c, {}).keys(), gone.get(c, set())) for c in types}
-        several: set[int] = set()  # entities that get a collider and have another
-        for collider, other in itertools.permutations(types, 2):
-            new, (also_new, old, lost) = holders[collider][0], holders[other]
-            several |= (new & also_new) | ((new & old) - lost)
+        several: dict[int, Mapping[type[Any], Any]] = {}  # entities that get a collider and have another
+        for component in new:
+            for entity in fresh[component].entities:
+                own = components_of(entity)
+                if len(types & own.keys()) > 1:
+                    several[entity] = own
         if not several:
             return
-        types = in_order(self._registry, types)
+        ordered = in_order(self._registry, {c for own in several.values() for c in own if c in types})
         entities = np.array(sorted(several), np.int64)
-        has = np.zeros((len(types), len(entities)), bool)
-        for index, collider in enumerate(types):
-            new, old, lost = holders[collider]
-            has[index] = [e in new or (e in old and e not in lost) for e in entities.tolist()]
+        has = np.array([[c in several[e] for e in entities.tolist()] for c in ordered], bool)
 
         def values(collider: type[Component], chosen: np.ndarray) -> Values:
-            return self._values(collider, entities[chosen], fresh.get(collider, {}))
+            sources = [stored(several[e][collider]) for e in entities[chosen].tolist()]
+            columns = collider.columns.items()
+            dimensions = self._table.dimensions
+            return {name: as_column([s[name] for s in sources], column, dimensions) for name, column in columns}
 
-        self._check_levels(types, has, entities, values)
+        self._check_levels(ordered, has, entities, values)
 
     def batch(self, stores: Stores, entities: np.ndarray, rows: Any) -> None:
         types = [component for component in stores if issubclass(component, Collider)]
@@ -157,21 +153,6 @@ class LevelCheck:
                 f"{inner.__name__}, which sticks out by {out[worst]:.4g}: make the {outer.__name__} larger, or use a "
                 f"second entity for a shape of its own" + (f" ({more} more entities likewise)" if more else "")
             )
-
-    def _values(self, collider: type[Component], entities: np.ndarray, fresh: Handles) -> Values:
-        """Columns by name, of handles to adopt and of those in the table."""
-        new = np.array([entity in fresh for entity in entities.tolist()], bool)
-        sources = Sources([fresh[e] for e in entities[new].tolist()]) if new.any() else None
-        rows = self._table.rows_of(entities[~new])
-        values = {}
-        for name, column in collider.columns.items():
-            shape = column.item_shape(self._table.dimensions)
-            values[name] = np.empty((len(entities), *shape), column.dtype)
-            if sources is not None:
-                values[name][new] = sources.values(column, self._table.dimensions)
-            if len(rows):
-                values[name][~new] = self._table.values(column.key, rows)
-        return values
 
     def _sticking_out(
         self, outer: type[Any], inner: type[Any], one: Values, two: Values

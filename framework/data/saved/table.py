@@ -12,7 +12,7 @@ from ..arrays.column import ArrayColumn
 from ..arrays.pool import Held
 from ..columns import Column
 from ..component import Component
-from ..table import Table
+from ..table import HAS_OBJECTS, Table
 
 
 @dataclass
@@ -42,6 +42,12 @@ class SavedTable:
         columns = {key: array[:count].copy() for key, array in table.arrays.items()}
         return cls(list(table.component_types), columns, table.stops, table.frame, [table.held_arrays()])
 
+    def types_of(self, entity: int) -> list[type[Component]]:
+        """The types of the components of that body; none if it is no body."""
+        rows = np.flatnonzero(self.columns["entity"] == entity)
+        masks = {c: self.columns.get(Table.mask_name(c)) for c in self.types} if len(rows) else {}
+        return [component for component, mask in masks.items() if mask is not None and mask[rows[0]]]
+
     def put_back(self, table: Table) -> bool:
         """Make the table what it was; True if bodies have other rows, or other components, than it had.
 
@@ -56,6 +62,7 @@ class SavedTable:
         same_statics = same_members and all(
             np.array_equal(table.arrays[key][table.stops[1] : count], column[table.stops[1] :])
             for key, column in columns.items()
+            if key != HAS_OBJECTS
         )
         same_arrays = same_members and all(
             np.array_equal(table.column(key), columns[key]) for key in array_columns(self.types) if key in columns
