@@ -121,11 +121,13 @@ class Entities(dict[int, dict[type[Any], Any]]):
     unshared
         what has come, gone or changed since a snapshot has held all dicts of components: these may be changed; None
         while there are no snapshots
+    version
+        changes whenever an entity that is there goes, or gains, loses or replaces a component
     """
 
     def __init__(self, content: dict[int, dict[type[Any], Any]], log: ChangeLog) -> None:
         super().__init__(content)
-        self.log, self.table, self.stop = log, None, 0
+        self.log, self.table, self.stop, self.version = log, None, 0, 0
         self.members: dict[type[Any], Members] = {}
         self.saved: Any = None
         self.unshared: set[int] | None = None
@@ -157,15 +159,20 @@ class Entities(dict[int, dict[type[Any], Any]]):
         return table.column("entity")[mask]
 
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
-        """(n,) which of these ids (n,) have no objects, and that component."""
-        mask, table = np.zeros(len(entities), bool), self.table
-        if table is not None and component in table.mask_names:
+        """(n,) which of these ids (n,) have that component."""
+        of, table, log = self.members.get(component), self.table, self.log
+        if of is None or not of.ours:
+            return among(entities, () if of is None else of.listed)
+        mask, unsure = np.zeros(len(entities), bool), np.ones(len(entities), bool)
+        if table is not None and component in table.mask_names and not log.cleared:
             rows = table.rows_of(entities)
-            mask = (rows >= 0) & table.has_mask(component)[rows] & ~table.arrays[HAS_OBJECTS][rows]
-        for one in self.log.arrivals:
-            if component in one.stores:
-                mask |= (entities >= one.first) & (entities < one.stop)
-        return mask & ~among(entities, self.log.deleted) if self.log.deleted else mask
+            mask = table.has_mask(component)[rows]
+            unsure = rows < 0
+            if log.dirty:
+                unsure |= among(entities, log.touched) | among(entities, log.deleted)
+        for index in unsure.nonzero()[0].tolist():
+            mask[index] = component in self.types_of(entities.item(index))
+        return mask
 
     def types_of(self, entity: Any) -> Collection[type[Any]]:
         """The types of its components, () for what is no entity."""
@@ -227,6 +234,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
 
     def changes(self, entity: int, component: type[Any], ours: bool) -> None:
         """An entity is about to gain, lose or replace a component."""
+        self.version += 1
         if entity < self.stop and not dict.__contains__(self, entity) and entity in self:
             self.__missing__(entity)
         if ours:
@@ -270,6 +278,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
 
     def delete(self, entities: Iterable[Any]) -> None:
         """What esper does for its dead; what does not exist (any more) is no error."""
+        self.version += 1
         log, members = self.log, self.members
         gone: dict[type[Any], list[int]] = {}
         handles: list[weakref.ref[Any]] = []
@@ -314,6 +323,7 @@ class Entities(dict[int, dict[type[Any], Any]]):
 
     def forget_all(self) -> None:
         """esper.clear_database()."""
+        self.version += 1
         lost = [h for components in dict.values(self) for h in components.values() if isinstance(h, Component)]
         lost += self.log.lost
         self.log.clear()
@@ -418,6 +428,8 @@ class Entities(dict[int, dict[type[Any], Any]]):
 
 def among(entities: np.ndarray, members: Collection[int]) -> np.ndarray:
     """(n,) mask of the ids that are members; takes as long as the fewer of the two."""
+    if not members:
+        return np.zeros(len(entities), bool)
     if len(members) + _SORTING < len(entities):
         return np.isin(entities, np.fromiter(members, np.int64, len(members)))
     return np.fromiter(map(members.__contains__, entities.tolist()), bool, len(entities))

@@ -198,21 +198,16 @@ class Contents:
 class Membership:
     """Which entities of a context have which components."""
 
-    __slots__ = ("_entities", "dead", "types_of")
+    __slots__ = ("dead", "entities", "types_of")
 
     def __init__(self, contents: Contents) -> None:
-        self._entities = contents.entities
+        self.entities = contents.entities
         self.types_of: Callable[[int], Collection[type[Any]]] = contents.entities.types_of
         self.dead: set[int] = contents.dead
 
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
         """(n,) which of these ids (n,) are living entities that have the component."""
-        members = self._entities.members.get(component)
-        if members is None:
-            return np.zeros(len(entities), bool)
-        mask = among(entities, members.listed)
-        if members.ours:
-            mask |= self._entities.mask(entities, component)
+        mask = self.entities.mask(entities, component)
         if self.dead:
             mask &= ~among(entities, self.dead)
         return mask

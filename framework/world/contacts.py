@@ -19,7 +19,6 @@ from ..data.esper_bridge import Membership
 
 VECTORIZED_MIN = 32  # rows; fewer are looked at one by one in less time than masks take
 BLOCK = 256  # records made at once; one that a game keeps also keeps the points and normals of its block
-NONE_LEFT = -1, None
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,53 +140,52 @@ class ContactRows:
 
     def _pairs(self, first: type[Any], second: type[Any]) -> Iterator[tuple[int, int, Contact]]:
         seen, start = ContactRows(self._columns, self._membership), 0  # its columns stay when the loop takes a step
-        made: Iterator[tuple[int, Contact | None]] = iter(())
-        if len(seen) >= VECTORIZED_MIN:  # find and make at once what matches now
-            found = seen.between(first, second)
-            made = zip(found.rows.tolist(), seen._records(found), strict=True)
-            start = int(found.rows[0]) if len(found.rows) else len(seen)
-        made_row, made_record = next(made, NONE_LEFT)
-        entities = seen.entity_a[start:].tolist(), seen.entity_b[start:].tolist()
-        enabled = seen._columns.get("enabled")
-        types_of: Any = None
-        dead: set[int] = set()
-        for row, a, b in zip(range(start, len(seen)), *entities, strict=True):  # the loop's body may change any of it
-            contact = None
-            if row == made_row:
-                contact = made_record
-                made_row, made_record = next(made, NONE_LEFT)
+        if not len(seen):
+            return
+        enabled, membership = seen._columns.get("enabled"), self._membership()
+        entities, dead, version = membership.entities, membership.dead, membership.entities.version
+        if len(seen) >= VECTORIZED_MIN:  # all at once, as long as the loop's body lets components alone
+            found = seen._matching(np.arange(len(seen)), first, second, membership)
+            for row, contact in zip(found.rows.tolist(), seen._records(found), strict=True):
+                if entities.version != version:
+                    break
+                start = row + 1
+                if enabled is None or enabled[row]:
+                    a, b = contact.entity_a, contact.entity_b
+                    if not dead or not (a in dead or b in dead):
+                        yield a, b, contact
+            if entities.version == version:
+                return
+        ids = seen.entity_a[start:].tolist(), seen.entity_b[start:].tolist()
+        for row, a, b in zip(range(start, len(seen)), *ids, strict=True):
             if enabled is not None and not enabled[row]:
                 continue
-            if types_of is None:  # at the first row
-                membership = self._membership()
-                types_of, dead = membership.types_of, membership.dead
-            of_a, of_b = types_of(a), types_of(b)
-            if first in of_a and second in of_b:
-                turned = False
-            elif first in of_b and second in of_a:
-                a, b, turned = b, a, True
-            else:
+            of_a, of_b = membership.types_of(a), membership.types_of(b)
+            forward = first in of_a and second in of_b
+            if not forward and not (first in of_b and second in of_a):
                 if not of_a and not of_b:
                     self._membership()  # CaromError if the loop has closed the world
-                continue
-            if dead and (a in dead or b in dead):
-                continue
-            if contact is None or contact.entity_a != a:
-                contact = seen.row(row).flipped() if turned else seen.row(row)
-            yield a, b, contact
+            elif not dead or not (a in dead or b in dead):
+                contact = seen.row(row) if forward else seen.row(row).flipped()
+                yield contact.entity_a, contact.entity_b, contact
 
     def between(self, first: type[Any], second: type[Any]) -> ContactsBetween:
         """The contacts that :meth:`pairs` would yield now, as columns: rows, a and b (k,), in the same order."""
         _check_types("between", first, second)
         a, b, enabled = self.entity_a, self.entity_b, self._columns.get("enabled")
         rows = np.arange(len(a)) if enabled is None else np.flatnonzero(enabled)
-        if len(rows):
-            membership = self._membership()
-            a_first, b_first = membership.mask(a[rows], first), membership.mask(b[rows], first)
-            some = a_first | b_first
-            rows, a_first, b_first = rows[some], a_first[some], b_first[some]
         if not len(rows):
             return ContactsBetween(rows, a[rows], b[rows])
+        return self._matching(rows, first, second, self._membership())
+
+    def _matching(
+        self, rows: np.ndarray, first: type[Any], second: type[Any], membership: Membership
+    ) -> ContactsBetween:
+        """Those of the rows (n,) of an entity that has ``first`` with one that has ``second``."""
+        a, b = self.entity_a, self.entity_b
+        a_first, b_first = membership.mask(a[rows], first), membership.mask(b[rows], first)
+        some = a_first | b_first
+        rows, a_first, b_first = rows[some], a_first[some], b_first[some]
         forward = a_first & membership.mask(b[rows], second)
         some = forward | (b_first & membership.mask(a[rows], second))
         rows, forward = rows[some], forward[some]

@@ -6,6 +6,7 @@ import esper
 import numpy as np
 import pytest
 from helpers_adoption import Charge, matches_esper
+from helpers_calls import calls_of
 from worlds import make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
@@ -222,3 +223,22 @@ def test_any_order_of_changes_gives_what_single_entities_give():
             hashes.append((world.state_hash(), len(world.contacts)))
         assert matches_esper(world)
     assert hashes[:40] == hashes[40:]
+
+
+def test_a_look_and_a_deletion_do_as_much_work_however_many_creations_in_bulk_live():
+    def work(calls):
+        world = make_world()
+        for number in range(calls):
+            world.create_entities(2, Transform.many([(3.0 * number, 0), (3.0 * number, 3)]), SphereCollider.many(0.5))
+        world.step()
+        victim, other = world.create_entity(Transform((-9, 0)), SphereCollider(0.5)), world.bodies.entity.item(0)
+        world.step()
+
+        def look_and_delete():
+            assert world.has_component(other, SphereCollider)
+            world.delete_entity(victim)
+            world._pipeline.contents.clear_dead()
+
+        return calls_of(look_and_delete)
+
+    assert work(300) <= work(3) + 3

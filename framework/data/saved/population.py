@@ -167,6 +167,7 @@ class PopulationRestore:
     def apply(self) -> None:
         """Give esper the entities, and bind the handles."""
         entities, members = self._entities, self._entities.members
+        entities.version += 1
         self._adoption.forget_pending()
         for entity in self._gone:
             dict.pop(entities, entity, None)
