@@ -1,7 +1,8 @@
 """Bringing the table up to date with what has come, gone or changed since the last time.
 
-Changes are logged as they happen (see entities), so the work here is in proportion to what has changed: it is looked at,
-everything is checked, and only then written. Between two looks the table is the truth about all that is not in the log.
+Changes are logged as they happen (see entities), so the work here is in proportion to what has changed: it is looked
+at, everything is checked, and only then written. Between two looks the table is the truth about all that is not in the
+log.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ def invariants(monkeypatch):
 def assert_table_and_entities_agree(adoption):
     """A row has objects if its id is in esper's dict; its masks are the types there, whose handles are bound to it."""
     table, entities, log = adoption.table, adoption._entities, adoption._log
-    assert not (log.touched or log.arrivals or log.deleted or log.lost or log.cleared)
+    assert not any((log.touched, log.arrivals, log.deleted, log.lost, log.cleared))
     ids = table.column("entity").tolist()
     assert len(set(ids)) == len(ids)
     for row, (entity, has_objects) in enumerate(zip(ids, table.column(HAS_OBJECTS).tolist(), strict=True)):
@@ -35,7 +35,7 @@ def assert_table_and_entities_agree(adoption):
         own = {c: h for c, h in dict.__getitem__(entities, entity).items() if issubclass(c, Component)}
         assert set(table.types_in(row)) == own.keys(), entity
         for component, handle in own.items():
-            assert handle._store is table and handle._entity == entity  # noqa: PT018
+            assert (handle._store, handle._entity) == (table, entity)
             assert handle._version != table.version or handle._row == row, entity
             assert entity in entities.members[component].listed
     for component, members in entities.members.items():
