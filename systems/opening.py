@@ -8,6 +8,7 @@ from .broad_phase.active_rows import ALL
 from .codes import NEED_SWEEPS, OK, ROTATE
 
 DISCRETE = 0
+OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE = 1, 2, 4, 8  # bits of state.kept
 NOTHING_TESTED = -1  # in place of a row: no pair has been tested yet
 LARGEST = 1.7976931348623157e308  # of all finite numbers
 
@@ -38,24 +39,25 @@ def any_ccd(state):
 
 
 def keep_state(state, dt):
-    """What a step that fails puts back: columns that the built-in stages overwrite. Nothing is known of this step yet.
+    """The velocity, which a step that fails puts back (see stage_list.KEPT). Nothing is known of this step yet.
 
-    The position is kept in previous_position, by keep_start; the velocity in start_velocity, if nothing changes that.
+    If nothing changes the velocity before keep_start, start_velocity has it too.
     """
     bodies, pairs, impacts = state.bodies, state.pairs, state.impacts
     state.unforced, state.pushed, state.moved = False, True, False
     state.forces_summed = state.candidates_ready = state.contacts_ready = False
-    state.event_count, state.step_force_kept, state.flight_usual = 0, False, False
+    state.event_count, state.flight_usual = 0, False
     pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0
     impacts.logged = impacts.capped = 0
     state.candidates.count, state.candidates.active_count = 0, ALL
     state.row_a, state.unsound = NOTHING_TESTED, 0
     state.all_still, state.sleep_stages = False, 0
     state.kept_rows = state.moving if state.collides and not state.statics_stale else state.count
-    state.velocity_kept = not state.others_write and (state.collides or len(bodies.max_linear_speed) > 0)
-    for i in range(state.moving if state.velocity_kept else 0):
-        bodies.kept_velocity[i] = bodies.linear_velocity[i]
-    state.kept = True
+    state.kept = OPENED
+    if not state.others_write and (state.collides or len(bodies.max_linear_speed) > 0):
+        state.kept |= KEEPS_VELOCITY
+        for i in range(state.moving):
+            bodies.kept_velocity[i] = bodies.linear_velocity[i]
     state.warm_start.before, state.contacts.before = state.warm_start.now, state.contacts.now
     return OK
 
@@ -97,8 +99,8 @@ def check_finite(state, dt):
             finite &= (abs(item(v, k)) <= LARGEST) | out[i]
     state.finite = finite
     state.moved = False
-    failed = state.unsound != 0  # which Python sees after this stage, and goes back
-    state.kept, state.started = state.kept and failed, state.started and failed
+    if state.unsound == 0:  # else Python goes back after this stage
+        state.kept = 0
     state.motion_version += 1
     state.bodies_counted += state.moving
     return OK

@@ -43,7 +43,7 @@ from .shapes.attribution import ErrorAttribution
 from .shapes.geometry_levels import LevelCheck, check_sensors
 from .shapes.pair_coverage import check_pairs
 from .sleeping.sleepers import Sleepers, add_columns
-from .stage_list import CLOSING, OPENING, STAGES, SYSTEM_OF_STAGE
+from .stage_list import CLOSING, KEPT, OPENING, STAGES, SYSTEM_OF_STAGE
 from .tracking import CONTACTS, WARM_START, put_rows_back, saved_rows
 
 
@@ -262,17 +262,19 @@ class Simulation:
     def abandon_step(self) -> None:
         """The step failed: put everything back to its start."""
         state, table, bodies = self.state, self.table, self.state.bodies
-        if state.others_write:
-            if self._copies.kept:
-                self._copies.put_back()
-        elif state.kept:
-            self._put_back(bodies)
+        if self._copies.kept:
+            self._copies.put_back()
+        for bit, column, copy, rows in KEPT:
+            if state.kept & bit:
+                count = getattr(state, rows)
+                getattr(bodies, column)[:count] = getattr(bodies, copy)[:count]
         self._copies.kept = False
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
         self.contacts.forget_step(state.step_number)
         self.sleepers.abandon_step()
-        state.moved = state.forces_summed = state.found_current = state.kept = state.started = False
+        state.moved = state.forces_summed = state.found_current = False
+        state.kept = 0
         state.impacts.logged = 0
         state.contacts_version += 1
         if self._contacts_before is not None:
@@ -282,19 +284,6 @@ class Simulation:
         table.static_version += 1
         self.queries.forget()
         table.in_step = False
-
-    def _put_back(self, bodies: Any) -> None:
-        """What keep_state and keep_start have kept; without the latter the step has written velocities at most."""
-        state, moving, dynamic, rows = self.state, self.state.moving, self.state.dynamic, self.state.kept_rows
-        if state.velocity_kept:
-            bodies.linear_velocity[:moving] = bodies.kept_velocity[:moving]
-        elif state.started:
-            bodies.linear_velocity[:moving] = bodies.start_velocity[:moving]
-        if state.started:
-            bodies.position[:rows] = bodies.previous_position[:rows]
-            bodies.previous_position[:rows] = bodies.kept_previous[:rows]
-        if state.step_force_kept:
-            bodies.step_force[:dynamic] = bodies.kept_step_force[:dynamic]
 
     def end_phase(self) -> None:
         """One phase has run alone."""

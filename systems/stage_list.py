@@ -28,7 +28,7 @@ from .linking.parts import (
 )
 from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
-from .opening import check_finite, keep_state, read_bodies
+from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, check_finite, keep_state, read_bodies
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS
 from .sleeping.stages import take_checksums, update_sleep
@@ -75,8 +75,16 @@ ON_DEMAND = (
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
 WITH_COLLIDERS = frozenset(("colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies"))
 CONDITIONS = ("", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "sleeping", "on demand")
-# Columns of the table that a failed step puts back, and those that every step makes again.
-PUT_BACK = ("position", "linear_velocity", "previous_position", "step_force", "force", "inverse_mass")
+# What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
+# copy, and their rows.
+KEPT = (
+    (KEEPS_FORCE, "step_force", "kept_step_force", "dynamic"),
+    (KEEPS_START, "position", "previous_position", "kept_rows"),
+    (KEEPS_START, "previous_position", "kept_previous", "kept_rows"),
+    (KEEPS_START, "linear_velocity", "start_velocity", "moving"),
+    (KEEPS_VELOCITY, "linear_velocity", "kept_velocity", "moving"),  # from before start_velocity
+)
+MADE_AGAIN = ("force", "inverse_mass")  # by every step
 
 
 def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
@@ -87,7 +95,7 @@ def check_stages(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
             if name not in fields:
                 raise ValueError(f"stage {stage.name}: no record in systems/records.py has {name!r}")
         for name in stage.writes:
-            if name in TABLE_COLUMNS and name not in PUT_BACK:
+            if name in TABLE_COLUMNS and name not in (*(kept[1] for kept in KEPT), *MADE_AGAIN):
                 raise ValueError(f"stage {stage.name} writes {name}, which a failed step does not put back")
         if stage.needed not in (*CONDITIONS, stage.name):
             raise ValueError(f"stage {stage.name}: needed must be one of {', '.join(CONDITIONS)}, got {stage.needed!r}")

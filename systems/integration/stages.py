@@ -15,7 +15,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, dot, item, scale, sub
 from ..codes import CHECK_FLIGHT, NEED_COLUMNS, OK
 from ..forces.stages import within
-from ..opening import LARGEST
+from ..opening import KEEPS_FORCE, KEEPS_START, LARGEST
 from ..quarantine.columns import are_columns_sound
 
 LINE, PARABOLA, CUBIC = 1, 2, 3  # degree of the path within the step
@@ -62,7 +62,6 @@ def keep_start(state, dt):
     bodies = state.bodies
     state.path_degree, state.drifted = state.usual_path_degree, False
     state.flight_usual, state.flight_seen = True, 0
-    state.started = True  # before anything is overwritten: previous_position then is what a failed step goes back to
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
     # Of static bodies the two are equal, see box_statics.
@@ -70,6 +69,7 @@ def keep_start(state, dt):
         for i in range(state.kept_rows):
             previous[i] = position[i]
     else:
+        state.kept |= KEEPS_START
         for i in range(state.kept_rows):
             bodies.kept_previous[i] = previous[i]
             previous[i] = position[i]
@@ -277,8 +277,8 @@ def end_flight(state, dt):
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity = bodies.position, bodies.linear_velocity
     pushed = (state.pushed or state.others_write) and len(bodies.step_force) > 0
-    state.step_force_kept = pushed and not state.others_write  # else every column is kept
-    if state.step_force_kept and len(bodies.kept_step_force) == 0:
+    keeps = pushed and not state.others_write  # else every column is kept
+    if keeps and len(bodies.kept_step_force) == 0:
         return NEED_COLUMNS
     if state.limits_speed:
         state.flight_usual, state.flight_seen = True, 0
@@ -288,8 +288,10 @@ def end_flight(state, dt):
             position[i] = within(position[i], bodies.previous_position[i], limit * dt)
     for i in range(dynamic, state.moving):
         position[i] = add_scaled(position[i], velocity[i], dt)
-    for i in range(dynamic if state.step_force_kept else 0):
-        bodies.kept_step_force[i] = bodies.step_force[i]
+    if keeps:
+        state.kept |= KEEPS_FORCE
+        for i in range(dynamic):
+            bodies.kept_step_force[i] = bodies.step_force[i]
     for i in range(dynamic if pushed else 0):
         bodies.step_force[i] = zero_of(state)
     state.forces_summed, state.moved = False, True
