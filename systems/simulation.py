@@ -103,13 +103,13 @@ class Simulation:
         )
         self.parts_version = 0
         self.links = StepLinks(self.scene, self.program, self.integration, self.search)
-        self._must_check = False  # in every step: sensors among levels, pairs that no plugin has
-        self._copies = ColumnCopies(self.table)
+        self.must_check = False  # in every step: sensors among levels, pairs that no plugin has
+        self.copies = ColumnCopies(self.table)
         self._words = self.state.words
         self._step_number, self._others_write = (self.state.word_of(name) for name in ("step_number", "others_write"))
         self._finite, self._pushed = (self.state.word_of(name) for name in ("finite", "pushed"))
         self._found_current = self.state.word_of("found_current")
-        self._contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
+        self.contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
         self.settled, self.take_deferred = self.adoption.settled, self.contacts.take_deferred
 
@@ -164,10 +164,10 @@ class Simulation:
         """Everything that depends on which bodies and systems there are."""
         table, scene, words = self.table, self.scene, self._words
         words[self._step_number] = self.table.clock.step_count
-        self._contacts_before = self.contacts.columns_now() if words[self._found_current] else None
+        self.contacts_before = self.contacts.columns_now() if words[self._found_current] else None
         if self._structure() != scene.structure or table.static_version != scene.static_version:
             self._refresh()
-        if self._must_check:
+        if self.must_check:
             self._check()
         if not self.links.follows(len(self._world.force_systems)):
             self.link()
@@ -186,7 +186,7 @@ class Simulation:
             self.parts_version += 1
         if others_write:
             state.stay_wanted = self._world.events.wanted("contact_stay")
-            self._copies.keep()
+            self.copies.keep()
 
     def _refresh(self) -> None:
         """Follow which bodies and colliders there are."""
@@ -196,7 +196,7 @@ class Simulation:
             if not state.collides:
                 state.warm_start.counts[:] = 0
             linked = scene.linked
-            self._must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
+            self.must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
             self.quarantine.bind()
         scene.refresh_statics()
         if table.generation != self._generation:
@@ -262,13 +262,13 @@ class Simulation:
     def abandon_step(self) -> None:
         """The step failed: put everything back to its start."""
         state, table, bodies = self.state, self.table, self.state.bodies
-        if self._copies.kept:
-            self._copies.put_back()
+        if self.copies.kept:
+            self.copies.put_back()
         for bit, column, copy, rows in KEPT:
             if state.kept & bit:
                 count = getattr(state, rows)
                 getattr(bodies, column)[:count] = getattr(bodies, copy)[:count]
-        self._copies.kept = False
+        self.copies.kept = False
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
         self.contacts.forget_step(state.step_number)
@@ -277,8 +277,8 @@ class Simulation:
         state.kept = 0
         state.impacts.logged = 0
         state.contacts_version += 1
-        if self._contacts_before is not None:
-            self.contacts.show(self._contacts_before)
+        if self.contacts_before is not None:
+            self.contacts.show(self.contacts_before)
         if len(bodies.place):
             bodies.place[:] = -1
         table.static_version += 1
@@ -292,7 +292,7 @@ class Simulation:
 
     def end_step(self) -> None:
         self.table.in_step = False
-        self._copies.kept = False
+        self.copies.kept = False
         if self.sleepers.on:
             self.sleepers.end_step()
         if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
@@ -368,7 +368,7 @@ class Simulation:
     def look_ahead(self, others_write: bool) -> None:
         """Before a plan is made, between two steps."""
         self._follow(others_write)
-        self._copies.kept = False
+        self.copies.kept = False
         self.scene.refresh_rotation()
         state = self.state
         state.sweeping = self.links.needs_sweeps()
@@ -377,7 +377,7 @@ class Simulation:
         return planned_kernels(self.state)
 
     def planned_columns(self) -> Iterable[PlannedColumn]:
-        return planned_columns(self.state, self.table, self.scene, self._copies)
+        return planned_columns(self.state, self.table, self.scene, self.copies)
 
     def counters(self) -> dict[str, int]:
         return counters_of(self.state)

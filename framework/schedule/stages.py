@@ -149,19 +149,24 @@ class Program:
 
     def run(self, start: int, stop: int, dt: float) -> None:
         """Run the stages start..stop-1, and what Python has to do in between."""
-        address = self.state.address
-        while start < stop:
-            try:
-                code = self._run_stages(address, start, stop, dt)
-            except Exception as error:
-                self.describe_error(error)
-                raise
-            if not code:
-                break
+        self.resume(self.call(start, stop, dt), stop, dt)
+
+    def call(self, start: int, stop: int, dt: float) -> int:
+        """Run the stages start..stop-1 up to one that asks for something; its code, 0 if none does."""
+        try:
+            return self._run_stages(self.state.address, start, stop, dt)
+        except Exception as error:
+            self.describe_error(error)
+            raise
+
+    def resume(self, code: int, stop: int, dt: float) -> None:
+        """Do what a stage has asked for by that code, and run those that follow it."""
+        while code:
             start = self._words[self._stage]
             self._handle(start, code, dt)
             if code >= self._afterwards:
                 start += 1
+            code = self.call(start, stop, dt) if start < stop else 0
         if self._words[self.alarm]:
             self.on_alarm()
 

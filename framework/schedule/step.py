@@ -15,6 +15,7 @@ from .faults import Faults
 from .no_physics import NoPhysics
 from .phases import FIRST_PRIORITY, Phase, System
 from .profiler import Profiler
+from .quiet_step import make_quiet_step
 from .stages import PythonPart, Segment, merged
 from .system_order import SystemOrder
 
@@ -36,8 +37,9 @@ class Pipeline(esper.Processor):
         self._events = world.events
         self._in_window = False
         self._was_too_long = False  # the frame before
-        self._parts: list[Any] = []  # what a step runs, in order
+        self.parts: list[Any] = []  # what a step runs, in order
         self._parts_order = self._parts_physics = -1  # versions that the parts were made of
+        self._quiet: Any = None  # takes the step of a world in which nothing changes
         self._at = ""  # the system at work
         self.processors: esper_bridge.Processors
         self.contents: esper_bridge.Contents
@@ -59,7 +61,8 @@ class Pipeline(esper.Processor):
     def step(self) -> None:
         if self.in_step:
             self.must_be_between_steps("a step can be taken")
-        self._take(1)
+        if self._quiet is None or not self._quiet():
+            self._take(1)
 
     def advance(self, seconds: float) -> int:
         self.must_be_between_steps("advance can be called")
@@ -75,7 +78,8 @@ class Pipeline(esper.Processor):
         self._was_too_long = too_long
         before = self.clock.step_count
         try:
-            self._take(steps)
+            if steps != 1 or self._quiet is None or not self._quiet():
+                self._take(steps)
         except BaseException:  # the time of the steps that were not taken is still there
             self.clock.gathered += (steps - (self.clock.step_count - before)) * self.clock.dt
             raise
@@ -156,7 +160,7 @@ class Pipeline(esper.Processor):
         self._begin(others_write)
         if self._parts_order != order.version or self._parts_physics != physics.parts_version:
             self._make_parts()
-        self._run_parts(self._parts, dt)
+        self._run_parts(self.parts, dt)
         physics.end_step()
         self.in_step = False
         esper_bridge.running.discard(self.world.name)
@@ -175,15 +179,19 @@ class Pipeline(esper.Processor):
                 if kind is Segment:
                     part.program.run(part.start, part.stop, dt)
                 elif kind is PythonPart:
-                    self._run_python(part, dt)
+                    self.run_python(part, dt)
                 elif part.words[part.index]:
-                    self._run_python(part.part, dt)
+                    self.run_python(part.part, dt)
         except BaseException as error:
-            at, self._at = self._at or self._system_at(), ""
-            self.fail(f"system {at}", error)
+            self.fail_at_work(error)
             raise
 
-    def _run_python(self, part: PythonPart, dt: float) -> None:
+    def fail_at_work(self, error: BaseException) -> None:
+        """The system at work has raised that."""
+        at, self._at = self._at or self._system_at(), ""
+        self.fail(f"system {at}", error)
+
+    def run_python(self, part: PythonPart, dt: float) -> None:
         """A system in Python: its time is taken, less that of stages inside and what it has waited for the compiler."""
         self._at = part.name
         program = self.physics.program
@@ -217,8 +225,9 @@ class Pipeline(esper.Processor):
             if debug:
                 name = name_of(processor)
                 parts.append(PythonPart(name, lambda dt, name=name: physics.report_faults(f"after {name}: ")))
-        self._parts = merged([*parts, *physics.closing()])
+        self.parts = merged([*parts, *physics.closing()])
         self._parts_order, self._parts_physics = self.order.version, physics.parts_version
+        self._quiet = make_quiet_step(self, physics)
 
     def look_ahead(self) -> None:
         """Between two steps: know what the next one will do."""
@@ -245,9 +254,9 @@ class Pipeline(esper.Processor):
     def _close_window(self) -> None:
         self.physics.end_window()
         if self.faults.pending:
-            self._tell_faults()
+            self.tell_faults()
 
-    def _tell_faults(self) -> None:
+    def tell_faults(self) -> None:
         self.faults.tell(f"step {self.clock.step_count - 1} of world {self.world.name!r}")
 
     def synchronize(self) -> None:
@@ -273,7 +282,7 @@ class Pipeline(esper.Processor):
             esper_bridge.running.discard(self.world.name)
             self.order.apply()
         if self.faults.pending:
-            self._tell_faults()
+            self.tell_faults()
 
     # -- when something raises --------------------------------------------------------------------
 

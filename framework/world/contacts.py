@@ -254,9 +254,9 @@ class Contacts(ContactRows):
         self._source = source
         self._columns_of = self._source.version  # the version that the columns show
         self._chunks: dict[str, list[dict[str, np.ndarray]]] = {name: [] for name in self.HISTORIES}
-        self._window = 0  # number of the step that the window was opened with
-        self._recorded = False  # something has happened since
-        self._deferred: Callable[[], None] | None = None  # records what the last step has brought
+        self.window = 0  # number of the step that the window was opened with
+        self.recorded = False  # something has happened since
+        self.deferred: Callable[[], None] | None = None  # records what the last step has brought
 
     # -- what users read --------------------------------------------------------------------------
 
@@ -287,7 +287,7 @@ class Contacts(ContactRows):
     @property
     def stay(self) -> ContactRows:
         """Pairs that touched in the last step and in the one before."""
-        if self._source.stay_step < self._window:
+        if self._source.stay_step < self.window:
             return ContactRows(empty_columns(self.dimensions), self._membership)
         return ContactRows(self._source.stay_columns(), self._membership)
 
@@ -295,9 +295,9 @@ class Contacts(ContactRows):
 
     def open_window(self, step: int) -> None:
         """Forget what the last window held; ``step`` is the next one's number."""
-        self._window, self._deferred = step, None
-        if self._recorded:
-            self._recorded = False
+        self.window, self.deferred = step, None
+        if self.recorded:
+            self.recorded = False
             for chunks in self._chunks.values():
                 chunks.clear()
 
@@ -310,22 +310,22 @@ class Contacts(ContactRows):
 
     def defer(self, record: Callable[[], None]) -> None:
         """Let ``record`` be called when the events are read, or before they are lost; most are never read."""
-        self._deferred = record
+        self.deferred = record
 
     def take_deferred(self) -> None:
         """The next step begins, or rows are about to move: record what has been deferred."""
-        if self._deferred is not None:
-            record, self._deferred = self._deferred, None
+        if self.deferred is not None:
+            record, self.deferred = self.deferred, None
             record()
 
     def record(self, history: str, columns: dict[str, np.ndarray]) -> None:
         if len(columns["entity_a"]):
-            self._recorded = True
+            self.recorded = True
             self._chunks[history].append(columns)
 
     def forget_step(self, step: int) -> None:
         """Drop the events of a step that has failed."""
-        self._deferred = None
+        self.deferred = None
         for name, chunks in self._chunks.items():
             self._chunks[name] = [chunk for chunk in chunks if chunk["step"][0] != step]
 
@@ -343,11 +343,11 @@ class Contacts(ContactRows):
         self._source.record_impacts()
         columns = _copied(self._own_columns) if self._columns_of == self._source.version else None
         histories = {name: [_copied(chunk) for chunk in chunks] for name, chunks in self._chunks.items()}
-        return {"window": self._window, "columns": columns, "histories": histories}
+        return {"window": self.window, "columns": columns, "histories": histories}
 
     def take_back(self, saved: dict[str, Any]) -> None:
         """Show them again; the source has the contacts of that time."""
-        self._deferred, self._recorded, self._window = None, True, saved["window"]
+        self.deferred, self.recorded, self.window = None, True, saved["window"]
         self._chunks = {name: [_copied(chunk) for chunk in chunks] for name, chunks in saved["histories"].items()}
         if saved["columns"] is not None:
             self.show(_copied(saved["columns"]))

@@ -18,12 +18,12 @@ class Events:
 
     def __init__(self) -> None:
         self._known: dict[str, None] = dict.fromkeys(CONTACT_EVENTS)  # in the order in which they were defined
-        self._handlers: dict[str, list[Handler]] = {}
-        self._of_esper: dict[str, Any] = {}
+        self.handlers: dict[str, list[Handler]] = {}
+        self.of_esper: dict[str, Any] = {}
 
     def attach(self) -> None:
         """Note esper's own handlers; called in the world's context."""
-        self._of_esper = esper_bridge.event_registry()
+        self.of_esper = esper_bridge.event_registry()
 
     def define(self, *names: str) -> None:
         """Declare events of your own, so that ``on`` takes them; ``dispatch`` declares its event too."""
@@ -49,25 +49,25 @@ class Events:
             )
         if not callable(handler):
             raise TypeError(f"a handler for {name!r} must be callable, got {handler!r}")
-        self._handlers.setdefault(name, []).append(handler)
+        self.handlers.setdefault(name, []).append(handler)
         return handler
 
     def off(self, name: str, handler: Handler) -> None:
         """Stop calling ``handler``; KeyError if it was not set. Safe inside a handler."""
-        handlers = self._handlers.get(name, [])
+        handlers = self.handlers.get(name, [])
         if handler not in handlers:
             raise KeyError(f"no such handler for {name!r}: {handler!r}")
         handlers.remove(handler)
 
     def wanted(self, name: str) -> bool:
         """True if the event has a handler; lets callers skip building the payload."""
-        return bool(self._handlers.get(name)) or bool(self._of_esper.get(name))
+        return bool(self.handlers.get(name)) or bool(self.of_esper.get(name))
 
     def any_handlers(self) -> bool:
         """True if any event has a handler."""
-        if self._of_esper:
+        if self.of_esper:
             return True
-        for handlers in self._handlers.values():  # noqa: SIM110  called in every step
+        for handlers in self.handlers.values():  # noqa: SIM110  called in every step
             if handlers:
                 return True
         return False
@@ -75,8 +75,8 @@ class Events:
     def dispatch_many(self, name: str, records: Iterable[Any]) -> None:
         """One event for each record; quick where a single handler listens, which is usual."""
         for record in records:
-            handlers = self._handlers.get(name, ())
-            if len(handlers) == 1 and not self._of_esper.get(name):
+            handlers = self.handlers.get(name, ())
+            if len(handlers) == 1 and not self.of_esper.get(name):
                 _call(name, handlers[0], (record,))
             else:
                 self.dispatch(name, record)
@@ -85,8 +85,8 @@ class Events:
         """Call the handlers that were set when the event began and have not been removed since."""
         if name not in self._known:
             self.define(name)
-        for handler in tuple(self._handlers.get(name, ())):
-            if handler in self._handlers.get(name, ()):
+        for handler in tuple(self.handlers.get(name, ())):
+            if handler in self.handlers.get(name, ()):
                 _call(name, handler, args)
         for handler in esper_bridge.event_handlers(name):
             _call(name, handler, args)

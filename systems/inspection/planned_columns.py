@@ -8,7 +8,7 @@ import numpy as np
 
 from ...framework.data.column_copies import ColumnCopies
 from ...framework.data.columns import REQUIRED
-from ...framework.data.table import Table
+from ...framework.data.table import HAS_OBJECTS, Table
 from ...framework.jit.records.record import Record
 from ...framework.jit.records.schema import Schema, Section
 from ...framework.schedule.plan import PlannedColumn
@@ -17,6 +17,7 @@ from ..scene import Scene
 
 FIELDS = "what the game has set"
 DEFAULTS = "at their defaults, there because handles and world.bodies write in place"
+OBJECTS = "whose entities have Python objects"
 MASKS = "which components it has"
 ROTATED = "some body is rotated: shapes as they are in the world"
 NOT_ENCLOSING = "some body has several colliders: whether the cheaper one still encloses the other"
@@ -29,6 +30,7 @@ def planned_columns(state: Record, table: Table, scene: Scene, copies: ColumnCop
     of_table = [section for section in BODIES.sections if section.group == "the table"]
     yield from _fields(table)
     yield from _sections(bodies, of_table)
+    yield from _column(HAS_OBJECTS, "body", "the table", table.arrays[HAS_OBJECTS], capacity, OBJECTS)
     for component in table.component_types:
         yield from _column(table.mask_name(component), "body", "the table", table.has_mask(component), capacity, MASKS)
     yield from _sections(bodies, [section for section in BODIES.sections if section not in of_table])

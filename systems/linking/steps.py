@@ -30,7 +30,7 @@ class StepLinks:
         self._scene, self._state, self._program = scene, scene.state, program
         self._integration, self._search = integration, search
         self._state.links = np.zeros(COUNT, np.int64)
-        self._version = self._forces = NEVER  # of the scene, and how many force systems there were
+        self.version = self._forces = NEVER  # of the scene, and how many force systems there were
         self._key: Any = None  # what the linked stages depend on
         self._usual: Any = None  # what of that bodies may change
         self._shapes_key: Any = None
@@ -38,7 +38,7 @@ class StepLinks:
 
     def follows(self, force_systems: int) -> bool:
         """Whether nothing has changed since the last time that makes other functions necessary."""
-        return self._scene.version == self._version and force_systems == self._forces
+        return self._scene.version == self.version and force_systems == self._forces
 
     def needs_sweeps(self) -> bool:
         """Whether some body is swept: all of them in the mode, or those whose ccd is set."""
@@ -48,14 +48,14 @@ class StepLinks:
 
     def forget(self) -> None:
         """Other settings: link again before the next step."""
-        self._version, self._key = NEVER, None
+        self.version, self._key = NEVER, None
 
     def link(self, force_systems: int) -> bool:
         """Compile or load what the step needs, and see to what later steps and queries may need.
 
         True if these are other stages than before; bodies that come and go seldom change that.
         """
-        self._version = NEVER  # until it is done
+        self.version = NEVER  # until it is done
         scene, state = self._scene, self._state
         state.sweeps_ready = self.needs_sweeps()
         usual = (
@@ -64,7 +64,7 @@ class StepLinks:
         )  # fmt: skip
         if self._key is not None and usual == self._usual and usual[5]:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
-            self._version = scene.version
+            self.version = scene.version
             return False
         self._usual = usual
         conditions = self._conditions()
@@ -79,7 +79,7 @@ class StepLinks:
             self._link_possible()
             self._key = key
         self.link_shapes()
-        self._version, self._forces = scene.version, force_systems
+        self.version, self._forces = scene.version, force_systems
         return changed
 
     def _link_stages(self, conditions: dict[str, bool]) -> None:

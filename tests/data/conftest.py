@@ -1,4 +1,4 @@
-"""In all tests of data: what holds after each merge of the log of changes into the table."""
+"""For tests of data: what holds after each merge of the log of changes into the table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from carom.framework.data.adoption import Adoption
 from carom.framework.data.table import HAS_OBJECTS
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def invariants(monkeypatch):
     merge = Adoption.synchronize
 

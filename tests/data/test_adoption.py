@@ -12,7 +12,7 @@ from worlds import ball, make_world
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import MissingComponentError, System
 
-pytestmark = pytest.mark.plain
+pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("invariants")]
 
 world = helpers_adoption.world  # a fixture
 

@@ -13,6 +13,8 @@ from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Component, MissingComponentError
 from carom.framework.data import esper_bridge
 
+pytestmark = pytest.mark.usefixtures("invariants")
+
 COUNT = 12
 
 

@@ -22,7 +22,7 @@ from carom.framework import CaromError, Component, Plugin, World, column
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
 
-pytestmark = pytest.mark.plain
+pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("invariants")]
 
 HERE = Path(__file__).resolve().parents[1]
 MODES = ("discrete", "continuous", "event_driven")

@@ -19,6 +19,8 @@ from carom.framework import CaromError, Component, ForceSystem, System, World, c
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.springs import Springs
 
+pytestmark = pytest.mark.usefixtures("invariants")
+
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = 200
 MODES = ("discrete", "continuous", "event_driven")

@@ -16,6 +16,8 @@ from carom.framework import Component, Settings, World
 from carom.plugins import Physics, capsule, convex_polygon
 from carom.plugins.springs import Springs
 
+pytestmark = pytest.mark.usefixtures("invariants")
+
 TYPES = (
     Transform, RigidBody, SphereCollider, capsule.CapsuleCollider, convex_polygon.ConvexPolygonCollider, Bullet, Charge,
     Tag,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers_steps import both_ways  # noqa: F401  every test with each
 from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, Transform

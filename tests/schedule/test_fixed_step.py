@@ -1,4 +1,4 @@
-"""The fixed step with a variable frame rate: C7, C26 of the accuracy list, the chapter's "never a variable step"."""
+"""The fixed step with a variable frame rate, taken in both ways."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import esper
 import numpy as np
 import pytest
 from helpers_motion import FRAME_RATES, Oscillator, SpringAndDrag, all_methods
+from helpers_steps import both_ways  # noqa: F401  every test with each
 from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, Transform

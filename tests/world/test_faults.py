@@ -10,6 +10,7 @@ from pathlib import Path
 import esper
 import numpy as np
 import pytest
+from helpers_steps import both_ways  # noqa: F401  every test with each
 from worlds import make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
