@@ -27,7 +27,6 @@ from ...systems.integration.system import Integration
 from ...systems.records import STATE
 
 Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 ROUNDING = 1e-12  # growth per step that counts as none
 SHORTEST, LONGEST = 1e-5, 30.0  # range of steps searched, in units of the oscillator's own time
@@ -152,24 +151,3 @@ def grows_by_itself(stiffness: Any, drag: Any, damping: Any) -> NDArray[np.bool_
     root = np.sqrt(c * c / 4 - stiffness + 0j)
     fastest = np.maximum((-c / 2 + root).real, (-c / 2 - root).real)
     return fastest > 1e-9 * np.maximum(np.sqrt(np.abs(stiffness)), np.abs(c))
-
-
-def growth_of_system(integrator: Integrator, stiffness: Floats, drag: Floats, damping: Floats, h: float) -> float:
-    """The largest absolute eigenvalue of one step of a coupled system: stiffness and drag (n, n), damping (n,).
-
-    Needed if stiffness and drag do not commute: then the system does not split into single oscillators.
-    """
-    n = len(damping)
-    k, c = stiffness * h * h, drag * h
-
-    def force(position: Floats, velocity: Floats) -> Floats:
-        x, v = (array[:, 0].reshape(2 * n, n) for array in (position, velocity))
-        out = np.zeros_like(position)
-        out[:, 0] = (-(x @ k.T) - v @ c.T).ravel()
-        return out
-
-    start = np.zeros((2, 2 * n * n, 2))
-    start[0, : n * n, 0] = start[1, n * n :, 0] = np.eye(n).ravel()
-    ends = advanced(integrator, start[0], start[1], np.tile(damping * h, 2 * n), force)
-    matrix = np.concatenate([end[:, 0].reshape(2 * n, n) for end in ends], axis=1)
-    return float(np.abs(np.linalg.eigvals(matrix)).max())

@@ -16,14 +16,10 @@ from ...components import Collider
 from ...framework import CaromError, NoPhysicsError, World
 from ...systems import Integrator
 from ..plain import jsonable
-from .stability import growth_of_system, stability_limits
+from .stability import stability_limits
 from .stiffness import Modes, modes_of, unmeasured
 
 SAFETY = 0.9  # fraction of the limit that is suggested
-EXACT = 60  # degrees of freedom of coupled bodies, up to which the full step is analysed
-COUPLED_GROWTH = 1e-7  # growth per step that counts as none: rounding of equal eigenvalues of large matrices
-SHORTEST, STEPS = 1e-3, 60  # range, as a fraction of the single oscillators' limit, and number of steps analysed
-HALVINGS = 20
 ROUNDS = 50  # more than needed to find the first pair that tunnels
 
 
@@ -176,9 +172,6 @@ def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
     limits = stability_limits(integrator, modes.stiffness, modes.drag, modes.damping)
     stiffest = np.lexsort((modes.entity, -np.abs(modes.drag), -np.abs(modes.stiffness), limits))[0]
     limit = float(limits[stiffest])
-    for k, c, damping in modes.coupled:
-        if limit > 0.0 and len(damping) <= EXACT:
-            limit = _limit_of_system(integrator, k, c, damping, limit)
     if limit == math.inf:
         return None
     return Oscillation(
@@ -188,25 +181,6 @@ def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
         damping=float(modes.damping[stiffest]),
         limit=limit,
     )
-
-
-def _limit_of_system(integrator: Integrator, k: Any, c: Any, damping: Any, limit: float) -> float:
-    """``limit``, or less if bodies whose stiffness and drag do not commute grow before it."""
-    if limit == math.inf:
-        return limit
-
-    def stable(h: float) -> bool:
-        return growth_of_system(integrator, k, c, damping, h) <= 1 + COUPLED_GROWTH
-
-    steps = np.geomspace(SHORTEST * limit, limit, STEPS).tolist()
-    first = next((place for place, h in enumerate(steps) if not stable(h)), None)
-    if first is None:
-        return limit
-    low, high = steps[first - 1] if first else 0.0, steps[first]
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
 
 
 def first_passage(world: World) -> Passage | None:

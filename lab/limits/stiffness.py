@@ -16,17 +16,16 @@ import numpy as np
 
 from ...framework import World
 from ...framework.jit.records.record import Record
-from .stability import Complexes, Floats
+from .stability import Floats
 
 EPS = float(np.finfo(float).eps)
 SHIFT = 1e-5  # relative to the distance between bodies, and to their speed
 FARTHEST = 1e-8  # relative to the coordinates: smaller shifts would be lost to rounding far from the origin
 KINK = 0.01  # a relative difference above this between forward and backward shifts means a kink in the force
 NOISE = 1e-7  # relative to the largest of its kind: smaller values are rounding
-DENSE = 2000  # degrees of freedom up to which every one is shifted alone
-BLOCK = 300  # degrees of freedom of coupled bodies up to which all modes are found
-KRYLOV = 60  # directions tried if only the stiffest and the most damped modes are computed
-SOUGHT = 20  # number of these modes
+ALL = 60  # degrees of freedom up to which all modes are found
+WIDTH, ROUNDS = 6, 30  # of the power iteration: vectors, and rounds at most
+CONVERGED = 1e-6  # relative change of the largest mode that ends it
 
 # What summing forces changes in the state beside the columns.
 FORCE_STATE = ("stage", "force_evaluations", "pushed", "unforced", "forces_summed")
@@ -41,14 +40,12 @@ class Modes:
     entity: the body with the largest amplitude
     stiffness, drag: 1/s^2 and 1/s, by forces; complex if forces turn the motion
     damping: 1/s, linear_damping
-    coupled: (stiffness, drag, damping) of groups of bodies whose stiffness and drag do not commute
     """
 
     entity: np.ndarray
-    stiffness: Complexes
-    drag: Complexes
+    stiffness: np.ndarray
+    drag: np.ndarray
     damping: Floats
-    coupled: list[tuple[Floats, Floats, Floats]]
 
 
 class Forces:
@@ -153,140 +150,62 @@ def unmeasured(state: Record) -> Iterator[None]:
 
 
 def modes_of(world: World) -> Modes:
-    """The oscillators that the force systems of ``world`` form with its dynamic bodies, in the present state.
+    """The stiffest and the most damped oscillators that the force systems of ``world`` form with its dynamic bodies.
 
-    All modes of coupled bodies with up to 300 degrees of freedom; with more, the stiffest and the most damped ones.
-    ValueError if the forces are not finite.
+    All of them if the bodies have at most ALL degrees of freedom. ValueError if the forces are not finite.
     """
     if not world.force_systems or not len(world.bodies.dynamic):
-        return _joined([])
+        return Modes(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0))
     with forces_of(world) as forces:
-        if len(forces) > DENSE:
-            return _joined([_extreme(forces.stiffness, forces.drag, np.arange(len(forces)), forces)])
-        unit = np.eye(len(forces))
-        stiffness, drag = (np.stack([ask(e) for e in unit], axis=1) for ask in (forces.stiffness, forces.drag))
-        parts = []
-        for rows in _groups((stiffness != 0) | (drag != 0)):
-            block = np.ix_(rows, rows)
-            parts.append(_of_block(stiffness[block], drag[block], rows, forces))
-        return _joined(parts)
+        spaces = [np.eye(len(forces))]
+        if len(forces) > ALL:
+            spaces = [_dominant(ask, len(forces)) for ask in (forces.stiffness, forces.drag)]
+        basis = np.linalg.qr(np.concatenate(spaces, axis=1))[0]
+        return _modes_in(basis, *(_images(ask, basis) for ask in (forces.stiffness, forces.drag)), forces)
 
 
-def _of_block(k: Floats, c: Floats, rows: np.ndarray, forces: Forces) -> Modes:
-    """All modes of a group of coupled bodies; of a large group, the extreme ones."""
-    n, damping = len(rows), forces.damping[rows]
-    if n > BLOCK:
-        return _extreme(lambda u: k @ u, lambda u: c @ u, rows, forces)
-    even = not np.ptp(damping)
-    symmetric = np.abs(k - k.T).max() <= NOISE * np.abs(k).max()
-    if not c.any() and even:
-        vectors: Any = np.linalg.eigh((k + k.T) / 2)[1] if symmetric else np.linalg.eig(k)[1]
-    else:
-        upper = np.concatenate((np.zeros((n, n)), np.eye(n)), axis=1)
-        lower = np.concatenate((-k, -c - np.diag(damping)), axis=1)
-        vectors = np.linalg.eig(np.concatenate((upper, lower)))[1][:n]
-    found = _quotients(vectors, k @ vectors, c @ vectors, rows, forces)
-    apart = _apart(k, c) or (not even and _apart(k, np.diag(damping))) or (not even and _apart(c, np.diag(damping)))
-    if apart:
-        found.coupled.append((k, c, damping))
-    return found
+def _images(apply: Apply, vectors: Floats) -> Floats:
+    return np.stack([apply(vector) for vector in vectors.T], axis=1)
 
 
-def _extreme(stiffness: Apply, drag: Apply, rows: np.ndarray, forces: Forces) -> Modes:
-    """The stiffest and the most damped modes, from the Krylov spaces of both matrices."""
-    parts = []
-    for apply in (stiffness, drag):
-        vectors = _extreme_vectors(apply, len(rows))
-        if vectors.shape[1]:
-            k, c = (np.stack([_of_complex(ask, v) for v in vectors.T], axis=1) for ask in (stiffness, drag))
-            parts.append(_quotients(vectors, k, c, rows, forces))
-    return _joined(parts)
-
-
-def _extreme_vectors(apply: Apply, n: int) -> Any:
-    """(n, m): Ritz vectors of the largest eigenvalues, by Arnoldi's method (Saad, Numerical Methods for Large
-    Eigenvalue Problems, section 6.2)."""
-    start = np.random.default_rng(0).normal(size=n)
-    basis, matrix = [start / np.linalg.norm(start)], np.zeros((KRYLOV + 1, KRYLOV))
-    for j in range(min(KRYLOV, n)):
-        image = apply(basis[j])
-        size = float(np.linalg.norm(image))
-        for _ in range(2):  # repeated: rounding leaves a remainder
-            for i, vector in enumerate(basis):
-                share = float(vector @ image)
-                matrix[i, j] += share
-                image = image - share * vector
-        rest = float(np.linalg.norm(image))
-        if rest <= 1e-9 * size or size == 0.0:
+def _dominant(apply: Apply, n: int) -> Floats:
+    """(n, WIDTH): a basis of the largest modes, by power iteration of several vectors at once (Saad, Numerical Methods
+    for Large Eigenvalue Problems, section 5.1)."""
+    basis = np.linalg.qr(np.random.default_rng(0).normal(size=(n, WIDTH)))[0]
+    largest = 0.0
+    for _ in range(ROUNDS):
+        image = _images(apply, basis)
+        before, largest = largest, float(np.abs(np.linalg.eigvals(basis.T @ image)).max())
+        if abs(largest - before) <= CONVERGED * largest:
             break
-        matrix[j + 1, j] = rest
-        basis.append(image / rest)
-    m = j + 1
-    values, small = np.linalg.eig(matrix[:m, :m])
-    chosen = np.argsort(-np.abs(values), kind="stable")[:SOUGHT]
-    chosen = chosen[np.abs(values[chosen]) > 0]
-    return np.stack(basis[:m], axis=1) @ small[:, chosen]
+        basis = np.linalg.qr(image)[0]
+    return basis
 
 
-def _of_complex(apply: Apply, vector: Any) -> Any:
-    real = apply(np.ascontiguousarray(vector.real)) + 0j
-    return real + 1j * apply(np.ascontiguousarray(vector.imag)) if np.iscomplexobj(vector) else real
+def _modes_in(basis: Floats, by_stiffness: Floats, by_drag: Floats, forces: Forces) -> Modes:
+    """The modes of x'' = -K x - (C + G) x' in the space of that basis (n, m), whose images under K and C are given.
 
-
-def _quotients(vectors: Any, by_stiffness: Any, by_drag: Any, rows: np.ndarray, forces: Forces) -> Modes:
-    """Rayleigh quotients of each mode (n, m), with which it satisfies x'' = -k x - c x' exactly."""
+    Their Rayleigh quotients k, c and g satisfy x'' = -k x - (c + g) x' exactly if the space holds the mode.
+    """
+    m, damping = basis.shape[1], forces.damping[:, None]
+    upper = np.concatenate((np.zeros((m, m)), np.eye(m)), axis=1)
+    lower = -np.concatenate((basis.T @ by_stiffness, basis.T @ (by_drag + damping * basis)), axis=1)
+    small = np.linalg.eig(np.concatenate((upper, lower)))[1][:m]
+    vectors = basis @ small
     weights = np.abs(vectors) ** 2
     squares = weights.sum(axis=0)
-    k, c = ((np.conj(vectors) * image).sum(axis=0) / squares for image in (by_stiffness, by_drag))
-    g = (weights * forces.damping[rows][:, None]).sum(axis=0) / squares
-    stiffest, fastest = float(np.abs(k).max(initial=0.0)), float(np.abs(c).max(initial=0.0))
+    k, c = ((np.conj(vectors) * (image @ small)).sum(axis=0) / squares for image in (by_stiffness, by_drag))
+    g = (weights * damping).sum(axis=0) / squares
+    stiffest, fastest = float(np.abs(k).max()), float(np.abs(c).max())
     k = _cleaned(k, max(NOISE * stiffest, forces.noise("position")))
     c = _cleaned(c, max(NOISE * max(fastest, stiffest**0.5), forces.noise("linear_velocity")))
-    dimensions = len(forces.damping) // len(forces.entity)
-    return Modes(forces.entity[rows[np.argmax(weights, axis=0)] // dimensions], k, c, g, [])
+    dimensions = len(forces) // len(forces.entity)
+    return Modes(forces.entity[np.argmax(weights, axis=0) // dimensions], k, c, g)
 
 
-def _cleaned(values: Any, noise: float) -> Complexes:
-    values = values + 0j
-    return np.where(np.abs(values.real) > noise, values.real, 0.0) + 1j * np.where(
-        np.abs(values.imag) > noise, values.imag, 0.0
-    )
-
-
-def _apart(one: Floats, other: Floats) -> bool:
-    """True if two matrices do not share their modes, that is, do not commute."""
-    return bool(np.abs(one @ other - other @ one).max() > 1e-5 * np.abs(one).max() * np.abs(other).max())
-
-
-def _groups(linked: np.ndarray) -> Iterator[np.ndarray]:
-    """Rows of coupled degrees of freedom, each group sorted."""
-    linked, left = linked | linked.T, set(range(len(linked)))
-    while left:
-        first = left.pop()
-        group, edge = [first], [first]
-        while edge:
-            near = [row for row in np.flatnonzero(linked[edge.pop()]).tolist() if row in left]
-            left.difference_update(near)
-            group += near
-            edge += near
-        yield np.array(sorted(group))
-
-
-def _joined(parts: list[Modes]) -> Modes:
-    """All parts together; equal oscillators are merged."""
-    if not parts:
-        return Modes(np.empty(0, np.int64), np.empty(0, complex), np.empty(0, complex), np.empty(0), [])
-    entity = np.concatenate([part.entity for part in parts])
-    k = np.concatenate([part.stiffness for part in parts])
-    c = np.concatenate([part.drag for part in parts])
-    g = np.concatenate([part.damping for part in parts])
-    keys = np.stack([k.real, np.abs(k.imag), c.real, np.abs(c.imag), g], axis=1)
-    with np.errstate(divide="ignore"):
-        digits = np.where(keys == 0, 0.0, np.floor(np.log10(np.abs(keys))) - 8)
-    order = np.argsort(entity, kind="stable")
-    first = order[np.unique(np.round(keys / 10.0**digits)[order] * 10.0 ** digits[order], axis=0, return_index=True)[1]]
-    first.sort()
-    return Modes(entity[first], k[first], c[first], g[first], [group for part in parts for group in part.coupled])
+def _cleaned(values: Any, noise: float) -> Any:
+    real, turning = (np.where(np.abs(part) > noise, part, 0.0) for part in (values.real, values.imag))
+    return real + 1j * turning
 
 
 def _spacing(dynamic: Floats, everything: Floats) -> float:
