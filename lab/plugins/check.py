@@ -22,6 +22,7 @@ from .samples import ORDINARY, Finding, Report, Rows, Subject, directions, poses
 
 BOXES = 400  # boxes given to a broad phase
 STEPS = 3
+ALIKE = "use what both know: numbers and tuples, math, carom.framework.vectors; no global that changes"
 
 
 def check_plugin(plugin: Plugin, others: list[Plugin], progress: Callable[[str], None] = lambda what: None) -> Report:
@@ -117,30 +118,17 @@ def _check_shape(subject: Subject, shape: Shape, dimensions: int) -> None:
     scale = np.repeat((1.0, 1e-9, 1e9), (ORDINARY, ORDINARY // 10, ORDINARY // 10))
     made = rows(shape, scale, rng.random(len(scale)) < 0.2, dimensions, rng)
     subject.inputs = len(scale)
-
-    def show(i: int) -> str:
-        return row_shown(made, i)
-
+    cure = "half extents are numbers of at least 0, or inf where the shape has no end"
     wrong = ~(made.half >= 0).min(axis=1)  # also true for nan
-    subject.found(
-        wrong, lambda i: f"bounds returned {tuple(made.half[i].tolist())}", show,
-        "half extents are numbers of at least 0, or inf where the shape has no end",
-    )  # fmt: skip
-    _compare_bounds(subject, made)
+    subject.found(wrong, "bounds returned {}", lambda i: row_shown(made, i), cure, made.half)
+    said = made.half.copy()
+    for i in range(0, len(said), 100):
+        said[i] = shape.component.bounds(made.at(i), dimensions)  # type: ignore[attr-defined]
+    other = ~np.isclose(said, made.half, rtol=TOLERANCE, atol=0, equal_nan=True).all(axis=1)
+    what = "compiled, bounds are {}, as plain Python {}"
+    subject.found(other, what, lambda i: row_shown(made, i), ALIKE, made.half, said)
     if shape.support is not None:
         _check_support(subject, made, rng)
-
-
-def _compare_bounds(subject: Subject, made: Rows) -> None:
-    """Compiled code and plain Python agree up to rounding."""
-    bounds, dimensions = made.shape.component.bounds, made.half.shape[1]  # type: ignore[attr-defined]
-    for i in range(0, len(made.half), 100):
-        said = np.array(bounds(made.at(i), dimensions), float)
-        if not np.allclose(said, made.half[i], rtol=TOLERANCE, atol=0, equal_nan=True):
-            what = f"compiled, bounds are {tuple(made.half[i].tolist())}, as plain Python {tuple(said.tolist())}"
-            cure = "use what both know: numbers and tuples, math, carom.framework.vectors"
-            subject.findings.append(Finding(what, row_shown(made, i), cure))
-            return
 
 
 def _check_support(subject: Subject, made: Rows, rng: np.random.Generator) -> None:
@@ -150,45 +138,30 @@ def _check_support(subject: Subject, made: Rows, rng: np.random.Generator) -> No
     upright = rng.random(n) < 0.2
     look[upright] = np.eye(dimensions)[rng.integers(dimensions, size=int(upright.sum()))]
     try:
-        point, beyond = code(made, look)
-        elsewhere, _ = code(made, other)
-        long, _ = code(made, 1e6 * look)
-        short, _ = code(made, 1e-6 * look)
+        (point, beyond), (elsewhere, _), (long, _) = (code(made, way) for way in (look, other, 1e6 * look))
     except RaisedError as error:
         what, cure = f"support or rounding raised {error}", "support takes any direction, of any length but 0"
         subject.findings.append(Finding(what, row_shown(made, error.at), cure))
         return
 
-    def show(i: int) -> str:
-        return f"{row_shown(made, i)}, direction = {tuple(look[i].tolist())}"
+    def found(bad: np.ndarray, what: str, cure: str, *values: np.ndarray) -> None:
+        show = lambda i: f"{row_shown(made, i)}, direction = {tuple(look[i].tolist())}"  # noqa: E731
+        subject.found(bad, what, show, cure, *values)
 
     finite = np.isfinite(point).all(axis=1) & np.isfinite(beyond) & (beyond >= 0)
-    subject.found(
-        ~finite, lambda i: f"support is {tuple(point[i].tolist())}, rounding {beyond[i]}", show,
-        "both are finite, and rounding is at least 0",
-    )  # fmt: skip
+    found(~finite, "support is {}, rounding {}", "both are finite, and rounding is at least 0", point, beyond)
     slack = TOLERANCE * (np.abs(point).max(axis=1) + beyond)
-    subject.found(
-        finite & (np.abs(point) + beyond[:, None] > made.half + slack[:, None]).any(axis=1),
-        lambda i: f"support {tuple(point[i].tolist())} and rounding {beyond[i]:.6g} reach beyond the bounds "
-        f"{tuple(made.half[i].tolist())}",
-        show, "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct support",
-    )  # fmt: skip
-    here = (point * look).sum(axis=1)
-    subject.found(
-        finite & ((elsewhere * look).sum(axis=1) > here + slack),
-        lambda i: f"support is {tuple(point[i].tolist())}, but for another direction it is "
-        f"{tuple(elsewhere[i].tolist())}, which is farther this way too",
-        show, "return the point whose product with the direction is largest",
-    )  # fmt: skip
-    for turned in (long, short):
-        if subject.found(
-            finite & (np.abs((turned * look).sum(axis=1) - here) > slack),
-            lambda i, turned=turned: f"support is {tuple(point[i].tolist())}, for a direction of another length "
-            f"{tuple(turned[i].tolist())}",
-            show, "the direction has any length: do not use it as a unit vector",
-        ):  # fmt: skip
-            break
+    out = (np.abs(point) + beyond[:, None] > made.half + slack[:, None]).any(axis=1)
+    what = "support {} and rounding {:.6g} reach beyond the bounds {}"
+    cure = "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct support"
+    found(finite & out, what, cure, point, beyond, made.half)
+    here, there, far = ((end * look).sum(axis=1) for end in (point, elsewhere, long))
+    what = "support is {}, but for another direction it is {}, which is farther this way too"
+    cure = "return the point whose product with the direction is largest"
+    found(finite & (there > here + slack), what, cure, point, elsewhere)
+    what = "support is {}, for a direction of another length {}"
+    cure = "the direction has any length: do not use it as a unit vector"
+    found(finite & (np.abs(far - here) > slack), what, cure, point, long)
 
 
 # -- other things ---------------------------------------------------------------------------------

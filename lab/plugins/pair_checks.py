@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ...framework.plugins.checks import plain
+from ...framework.plugins.checks import contact_fault, plain
 from ...framework.plugins.registry import Pair, Shape
 from .kernels import PairCode, RaisedError, SupportCode
-from .samples import KINDS, Poses, Subject, directions, numbers_shown, pose_shown
+from .samples import KINDS, Finding, Poses, Subject, directions, pose_shown
 
 TOLERANCE, GENERIC = 1e-9, 2e-6
-UNIT = 1e-6  # tolerance of a normal's length
 PLAIN_ORDINARY, PLAIN_EXTREME = 100, 15  # poses that are also run in plain Python
 PATH = 24  # samples along a sweep
 
@@ -39,8 +38,8 @@ class PairChecks:
         try:
             result = self._evaluate(self.d)
         except RaisedError as error:
-            what = f"the compiled function raised {error}"
-            self._found_one(error.at, what, "return a contact for every input; a miss is (False, -gap, normal, point)")
+            cure = "return a contact for every input; a miss is (False, -gap, normal, point)"
+            self._found_one(error.at, f"the compiled function raised {error}", cure)
             return
         good = self._contacts(result)
         if not good.any():
@@ -64,48 +63,32 @@ class PairChecks:
 
     def _contacts(self, r: Any) -> np.ndarray:
         """Check that results are valid, and return which of them are usable."""
-        apart = ~r.hit & (r.depth == -np.inf)
-        finite = np.isfinite(r.depth) & np.isfinite(r.normal).all(axis=1) & np.isfinite(r.point).all(axis=1) | apart
-        self._found(
-            ~finite, lambda i: f"{self._said(r, i)}: not finite", "guard the divisions and roots that fail there"
-        )
-        wrong = finite & (r.hit != (r.depth >= 0))
-        self._found(
-            wrong, lambda i: f"{self._said(r, i)}: hit must be depth >= 0", "return depth >= 0.0 as the first value"
-        )
-        length = np.sqrt((r.normal**2).sum(axis=1))
-        bent = finite & ~apart & (np.abs(length - 1.0) > UNIT)
-        self._found(
-            bent, lambda i: f"the normal's length is {length[i]:.9g}, it must be 1", "divide the normal by its length"
-        )
-        return finite & ~bent & ~apart
+        found = zip(r.hit.tolist(), r.depth.tolist(), r.normal.tolist(), r.point.tolist(), strict=True)
+        faults = np.array([contact_fault(*contact) for contact in found])
+        said = [self._said(r, i) for i in np.flatnonzero(faults != "")[:1]]
+        cure = "guard the divisions and roots that fail there, and return depth >= 0.0 as the first value"
+        self._found(faults != "", f"{''.join(said)}: {{}}", cure, faults)
+        return (faults == "") & ~(~r.hit & (r.depth == -np.inf))
 
     def _boxes(self, r: Any) -> None:
         """At a contact the bounds of both shapes overlap; otherwise the broad phase does not report the pair."""
-        reach = self.poses.a.half + self.poses.b.half
-        outside = (r.depth > self.tolerance) & (np.abs(self.d) - reach > self.tolerance[:, None]).any(axis=1)
-        self._found(
-            outside,
-            lambda i: f"they overlap by {r.depth[i]:.6g}, but their boxes do not: half extents "
-            f"{numbers_shown(self.poses.a.half[i])} and {numbers_shown(self.poses.b.half[i])}",
-            "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct the depth",
-        )
+        a, b = self.poses.a.half, self.poses.b.half
+        outside = (r.depth > self.tolerance) & (np.abs(self.d) - (a + b) > self.tolerance[:, None]).any(axis=1)
+        what = "they overlap by {:.6g}, but their boxes do not: half extents {} and {}"
+        cure = "make bounds enclose the whole shape (for turned shapes: use shape.axes), or correct the depth"
+        self._found(outside, what, cure, r.depth, a, b)
 
     def _points(self, r: Any) -> None:
         """The contact point lies in both boxes, up to the overlap."""
-        room = np.abs(r.depth) + self.tolerance
-        hit = r.depth >= 0
-        off_a = np.any(np.abs(r.point) - self.poses.a.half > room[:, None], axis=1)
-        off_b = np.any(np.abs(r.point - self.d) - self.poses.b.half > room[:, None], axis=1)
-        self._found(
-            hit & (off_a | off_b),
-            lambda i: f"the point of contact {numbers_shown(r.point[i])} is outside of "
-            f"{'the first' if off_a[i] else 'the second'} shape",
-            "point counts from the centre of the first shape, and lies in the overlap",
-        )
+        room = (np.abs(r.depth) + self.tolerance)[:, None]
+        off = np.abs(r.point) - self.poses.a.half > room
+        off |= np.abs(r.point - self.d) - self.poses.b.half > room
+        cure = "point counts from the centre of the first shape, and lies in the overlap"
+        what = "the point of contact {} is outside of one of the shapes"
+        self._found((r.depth >= 0) & off.any(axis=1), what, cure, r.point)
 
     def _meets(self, r: Any) -> None:
-        if not (r.hit & (r.depth >= 0)).any():
+        if not (r.depth >= 0).any():
             near = (np.abs(self.d) <= self.poses.a.half + self.poses.b.half).all(axis=1)
             what = f"they never touch, in none of {near.sum()} poses in which their boxes overlap"
             cure = "return depth >= 0 where they overlap; to keep two shapes apart use layer and mask"
@@ -119,14 +102,10 @@ class PairChecks:
         for shape, rows, way in zip(self.shapes, (self.poses.a, self.poses.b), (normal, -normal), strict=True):
             point, beyond = SupportCode(shape, self.d.shape[1])(rows, way)
             room += (point * way).sum(axis=1) + beyond
-        hit = r.depth >= 0
-        wrong = np.where(hit, np.abs(room - r.depth), room - r.depth) > self.tolerance
-        self._found(
-            known & wrong,
-            lambda i: f"depth {r.depth[i]:.9g}, normal {numbers_shown(r.normal[i])}: along it, by their support "
-            f"functions, the depth is {room[i]:.9g}",
-            "correct the depth, the normal, or the support function",
-        )
+        wrong = np.where(r.depth >= 0, np.abs(room - r.depth), room - r.depth) > self.tolerance
+        what = "depth {:.9g}, normal {}: along it, by their support functions, the depth is {:.9g}"
+        cure = "correct the depth, the normal, or the support function"
+        self._found(known & wrong, what, cure, r.depth, r.normal, room)
 
     # -- two related poses ------------------------------------------------------------------------
 
@@ -140,19 +119,13 @@ class PairChecks:
         else:  # hollow or composite shapes may run into another piece, but not in most poses
             deep, far = left > 0.5 * r.depth + self.tolerance, np.zeros(len(hit), bool)
             deep &= (hit & deep).sum() > 0.5 * hit.sum()
-        cure = "depth is how far the second shape has to move along the normal until they part; normal points from the "
-        self._found(
-            hit & deep,
-            lambda i: f"depth {r.depth[i]:.9g}, normal {numbers_shown(r.normal[i])}: moved apart by that they still "
-            f"overlap, by {left[i]:.3g}",
-            cure + "first shape to the second",
+        cure = (
+            "depth is how far the second shape has to move along the normal until they part; normal points from the "
+            "first shape to the second"
         )
-        self._found(
-            hit & far,
-            lambda i: f"depth {r.depth[i]:.9g}, normal {numbers_shown(r.normal[i])}: moved apart by that they are "
-            f"{-left[i]:.3g} apart",
-            cure + "first shape to the second",
-        )
+        what = "depth {:.9g}, normal {}: moved apart by that they "
+        self._found(hit & deep, what + "still overlap, by {:.3g}", cure, r.depth, r.normal, left)
+        self._found(hit & far, what + "are {:.3g} apart", cure, r.depth, r.normal, -left)
 
     def _steadiness(self, r: Any) -> None:
         """A translation by s changes the distance by at most s: the search for the time of impact relies on it."""
@@ -163,15 +136,12 @@ class PairChecks:
         after = self._evaluate(self.d + step)
         both = np.isfinite(r.depth) & np.isfinite(after.depth)
         with np.errstate(invalid="ignore"):
-            change = np.where(both, after.depth - r.depth, 0.0)
-        jumps = change > moved + 2 * self.tolerance
+            jumps = both & (after.depth - r.depth > moved + 2 * self.tolerance)
         if not self.convex:
             jumps &= r.depth < 0  # the depth of overlapping pieces is arbitrary, their distance is not
-        self._found(
-            jumps,
-            lambda i: f"depth is {r.depth[i]:.9g}; the second shape moved by {moved[i]:.3g} it is {after.depth[i]:.9g}",
-            "apart, depth is minus the distance, or minus something smaller: fast bodies would pass through else",
-        )
+        what = "depth is {:.9g}; the second shape moved by {:.3g} it is {:.9g}"
+        cure = "apart, depth is minus the distance, or minus something smaller: fast bodies would pass through else"
+        self._found(jumps, what, cure, r.depth, moved, after.depth)
 
     def _turned_round(self, r: Any) -> None:
         """Two of one shape, with the roles exchanged."""
@@ -180,31 +150,20 @@ class PairChecks:
         with np.errstate(invalid="ignore"):
             unequal = both & (np.abs(r.depth - back.depth) > 2 * self.tolerance)
         cure = "write the function so that a and b may change places: depth stays, normal turns round"
-        self._found(
-            unequal,
-            lambda i: f"depth is {r.depth[i]:.9g}, and seen from the other shape {back.depth[i]:.9g}",
-            cure,
-        )
+        self._found(unequal, "depth is {:.9g}, and seen from the other shape {:.9g}", cure, r.depth, back.depth)
         along = (r.normal * back.normal).sum(axis=1)
         # With level centres either direction is right.
         level = (np.abs(self.d) <= 1e-6 * self.poses.scale()[:, None]).any(axis=1)
-        self._found(
-            both & ~unequal & ~level & (along > UNIT),
-            lambda i: f"the normal is {numbers_shown(r.normal[i])}, and seen from the other shape "
-            f"{numbers_shown(back.normal[i])}",
-            cure,
-        )
+        kept = both & ~unequal & ~level & (along > 1e-6)
+        self._found(kept, "the normal is {}, and seen from the other shape {}", cure, r.normal, back.normal)
         if not self.by_hand:
             return
         gap = np.abs(back.point - (r.point - self.d)).max(axis=1)
         same = (r.depth >= 0) & (along < -1 + 1e-9)
         slip = same & (gap > np.abs(r.depth) + self.tolerance)
         slip &= slip.sum() > 0.5 * same.sum()  # for touching faces any point of them is right
-        self._found(
-            slip,
-            lambda i: f"the points of contact seen from both sides are {gap[i]:.6g} apart",
-            "point counts from the centre of the first shape, and lies in the middle of the overlap",
-        )
+        cure = "point counts from the centre of the first shape, and lies in the middle of the overlap"
+        self._found(slip, "the points of contact seen from both sides are {:.6g} apart", cure, gap)
 
     # -- other ways to the same result ------------------------------------------------------------
 
@@ -249,28 +208,24 @@ class PairChecks:
             self._found_one(int(away[error.at]), f"the sweep raised {error}", "return (hit, time) for every input")
             return
 
-        def show(i: int) -> str:
-            return f"{pose_shown(poses, i)}, v = {numbers_shown(v[i])}"
+        def found(bad: np.ndarray, what: str, *values: np.ndarray) -> None:
+            cure = "time, from 0 to 1, is the part of v after which they touch for the first time"
+            show = lambda i: f"{pose_shown(poses, i)}, v = {tuple(v[i].tolist())}"  # noqa: E731
+            self.subject.found(bad, what, show, cure, *values)
 
-        cure = "time, from 0 to 1, is the part of v after which they touch for the first time"
         wrong = hit & ~((time >= 0) & (time <= 1))
-        self.subject.found(wrong, lambda i: f"the sweep's time is {time[i]!r}", show, cure)
+        found(wrong, "the sweep's time is {}", time)
         until = np.where(hit & ~wrong, time, 1.0)
-        speed = np.sqrt((v * v).sum(axis=1))
-        slack = tolerance + 1e-9 * speed
+        slack = tolerance + 1e-9 * np.sqrt((v * v).sum(axis=1))
         deepest = np.full(len(d), -np.inf)
         for part in np.linspace(0, 1, PATH, endpoint=False):
             depth = self.code(poses.a, poses.b, d + (part * until)[:, None] * v).depth
-            deepest = np.maximum(deepest, np.where(np.isnan(depth), -np.inf, depth))
+            deepest = np.fmax(deepest, depth)
         at_end = self.code(poses.a, poses.b, d + until[:, None] * v).depth
         late = deepest > slack
-        self.subject.found(
-            late, lambda i: f"on the way to time {until[i]:.9g} they overlap by {deepest[i]:.6g} already", show, cure
-        )
+        found(late, "on the way to time {:.9g} they overlap by {:.6g} already", until, deepest)
         off = hit & ~wrong & ~late & ~(np.abs(at_end) <= slack)
-        self.subject.found(
-            off, lambda i: f"at the sweep's time {time[i]:.9g} they do not touch: depth {at_end[i]:.6g}", show, cure
-        )
+        found(off, "at the sweep's time {:.9g} they do not touch: depth {:.6g}", time, at_end)
 
     # -- help -------------------------------------------------------------------------------------
 
@@ -278,14 +233,10 @@ class PairChecks:
         return self.code(self.poses.a, self.poses.b, d)
 
     def _said(self, r: Any, i: int) -> str:
-        depth = float(r.depth[i])
-        return f"({bool(r.hit[i])}, {depth!r}, {numbers_shown(r.normal[i])}, {numbers_shown(r.point[i])})"
+        return repr((bool(r.hit[i]), float(r.depth[i]), tuple(r.normal[i].tolist()), tuple(r.point[i].tolist())))
 
-    def _found(self, bad: np.ndarray, what: Any, cure: str) -> None:
-        self.subject.found(bad, what, lambda i: pose_shown(self.poses, i), cure)
+    def _found(self, bad: np.ndarray, what: str, cure: str, *values: np.ndarray) -> None:
+        self.subject.found(bad, what, lambda i: pose_shown(self.poses, i), cure, *values)
 
     def _found_one(self, at: int, what: str, cure: str) -> None:
-        bad = np.zeros(len(self.d), bool)
-        bad[at] = True
-        self._found(bad, lambda _: what, cure)
-        self.subject.findings[-1].share = ""
+        self.subject.findings.append(Finding(what, pose_shown(self.poses, at), cure))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import contextlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -242,13 +243,15 @@ class Subject:
     def place(self) -> str:
         return f"{self.kind} {self.name}" + (f", {self.dimensions}D" if self.dimensions else "")
 
-    def found(self, bad: np.ndarray, what: Any, example: Any, cure: str) -> bool:
-        """Record a finding where ``bad`` (n,) is true; ``what`` and ``example`` describe the first such row."""
+    def found(
+        self, bad: np.ndarray, what: str, example: Callable[[int], str], cure: str, *values: np.ndarray
+    ) -> None:
+        """Record a finding where ``bad`` (n,) is true; ``what`` is formatted with the values of the first such row."""
         at = np.flatnonzero(bad)
         if len(at):
             first = int(at[0])
-            self.findings.append(Finding(what(first), example(first), cure, f"{len(at)} of {len(bad)}"))
-        return len(at) > 0
+            of_row = (tuple(value[first].tolist()) if value.ndim > 1 else value[first].item() for value in values)
+            self.findings.append(Finding(what.format(*of_row), example(first), cure, f"{len(at)} of {len(bad)}"))
 
 
 @dataclass
@@ -268,11 +271,10 @@ class Report:
         return made
 
 
-def pose_shown(poses: Poses, at: int, d: Any = None, swapped: bool = False) -> str:
+def pose_shown(poses: Poses, at: int) -> str:
     """The input of a pair function, as text."""
-    d = poses.d[at] if d is None else d
-    a, b = (poses.b, poses.a) if swapped else (poses.a, poses.b)
-    return f"{KINDS[poses.kind[at]][0]}: a = {row_shown(a, at)}, b = {row_shown(b, at)}, d = {numbers_shown(d)}"
+    d = tuple(poses.d[at].tolist())
+    return f"{KINDS[poses.kind[at]][0]}: a = {row_shown(poses.a, at)}, b = {row_shown(poses.b, at)}, d = {d}"
 
 
 def row_shown(rows: Rows, at: int) -> str:
@@ -280,7 +282,3 @@ def row_shown(rows: Rows, at: int) -> str:
     turned = rows.shape.rotates and (rows.axes[at] != np.eye(len(rows.axes[at]))).any()
     axes = f", axes={plain(parameters.axes)!r}" if turned else ""
     return shown(parameters)[:-1].removesuffix(", ") + axes + ")"
-
-
-def numbers_shown(values: Any) -> str:
-    return repr(tuple(float(value) for value in values))

@@ -73,6 +73,14 @@ MISTAKES = {  # mistakes that pass registration, and the expected finding
         (TWIN, TWIN.replace("a.radius + b.radius", "2.0 * a.radius")),
         ("and seen from the other shape", "a and b may change places"),
     ),
+    "a normal to the first": (
+        (RETURN, RETURN.replace("depth, normal,", "depth, negative(normal),")),
+        ("moved apart by that they still overlap, by", "normal points from the first shape to the second"),
+    ),
+    "a normal that does not turn round": (
+        (TWIN, TWIN + "    d = scale(d, 1.0 if d[0] > 0.0 else -1.0)\n"),
+        ("moved apart by that they still overlap, by", "normal points from the first shape to the second"),
+    ),
     "a root of what may be negative": (
         (SPHERE, SPHERE + "    depth += 0.0 * math.sqrt(2.0 * a.radius - b.radius)\n"),
         ("nan", "guard the divisions and roots that fail there"),
