@@ -1,114 +1,20 @@
-"""Convex polygons: refused input, 10,000 poses against brute force over features, and falling, sliding, queries."""
+"""Convex polygons: refused input, falling, sliding, queries; their pairs are in test_shipped_pairs and test_convex."""
 
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 
 import numpy as np
 import pytest
-from oracles import convex_brute
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
-from carom.framework.compilation import inlined, kernel
-from carom.framework.vectors import row, store
 from carom.plugins import Physics, convex_polygon
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.standard_shapes import convex_convex
 
 pytestmark = pytest.mark.slow  # its scenes compile for long
 
-COUNT = 10_000
 SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
-
-Parameters = namedtuple("Parameters", "vertices corner_radius axes")
-support, rounding = inlined(ConvexPolygonCollider.support), inlined(ConvexPolygonCollider.rounding)
-bounds = inlined(ConvexPolygonCollider.bounds)
-
-
-@inlined
-def parameters(vertices, radii, angles, i):
-    axes = ((math.cos(angles[i]), math.sin(angles[i])), (-math.sin(angles[i]), math.cos(angles[i])))
-    return Parameters(vertices[i], radii[i], axes)
-
-
-@kernel
-def meet_all(a, b, offsets, depths, normals, points, half, like):
-    for i in range(len(offsets)):
-        one, two = parameters(a[0], a[1], a[2], i), parameters(b[0], b[1], b[2], i)
-        d = row(offsets, i, like)
-        _, depths[i], normal, point = convex_convex(one, two, d, support, support, rounding, rounding)
-        store(normals, i, normal)
-        store(points, i, point)
-        store(half, i, bounds(one, 2))
-
-
-def meet(a, b, offsets):
-    """Depths, normals, points, and half extents of a's boxes; a, b: (vertices (n, v, 2), radii (n,), angles (n,))."""
-    n = len(offsets)
-    results = np.zeros(n), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
-    meet_all(a, b, offsets, *results, (0.0, 0.0))
-    return results
-
-
-def in_world(polygons):
-    """The turned corners at their positions."""
-    vertices, _, angles = polygons
-    turn = np.array(((np.cos(angles), -np.sin(angles)), (np.sin(angles), np.cos(angles))))
-    return np.einsum("kjn,nvj->nvk", turn, vertices)
-
-
-def random_polygons(rng, corners, size=1.0):
-    """Corners on an ellipse, so convex, in random places of it; somewhere around the origin."""
-    angles = np.sort(rng.uniform(0, 2 * np.pi, (COUNT, corners)) * 0.1 + np.linspace(0, 1.7 * np.pi, corners), axis=1)
-    points = np.stack((np.cos(angles), np.sin(angles)), 2) * rng.uniform(0.2, 1, (COUNT, 1, 2))
-    return size * (points + rng.normal(size=(COUNT, 1, 2)) * 0.3)
-
-
-@pytest.mark.parametrize(("corners", "others", "ratio"), [
-    (3, 4, 1.0), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((5, 7, 1.0), (4, 4, 1e3), (3, 6, 1e-4)))
-])
-def test_random_poses_agree_with_brute_force(corners, others, ratio):
-    rng = np.random.default_rng(corners + others)
-    a = random_polygons(rng, corners), rng.uniform(0, 0.2, COUNT), rng.uniform(-10, 10, COUNT)
-    b = random_polygons(rng, others, ratio), rng.uniform(0, 0.2 * ratio, COUNT), rng.uniform(-10, 10, COUNT)
-    size = 1.0 + ratio
-    offsets = rng.normal(size=(COUNT, 2)) * size
-    offsets[:50] = 0.0
-    depths, normals, points, half = meet(a, b, offsets)
-    first, second = in_world(a), in_world(b) + offsets[:, None]
-    expected, _ = convex_brute.meet(first, second)
-    assert abs(depths - (expected + a[1] + b[1])).max() < 1e-13 * size  # measured 2e-15
-    along = convex_brute.overlap_along(first, second, normals)
-    tilt = np.where(expected < 0, 1e-14 * size / np.maximum(-expected, 1e-300), 0)  # of directions between near points
-    assert (abs(along - expected) - tilt * size).max() < 1e-12 * size
-    # The point lies in the middle of the overlap or gap, along the normal.
-    surface = np.einsum("nvk,nk->nv", first, normals).max(1) + a[1]
-    middle = np.einsum("nk,nk->n", points, normals) + depths / 2
-    assert (abs(middle - surface) - tilt * size).max() < 1e-12 * size
-    # The box around the turned polygon touches it.
-    np.testing.assert_allclose(half, abs(first).max(1) + a[1][:, None], rtol=1e-14)
-
-
-@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
-@pytest.mark.parametrize("ratio", [1.0, 1e12])
-def test_extreme_sizes(size, ratio):
-    """Two boxes side by side, and on top of each other; the small one in the middle of the large one's side."""
-    box = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))[None]
-    zero = np.zeros(1)
-    for at in ((1.0, 0.0), (0.0, -1.0), (0.0, 0.0)):
-        offset = np.array([at]) * size * (1.0 + ratio)
-        depths, normals, points, _ = meet((box * size * ratio, zero, zero), (box * size, zero, zero), offset)
-        away = 0.0 if any(at) else size * (1 + ratio)
-        assert depths[0] == pytest.approx(away, abs=1e-15 * size * ratio)
-        if any(at):
-            np.testing.assert_allclose(normals[0], at, atol=1e-15)
-            np.testing.assert_allclose(points[0], np.array(at) * size * ratio, atol=1e-15 * size * ratio)
-    far = np.array([[3e12, 4e12]]) * size
-    depths, normals, _, _ = meet((box * size, zero, zero), (box * size, zero, zero), far)
-    assert depths[0] == pytest.approx(-5e12 * size, rel=1e-11)
-    np.testing.assert_allclose(normals[0], (0.6, 0.8), atol=1e-11)
 
 
 @pytest.mark.parametrize(

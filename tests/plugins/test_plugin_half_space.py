@@ -1,90 +1,19 @@
-"""Half-spaces: the pair against the definition, unbounded ground in small and large worlds, in 2D and 3D."""
+"""Half-spaces: unbounded ground in small and large worlds, in 2D and 3D; their pairs are in test_shipped_pairs."""
 
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 
 import numpy as np
 import pytest
-from helpers_axes import axes_at
 from worlds import both_dimensions, mostly_2d
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
-from carom.framework.compilation import inlined, kernel
-from carom.framework.vectors import row, store
 from carom.plugins import Physics, half_space
 from carom.plugins.half_space import HalfSpaceCollider
 
 G = 10.0
-HalfSpace = namedtuple("HalfSpace", "normal axes")
-Box = namedtuple("Box", "half_extents radius")  # a rounded one
-convex = next(pair for (_, other), pair in half_space.plugin.pairs.items() if other is not HalfSpaceCollider).function
-box_support = inlined(AABBCollider.support)
-
-
-@inlined
-def box_rounding(shape):
-    return shape.radius
-
-
-@kernel
-def meet_all(normal, axes, half, radius, offsets, hits, depths, normals, points, like):
-    for i in range(len(offsets)):
-        one, two = HalfSpace(row(normal, i, like), axes_at(axes, i, like)), Box(row(half, i, like), radius[i])
-        hits[i], depths[i], n, p = convex(one, two, row(offsets, i, like), box_support, box_rounding)
-        store(normals, i, n)
-        store(points, i, p)
-
-
-def check(normal, axes, half, radius, offsets, tolerance=1e-14):
-    """Depth: that of the lowest corner below the plane; the point: halfway between that corner and the plane."""
-    n, d = offsets.shape
-    hits, depths, normals, points = np.zeros(n, bool), np.zeros(n), np.zeros((n, d)), np.zeros((n, d))
-    meet_all(normal, axes, half, radius, offsets, hits, depths, normals, points, (0.0,) * d)
-    units = np.einsum("nkj,nj->nk", axes, normal / np.abs(normal).max(1, keepdims=True))
-    units /= np.linalg.norm(units, axis=1, keepdims=True)
-    corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * d), -1).reshape(-1, d)
-    heights = np.einsum("ncd,nd->nc", offsets[:, None] + corners * half[:, None], units).min(1) - radius
-    size = np.abs(offsets).max(1) + half.max(1) + radius + 1e-300
-    assert (abs(depths + heights) / size).max() < tolerance
-    assert np.array_equal(hits, depths >= 0)
-    assert abs(normals - units).max() < 1e-14
-    assert (abs(np.einsum("nd,nd->n", points, units) + depths / 2) / size).max() < tolerance
-    assert (abs(points - offsets) <= half + radius[:, None] + abs(depths)[:, None] + 1e-9 * size[:, None]).all()
-    return depths, points
-
-
-@mostly_2d
-def test_ten_thousand_random_poses(d):
-    rng, n = np.random.default_rng(d), 10_000
-    axes = np.ascontiguousarray(np.linalg.qr(rng.normal(size=(n, d, d)))[0])
-    normal = rng.normal(size=(n, d)) * 10 ** rng.uniform(-3, 3, (n, 1))
-    depths, _ = check(
-        normal, axes, 10 ** rng.uniform(-2, 1, (n, d)), 10 ** rng.uniform(-2, 1, n), 10 * rng.normal(size=(n, d)))
-    assert 0.3 < (depths > 0).mean() < 0.9
-
-
-@mostly_2d
-def test_extremes(d):
-    """Sizes and lengths of normals from 1e-9 to 1e9, coincident centres, 1e12 away, points."""
-    poses = [
-        (scale, half * size, radius * size, offset * size)
-        for size in (1e-9, 1.0, 1e9) for scale in (1e-9, 1e9) for half in (0.0, 1.0, 1e-12) for radius in (0.0, 1.0)
-        for offset in (0.0, 1.0, -1e12, 1e-12)
-    ]  # fmt: skip
-    scales, halves, radii, offsets = map(np.array, zip(*poses, strict=True))
-    ones, axes = np.ones((len(poses), d)), np.array([np.eye(d)] * len(poses))
-    check(scales[:, None] * ones, axes, halves[:, None] * ones, radii, offsets[:, None] * ones)
-
-
-@mostly_2d
-def test_the_point_is_in_the_middle_of_a_face_that_lies_on_it(d):
-    """For a box on level ground, for any rounding."""
-    up, half, place = np.eye(d)[[1]], np.full((1, d), 2.0), np.full((1, d), 1.9)
-    _, points = check(up, np.eye(d)[None], half, np.zeros(1), place)
-    assert points[0] == pytest.approx([1.9, -0.05, *[1.9] * (d - 2)])
 
 
 def at(d, *place):
@@ -153,6 +82,8 @@ def test_bodies_rest_on_it_as_on_a_box(d):
             world.step()
         heights.append([place_of(world, entity)[1] for entity in entities])
         assert [len(world.contacts.of(entity)) for entity in entities] == [1] * 4
+        on_ground = world.contacts.of(entities[3])[0].point  # of a box: in the middle of its face
+        np.testing.assert_allclose(np.delete(on_ground, 1), np.delete(place_of(world, entities[3]), 1), atol=1e-9)
         world.close()
     heights = np.array(heights)
     assert np.abs(heights[0] - heights[1])[lows > 0].max() < 1e-12

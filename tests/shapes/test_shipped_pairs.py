@@ -1,4 +1,5 @@
-"""Every shipped convex pair: the normal attains the depth, and no other direction of many gives more distance."""
+"""Every shipped convex pair: the normal attains the depth, no other direction of many gives more distance, and the
+point lies between the two."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ SHAPES = (
     AABBCollider, CapsuleCollider, ConvexPolygonCollider, HalfSpaceCollider, OneWaySegmentCollider, SphereCollider
 )  # fmt: skip
 DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
-ROUNDING = 1e-9  # of distance and sizes
+ROUNDING = 1e-12  # of distance and sizes
 
 
 def registry():
@@ -94,6 +95,8 @@ def test_depth_and_normal_of(first, second, d):
         height = np.einsum("pd,pd->p", sign * cases.d, normal) - reach(other, -normal[:, None])[:, 0]
         np.testing.assert_allclose(found.normal, sign * normal, rtol=0, atol=1e-12)
         np.testing.assert_array_less(np.abs(-found.depth - height), allowed + 1e-300)
+        middle = sign * np.einsum("pd,pd->p", found.point - (0.0 if sign > 0.0 else cases.d), normal)
+        np.testing.assert_array_less(np.abs(middle + 0.5 * sign * found.depth), allowed + 1e-300)
         return
     attained = gap(cases, found.normal[:, None])[:, 0]
     worst = np.argmax(np.abs(attained + found.depth) - allowed)
@@ -102,10 +105,20 @@ def test_depth_and_normal_of(first, second, d):
     noise = rng.normal(size=(len(cases.d), DIRECTIONS, d))
     width = 10.0 ** rng.uniform(-6, 0, (len(cases.d), DIRECTIONS // 2, 1))
     near = found.normal[:, None] + width * noise[:, : DIRECTIONS // 2]
-    tried = gap(cases, unit(np.concatenate((near, noise[:, DIRECTIONS // 2 :]), axis=1))).max(axis=1)
+    tries = unit(np.concatenate((near, noise[:, DIRECTIONS // 2 :]), axis=1))
+    tried = gap(cases, tries).max(axis=1)
     if first is second is AABBCollider:  # apart, their depth is the gap along one axis: less than the distance
         tried = np.where(found.hit, tried, attained)
     worst = np.argmax(tried + found.depth - allowed)
     assert (tried <= -found.depth + allowed).all(), (worst, tried[worst], found.depth[worst])
+    if not {first, second} <= {AABBCollider, SphereCollider}:  # theirs lies on a face, or in the middle of the overlap
+        middle = reach(cases.a, found.normal[:, None])[:, 0] - 0.5 * found.depth
+        off = np.abs(np.einsum("pd,pd->p", found.normal, found.point) - middle) - allowed
+        if first is second is CapsuleCollider:  # whose segments cross: near there
+            off -= np.where(found.depth > cases.a.arrays["radius"] + cases.b.arrays["radius"], found.depth, 0.0)
+        assert (off <= 0.0).all(), (np.argmax(off), off.max())
+    for rows, place in ((cases.a, found.point), (cases.b, found.point - cases.d)):  # beside none of them
+        out = np.einsum("pkd,pd->pk", tries, place) - reach(rows, tries) - (np.abs(found.depth) + allowed)[:, None]
+        assert (out <= 0.0).all(), (np.argmax(out.max(axis=1)), out.max())
     assert found.hit.any()
     assert not found.hit.all()
