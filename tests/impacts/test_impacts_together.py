@@ -10,7 +10,6 @@ import pytest
 from worlds import both_dimensions
 
 from carom.lab import testing as kit
-from carom.systems.impacts.exact_sum import exact_sum
 from carom.systems.impacts.group import WORK
 
 each_collision = pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
@@ -191,16 +190,3 @@ def test_friction_of_several_takes_no_more_than_there_is(mode):
     velocity = kit.velocity(world, box)
     assert abs(velocity[0]) <= 1e-15
     assert velocity[1] == 1.0
-
-
-def test_exact_sums():
-    """The same to the bit in any order, odd, and right to the last place."""
-    rng = np.random.default_rng(0)
-    for count in (0, 1, 2, 3, 7, 40, 1000):
-        terms = rng.normal(size=count) * 10.0 ** rng.uniform(-12, 12, count)
-        total = exact_sum(terms, count)
-        assert exact_sum(-terms, count) == -total
-        for _ in range(5):
-            assert exact_sum(rng.permutation(terms), count) == total
-        assert total == pytest.approx(math.fsum(terms), rel=1e-15, abs=1e-300)
-    assert exact_sum(np.array([1e20, 1.0, -1e20]), 3) == 1.0

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from worlds import both_dimensions
 
 from carom.framework.jit.records.plain_view import PlainView
@@ -16,15 +14,12 @@ from carom.systems.broad_phase import boxes
 from carom.systems.ccd import search_bounds, time_of_impact
 from carom.systems.ccd.search_bounds import CONTINUOUS, DISCRETE, EVENT_DRIVEN, leaves_bounds_at
 from carom.systems.ccd.time_of_impact import APART, TOUCHES, first_touch
-from carom.systems.impacts.heap import heap_pop, heap_push
 from carom.systems.integration import trajectory
 from carom.systems.records import STATE
 
 pytestmark = pytest.mark.plain
 
 DT = 1 / 60
-
-numbers = st.floats(-10, 10).map(lambda x: round(x, 3))
 
 
 def fill(record, **fields):
@@ -38,43 +33,6 @@ def plain_zero(monkeypatch):
     """Parts of kernels run as plain Python here; the zero vector is all that only compiled code can make."""
     for module in (search_bounds, time_of_impact, trajectory):
         monkeypatch.setattr(module, "zero_of", lambda state: (0.0,) * state.dimensions)
-
-
-@settings(max_examples=150, deadline=None, derandomize=True)
-@given(st.floats(0, 10), numbers, numbers, numbers, st.floats(0.01, 2))
-def test_first_root_against_numpy(gap, c1, c2, c3, span):
-    """Exact for a parabola; never late for a cubic. Tolerance: double roots lose half of the digits."""
-    exact, cubic = (trajectory.first_root(gap, c1, c2, third, span) for third in (0.0, c3))
-    for root, third in ((exact, 0.0), (cubic, c3)):
-        polynomial = np.polynomial.Polynomial([gap, c1, c2, third])
-        times = np.linspace(0, min(root, span), 101)[1:-1]
-        assert (polynomial(times) >= -1e-12 * (gap + abs(c1) + abs(c2) + abs(third))).all()
-    found = [r.real for r in np.roots([c2, c1, gap]) if abs(r.imag) < 1e-12 and r.real > 1e-6] if c1 or c2 else []
-    if gap > 1e-3 and abs(c1 * c1 - 4 * c2 * gap) > 1e-3 and (abs(c2) > 1e-6 or not c2):
-        assert exact == pytest.approx(min(found, default=math.inf), rel=1e-8)
-
-
-@settings(max_examples=60, deadline=None, derandomize=True)
-@given(st.lists(st.one_of(st.none(), st.integers(0, 5)), max_size=60), st.integers(0, 2**32 - 1))
-def test_the_heap_against_sorted(orders, seed):
-    """Pushes (a time, many alike) and pops (None) in any order; the rest comes off sorted."""
-    rng, impacts = np.random.default_rng(seed), make_record(STATE, 2).impacts
-    room, view, waiting = len(orders) + 1, PlainView(impacts), []
-    fill(impacts, heap=np.arange(room), event_time=np.zeros(room), event_key=rng.permutation(room))
-    heap, times, keys = impacts.heap, impacts.event_time, impacts.event_key
-    for order in [*orders, *[None] * room]:
-        if order is not None:
-            place = heap[impacts.waiting]
-            times[place] = order
-            heap_push(view)
-            waiting.append((order, int(keys[place])))
-        elif impacts.waiting:
-            earliest = min(waiting)
-            waiting.remove(earliest)
-            heap_pop(view)
-            assert (times[heap[impacts.waiting]], keys[heap[impacts.waiting]]) == earliest
-        assert impacts.waiting == len(waiting)
-        assert sorted(heap.tolist()) == list(range(room))
 
 
 @both_dimensions

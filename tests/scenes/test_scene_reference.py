@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import each_mode, strikes
+from helpers_modes import strikes
 
 from carom.framework import Settings
-from carom.scenes import bouncing, drops, oblique, orbit, shots, spring, thermal_gas
+from carom.scenes import bouncing, orbit, shots, spring, thermal_gas
 
 OMEGA = 2 * math.pi
 
@@ -50,13 +50,6 @@ def test_spring_with_any_stiffness_and_damping_follows_its_formula(stiffness, da
         assert world.bodies.position[0, 0] == pytest.approx(expected, abs=3.2e-10)
 
 
-def test_spring_has_the_energy_of_its_amplitude():
-    with spring.build(Settings(dt=1 / 1000, integrator="rk4")) as world:
-        assert world.potential_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-15)
-        assert energy(run(world, 0.25)) == pytest.approx(OMEGA**2 / 2, rel=1e-9)
-        assert world.kinetic_energy() == pytest.approx(OMEGA**2 / 2, rel=1e-9)  # a quarter period: at the centre
-
-
 def return_error(method, steps, eccentricity):
     """Distance of the planet from its start after one orbit."""
     with orbit.build(Settings(dt=orbit.PERIOD / steps, integrator=method), eccentricity=eccentricity) as world:
@@ -90,18 +83,6 @@ def test_bouncing_from_another_height():
         np.testing.assert_allclose(hits.time, [math.sqrt(2 * 7.9 / 9.81)] * 2, rtol=1e-12)
 
 
-@each_mode
-@pytest.mark.parametrize("dt", [1 / 240, 1 / 60, 3 / 43, 1.0])
-def test_oblique_equal_and_elastic(mode, dt):
-    """B10: one impact at 2.2 s and the places at 3 s, to rounding."""
-    with oblique.build(Settings(dt=dt, collision=mode)) as world:
-        hits = strikes(world, round(3 / dt))
-        np.testing.assert_allclose(hits.time, [2.2], rtol=1e-12)
-        np.testing.assert_allclose(hits.normal, [(0.8, -0.6)], rtol=1e-12)
-        np.testing.assert_allclose(world.bodies.position, [(-0.512, 0.984), (0.512, -0.384)], atol=1e-12)
-        np.testing.assert_allclose(world.bodies.linear_velocity, [(0.36, 0.48), (0.64, -0.48)], atol=1e-12)
-
-
 @pytest.mark.parametrize(("n", "eta", "seed"), [(400, 0.3, 0), (400, 0.3, 7), (4, 0.01, 0), (100, 0.78, 1)])
 def test_thermal_gas_starts_warm_at_rest_as_a_whole_and_apart(n, eta, seed):
     """kT = <v^2> / 2 = 1, momentum 0, no overlap, and the requested fraction of the box."""
@@ -123,23 +104,6 @@ def test_thermal_gas_has_the_velocities_of_its_seed_with_normal_components():
     _, other = thermal_gas.initial_state(400, 0.3, 1)
     assert not np.any(first == other)
     assert np.mean(first**4) == pytest.approx(3.0, abs=3 * math.sqrt(24 / 800))
-
-
-def test_drops_have_the_published_times():
-    first = math.sqrt(2 * 4.9 / 9.81)
-    for n, time in enumerate(drops.impact_times(0.8, 200), 1):
-        assert time == pytest.approx(first * (1 + 1.6 * (1 - 0.8 ** (n - 1)) / 0.2), rel=1e-13)
-    assert drops.impact_times(0.8, 200)[-1] == pytest.approx(8.995412, abs=1e-6)
-
-
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_drops_come_to_rest(restitution):
-    """After T (1 + e) / (1 - e) <= 3 s it rests on the floor, no deeper than the slop and a quarter."""
-    with drops.build(restitution=restitution) as world:
-        run(world, 5.0)
-        body = world.bodies.dynamic
-        assert -1.25 * 0.005 * 0.2 < body.position[0, 1] - 0.1 <= 1e-12
-        assert np.abs(body.linear_velocity).max() < 1e-6
 
 
 STEPS = 6

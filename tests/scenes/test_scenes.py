@@ -175,10 +175,3 @@ def test_the_player_sees_what_brute_force_sees_and_pushes_what_it_meets():
     pushed = np.linalg.norm(world.bodies.dynamic.linear_velocity, axis=1) > 0.1
     assert 1 < pushed.sum() < 2000
     world.close()
-
-
-def test_every_scene_is_a_module_with_build():
-    for name in scenes.names():
-        world = getattr(scenes, name).build(Settings(), seed=1)
-        assert isinstance(world, World)
-        world.close()

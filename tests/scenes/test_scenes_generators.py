@@ -70,17 +70,6 @@ def test_gas(name, dimensions, n, seed):
         assert not np.any(world.gravity)
 
 
-@pytest.mark.parametrize("n", [1, 2, 999])
-def test_mixed2d_is_the_gas_with_boxes_at_the_odd_places(n):
-    positions, velocities = gas(n, 2)
-    with make("mixed2d", n=n) as world:
-        order = [*range(0, n, 2), *range(1, n, 2)]
-        mass = [1.0 if k % 2 else CIRCLE for k in order]
-        assert_bodies(world, positions[order], velocities[order], mass)
-        for k, entity in zip(order, world.bodies.dynamic.entity, strict=True):
-            assert material(world, entity) == ([0.5, 0.5] if k % 2 else [0.5], 1.0, None)
-
-
 @pytest.mark.parametrize(("n", "seed"), [(1, 0), (10, 2), (1000, 0), (1024, 0)])
 def test_pile2d(n, seed):
     width, per_row, u = 1.2 * math.sqrt(n), math.isqrt(n), draws(seed)
@@ -106,12 +95,6 @@ def test_pyramid(rows, friction, spacing):
         assert material(world, world.bodies.dynamic.entity[0]) == ([0.5, 0.5], 0.0, friction)
         assert material(world, world.bodies.static.entity[0]) == ([100.0, 0.5], 0.0, friction)
         assert world.bodies.static.position.tolist() == [[0.0, -0.5]]
-
-
-def test_a_large_pyramid_has_ground_to_stand_on():
-    with make("pyramid", rows=150, spacing=1.1) as world:
-        half = material(world, world.bodies.static.entity[0])[0][0]
-        assert np.abs(world.bodies.dynamic.position[:, 0]).max() + 0.5 < half
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 
 from carom.components import AABBCollider, Transform
 from carom.framework import Settings
-from carom.scenes import conveyor, galperin, lift, maze, platforms
+from carom.scenes import conveyor, lift, maze, platforms
 
 
 def reached(right, above):
@@ -104,12 +104,6 @@ def test_platforms_leave_ways_down_for_every_crate():
         assert bottoms.min() > max(height for *_, height in platforms.PLATFORMS)
         half = np.array([c.half_extents for _, (c,) in world.get_components(AABBCollider)])[-200:]
         np.testing.assert_allclose(world.bodies.dynamic.mass, 4 * half[:, 0] * half[:, 1], rtol=1e-15)
-
-
-def test_pi_in_counts():
-    assert [galperin.impacts(digits) for digits in range(8)] == [
-        3, 31, 314, 3141, 31415, 314159, 3141592, 31415926
-    ]  # fmt: skip
 
 
 G = 9.81

@@ -14,7 +14,6 @@ from worlds import ball, floor, make_world
 
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, StepError, System
-from carom.framework.schedule.clock import Clock
 
 
 def busy_world(**settings):
@@ -70,15 +69,6 @@ def test_frames_of_any_length_give_the_same_bits_per_step(hashes_by_step, method
     assert len(set(expected)) == len(expected)
 
 
-def test_plain_esper_gives_the_same_bits(hashes_by_step):
-    """esper.process(settings.dt) inside ``with world`` is a step."""
-    world = busy_world(integrator="velocity_verlet")
-    with world:
-        for _ in range(30):
-            esper.process(world.settings.dt)
-    assert world.state_hash() == hashes_by_step("velocity_verlet")[30]
-
-
 @pytest.mark.parametrize("rate", FRAME_RATES)
 def test_number_of_steps(rate):
     """After n frames exactly floor(n 60 / rate) steps, whatever the rounding of the sum of frames."""
@@ -87,16 +77,6 @@ def test_number_of_steps(rate):
         world.advance(1 / rate)
         assert world.step_count == n * 60 // rate
         assert world.alpha == pytest.approx(float(Fraction(n * 60, rate) % 1), abs=1e-9)
-
-
-def test_alpha_lies_between_zero_and_one():
-    world = make_world()
-    assert world.alpha == 0.0
-    for frame in frames_of("irregular"):
-        world.advance(frame)
-        assert 0.0 <= world.alpha <= 1.0
-    world.settings = world.settings.replace(dt=1e-6)  # the accumulated time is more than a step now
-    assert world.alpha == 1.0
 
 
 @pytest.mark.parametrize("rate", FRAME_RATES)
@@ -201,16 +181,6 @@ def test_seconds_that_are_none_are_refused(seconds):
     assert world.clock.state() == state
 
 
-def test_c7_time_gathers_no_rounding():
-    """C7: a million steps of 1/60 (summed one by one they would be off by 1.6e-7 s)."""
-    clock = Clock(1 / 60)
-    taken = sum(clock.gather(1 / 60, 8) for _ in range(1_000_000))
-    clock.step_count += taken
-    assert taken == 1_000_000
-    assert clock.time == 1_000_000 * (1 / 60)
-    assert clock.dropped_steps == 0
-
-
 def test_replacing_other_settings_leaves_time_exact():
     """Only a new dt starts a new count; a game that changes another setting in every step has no rounding either."""
     world = make_world()
@@ -293,13 +263,3 @@ def test_frames_after_a_step_that_failed():
     assert other.advance(4.5 / 60) == 4
     assert world.alpha == pytest.approx(0.5, abs=1e-9)
     assert world.state_hash() == other.state_hash()
-
-
-@pytest.mark.parametrize("dt", [1e-9, 1e-6, 0.25, 1.0, 10.0])
-def test_c7_extreme_steps_of_the_clock(dt):
-    """C7: frames of two and a half steps of any length."""
-    world = make_world(dt=dt, gravity=9.81)
-    world.create_entity(Transform((0, 0)), RigidBody())
-    assert [world.advance(2.5 * dt) for _ in range(4)] == [2, 3, 2, 3]
-    assert world.time == 10 * dt
-    assert world.bodies.linear_velocity[0, 1] == pytest.approx(-9.81 * 10 * dt, rel=1e-14)

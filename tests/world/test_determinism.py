@@ -52,16 +52,6 @@ def test_plain_esper_gives_the_same_bits_as_the_facade(integrator):
     assert np.isfinite(worlds[0].bodies.position).all()
 
 
-def test_repeated_runs_are_equal():
-    def run():
-        world = settled()
-        for _ in mixed_scene(world, Facade(world)):
-            pass
-        return state(world)
-
-    assert run() == run()
-
-
 N = 60
 
 
