@@ -7,10 +7,15 @@ import itertools
 import esper
 import numpy as np
 import pytest
-from helpers_contacts import ids, listen
+from helpers_filters import EVENTS, pairs
 from worlds import ball, floor, make_world, run
 
 from carom.components import RigidBody, SphereCollider, Transform
+
+
+def listen(world, told, *names):
+    for name in names or EVENTS:
+        world.on(name, lambda contact, name=name: told.append((name, contact.step, contact.entity_a, contact.entity_b)))
 
 
 def rain(restitution=0.5, **settings):
@@ -44,7 +49,7 @@ def test_begin_stay_end_in_order():
                 case "contact_end":
                     assert pair in touching
                     touching.remove(pair)
-        assert set(ids(world.contacts)) == touching
+        assert set(pairs(world.contacts)) == touching
     assert touching
 
 

@@ -128,7 +128,8 @@ def check_between(rows, first, second, expected):
     assert normals.tobytes() == b"".join(contact.normal.tobytes() for *_, contact in expected)
 
 
-@pytest.mark.parametrize("count", [2, 3, 7, 12, 150])
+@pytest.mark.plain
+@pytest.mark.parametrize("count", [2, 3, 7, 12, pytest.param(150, marks=pytest.mark.compiled)])
 def test_few_contacts_and_many(count):
     """Whatever the number of contacts beside the number of entities that have the component."""
     world, entities = crowd(count=count, seed=count)
@@ -244,9 +245,10 @@ def test_a_step_within_the_loop():
     assert seen == before
 
 
+@pytest.mark.plain
 def test_a_closed_world_says_so():
     """Also when the loop closes it; a list without rows asks nothing."""
-    world, _ = crowd()
+    world, _ = crowd(count=12)
     empty, full = make_world().contacts.begin, world.contacts.begin
     loop = full.pairs(RigidBody, Transform)
     next(loop)
@@ -258,8 +260,9 @@ def test_a_closed_world_says_so():
     assert [len(column) for column in empty.between(Tag, Tag)] == [0, 0, 0]
 
 
+@pytest.mark.plain
 def test_what_is_no_type():
-    world, _ = crowd()
+    world, _ = crowd(count=12)
     for verb in (world.contacts.pairs, world.contacts.between):
         for wrong in ([], Tag()):
             with pytest.raises(TypeError, match="component types"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers_contacts import ids
+from helpers_filters import pairs as ids
 from worlds import ball, both_dimensions, box, floor, make_world, run
 
 pytestmark = pytest.mark.plain

@@ -178,6 +178,7 @@ def test_a_replaced_integration_lets_nothing_sleep():
     assert not any(is_asleep(world, *boxes))
 
 
+@pytest.mark.plain
 def test_without_its_collider_the_last_sleeper_falls():
     world = sleepy_world()
     boxes = tower(world, 0.0, 1)
@@ -188,6 +189,7 @@ def test_without_its_collider_the_last_sleeper_falls():
     assert world.component_for_entity(boxes[0], Transform).position[1] < 0.0
 
 
+@pytest.mark.plain
 def test_turned_off_all_wake():
     world = sleepy_world()
     boxes = tower(world, 0.0)

@@ -257,6 +257,7 @@ def test_one_bullet_in_a_discrete_world():
     assert world.momentum()[0] == pytest.approx(without.momentum()[0] + 2000.0, rel=1e-12)
 
 
+@pytest.mark.plain
 @each_sweep
 def test_a_bullet_and_its_partners_partners(mode):
     """A bullet hits a ball that had nothing near it, which then hits another one far away, all in one step."""

@@ -121,6 +121,7 @@ def test_many_fast_bodies_in_several_rounds(mode, d):
         assert world.stats().counters["rounds"] > 0
 
 
+@pytest.mark.plain
 @both_dimensions
 @pytest.mark.parametrize("mode", ["discrete", "continuous", "event_driven"])
 def test_several_strike_one_at_the_same_time(mode, d):
@@ -179,6 +180,7 @@ def test_beyond_the_cap_nothing_is_lost(d, cap, pillar):
     assert capped > 0
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("cap", [1, 2])
 @each_sweep
 def test_what_loses_energy_sticks(mode, cap):
@@ -202,6 +204,7 @@ def test_what_loses_energy_sticks(mode, cap):
         world.close()
 
 
+@pytest.mark.plain
 def test_a_kinematic_body_runs_into_one_that_is_stopped():
     """It once continued to stop it without end."""
     world = mode_world("continuous", max_impacts_per_step=1)

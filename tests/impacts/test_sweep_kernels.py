@@ -1,4 +1,4 @@
-"""The small kernels of sweeps against brute force: roots, the heap, search bounds, touches on curved paths."""
+"""Search bounds against brute force: pairs known to stay apart, and when a deflected body leaves its bounds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from carom.framework.jit.records.record import make_record
 from carom.systems.broad_phase import boxes
 from carom.systems.ccd import search_bounds, time_of_impact
 from carom.systems.ccd.search_bounds import CONTINUOUS, DISCRETE, EVENT_DRIVEN, leaves_bounds_at
-from carom.systems.ccd.time_of_impact import APART, TOUCHES, first_touch
 from carom.systems.integration import trajectory
 from carom.systems.records import STATE
 
@@ -31,7 +30,7 @@ def fill(record, **fields):
 @pytest.fixture
 def plain_zero(monkeypatch):
     """Parts of kernels run as plain Python here; the zero vector is all that only compiled code can make."""
-    for module in (search_bounds, time_of_impact, trajectory):
+    for module in (search_bounds, trajectory):
         monkeypatch.setattr(module, "zero_of", lambda state: (0.0,) * state.dimensions)
 
 
@@ -98,57 +97,3 @@ def test_no_body_leaves_its_search_bounds_before_the_stated_time(mode, degree, d
         else:
             assert leaves == math.inf
     assert asked > 20
-
-
-def plain_sphere(state, _, a, __, b, d):
-    size, distance = state.bodies.min_extent, math.hypot(*d)
-    depth, normal = size[a] + size[b] - distance, tuple(x / distance for x in d)
-    return depth >= 0.0, depth, normal, normal
-
-
-def plain_box(state, _, a, __, b, d):
-    size = state.bodies.min_extent
-    overlaps = [size[a] + size[b] - abs(x) for x in d]
-    depth = min(overlaps)
-    normal = tuple(math.copysign(1.0, x) if k == overlaps.index(depth) else 0.0 for k, x in enumerate(d))
-    return depth >= 0.0, depth, normal, normal
-
-
-@both_dimensions
-@pytest.mark.parametrize("shape", [plain_sphere, plain_box])
-def test_first_touch_on_parabolas_against_sampling(shape, d, plain_zero, monkeypatch):
-    """Against 1000 moments and bisection between two; but for grazes, times agree to rounding over the slope."""
-    for name, answer in (("both_convex", True), ("is_corner_touch", False), ("sweep", (False, False, 0.0))):
-        monkeypatch.setattr(time_of_impact, name, lambda *_, answer=answer: answer)
-    monkeypatch.setattr(time_of_impact, "evaluate", shape)
-    rng, state, found, zero = np.random.default_rng(d), make_record(STATE, d), 0, (0.0,) * d
-    view, limits = PlainView(state), (0.0, 1e-3, 0.0)  # slop, stride, threshold
-    for _ in range(40):
-        fill(state.bodies, shape=np.zeros(2), min_extent=rng.uniform(0.1, 1.0, 2))
-        x0, x2 = rng.normal(size=d) * 2, rng.normal(size=d) * 3
-        x1 = -x0 * rng.uniform(0, 4) + rng.normal(size=d)
-        if shape(view, 0, 0, 0, 1, tuple(x0))[1] >= -1e-3:
-            continue
-
-        def depth(t, x0=x0, x1=x1, x2=x2):
-            return shape(view, 0, 0, 0, 1, tuple(x0 + x1 * t + x2 * t * t))[1]
-
-        times = np.linspace(0, 1, 1001)
-        depths = np.array([depth(t) for t in times])
-        if abs(depths.max()) < 1e-4:
-            continue
-        path = tuple(x0), tuple(x1), tuple(x2), zero
-        outcome, time, normal, _, at = first_touch(view, 0, 1, path, False, 0.0, 1.0, limits)
-        touched = depths >= 0.0
-        assert outcome == (TOUCHES if touched.any() else APART)
-        if not touched.any():
-            continue
-        low, high = times[touched.argmax() - 1], times[touched.argmax()]
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if depth(middle) >= 0.0 else (middle, high)
-        slope = -(x1 + 2 * high * x2) @ np.array(normal)
-        assert time == pytest.approx(high, abs=1e-13 / slope + 1e-15)
-        np.testing.assert_allclose(at, x0 + x1 * time + x2 * time * time, atol=1e-14)
-        found += 1
-    assert found > 10

@@ -202,6 +202,7 @@ WRONG = {
 }
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("message", WRONG)
 @pytest.mark.parametrize("empty", [True, False])
 def test_wrong_arguments(message, empty):
@@ -213,6 +214,7 @@ def test_wrong_arguments(message, empty):
     world.close()
 
 
+@pytest.mark.plain
 def test_wrong_shapes():
     world = make_world()
     for shape in (RigidBody(), 0.5, SphereCollider, SphereCollider.many(radius=1.0)):

@@ -143,6 +143,7 @@ def test_the_kernels_that_run_are_those_of_the_plan(name):
         assert all(array.name in text for array in plan.columns)
 
 
+@pytest.mark.plain
 def test_integrators_of_plugins_name_their_kernels():
     plugin = Plugin("flights")
 
@@ -161,6 +162,7 @@ def test_integrators_of_plugins_name_their_kernels():
     assert "mine" in {call.kernel for call in world.plan().kernels}
 
 
+@pytest.mark.plain
 def test_what_comes_later_is_in_the_plan_at_once():
     world = flying()
     assert "evaluate_pairs" not in {call.kernel for call in world.plan().kernels}
@@ -303,6 +305,7 @@ def test_the_solver_has_room_for_the_bodies_at_rest():
         assert len(world.physics.state.solver.body_row) >= COUNT
 
 
+@pytest.mark.plain
 def test_fields_at_their_defaults_are_distinguished_from_those_in_use():
     world = make_world()
     entity = world.create_entity(Transform((0.0, 0.0)), RigidBody())
@@ -317,6 +320,7 @@ def test_fields_at_their_defaults_are_distinguished_from_those_in_use():
     assert reasons["rotation"] == "what the game has set"
 
 
+@pytest.mark.plain
 def test_a_world_without_physics_has_a_plan():
     plan = World(settings=Settings()).plan()
     assert plan.entries == plan.kernels == plan.columns == ()
