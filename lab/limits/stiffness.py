@@ -161,7 +161,7 @@ def modes_of(world: World) -> Modes:
         if len(forces) > ALL:
             spaces = [_dominant(ask, len(forces)) for ask in (forces.stiffness, forces.drag)]
         basis = np.linalg.qr(np.concatenate(spaces, axis=1))[0]
-        return _modes_in(basis, *(_images(ask, basis) for ask in (forces.stiffness, forces.drag)), forces)
+        return _modes_in(basis, _images(forces.stiffness, basis), _images(forces.drag, basis), forces)
 
 
 def _images(apply: Apply, vectors: Floats) -> Floats:
