@@ -119,12 +119,12 @@ def _check_shape(subject: Subject, shape: Shape, dimensions: int) -> None:
     made = rows(shape, scale, rng.random(len(scale)) < 0.2, dimensions, rng)
     subject.inputs = len(scale)
     cure = "half extents are numbers of at least 0, or inf where the shape has no end"
-    wrong = ~(made.half >= 0).all(axis=1)  # also true for nan
+    wrong = ~(made.half >= 0).min(axis=1)  # also true for nan
     subject.found(wrong, "bounds returned {}", lambda i: row_shown(made, i), cure, made.half)
     said = made.half.copy()
     for i in range(0, len(said), 100):
         said[i] = shape.component.bounds(made.at(i), dimensions)  # type: ignore[attr-defined]
-    other = ~np.isclose(said, made.half, rtol=TOLERANCE, atol=0, equal_nan=True).all(axis=1)
+    other = ~np.isclose(said, made.half, rtol=TOLERANCE, atol=0, equal_nan=True).min(axis=1)
     what = "compiled, bounds are {}, as plain Python {}"
     subject.found(other, what, lambda i: row_shown(made, i), ALIKE, made.half, said)
     if shape.support is not None:
