@@ -9,8 +9,6 @@ from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import System
 from carom.framework.schedule import step
 
-pytestmark = pytest.mark.plain
-
 
 class Wind(System):
     def process(self, dt):
