@@ -290,16 +290,20 @@ class Entities(dict[int, dict[type[Any], Any]]):
                 others.append(entity)
                 continue
             self.note((entity,))
+            ours = False
             for component, handle in components.items():
+                ours = ours or members[component].ours
                 ids = gone.get(component)
                 if ids is None:
                     ids = gone[component] = []
                 ids.append(entity)
                 if isinstance(handle, Component):
                     handles.append(weakref.ref(handle))
-            log.touched.add(entity)
-        log.dirty = True
+            if ours:  # the table does not know of others
+                log.dirty = True
+                log.touched.add(entity)
         if others:
+            log.dirty = True
             self._delete_without_objects(others)
         components = handle = None
         log.lost += [handle for one in handles if (handle := one()) is not None]  # those that somebody holds

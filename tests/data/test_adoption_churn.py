@@ -13,8 +13,6 @@ from worlds import ball, make_world
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, System
 
-pytestmark = pytest.mark.usefixtures("invariants")
-
 world = helpers_adoption.world  # a fixture
 
 
