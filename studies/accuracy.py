@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -17,7 +16,7 @@ from carom.lab.reporting.progress import Bar
 from carom.lab.reporting.text import NOTHING, TextTable, compact, number
 from carom.lab.trading.charts import draw
 from carom.lab.trading.records import PYMUNK, CaseTrade, Cell, Curve, ErrorBar, Point
-from carom.lab.trading.report import TARGETS, cheapest, failures, order, remarks, target_text
+from carom.lab.trading.report import ENERGY_SQUARE, ERROR_UNIT, failures, order, remarks
 from carom.lab.trading.trade import trade
 
 from .page import PageOutput, shown_options
@@ -34,14 +33,14 @@ def accuracy_command(
     context: click.Context, scene: str, against: str | None, kept: Path, out: Path | None, as_json: bool,
     as_markdown: bool, into: Path | None,
 ) -> None:  # fmt: skip
-    """Measure a scene as `carom trade SCENE --thorough` does: a row per method, and the cheapest for each target."""
+    """Measure a scene as `carom trade SCENE --thorough` does: a row per method."""
     output = PageOutput(as_json, as_markdown, into, f"studies accuracy {scene}")
     command = shlex.join(["python", "-m", "studies", "accuracy", *context.meta[WORDS]])
     with Store(kept) as store, Bar(Console(stderr=True)) as bar:
         result = trade(scene, against_pymunk=against == PYMUNK, store=store, progress=bar, command=command)
     (case,) = result.cases
     others = published(case.scene, case.norm)
-    output.show(result, [summary(case), met(cheapest(case))], [*remarks(result), *[SOURCE] * bool(others)])
+    output.show(result, [summary(case)], [*remarks(result), *[SOURCE] * bool(others)])
     case.curves += others
     if out is not None:
         for path in draw(result, out):
@@ -49,6 +48,15 @@ def accuracy_command(
 
 
 # -- a short table -----------------------------------------------------------------------------------------------
+
+TARGETS = (0.1, 0.01, 0.001, 1e-6)
+
+
+def target_text(target: float, norm: str) -> str:
+    """`0.1 %` for a relative error; with the unit for a norm that has one."""
+    if norm == ENERGY_SQUARE:
+        return f"{target:g} {ERROR_UNIT}".replace("e-0", "e-")
+    return f"{100 * target:g} %" if target >= 1e-3 else f"{target:g}".replace("e-0", "e-")
 
 
 def summary(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
@@ -73,12 +81,6 @@ def summary(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
         f"its work per simulated second"
     )
     return TextTable(title, (*headings, *["failed"] * failing), rows)
-
-
-def met(table: TextTable) -> TextTable:
-    """The rows of the cheapest choices in which there is one: they have a step."""
-    step = table.headings.index("step, s")
-    return replace(table, rows=[row for row in table.rows if row[step] != NOTHING])
 
 
 def _step(curve: Curve, norm: str, target: float) -> str:

@@ -36,7 +36,7 @@ from ..reporting.progress import Bar
 from ..reporting.text import counted
 from .answer import Target, answer, recommended
 from .records import PYMUNK
-from .report import cheapest, measured, remarks, tables, write_csv, write_json
+from .report import remarks, tables, write_csv, write_json
 from .trade import Only, trade
 
 MARK = "carom trade"
@@ -103,9 +103,7 @@ def trade_command(
     if output.plain:
         for case in result.cases:
             click.echo("\n".join(answer(case, target)) + "\n")
-    shown = [table for norm in norms or [None] for table in tables(result, norm)]
-    shown += [cheapest(case) for case in measured(result)]
-    output.show(result, shown, remarks(result))
+    output.show(result, [table for norm in norms or [None] for table in tables(result, norm)], remarks(result))
     for path in files:
         click.echo(f"written: {path}", err=True)
     if target is not None and any(recommended(case, target) is None for case in result.cases):

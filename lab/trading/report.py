@@ -1,4 +1,4 @@
-"""A trade of accuracy for speed as tables and sentences: every point, its cost, and the best choices."""
+"""A trade of accuracy for speed as tables and sentences: every point and its cost."""
 
 from __future__ import annotations
 
@@ -7,41 +7,31 @@ import dataclasses
 import io
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from ..bench.report import machine_line
-from ..cli.usage_errors import Problem, did_you_mean
+from ..cli.usage_errors import Problem
 from ..engines.adapters import WEIGHTS
 from ..measure.norms import MEAN
 from ..reporting.text import NOTHING, TextTable, compact, number
-from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade, known_well, python_line
+from .records import TRUSTED, CaseTrade, Curve, ErrorBar, Point, Reference, Trade
 
 ENERGY_SQUARE, ERROR_UNIT = "energy_square", "J²"  # the norm that has a unit
 DOUBTED = "*"  # marks an error that is too close to the reference's own
-TARGETS = (0.1, 0.01, 0.001, 1e-6)
-ORDER_TOLERANCE = 0.3  # a larger difference between the observed and the theoretical order is significant
 
 
 def tables(trade: Trade, norm: str | None = None) -> list[TextTable]:
     """A table of all points for each case.
 
-    ``norm``: used for cases that have it; the others use their first one. Problem if no case has it.
+    ``norm``: used for cases that have it; the others use their first one.
     """
-    check_norm(trade, norm)
     return [points_table(case, norm_of(case, norm)) for case in measured(trade)]
 
 
 def measured(trade: Trade) -> list[CaseTrade]:
     """The cases that were not refused."""
     return [case for case in trade.cases if not case.refused]
-
-
-def check_norm(trade: Trade, norm: str | None) -> None:
-    """Problem for a norm that no case has."""
-    known = list(dict.fromkeys(name for case in trade.cases for name in case.norms))
-    if norm is not None and not {norm, MEAN + norm} & {*known}:
-        raise Problem(f"no case here has the norm {norm!r}{did_you_mean(norm, known)}")
 
 
 def norm_of(case: CaseTrade, norm: str | None) -> str:
@@ -97,14 +87,6 @@ def order(curve: Curve, norm: str) -> str:
     return text if theory is None else f"{text} ({theory:g})"
 
 
-def off_theory(curve: Curve, norm: str) -> bool:
-    """True if the observed order differs significantly from theory."""
-    found, theory = curve.orders.get(norm), curve.theory.get(norm)
-    if found is None or theory is None or theory == math.inf:
-        return False
-    return abs(found - theory) > ORDER_TOLERANCE
-
-
 def failures(point: Point) -> str:
     """`tunnelled` if all repeats did, else `3 of 64 tunnelled`; empty if none failed."""
     words = [
@@ -115,72 +97,12 @@ def failures(point: Point) -> str:
     return ", ".join(words)
 
 
-def cheapest(case: CaseTrade, targets: Sequence[float] = TARGETS) -> TextTable:
-    """For each target and engine, the setting of least work that meets it in all repeats."""
-    chosen, rows = case.norm, []
-    for target, engine, found in choices(case, targets):
-        words = (target_text(target, chosen), engine)
-        if found is None:
-            reason = "none" if case.reference.trusts(chosen, target) else "the reference is not exact enough to tell"
-            rows.append((*words, reason, *[NOTHING] * 4))
-            continue
-        curve, point = found
-        time = compact(point.milliseconds.median) if point.milliseconds else NOTHING
-        error = compact(point.errors[chosen].high)
-        rows.append((*words, curve.label, number(point.cell.dt), error, compact(point.work), time))
-    headings = ("target", "engine", "method", "step, s", worst_heading(case.reference, chosen), "work", "wall ms")
-    kept = "two standard errors beyond the mean" if case.reference.is_statistic(chosen) else "in every repeat"
-    title = f"{case.scene}: the least work per simulated second that keeps {chosen} below the target {kept}"
-    return TextTable(title, headings, rows, words=3)
-
-
-def choices(
-    case: CaseTrade, targets: Sequence[float] = TARGETS
-) -> list[tuple[float, str, tuple[Curve, Point] | None]]:
-    """Target, engine, and the curve and point of least work that meets it; None if there is none or it is unknown.
-
-    Engines are treated separately, because their counts are not comparable.
-    """
-    chosen = case.norm
-    engines = dict.fromkeys(point.cell.engine for point in case.points)
-    known = {point.cell for point in known_well(case.points)}
-    made: list[tuple[float, str, tuple[Curve, Point] | None]] = []
-    for target in targets:
-        for engine in engines:
-            meeting = [
-                (curve, point)
-                for curve in case.curves
-                for point in curve.points
-                if point.cell.engine == engine and point.cell in known and point.meets(chosen, target)
-            ]
-            usable = meeting and case.reference.trusts(chosen, target)
-            made.append((target, engine, min(meeting, key=lambda found: found[1].work) if usable else None))
-    return made
-
-
-def choice_lines(case: CaseTrade) -> list[str]:
-    """For each target that can be met: scene, target, engine, and the line of Python that meets it."""
-    return [
-        f"{case.scene}, {target_text(target, case.norm)}, {engine}: {python_line(found[1].cell)}"
-        for target, engine, found in choices(case)
-        if found is not None
-    ]
-
-
-def target_text(target: float, norm: str) -> str:
-    """`0.1 %` for a relative error; with the unit for a norm that has one."""
-    if norm != ENERGY_SQUARE and target >= 1e-3:
-        return f"{100 * target:g} %"
-    short = f"{target:g}".replace("e-0", "e-").replace("e+", "e")
-    return f"{short} {ERROR_UNIT}" if norm == ENERGY_SQUARE else short
-
-
 def remarks(trade: Trade) -> list[str]:
-    """The machine and, for each case, what was measured, against what, and how reliable it is; then what to paste."""
+    """The machine and, for each case, what was measured, against what, and how reliable it is."""
     lines = [machine_line(trade.machine), trade.command]
     for case in trade.cases:
         lines += [f"{case.scene}: {line}" for line in case_remarks(case, case.norm)]
-    return [*lines, *(line for case in measured(trade) for line in choice_lines(case))]
+    return lines
 
 
 def case_remarks(case: CaseTrade, norm: str) -> list[str]:
@@ -202,9 +124,6 @@ def case_remarks(case: CaseTrade, norm: str) -> list[str]:
             f"{DOUBTED} {len(doubted)} of the errors {'is' if len(doubted) == 1 else 'are'} below {compact(limit)},"
             f" {TRUSTED:g} times what the references differ by: too small to be told from the reference's own"
         )
-    off = [f"{curve.label} {order(curve, norm)}" for curve in case.curves if off_theory(curve, norm)]
-    if off:
-        lines.append(f"observed orders more than {ORDER_TOLERANCE:g} from the theory's: {', '.join(off)}")
     return lines
 
 
