@@ -1,4 +1,4 @@
-"""The sheet of a picture: dark theme, panels to scale, header, legend; works without a display."""
+"""The sheet of a picture: dark theme, to scale, header, legend; works without a display."""
 
 from __future__ import annotations
 
@@ -37,60 +37,40 @@ STYLE: dict[Any, Any] = {
     "legend.edgecolor": FRAME, "legend.labelcolor": TEXT,
 }  # fmt: skip
 styled = matplotlib.rc_context(STYLE)  # a decorator of what makes figures
-LONG_SIDE = 10.0  # inches, of the longer side of a single panel; the shorter follows from the view
-LONG_SIDE_OF_TWO = 7.2
-LONGEST_RATIO = 5.0  # of a panel's sides
+LONG_SIDE = 10.0  # inches, of the longer side; the shorter follows from the view
+LONGEST_RATIO = 5.0  # of the sides
 SHORTEST = 3.2  # inches
-HEADER, FOOTER, GAP = 0.95, 0.8, 0.35
-MARGIN = 0.45
+HEADER, FOOTER, MARGIN = 0.95, 0.8, 0.45
 
 View = tuple[np.ndarray, np.ndarray]
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One view: matplotlib's axes, and the number of points of the picture per unit of space."""
+@dataclass
+class Sheet:
+    """A figure with one view to scale, a header above and a footer below; points: of the picture per unit of space."""
 
+    figure: Figure
     axes: Any
     points: float
 
-    def outline(self, lower: np.ndarray, upper: np.ndarray) -> None:
-        """Frame the part of this panel that another panel magnifies."""
-        (x0, y0), (x1, y1) = lower, upper
-        self.axes.plot([x0, x1, x1, x0, x0], [y0, y0, y1, y1, y0], color=TEXT, lw=1.0, alpha=0.9, zorder=8)
-
-
-@dataclass
-class Sheet:
-    """A figure with panels side by side, each to scale, a header above and a footer below."""
-
-    figure: Figure
-    panels: list[Panel]
-
     @classmethod
     @styled
-    def new(cls, title: str, subtitle: str, views: list[View], numbered: bool) -> Sheet:
-        """``views``: two corners in the plane for each panel; ``numbered``: the first one has a scale."""
-        spans = [np.maximum(upper - lower, np.finfo(float).tiny) for lower, upper in views]
-        long_side = LONG_SIDE if len(views) == 1 else LONG_SIDE_OF_TWO
-        ratios = [float(np.clip(span[0] / span[1], 1 / LONGEST_RATIO, LONGEST_RATIO)) for span in spans]
-        height = max(SHORTEST, min(long_side, *(long_side / ratio for ratio in ratios)))
-        widths = [max(height * ratio, SHORTEST) for ratio in ratios]
-        size = np.array([sum(widths) + GAP * (len(views) - 1) + 2 * MARGIN, height + HEADER + FOOTER])
+    def new(cls, title: str, subtitle: str, view: View, numbered: bool) -> Sheet:
+        """``view``: two corners in the plane; ``numbered``: it has a scale."""
+        lower, upper = view
+        span = np.maximum(upper - lower, np.finfo(float).tiny)
+        ratio = float(np.clip(span[0] / span[1], 1 / LONGEST_RATIO, LONGEST_RATIO))
+        height = max(SHORTEST, min(LONG_SIDE, LONG_SIDE / ratio))
+        panel = np.array([max(height * ratio, SHORTEST), height])
+        size = panel + np.array([2 * MARGIN, HEADER + FOOTER])
         figure = Figure(figsize=tuple(size))
         FigureCanvasAgg(figure)
-        sheet, left = cls(figure, []), MARGIN
-        for number, ((lower, upper), span, width) in enumerate(zip(views, spans, widths, strict=True)):
-            axes = figure.add_axes((left / size[0], FOOTER / size[1], width / size[0], height / size[1]))
-            unit = min(width / span[0], height / span[1])  # inches per unit of space
-            middle, half = (lower + upper) / 2, np.array([width, height]) / unit / 2
-            axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
-            axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-            axes.tick_params(labelsize=7, length=2, pad=2)
-            if number or not numbered:
-                axes.tick_params(labelbottom=False, labelleft=False, length=0)
-            sheet.panels.append(Panel(axes, 72 * unit))
-            left += width + GAP
+        axes = figure.add_axes((MARGIN / size[0], FOOTER / size[1], *(panel / size)))
+        unit = float((panel / span).min())  # inches per unit of space
+        low, high = ((lower + upper + side * panel / unit) / 2 for side in (-1, 1))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.tick_params(labelsize=7, length=2 * numbered, pad=2, labelbottom=numbered, labelleft=numbered)
+        sheet = cls(figure, axes, 72 * unit)
         sheet.write(MARGIN, size[1] - HEADER + 0.54, title, color=TEXT, fontsize=17, fontweight="bold")
         sheet.write(MARGIN, size[1] - HEADER + 0.21, subtitle, color=MUTED, fontsize=9.5)
         return sheet

@@ -1,4 +1,4 @@
-"""Drawing of walls, bodies, contacts, arrows and paths into a panel."""
+"""Drawing of walls, bodies, contacts, arrows and paths into a sheet."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgba_array
 
 from ..measure.body_shapes import Floats, Shapes
 from . import canvas
-from .canvas import Panel
+from .canvas import Sheet
 from .projection import Projection, corners, edges, faces
 
 MOST_ARROWS = 1500  # in 2D; more could not be distinguished
@@ -22,13 +22,13 @@ FACE_SHADE = (0.3, 0.0, 0.5)  # of boxes, by the axis of the face's normal: ligh
 OUTLINED = 6.0  # points: smaller bodies have no outline
 
 
-def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
+def draw_walls(sheet: Sheet, walls: Shapes, projection: Projection) -> None:
     """Static geometry: filled in 2D, edges only in 3D; sensors dashed."""
-    draw_sensors(panel, walls.where(walls.sensor), projection, canvas.SENSOR, zorder=1.2)
+    draw_sensors(sheet, walls.where(walls.sensor), projection, canvas.SENSOR, zorder=1.2)
     walls = walls.where(~walls.sensor)
     if projection.flat:
         colours = np.tile(to_rgba_array(canvas.WALL), (len(walls.entity), 1))
-        _draw_flat(panel, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
+        _draw_flat(sheet, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
         return
     segments, filled = [], []
     for low, high in zip(walls.lower, walls.upper, strict=True):
@@ -36,25 +36,25 @@ def draw_walls(panel: Panel, walls: Shapes, projection: Projection) -> None:
         places, _, _ = projection.plane(corners(*seen))
         segments += [places[list(edge)] for edge in edges()]
         filled += [places[rows] for _, _, rows in faces()]
-    panel.axes.add_collection(PolyCollection(filled, facecolors=canvas.WALL, alpha=0.13, linewidths=0, zorder=1))
-    _lines(panel, segments, colors=canvas.WALL_EDGE, linewidths=0.6, alpha=0.7, zorder=1.1)
+    sheet.axes.add_collection(PolyCollection(filled, facecolors=canvas.WALL, alpha=0.13, linewidths=0, zorder=1))
+    _lines(sheet, segments, colors=canvas.WALL_EDGE, linewidths=0.6, alpha=0.7, zorder=1.1)
 
 
-def draw_bodies(panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3) -> None:
+def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3) -> None:
     """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors dashed."""
     if bodies.sensor.any():
-        draw_sensors(panel, bodies.where(bodies.sensor), projection, colours[bodies.sensor], zorder)
+        draw_sensors(sheet, bodies.where(bodies.sensor), projection, colours[bodies.sensor], zorder)
         colours, bodies = colours[~bodies.sensor], bodies.where(~bodies.sensor)
     if not len(bodies.entity):
         return
-    outline = 0.7 if bodies.typical_diameter * panel.points > OUTLINED else 0.0
+    outline = 0.7 if bodies.typical_diameter * sheet.points > OUTLINED else 0.0
     if projection.flat:
-        _draw_flat(panel, bodies, colours, canvas.PANEL, outline, zorder)
+        _draw_flat(sheet, bodies, colours, canvas.PANEL, outline, zorder)
     else:
-        _draw_solids(panel, bodies, colours, projection, outline, zorder)
+        _draw_solids(sheet, bodies, colours, projection, outline, zorder)
 
 
-def draw_sensors(panel: Panel, sensors: Shapes, projection: Projection, colour: Any, zorder: float) -> None:
+def draw_sensors(sheet: Sheet, sensors: Shapes, projection: Projection, colour: Any, zorder: float) -> None:
     """Hollow, with a dashed edge, in one ``colour`` or (n, 4) of them."""
     if not len(sensors.entity):
         return
@@ -64,7 +64,7 @@ def draw_sensors(panel: Panel, sensors: Shapes, projection: Projection, colour: 
     if len(discs.entity):
         places, magnification, _ = projection.plane(discs.centre)
         widths = 2 * discs.half[:, 0] * magnification
-        _ellipses(panel, places, widths, facecolors="none", edgecolors=colours[sensors.round], **dashed)
+        _ellipses(sheet, places, widths, facecolors="none", edgecolors=colours[sensors.round], **dashed)
     segments, edge_colours = [], []
     ends_of_edges = [(0, 1), (1, 3), (3, 2), (2, 0)] if projection.flat else edges()
     for low, high, edge_colour in zip(boxes.lower, boxes.upper, colours[~sensors.round], strict=True):
@@ -72,11 +72,11 @@ def draw_sensors(panel: Panel, sensors: Shapes, projection: Projection, colour: 
         segments += [places[list(edge)] for edge in ends_of_edges]
         edge_colours += [edge_colour] * len(ends_of_edges)
     if segments:
-        _lines(panel, segments, colors=edge_colours, **dashed)
+        _lines(sheet, segments, colors=edge_colours, **dashed)
 
 
 def _draw_solids(
-    panel: Panel, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
+    sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, outline: float, zorder: float
 ) -> None:
     """Balls and boxes as polygons in one list, painted from far to near; balls with a highlight."""
     places, magnification, depth = projection.plane(bodies.centre)
@@ -100,26 +100,27 @@ def _draw_solids(
                 fill.append(canvas.mixed(shade[k], canvas.BACKGROUND, FACE_SHADE[axis]))
                 edge.append(dark)
     style: dict[str, Any] = {"linewidths": 0.6 * outline, "zorder": zorder}
-    panel.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
+    sheet.axes.add_collection(PolyCollection(polygons, facecolors=fill, edgecolors=edge, **style))
 
 
-def draw_contacts(panel: Panel, points: Floats, normals: Floats, diameter: float, projection: Projection) -> None:
-    """A dot at each contact point, with a line along its normal; ``diameter`` is a typical body's."""
+def draw_contacts(sheet: Sheet, points: Floats, normals: Floats, diameter: float, projection: Projection) -> bool:
+    """A dot at each contact point, with a line along its normal; ``diameter`` is a typical body's. False for none."""
     if not len(points) or (not projection.flat and len(points) > MOST_CONTACTS_3D):
-        return
-    size = float(np.clip(0.16 * diameter * panel.points, 1.6, 5.0))
-    length = float(np.clip(0.28 * diameter * panel.points, 2.5, 12.0)) / panel.points
+        return False
+    size = float(np.clip(0.16 * diameter * sheet.points, 1.6, 5.0))
+    length = float(np.clip(0.28 * diameter * sheet.points, 2.5, 12.0)) / sheet.points
     places, _, _ = projection.plane(points)
     ends, _, _ = projection.plane(np.stack([points - length * normals, points + length * normals], axis=1))
-    _lines(panel, list(ends), colors=canvas.CONTACT, linewidths=0.9, alpha=0.9, zorder=5)
+    _lines(sheet, list(ends), colors=canvas.CONTACT, linewidths=0.9, alpha=0.9, zorder=5)
     style = {"color": canvas.CONTACT, "ms": size, "mec": canvas.PANEL, "mew": 0.4}
-    panel.axes.plot(places[:, 0], places[:, 1], "o", **style, zorder=6)
+    sheet.axes.plot(places[:, 0], places[:, 1], "o", **style, zorder=6)
+    return True
 
 
-def draw_arrows(panel: Panel, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float) -> float:
+def draw_arrows(sheet: Sheet, bodies: Shapes, velocity: Floats, projection: Projection, top_speed: float) -> float:
     """Velocity arrows of the visible bodies; returns how many seconds an arrow stands for (0: none)."""
     start, _, depth = projection.plane(bodies.centre)
-    x, y = panel.axes.get_xlim(), panel.axes.get_ylim()
+    x, y = sheet.axes.get_xlim(), sheet.axes.get_ylim()
     visible = (start[:, 0] > x[0]) & (start[:, 0] < x[1]) & (start[:, 1] > y[0]) & (start[:, 1] < y[1])
     chosen = np.flatnonzero(visible & (bodies.speed > 0.02 * top_speed) & np.isfinite(bodies.speed))
     if not len(chosen):
@@ -133,7 +134,7 @@ def draw_arrows(panel: Panel, bodies: Shapes, velocity: Floats, projection: Proj
     seconds = _round_number(wanted / top_speed)
     end, _, _ = projection.plane(bodies.centre[chosen] + seconds * velocity[chosen])
     way = end - start[chosen]
-    panel.axes.quiver(
+    sheet.axes.quiver(
         start[chosen, 0], start[chosen, 1], way[:, 0], way[:, 1], angles="xy", scale_units="xy", scale=1,
         units="dots", width=1.5, headwidth=4, headlength=4.5, headaxislength=4, minlength=0.5,
         color=canvas.TEXT, alpha=0.85, zorder=4,
@@ -141,7 +142,7 @@ def draw_arrows(panel: Panel, bodies: Shapes, velocity: Floats, projection: Proj
     return seconds
 
 
-def draw_paths(panel: Panel, positions: Floats, colours: Floats, projection: Projection) -> None:
+def draw_paths(sheet: Sheet, positions: Floats, colours: Floats, projection: Projection) -> None:
     """Paths (samples, bodies, d) that fade with age; a jump across a third of the view is not connected."""
     stride = max(1, positions.shape[0] * positions.shape[1] // MOST_SEGMENTS)
     positions = np.concatenate([positions[:-1:stride], positions[-1:]])
@@ -157,31 +158,31 @@ def draw_paths(panel: Panel, positions: Floats, colours: Floats, projection: Pro
     else:
         opacity, width = 0.25 + 0.75 * age**1.2, 0.9 + 1.3 * age
     rgba[..., 3] = opacity if projection.flat else opacity * (0.25 + 0.75 * depth[1:])
-    _lines(panel, list(segments[drawn]), colors=rgba[drawn], linewidths=width[drawn], capstyle="butt", zorder=2.5)
+    _lines(sheet, list(segments[drawn]), colors=rgba[drawn], linewidths=width[drawn], capstyle="butt", zorder=2.5)
 
 
-def _draw_flat(panel: Panel, shapes: Shapes, colours: Floats, edge: str, outline: float, zorder: float) -> None:
+def _draw_flat(sheet: Sheet, shapes: Shapes, colours: Floats, edge: str, outline: float, zorder: float) -> None:
     discs, boxes = shapes.where(shapes.round), shapes.where(~shapes.round)
     style: dict[str, Any] = {"edgecolors": edge, "linewidths": outline, "zorder": zorder}
     if len(discs.entity):
-        _ellipses(panel, discs.centre, 2 * discs.half[:, 0], facecolors=colours[shapes.round], **style)
+        _ellipses(sheet, discs.centre, 2 * discs.half[:, 0], facecolors=colours[shapes.round], **style)
     if len(boxes.entity):
         signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         polygons = list(boxes.centre[:, None] + signs * boxes.half[:, None])
-        panel.axes.add_collection(PolyCollection(polygons, facecolors=colours[~shapes.round], **style))
+        sheet.axes.add_collection(PolyCollection(polygons, facecolors=colours[~shapes.round], **style))
 
 
-def _ellipses(panel: Panel, centres: Floats, widths: Floats, **style: Any) -> None:
+def _ellipses(sheet: Sheet, centres: Floats, widths: Floats, **style: Any) -> None:
     """Circles to scale."""
-    transform = panel.axes.transData
+    transform = sheet.axes.transData
     angles = np.zeros(len(widths))
-    panel.axes.add_collection(
+    sheet.axes.add_collection(
         EllipseCollection(widths, widths, angles, units="xy", offsets=centres, offset_transform=transform, **style)
     )
 
 
-def _lines(panel: Panel, segments: list[Floats], **style: Any) -> None:
-    panel.axes.add_collection(LineCollection(segments, **style))
+def _lines(sheet: Sheet, segments: list[Floats], **style: Any) -> None:
+    sheet.axes.add_collection(LineCollection(segments, **style))
 
 
 def _round_number(value: float) -> float:

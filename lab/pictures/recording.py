@@ -46,11 +46,10 @@ class Recording:
         norm = canvas.speed_norm(np.concatenate([shapes.speed[~shapes.static] for shapes in self.frames]))
         images = []
         for shapes in self.frames:
-            sheet = Sheet.new(run.report.scene, "", [projection.frame()], numbered=False)
-            (panel,) = sheet.panels
+            sheet = Sheet.new(run.report.scene, "", projection.frame(), numbered=False)
             bodies = shapes.where(~shapes.static & (np.abs(shapes.centre) < DRAWABLE).all(axis=1))
-            draw_walls(panel, shapes.where(shapes.static), projection)
-            draw_bodies(panel, bodies, canvas.SPEED(norm(bodies.speed)), projection)
+            draw_walls(sheet, shapes.where(shapes.static), projection)
+            draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
             images.append(Image.fromarray(sheet.pixels(DPI)))
             drawn(len(images))
         file.parent.mkdir(parents=True, exist_ok=True)

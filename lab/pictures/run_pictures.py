@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +11,15 @@ from matplotlib.colors import to_rgba_array
 
 from ..measure.body_shapes import QUIET, Floats, Shapes, shapes_of
 from ..measure.paths import Traces
-from ..measure.run import Run, RunReport
+from ..measure.run import Run
 from ..reporting.text import counted
 from . import canvas
-from .canvas import Panel, Sheet
-from .marks import MOST_CONTACTS_3D, draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
+from .canvas import Sheet
+from .marks import draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
 from .projection import Projection, corners
 
-SMALLEST_LEGIBLE = 5.0  # points: below this typical diameter a second panel magnifies a part
-MAGNIFIED_DIAMETER = 20.0  # points
 CROWD_3D = 500  # untraced bodies that would hide the paths behind them
-SOME = 60  # up to this number of bodies the starts are shown
-FEW = 3  # up to this number of bodies the shapes are repeated along the path
-GHOSTS = 14  # number of repetitions
+FEW, GHOSTS = 3, 14  # bodies up to which the shapes are repeated along the path, and how often
 DRAWABLE = 1e30  # larger coordinates are not drawn
 UNTRACED = "#1b2431"
 HUGE = 5.0  # times the extent of everything smaller: such static bodies are clipped by the view
@@ -128,31 +124,23 @@ def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas
 
 
 def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:
-    """All shapes to scale, coloured by speed, with velocities and contacts; a crowd gets a magnified part."""
+    """All shapes to scale, coloured by speed, with velocities and contacts."""
     report, shapes = run.report, still.shapes
     bodies, velocity = shapes.where(still.moving), still.velocity[still.moving]
     norm = canvas.speed_norm(bodies.speed)
-    part = _magnified(bodies, projection)
+    kinds = [f"{report.bodies[kind]:,} {kind}" for kind in ("dynamic", "kinematic") if report.bodies[kind]]
     subtitle = (
-        f"{_moving_bodies(report)} after {report.simulated_seconds:.4g} s ({counted(report.steps, 'step')})"
-        f"   ·   {counted(len(still.points), 'contact')}   ·   {report.settings['integrator']}"
+        f"{' and '.join(kinds) or 'no moving'} bodies after {report.simulated_seconds:.4g} s "
+        f"({counted(report.steps, 'step')})   ·   {counted(len(still.points), 'contact')}   ·   "
+        f"{report.settings['integrator']}"
     )
-    views = [frame, *([part] if part else [])]
-    sheet = Sheet.new(report.scene, subtitle, views, numbered=projection.flat)
-    colours = canvas.SPEED(norm(bodies.speed))
-    for panel in sheet.panels:
-        draw_walls(panel, shapes.where(shapes.static), projection)
-        draw_bodies(panel, bodies, colours, projection)
-    detail = sheet.panels[-1]
-    draw_contacts(detail, still.points, still.normals, bodies.typical_diameter, projection)
-    seconds = draw_arrows(detail, bodies, velocity, projection, float(norm.vmax or 1.0))
-    if part:
-        sheet.panels[0].outline(*part)
-
+    sheet = Sheet.new(report.scene, subtitle, frame, numbered=projection.flat)
+    draw_walls(sheet, shapes.where(shapes.static), projection)
+    draw_bodies(sheet, bodies, canvas.SPEED(norm(bodies.speed)), projection)
+    drawn = draw_contacts(sheet, still.points, still.normals, bodies.typical_diameter, projection)
+    seconds = draw_arrows(sheet, bodies, velocity, projection, float(norm.vmax or 1.0))
     legend = [(r"$\rightarrow$", canvas.TEXT, f"the way in {seconds:.2g} s")] if seconds else []
-    if len(still.points) > 0 and (projection.flat or len(still.points) <= MOST_CONTACTS_3D):
-        legend.append(("o", canvas.CONTACT, "contact"))
-    sheet.legend(legend)
+    sheet.legend([*legend, *[("o", canvas.CONTACT, "contact")] * drawn])
     sheet.speed_scale(norm)
     return sheet
 
@@ -161,68 +149,34 @@ def draw_traces(run: Run, still: Still, projection: Projection, frame: canvas.Vi
     """The paths, one colour per body, fading with age; the traced bodies at their present positions."""
     traces, shapes, report = run.traces, still.shapes, run.report
     count, moved = len(traces.entities), traces.moved
-    over = f"{report.simulated_seconds:.4g} s"
-    if traces.impacts is not None:
-        over = f"{counted(report.steps, 'step')} of {report.settings['dt']:.4g} s"
-    if not report.bodies["total"] and not count:
-        subtitle = "no bodies"
-    elif not count:
-        subtitle = f"nothing moved in {over}"
-    elif count < moved:
-        subtitle = f"paths of {count:,} of the {moved:,} bodies that moved, those that went farthest, over {over}"
-    else:
-        that_moved = "path of the one body" if count == 1 else f"paths of the {count:,} bodies"
-        subtitle = f"{that_moved} that moved, over {over}"
-    subtitle += ", fading into the past" if count else ""
+    farthest = ", those that went farthest" * (count < moved)
+    subtitle = f"paths of {count:,} of {counted(moved, 'body', 'bodies')} that moved{farthest}, over "
+    subtitle += f"{counted(report.steps, 'step')}, {report.simulated_seconds:.4g} s, fading into the past"
     if traces.impacts is not None:
         subtitle += f"   ·   {report.settings['collision']}"
-    sheet = Sheet.new(report.scene, subtitle, [frame], numbered=projection.flat)
-    panel = sheet.panels[0]
-    draw_walls(panel, shapes.where(shapes.static), projection)
-
+    sheet = Sheet.new(report.scene, subtitle, frame, numbered=projection.flat)
+    draw_walls(sheet, shapes.where(shapes.static), projection)
     traced = np.isin(shapes.entity, traces.entities)
     others, followed = shapes.where(still.moving & ~traced), shapes.where(still.moving & traced)
     if projection.flat or len(others.entity) <= CROWD_3D:
         faint = np.tile(to_rgba_array(UNTRACED), (len(others.entity), 1))
-        draw_bodies(panel, others, faint, projection, zorder=2)
+        draw_bodies(sheet, others, faint, projection, zorder=2)
     palette = to_rgba_array(canvas.BODY_COLOURS)
     colours = palette[np.arange(count) * 5 % len(palette)]  # bodies with consecutive ids get different colours
     if count and len(traces.positions) > 1:
-        draw_paths(panel, traces.corners, colours, projection)
+        draw_paths(sheet, traces.corners, colours, projection)
     own = colours[np.searchsorted(traces.entities, followed.entity)] if count else np.zeros((0, 4))
-    if 0 < count <= SOME:
-        _draw_starts(panel, traces, followed, own, projection)
     if 0 < count <= FEW or (count and traces.impacts is not None):
-        _draw_ghosts(panel, traces, followed, own, projection)
-    draw_bodies(panel, followed, own, projection)
+        _draw_ghosts(sheet, traces, followed, own, projection)
+    draw_bodies(sheet, followed, own, projection)
     if traces.impacts:
         points, normals = (np.array([getattr(one, name) for one in traces.impacts]) for name in ("point", "normal"))
-        draw_contacts(panel, points, normals, followed.typical_diameter, projection)
+        draw_contacts(sheet, points, normals, followed.typical_diameter, projection)
         sheet.legend([("o", canvas.CONTACT, "impact")])
     return sheet
 
 
-def _moving_bodies(report: RunReport) -> str:
-    """`12 bodies and 2 kinematic ones`; static ones are not counted."""
-    dynamic, kinematic = report.bodies["dynamic"], report.bodies["kinematic"]
-    if not dynamic and not kinematic:
-        return "no bodies" if not report.bodies["total"] else "only static bodies"
-    parts = [counted(dynamic, "dynamic body", "dynamic bodies")] * bool(dynamic)
-    parts += [counted(kinematic, "kinematic body", "kinematic bodies")] * bool(kinematic)
-    return " and ".join(parts)
-
-
-def _draw_starts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
-    """The start positions, faintly."""
-    paths = traces.positions[:, np.searchsorted(traces.entities, followed.entity)]
-    first = np.isfinite(paths).all(axis=2).argmax(axis=0)  # a body may have been created later
-    places = paths[first, np.arange(len(first))]
-    faint = colours.copy()
-    faint[:, 3] = 0.16
-    draw_bodies(panel, replace(followed, centre=places), faint, projection, zorder=2.2)
-
-
-def _draw_ghosts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
+def _draw_ghosts(sheet: Sheet, traces: Traces, followed: Shapes, colours: Floats, projection: Projection) -> None:
     """The shapes at equal time intervals along the path."""
     positions = traces.positions
     when = np.unique(np.linspace(0, len(positions) - 1, GHOSTS).round().astype(int))[:-1]
@@ -231,19 +185,4 @@ def _draw_ghosts(panel: Panel, traces: Traces, followed: Shapes, colours: Floats
         places = places[np.isfinite(places).all(axis=1)]
         repeated = np.tile(colours[row], (len(places), 1))
         repeated[:, 3] = np.linspace(0.12, 0.4, len(places))
-        draw_bodies(panel, followed.where(np.array([row])).at(places), repeated, projection, zorder=2.7)
-
-
-def _magnified(bodies: Shapes, projection: Projection) -> tuple[Floats, Floats] | None:
-    """2D, bodies too small to be legible: the region around the fastest one, for a second panel."""
-    if not projection.flat or not len(bodies.entity):
-        return None
-    lower, upper = projection.lower, projection.upper
-    per_unit = 72 * canvas.LONG_SIDE_OF_TWO / float((upper - lower).max())
-    diameter = bodies.typical_diameter * per_unit
-    if not 0 < diameter < SMALLEST_LEGIBLE:
-        return None
-    half = (upper - lower) * diameter / MAGNIFIED_DIAMETER / 2
-    middle = bodies.centre[int(np.argmax(bodies.speed))]
-    middle = np.clip(middle, lower + half, upper - half)
-    return middle - half, middle + half
+        draw_bodies(sheet, followed.where(np.array([row])).at(places), repeated, projection, zorder=2.7)
