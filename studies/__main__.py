@@ -18,7 +18,7 @@ from carom.lab.reporting.text import TextTable
 
 from . import ladder, limits, scaling, settings, startup
 from .accuracy import accuracy_command
-from .page import PageOutput, page_command, shown_options
+from .page import PageOutput, shown_options
 from .runner import Axis, Result, run
 from .stages import stages_command
 
@@ -106,7 +106,7 @@ def _command(name: str, study: Study) -> click.Command:
 
 for _name, _study in STUDIES.items():
     cli.add_command(_command(_name, _study))
-for _other in (accuracy_command, page_command, stages_command):
+for _other in (accuracy_command, stages_command):
     cli.add_command(_other)
 
 if __name__ == "__main__":

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,19 +39,6 @@ class PageOutput(Output):
             listed = ["\n".join(f"- {remark}" for remark in remarks)] if remarks else []
             replace_between_marks(self.into, self.mark, as_markdown(tables, listed))
             click.echo(f"tables: {self.into}", err=True)
-
-
-@click.command("page", context_settings={"ignore_unknown_options": True})
-@click.argument("page", type=click.Path(path_type=Path, dir_okay=False))
-@click.argument("words", nargs=-1, required=True, type=click.UNPROCESSED)
-def page_command(page: Path, words: tuple[str, ...]) -> None:
-    """Put what `carom WORDS --markdown` prints into a page, between the marks with the words before all options."""
-    mark = " ".join(["carom", *itertools.takewhile(lambda word: not word.startswith("-"), words)])
-    between_marks(page, mark)
-    done = subprocess.run([sys.executable, "-m", "carom", *words, "--markdown"], stdout=subprocess.PIPE, text=True)
-    if done.returncode:
-        raise click.exceptions.Exit(done.returncode)
-    replace_between_marks(page, mark, done.stdout.strip())
 
 
 def between_marks(path: Path, name: str) -> tuple[str, str, str]:

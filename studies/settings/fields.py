@@ -23,7 +23,6 @@ from . import scenes as at
 ENOUGH = 0.03  # s of processor time per repeat: shorter runs are repeated until then
 WARM_UP = 2  # steps, not timed
 ATTEMPTS = 5  # to time a run in which no kernel is compiled or loaded
-Play = Callable[[World, float], float]
 
 
 def steps(world: World, seconds: float) -> float:
@@ -42,7 +41,6 @@ class Varied:
     values: the values tried; the ratios are relative to the value in ``others`` or in Settings
     errors: units by name; ``measure`` returns the errors, ``words`` describe them
     seconds: duration of the runs whose errors are measured; ``timed``: of the timed runs
-    play: advances a world by that many seconds in the timed runs, and returns the seconds simulated
     """
 
     field: str
@@ -55,7 +53,6 @@ class Varied:
     seconds: float
     timed: float
     others: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    play: Play = steps
 
     @property
     def base(self) -> Settings:
@@ -85,7 +82,7 @@ class Varied:
         with self.world(value) as world:
             steps(world, WARM_UP * world.settings.dt)
             before = counts_of(world)
-            span = timed(lambda: self.play(world, self.timed))
+            span = timed(lambda: steps(world, self.timed))
             done = {name: amount - before[name] for name, amount in counts_of(world).items()}
         return span, work_of(done) / span[2]
 
@@ -111,7 +108,6 @@ IMPACTS_LOST = (
     "discs that end outside the walls; impacts that are missing beside a run with all impacts at their true times, "
     "of which a hundredth is chance"
 )
-SAME = {"elsewhere": "bodies"}
 
 VARIED: tuple[Varied, ...] = (
     Varied(
@@ -186,13 +182,6 @@ VARIED: tuple[Varied, ...] = (
     ),
     Varied("slop", "stack of 10", at.scene_of("stack"), (None, 0.0, 0.1), at.rest, OVERLAP, RESTS, 5.0, 1.0),
     Varied(
-        "max_steps_per_advance", "platforms", at.scene_of("platforms"), (1, 2, 4, 8, 16, 32), at.dropped,
-        {"dropped": "% dropped", "longest": "steps"},
-        "60 frames a second are asked for, and each thirtieth takes a quarter of a second: time that is not simulated, "
-        "steps of the longest frame",
-        8 * at.CYCLE, 5 * at.CYCLE, {"max_impacts_per_step": 32}, at.frames,
-    ),
-    Varied(
         "max_impacts_per_step", "galperin", at.scene_of("galperin"), (None, 1, 4, 64, 1000), at.counted_pi,
         {"missing": "% missed", "energy": "% energy lost"},
         "impacts that are missing of the 314 that two blocks and a wall must have, and kinetic energy that is lost; "
@@ -204,40 +193,7 @@ VARIED: tuple[Varied, ...] = (
         0.5, 0.5, {"collision": "continuous"},
     ),
     Varied(
-        "restitution_mixing", "two balls", at.head_on, at.RULES, at.bounced, {"shown": ""},
-        "restitution that shows when balls of 0.9 and 0.4 meet", 0.2, 1.0,
-    ),
-    Varied(
-        "friction_mixing", "sliding box", at.sliding, at.RULES, at.slowed, {"shown": ""},
-        "friction that shows when a box of 0.9 slides on a floor of 0.4", 0.4, 0.5,
-    ),
-    Varied(
-        "broad_phase", "slow gas", partial(at.with_every_pair, n=1000), ("automatic", at.EVERY_PAIR),
-        at.same_as(broad_phase="automatic"), SAME,
-        f"bodies that end elsewhere than with the default, of 1,000; {at.EVERY_PAIR!r} is a plugin of this study "
-        "that compares all boxes with all",
-        0.5, 1 / 12,
-    ),
-    Varied(
-        "debug", "slow gas", at.scene_of("gas2d"), (False, True), at.culprit, {**SAME, "unnamed": "unnamed"},
-        "bodies that end elsewhere than without, of 1,000; whether a system that makes a velocity nan stays unnamed in "
-        "world.faults",
-        0.5, 0.5,
-    ),
-    Varied(
-        "debug", "jump", at.scene_of("jump"), (False, True), at.same_as(debug=False), SAME,
-        "bodies that end elsewhere than without, in a world of one body, whose steps cost least", 1.0, 0.8,
-    ),
-    Varied(
-        "on_fault", "jump", at.scene_of("jump"), ("warn", "raise", "ignore"), at.same_as(on_fault="warn"), SAME,
-        "bodies that end elsewhere than with the default, in a world without faults", 1.0, 0.8,
-    ),
-    Varied(
         "sleeping", "pyramid of 210", at.scene_of("pyramid", rows=20), (False, True), at.rest, OVERLAP, RESTS, 5.0, 5.0
-    ),
-    Varied(
-        "sleeping", "slow gas", at.scene_of("gas2d"), (False, True), at.same_as(sleeping=False), SAME,
-        "bodies that end elsewhere than without, of 1,000, in a world in which nothing comes to rest", 0.5, 0.5,
     ),
 )  # fmt: skip
 

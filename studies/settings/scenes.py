@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import Phase, Plugin, Settings, System, World
+from carom.framework import Settings, World
 from carom.lab import testing as kit
 from carom.lab.cases.closed_forms import FORMS
 from carom.lab.engines.adapters import CaromEngine
-from carom.lab.measure.body_shapes import Enclosure, Floats
+from carom.lab.measure.body_shapes import Enclosure
 from carom.lab.measure.norms import NORMS
 from carom.lab.measure.observation import Seen, observe
 from carom.plugins import Physics
@@ -194,132 +193,3 @@ def false_contacts(make: Make, seconds: float) -> Errors:
             world.step()
             counts.append(len(world.contacts))
     return {"false": 100 * (1 - counts[1] / counts[0])}
-
-
-# -- mixing -----------------------------------------------------------------------------------------------------
-
-FIRST, SECOND = 0.9, 0.4  # the two bodies' values
-RULES = ("max", "min", "average", "multiply", "geometric_mean")
-
-
-def head_on(settings: Settings) -> World:
-    """Two balls of equal mass that meet at 1 m/s, one of restitution FIRST, the other of SECOND."""
-    world = World(Physics(dimensions=2, gravity=(0.0, 0.0)), settings=settings)
-    for x, speed, restitution in ((0.0, 1.0, FIRST), (1.01, 0.0, SECOND)):
-        kit.ball(world, x, speed, restitution=restitution)
-    return world
-
-
-def bounced(make: Make, seconds: float) -> Errors:
-    """The observed restitution: they part at so many m/s, having approached at 1 m/s."""
-    with make() as world:
-        _run(world, seconds)
-        return {"shown": float(np.diff(CaromEngine(world).velocity[:, 0])[0])}
-
-
-def sliding(settings: Settings) -> World:
-    """A box with friction FIRST that slides at 5 m/s on a floor with friction SECOND."""
-    world = World(Physics(dimensions=2, gravity=(0.0, -GRAVITY)), settings=settings)
-    kit.floor(world, friction=SECOND)
-    kit.box(world, (0.0, 0.5), 5.0, friction=FIRST)
-    return world
-
-
-def slowed(make: Make, seconds: float) -> Errors:
-    """The observed coefficient of friction: (v0 - v) / g t."""
-    with make() as world:
-        before = world.bodies.dynamic.linear_velocity[0, 0]
-        _run(world, seconds)
-        return {"shown": float(before - world.bodies.dynamic.linear_velocity[0, 0]) / (GRAVITY * world.time)}
-
-
-# -- settings that must change nothing --------------------------------------------------------------------------
-
-EVERY_PAIR = "every pair"
-every_pair = Plugin("every pair of boxes")
-
-
-@every_pair.broad_phase(EVERY_PAIR)
-class EveryPair:
-    """Compares all boxes with all others, without a spatial index."""
-
-    def pairs(self, lower: Floats, upper: Floats, moving: int) -> tuple[Any, Any]:
-        """Rows of overlapping boxes."""
-        overlap = np.ones((moving, len(lower)), bool)
-        for axis in range(lower.shape[1]):
-            overlap &= lower[:moving, axis, None] <= upper[:, axis]
-            overlap &= lower[:, axis] <= upper[:moving, axis, None]
-        first, second = np.nonzero(np.triu(overlap, 1))
-        return first, second
-
-
-def with_every_pair(settings: Settings, *, n: int) -> World:
-    """The gas, with this additional broad phase available."""
-    world = scene_of("gas2d", n=n)(settings.replace(broad_phase="automatic"))
-    world.add_plugin(every_pair)
-    world.settings = settings
-    return world
-
-
-def same_as(**default: Any) -> Callable[[Make, float], Errors]:
-    """The number of bodies whose final position differs in any bit from that with ``default``."""
-    return partial(_elsewhere, default)
-
-
-def _elsewhere(default: dict[str, Any], make: Make, seconds: float) -> Errors:
-    places = []
-    for changes in ({}, default):
-        with make() as world:
-            world.settings = world.settings.replace(**changes)
-            engine = CaromEngine(world)
-            _run(world, seconds)
-            places.append(engine.position)
-    return {"elsewhere": float((places[0] != places[1]).any(axis=1).sum())}
-
-
-class Spoiler(System):
-    """A user error: in the third step a body's velocity becomes NaN."""
-
-    phase = Phase.FORCES
-
-    def process(self, dt: float) -> None:
-        del dt
-        if self.world.step_count == 2:
-            self.world.bodies.dynamic.linear_velocity[0] = math.nan
-
-
-def culprit(make: Make, seconds: float) -> Errors:
-    """Bodies that differ from a run without debug, and whether the first fault fails to name the culprit system."""
-    errors = _elsewhere({"debug": False}, make, seconds)
-    with make() as world:
-        world.add_system(Spoiler())
-        _run(world, 4 * world.settings.dt)
-        named = "Spoiler" in next(iter(world.faults), "")
-    return {**errors, "unnamed": 0.0 if named else 1.0}
-
-
-# -- frames -----------------------------------------------------------------------------------------------------
-
-FRAME, SLOW_FRAME, EVERY = 1 / 60, 1 / 4, 30  # s, s, frames: one slow frame about every half second
-CYCLE = (EVERY - 1) * FRAME + SLOW_FRAME  # s
-
-
-def frames(world: World, seconds: float) -> float:
-    """Play whole cycles of frames in which every EVERY-th frame is slow; returns the seconds played."""
-    cycles = round(seconds / CYCLE)
-    for _ in range(cycles):
-        _cycle(world)
-    return cycles * CYCLE
-
-
-def _cycle(world: World) -> list[int]:
-    """The steps taken in each frame."""
-    return [world.advance(SLOW_FRAME if k == EVERY - 1 else FRAME) for k in range(EVERY)]
-
-
-def dropped(make: Make, seconds: float) -> Errors:
-    """% of the time played that was not simulated, and the number of steps in the longest frame."""
-    with make() as world:
-        taken = [count for _ in range(round(seconds / CYCLE)) for count in _cycle(world)]
-        gone = world.stats().counters.get("dropped_steps", 0)
-    return {"dropped": 100 * gone / (gone + sum(taken)), "longest": float(max(taken))}

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.trading.charts import TIME, WORK, figure
+from carom.lab.trading.charts import TIME, figure
 from carom.lab.trading.records import Trade
 from studies import ladder, startup
 from studies.__main__ import STUDIES, cli
@@ -79,20 +79,6 @@ def test_a_study_prints_json_draws_and_fills_a_page(studies, tmp_path):
     assert text.endswith("\n\n<!-- end of studies limits -->\nafter\n")
 
 
-def test_what_a_command_prints_goes_into_a_page(studies, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("# Mine\n\n<!-- carom bench -->\nold\n<!-- end of carom bench -->\nend\n")
-    refused = studies("page", "page.md", "bench", "--scenes", "nothing")
-    assert (refused.exit_code, "old" in page.read_text()) == (2, True)
-    done = studies("page", "page.md", "bench", "--scenes", "gas2d", "--sizes", "20", "--repeats", "1", "--no-peer")
-    assert done.exit_code == 0, done.output
-    text = page.read_text()
-    assert "| gas2d 20 |" in text
-    assert "old" not in text
-    assert text.startswith("# Mine\n\n<!-- carom bench -->\n\n**ms per step")
-    assert text.endswith("\n\n<!-- end of carom bench -->\nend\n")
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -104,7 +90,6 @@ def test_what_a_command_prints_goes_into_a_page(studies, tmp_path):
         (("scaling", "--repeats", "0"), "0 is not in the range x>=1"),
         (("limits", "--json", "--markdown"), "--json and --markdown exclude each other"),
         (("limits", "--into", "nowhere.md"), "--into nowhere.md: No such file"),
-        (("page", "page.md", "bench", "--repeats", "2"), "it has no line <!-- carom bench -->"),
         (("accuracy", "spring", "--into", "page.md"), "it has no line <!-- studies accuracy spring -->"),
     ],
 )
@@ -191,11 +176,9 @@ def test_published_points_follow_the_laws_that_are_known_of_them():
 def test_published_points_share_the_axes_of_wall_time():
     case = made.bouncing()
     case.curves += published("bouncing", "energy_square")
-    by_time, by_work = figure(case, TIME), figure(case, WORK)
-    drawn = {line.get_label(): line for line in by_time.axes[0].get_lines()}
+    drawn = {line.get_label(): line for line in figure(case, TIME).axes[0].get_lines()}
     for engine in ("RaiSim", "ODE", "Bullet", "DART"):
-        assert len(drawn[f"{engine}, published"].get_xdata()) == 5
-    assert "The work of 20 points is not known: they are not here." in by_work.legends[0].get_title().get_text()
+        assert len(drawn[f"_{engine}, published"].get_xdata()) == 5
 
 
 def test_the_summary_has_the_largest_step_of_each_method_that_meets_a_target():
