@@ -13,7 +13,7 @@ from carom.lab.cli.group import Commands
 from carom.lab.cli.main import in_command
 from carom.lab.cli.options import out_option, traceback_option, writable_folder
 from carom.lab.cli.usage_errors import Problem, did_you_mean
-from carom.lab.reporting.progress import Bar
+from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
 from . import ladder, limits, scaling, settings, startup
@@ -91,7 +91,7 @@ def _command(name: str, study: Study) -> click.Command:
         output = PageOutput(as_json, as_markdown, into, f"studies {name}")
         if out is not None:
             writable_folder(out)
-        with Bar(Console(stderr=True)) as bar:
+        with Progress(Console(stderr=True)) as bar:
             result = run(axes, repeats or (1 if quick else study.repeats), bar)
         output.show(result, *study.report(result))
         if out is not None and study.draw is not None:

@@ -12,7 +12,7 @@ from rich.console import Console
 from carom.lab.cli.options import WORDS, KeepsWords, out_option
 from carom.lab.jobs.runs import Store
 from carom.lab.measure.timing import Spread
-from carom.lab.reporting.progress import Bar
+from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import NOTHING, TextTable, compact, number
 from carom.lab.trading.charts import draw
 from carom.lab.trading.records import PYMUNK, CaseTrade, Cell, Curve, ErrorBar, Point
@@ -36,7 +36,7 @@ def accuracy_command(
     """Measure a scene as `carom trade SCENE --thorough` does: a row per method."""
     output = PageOutput(as_json, as_markdown, into, f"studies accuracy {scene}")
     command = shlex.join(["python", "-m", "studies", "accuracy", *context.meta[WORDS]])
-    with Store(kept) as store, Bar(Console(stderr=True)) as bar:
+    with Store(kept) as store, Progress(Console(stderr=True)) as bar:
         result = trade(scene, against_pymunk=against == PYMUNK, store=store, progress=bar, command=command)
     (case,) = result.cases
     others = published(case.scene, case.norm)

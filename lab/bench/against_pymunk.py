@@ -82,12 +82,6 @@ class Case:
         settings = settings or Settings(**self.subject.settings)
         return function(settings, seed, **self.subject.build_options(self.size))
 
-    def effort(self) -> float:
-        """Estimated cost for one engine, in steps of one gas body."""
-        steps = self.subject.windows[-1].shortened(self.size).last if self.subject.windows else 100
-        size = 1275 if self.subject.size_option == "rows" else self.size
-        return max(size, 200) * steps * self.subject.effort
-
 
 def bench(
     subjects: Iterable[Subject],
@@ -98,11 +92,12 @@ def bench(
 ) -> Result:
     """Measure every subject at every size, ``repeats`` times; with ``peer=False`` only carom."""
     cases = [Case(subject, size) for subject in subjects for size in sizes_of(subject, sizes)]
-    progress.begin(sum(case.effort() for case in cases) * repeats)
+    progress.begin(len(cases) * repeats)
     for repeat in range(repeats):
         for case in cases:
             progress.say(f"{case.subject.name} {case.size:,}, repeat {repeat + 1} of {repeats}")
-            _run(case, repeat, peer, progress)
+            _run(case, repeat, peer)
+            progress.advance(1)
     settings = {CAROM: {}, **({"pymunk": {}} if peer else {})}
     if cases:
         with contextlib.closing(cases[0].build(0, Settings())) as world:
@@ -112,7 +107,7 @@ def bench(
     return Result(machine(), settings, repeats, [row for case in cases for row in _rows(case)])
 
 
-def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
+def _run(case: Case, repeat: int, peer: bool) -> None:
     """One repeat of one case, by all engines."""
     waited = log.waited
     if repeat == 0:
@@ -128,33 +123,29 @@ def _run(case: Case, repeat: int, peer: bool, progress: Progress) -> None:
             indexes = indexes[:1]
         for index in indexes:
             engines[index] = PymunkSpace(world, index)
-        before = progress.done
         if case.subject.windows:
             with contextlib.closing(case.build(repeat)) as other:
-                _run_windows(case, other, engines, progress)
+                _run_windows(case, other, engines)
         else:
             for query, answers in time_queries(world, engines, case.bodies, repeat).items():
                 case.timed[query] = Query.COUNT
                 for name, (seconds, figures) in answers.items():
                     case.note(query, name, seconds, figures)
-        progress.advance(case.effort() - (progress.done - before))
     if peer and case.peer is None:
         case.peer = min(indexes, key=lambda index: sum(by_engine[index][0][0] for by_engine in case.found.values()))
     case.compile_seconds += log.waited - waited
 
 
-def _run_windows(case: Case, other: World, engines: Engines, progress: Progress) -> None:
+def _run_windows(case: Case, other: World, engines: Engines) -> None:
     """other: a world like carom's that takes no steps, in which overlaps are measured."""
     quality = {name: Quality(other) for name in engines}
     taken = 0
-    whole = case.subject.windows[-1].shortened(case.bodies).last
     for window in case.subject.windows:
         window = window.shortened(case.bodies)
         with no_garbage_collection():
             for engine in engines.values():
                 engine.step(window.first - taken)
-        progress.advance(case.effort() * (window.first - taken) / whole)
-        seconds = _run_window(case, window, engines, quality, progress, case.effort() / whole)
+        seconds = _run_window(case, window, engines, quality)
         case.timed[window.name] = window.last - window.first
         for name, engine in engines.items():
             case.note(window.name, name, seconds[name], quality[name].figures(*engine.state()))
@@ -162,12 +153,7 @@ def _run_windows(case: Case, other: World, engines: Engines, progress: Progress)
 
 
 def _run_window(
-    case: Case,
-    window: Window,
-    engines: Engines,
-    quality: dict[str, Quality],
-    progress: Progress,
-    effort_per_step: float,
+    case: Case, window: Window, engines: Engines, quality: dict[str, Quality]
 ) -> dict[str, list[float]]:
     """Seconds of each step, by engine; of steps in which a kernel came, none."""
     for seen in quality.values():
@@ -185,7 +171,6 @@ def _run_window(
                         seconds[name].append(taken[name][0])
         for name, engine in engines.items():
             quality[name].sample(engine.state()[0])
-        progress.advance(effort_per_step * (last - first))
     if not seconds[CAROM]:
         raise Problem(f"{case.subject.name}: kernels were compiled in all steps; run it once more")
     return seconds

@@ -11,7 +11,7 @@ from ..cli.options import listed, out_option, shown_options, whole_number
 from ..cli.usage_errors import Problem
 from ..engines.pymunk_space import pymunk_module
 from ..reporting.output import Output, drawing_into
-from ..reporting.progress import Bar
+from ..reporting.progress import Progress
 from . import report as bench_report
 from .against_pymunk import bench
 from .suite import LARGE, SIZES, SUITE, subjects
@@ -60,7 +60,7 @@ def bench_command(
     repeats = repeats or (QUICK_REPEATS if quick else REPEATS)
     output, charts = Output(as_json, as_markdown), drawing_into(out, "bench.charts")
     peer = not no_peer and _peer_there()
-    with Bar(Console(stderr=True)) as bar:
+    with Progress(Console(stderr=True)) as bar:
         result = bench(wanted, asked, repeats, peer, bar)
     output.show(result, bench_report.tables(result), bench_report.remarks(result))
     if charts is not None:

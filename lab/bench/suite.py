@@ -42,7 +42,6 @@ class Subject:
     ``energy``: "kept": kinetic energy must be conserved, shown as a percentage; "left": it must be dissipated, shown in
     joules; "": neither
     ``targets``: by (window, bodies); bodies 0 means any number
-    ``effort``: approximate time per body and step relative to the gas; used for the remaining time
     """
 
     scene: str
@@ -54,7 +53,6 @@ class Subject:
     sizes: tuple[int, ...] | None = None
     size_option: str = "n"
     targets: Mapping[tuple[str, int], float] = field(default_factory=lambda: MappingProxyType({}))
-    effort: float = 1.0
 
     @property
     def name(self) -> str:
@@ -93,7 +91,6 @@ def _pyramid(friction: float, target: float) -> Subject:
         sizes=(50,),
         size_option="rows",
         targets={("", 0): target},
-        effort=4.0,
     )
 
 
@@ -109,15 +106,14 @@ SUITE: tuple[Subject, ...] = (
         (Window("falling", 0, 300), Window("settled", 600, 900)),
         energy="left",
         targets={("falling", 1000): 2.0, ("settled", 1000): 4.0, ("falling", 10_000): 2.0, ("settled", 10_000): 8.0},
-        effort=6.0,
     ),
     _pyramid(0.6, 4.0),
     _pyramid(0.0, 5.0),
     Subject("static_world", AFTER_START, sizes=(1000,), targets={("", 0): 2.0}),
-    _fastgas("continuous", targets={("", 0): 1 / 3}, effort=12.0),
+    _fastgas("continuous", targets={("", 0): 1 / 3}),
     _fastgas("discrete"),
-    Subject("freefall", (Window("", 10, 300),), energy="", sizes=(LARGE,), targets={("", 0): 8.0}, effort=0.1),
-    Subject("player_query", (), energy="", targets={(query, 10_000): target for query, target in QUERIES}, effort=0.2),
+    Subject("freefall", (Window("", 10, 300),), energy="", sizes=(LARGE,), targets={("", 0): 8.0}),
+    Subject("player_query", (), energy="", targets={(query, 10_000): target for query, target in QUERIES}),
 )
 
 

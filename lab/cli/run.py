@@ -19,7 +19,7 @@ from ..measure.run import Drift, Run, RunReport, run
 from ..plain import jsonable
 from ..plugins.command import plugin_named
 from ..reporting.output import drawing_if_there, drawing_module
-from ..reporting.progress import Bar
+from ..reporting.progress import Progress
 from ..reporting.text import NOTHING, TextTable, counted, number
 from .loading import Loaded, load, stdout_kept_clean
 from .options import above_zero, parse_view, traceback_option, world_options, writable_folder
@@ -125,7 +125,7 @@ def _recording(file: Path) -> Any:
 
 
 def _save_film(film: Any, finished: Run, file: Path, loaded: Loaded, screen: Console) -> str:
-    with Bar(screen) as bar:
+    with Progress(screen) as bar:
         bar.begin(len(film.frames))
         bar.say(f"drawing {file.name}")
         try:
@@ -142,7 +142,7 @@ def _run_with_progress(
         if film is not None:
             film.after_step(done)
 
-    with Bar(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
+    with Progress(screen) as bar, loaded.attribute_errors(), stdout_kept_clean():
         bar.begin(steps)
         bar.say(loaded.name)
         return run(world, steps, scene=loaded.name, seed=seed, after_step=after_step, profile=profile)

@@ -24,7 +24,7 @@ from ...framework.compilation import log
 from ...framework.jit.cache import CACHE_FOLDER_VARIABLE, cache_contents, cache_folder, clear_cache, used
 from ...framework.jit.prebuilt import INDEX, OFF, PORTABLE, write_index
 from ...plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
-from ..reporting.progress import Bar
+from ..reporting.progress import Progress
 from ..reporting.text import TextTable
 from .loading import Loaded, load, stdout_kept_clean
 from .options import traceback_option
@@ -83,7 +83,7 @@ def warm_up_command(
         return
     wanted = {int(dimensions)} if dimensions else {2, 3}
     before = cache_contents()
-    with Bar(Console(stderr=True)) as status:
+    with Progress(Console(stderr=True)) as status:
         rows = warm_up(_work(targets, everything, wanted), status.say)
     copy_used()
     after = cache_contents()

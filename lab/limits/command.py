@@ -21,7 +21,7 @@ from ..cli.usage_errors import Problem
 from ..jobs.runs import Runs
 from ..measure.effects import SHARE, in_words, names_told, noticed
 from ..plain import Plain, jsonable
-from ..reporting.progress import Bar, Progress
+from ..reporting.progress import Progress
 from ..reporting.text import counted, metres, number
 from ..trading.records import CaseTrade, Cell, known_well
 from ..trading.report import failures
@@ -69,7 +69,7 @@ def limits_command(
         raise Problem(f"--max-error does not apply: {loaded.name} says itself what counts, in compared(world)")
     if seconds is None:
         seconds = DEFAULT_SECONDS if loaded.seconds is None else loaded.seconds
-    with Bar(Console(stderr=True)) as bar:
+    with Progress(Console(stderr=True)) as bar:
         with closing(scene.world(None)) as world:
             found = _watched(loaded, world, seconds, bar)
         outcome = outcome_of_steps(scene, seconds, Runs(progress=bar), thorough, way)

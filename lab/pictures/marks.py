@@ -19,15 +19,14 @@ MOST_SEGMENTS = 160_000
 MOST_CONTACTS_3D = 200  # more would hide the bodies
 ANGLES = np.linspace(0, 2 * np.pi, 40, endpoint=False)
 FACE_SHADE = (0.3, 0.0, 0.5)  # of boxes, by the axis of the face's normal: light from above
+FAINT = 0.3  # opacity of sensors
 OUTLINED = 6.0  # points: smaller bodies have no outline
 
 
 def draw_walls(sheet: Sheet, walls: Shapes, projection: Projection) -> None:
-    """Static geometry: filled in 2D, edges only in 3D; sensors dashed."""
-    draw_sensors(sheet, walls.where(walls.sensor), projection, canvas.SENSOR, zorder=1.2)
-    walls = walls.where(~walls.sensor)
+    """Static geometry: filled in 2D, edges only in 3D; sensors faint."""
     if projection.flat:
-        colours = np.tile(to_rgba_array(canvas.WALL), (len(walls.entity), 1))
+        colours = np.where(walls.sensor[:, None], to_rgba_array(canvas.SENSOR, FAINT), to_rgba_array(canvas.WALL))
         _draw_flat(sheet, walls, colours, canvas.WALL_EDGE, 0.6, zorder=1)
         return
     segments, filled = [], []
@@ -41,10 +40,8 @@ def draw_walls(sheet: Sheet, walls: Shapes, projection: Projection) -> None:
 
 
 def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Projection, zorder: float = 3) -> None:
-    """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors dashed."""
-    if bodies.sensor.any():
-        draw_sensors(sheet, bodies.where(bodies.sensor), projection, colours[bodies.sensor], zorder)
-        colours, bodies = colours[~bodies.sensor], bodies.where(~bodies.sensor)
+    """Moving shapes in their ``colours`` (n, 4); in 3D far ones first and dimmed; sensors faint."""
+    colours = colours * np.where(bodies.sensor, FAINT, 1.0)[:, None] ** (0, 0, 0, 1)
     if not len(bodies.entity):
         return
     outline = 0.7 if bodies.typical_diameter * sheet.points > OUTLINED else 0.0
@@ -52,27 +49,6 @@ def draw_bodies(sheet: Sheet, bodies: Shapes, colours: Floats, projection: Proje
         _draw_flat(sheet, bodies, colours, canvas.PANEL, outline, zorder)
     else:
         _draw_solids(sheet, bodies, colours, projection, outline, zorder)
-
-
-def draw_sensors(sheet: Sheet, sensors: Shapes, projection: Projection, colour: Any, zorder: float) -> None:
-    """Hollow, with a dashed edge, in one ``colour`` or (n, 4) of them."""
-    if not len(sensors.entity):
-        return
-    colours = np.broadcast_to(to_rgba_array(colour), (len(sensors.entity), 4))
-    dashed: dict[str, Any] = {"linewidths": 1.1, "linestyles": "--", "zorder": zorder}
-    discs, boxes = sensors.where(sensors.round), sensors.where(~sensors.round)
-    if len(discs.entity):
-        places, magnification, _ = projection.plane(discs.centre)
-        widths = 2 * discs.half[:, 0] * magnification
-        _ellipses(sheet, places, widths, facecolors="none", edgecolors=colours[sensors.round], **dashed)
-    segments, edge_colours = [], []
-    ends_of_edges = [(0, 1), (1, 3), (3, 2), (2, 0)] if projection.flat else edges()
-    for low, high, edge_colour in zip(boxes.lower, boxes.upper, colours[~sensors.round], strict=True):
-        places, _, _ = projection.plane(corners(low, high))
-        segments += [places[list(edge)] for edge in ends_of_edges]
-        edge_colours += [edge_colour] * len(ends_of_edges)
-    if segments:
-        _lines(sheet, segments, colors=edge_colours, **dashed)
 
 
 def _draw_solids(

@@ -63,9 +63,9 @@ class Projection:
         """The position of the camera, (3,)."""
         return (self.lower + self.upper) / 2 + self.distance * self.axes[2]
 
-    def frame(self, points: Floats | None = None) -> tuple[Floats, Floats]:
-        """The corners of the rectangle in the plane that encloses the view, or only ``points`` (n, d) if given."""
-        places, _, _ = self.plane(corners(self.lower, self.upper) if points is None or not len(points) else points)
+    def frame(self) -> tuple[Floats, Floats]:
+        """The corners of the rectangle in the plane that encloses the view."""
+        places, _, _ = self.plane(corners(self.lower, self.upper))
         return places.min(axis=0), places.max(axis=0)
 
     def _relative(self, points: Floats) -> Floats:

@@ -16,7 +16,7 @@ from ..reporting.text import counted
 from . import canvas
 from .canvas import Sheet
 from .marks import draw_arrows, draw_bodies, draw_contacts, draw_paths, draw_walls
-from .projection import Projection, corners
+from .projection import Projection
 
 CROWD_3D = 500  # untraced bodies that would hide the paths behind them
 FEW, GHOSTS = 3, 14  # bodies up to which the shapes are repeated along the path, and how often
@@ -62,7 +62,7 @@ def draw_run(run: Run, out: Path, view: Any = None) -> list[Path]:
     still = Still.of(run)
     ends = find_view(still, run.traces) if view is None else view
     projection = Projection.of(*(np.asarray(end, float) for end in ends))
-    frame = projection.frame() if view is not None or projection.flat else _tight_frame(still, run.traces, projection)
+    frame = projection.frame()
     if is_file(out):
         out.parent.mkdir(parents=True, exist_ok=True)
         return [draw_traces(run, still, projection, frame).save(out)]
@@ -105,22 +105,6 @@ def find_view(still: Still, traces: Traces) -> tuple[Floats, Floats]:
         lower = np.minimum(lower, np.maximum(box_low, near_low))
         upper = np.maximum(upper, np.minimum(box_high, near_high))
     return lower - room / 2, upper + room / 2
-
-
-def _tight_frame(still: Still, traces: Traces, projection: Projection) -> canvas.View:
-    """3D: the region of the plane that bodies, paths and near walls cover, with a margin."""
-    bodies, walls = still.shapes.where(still.moving), still.shapes.where(still.shapes.static)
-    near = walls.where(np.all((walls.upper >= projection.lower) & (walls.lower <= projection.upper), axis=1))
-    boxes = [
-        *zip(bodies.lower, bodies.upper, strict=True),
-        *zip(np.maximum(near.lower, projection.lower), np.minimum(near.upper, projection.upper), strict=True),
-    ]
-    points = [corners(low, high) for low, high in boxes]
-    if traces.positions.size:
-        points.append(traces.places)
-    lower, upper = projection.frame(np.concatenate(points) if points else None)
-    margin = 0.06 * (upper - lower).max()
-    return lower - margin, upper + margin
 
 
 def draw_final(run: Run, still: Still, projection: Projection, frame: canvas.View) -> Sheet:

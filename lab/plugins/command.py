@@ -18,7 +18,7 @@ from ..cli.group import Commands
 from ..cli.loading import import_file, module_of, stdout_kept_clean
 from ..cli.options import traceback_option
 from ..cli.usage_errors import Problem, did_you_mean, one_line
-from ..reporting.progress import Bar
+from ..reporting.progress import Progress
 from ..reporting.text import TextTable, counted
 from .check import check_plugin
 from .samples import Report, Subject
@@ -58,7 +58,7 @@ def check_command(target: str) -> int:
     """
     found = plugins_of(target)
     console, findings = Console(), 0
-    with Bar(Console(stderr=True)) as status:
+    with Progress(Console(stderr=True)) as status:
         for plugin in found:
             with stdout_kept_clean():
                 report = check_plugin(plugin, needed_by(plugin), lambda what, p=plugin: status.say(f"{p.name}: {what}"))

@@ -15,46 +15,25 @@ LINES = 5.0  # s between two lines where there is no terminal
 
 
 class Progress:
-    """Counts, but shows nothing."""
-
-    def __init__(self) -> None:
-        self.done = 0.0
-
-    def begin(self, total: float, done: float = 0.0) -> None:
-        """Set the total amount of work, in any unit, and the part done by an earlier process."""
-        self.done = done
-
-    def say(self, what: str) -> None:
-        """Show the current activity."""
-
-    def advance(self, amount: float) -> None:
-        """Add to the work done."""
-        self.done += amount
-
-
-NO_PROGRESS = Progress()
-
-
-class Bar(Progress):
-    """A context manager that shows progress on ``console``, and the names of kernels while they compile.
+    """Shows progress on ``console``, and the names of kernels while they compile, inside ``with``; else only counts.
 
     It has no thread, which would take time from the measurement.
     """
 
-    def __init__(self, console: Console) -> None:
-        super().__init__()
-        self._console = console
+    def __init__(self, console: Console | None = None) -> None:
+        self.done = 0.0
+        self._console = console or Console(quiet=True)
         self._bar = rich.progress.Progress(
             rich.progress.TextColumn("[bold]{task.description}"),
             rich.progress.BarColumn(bar_width=None),
             rich.progress.TaskProgressColumn(),
             rich.progress.TimeRemainingColumn(),
             rich.progress.TextColumn("left"),
-            console=console,
+            console=self._console,
             expand=True,
             auto_refresh=False,
             speed_estimate_period=120,
-            disable=not console.is_terminal,
+            disable=not self._console.is_terminal,
         )
         self._task = self._bar.add_task("starting", total=None)
         self._total: float | None = None
@@ -75,8 +54,7 @@ class Bar(Progress):
 
         That part fills the bar and is not used for the time left.
         """
-        super().begin(total, done)
-        self._total = total
+        self.done, self._total = done, total
         self._bar.update(self._task, total=total, completed=done)
         self._show(0.0)
 
@@ -88,7 +66,7 @@ class Bar(Progress):
 
     def advance(self, amount: float) -> None:
         """Add to the work done."""
-        super().advance(amount)
+        self.done += amount
         self._bar.update(self._task, completed=self.done, description=self._what)
         last = self._total is not None and self.done >= self._total
         self._show(0.0 if last else REFRESH)
@@ -122,3 +100,6 @@ class Bar(Progress):
         elif time.monotonic() - self._shown >= LINES:
             self._shown = time.monotonic()
             self._line(text)
+
+
+NO_PROGRESS = Progress()

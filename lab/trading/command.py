@@ -32,7 +32,7 @@ from ..engines.pymunk_space import pymunk_module
 from ..jobs import cluster as clusters
 from ..jobs.runs import Store
 from ..reporting.output import Output, drawing_if_there
-from ..reporting.progress import Bar
+from ..reporting.progress import Progress
 from ..reporting.text import counted
 from .answer import Target, answer, recommended
 from .records import PYMUNK
@@ -134,7 +134,7 @@ def performing(workers: int | None, cluster: str | None, kept: Path) -> Iterator
     if workers is not None and cluster is not None:
         raise Problem("--workers and --cluster exclude each other")
     pool = contextlib.nullcontext(workers) if cluster is None else clusters.cluster(cluster)
-    with Store(kept) as store, pool as performs, Bar(Console(stderr=True)) as bar:
+    with Store(kept) as store, pool as performs, Progress(Console(stderr=True)) as bar:
         try:
             yield {"workers": performs, "store": store, "progress": bar}
         except KeyboardInterrupt:

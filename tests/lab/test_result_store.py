@@ -12,7 +12,7 @@ from rich.console import Console
 
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.jobs.runs import Store
-from carom.lab.reporting.progress import Bar
+from carom.lab.reporting.progress import Progress
 
 RECORDS = {
     "one": {"error": 0.1, "counts": {"steps": 60.0}},
@@ -74,7 +74,7 @@ def test_the_time_left_counts_what_was_resumed_as_done_and_not_as_fast(done, lef
     now = 0.0
     shown = io.StringIO()
     console = Console(file=shown, force_terminal=True, width=80, get_time=lambda: now)
-    with Bar(console) as bar:
+    with Progress(console) as bar:
         bar.begin(1000, done)
         for _ in range(4):
             now += 10
@@ -88,7 +88,7 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
     now = 100.0
     monkeypatch.setattr("carom.lab.reporting.progress.time.monotonic", lambda: now)
     shown = io.StringIO()
-    with Bar(Console(file=shown)) as bar:
+    with Progress(Console(file=shown)) as bar:
         bar.begin(40)
         for _ in range(40):
             now += 1
