@@ -52,7 +52,7 @@ def keep_state(state, dt):
     state.candidates.count, state.candidates.active_count = 0, ALL
     state.row_a, state.unsound = NOTHING_TESTED, 0
     state.all_still, state.sleep_stages = False, 0
-    state.kept_rows = state.moving if state.collides and not state.statics_stale else state.count
+    state.kept_rows = state.moving if state.collides and state.boxed_version == state.statics_version else state.count
     state.kept = OPENED
     if not state.others_write and (state.collides or len(bodies.max_linear_speed) > 0):
         state.kept |= KEEPS_VELOCITY
@@ -73,14 +73,14 @@ def read_bodies(state, dt):
             inverse_mass[i] = 0.0
     for i in range(state.dynamic if len(limit) > 0 else 0):
         limited |= (limit[i] == limit[i]) & (not out[i])
-    every = state.statics_unread or state.inverse_masses_exposed
+    every = state.read_version != state.statics_version or state.inverse_masses_exposed
     for i in range(state.dynamic, state.count if every else state.moving):
         inverse_mass[i] = 0.0
     state.limits_speed = limited
     state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))
     if state.sweeping and not state.sweeps_ready:
         return NEED_SWEEPS
-    state.statics_unread = False
+    state.read_version = state.statics_version
     rotated = state.collides and any_rotation(state)
     if rotated or state.rotated or state.rotation_stale:
         return ROTATE

@@ -134,7 +134,8 @@ class Scene:
         self.linked = linked_shapes(self.registry, present, self.state.dimensions) if present else None
         self.parameters = ParameterRecords(self.linked) if self.linked else None
         self._bind_shapes()
-        self.state.statics_stale = self.state.statics_unread = self.state.rotation_stale = True
+        self.state.rotation_stale = True
+        self.state.statics_version += 1
 
     # -- bodies that come and go ------------------------------------------------------------------
 
@@ -280,7 +281,7 @@ class Scene:
         count, moving, bodies = self.table.count, self.table.stops[1], self.state.bodies
         if not len(bodies.quarantined):
             self.reserve("quarantined")
-        self.state.statics_stale |= bool((bodies.quarantined[moving:count] != out[moving:]).any())
+        self.state.statics_version += int((bodies.quarantined[moving:count] != out[moving:]).any())
         bodies.quarantined[:count] = out
         rows, shapes = self._taken_out
         self.levels[:, rows] = shapes
@@ -333,7 +334,7 @@ class Scene:
             bodies.axes = self._axes.reshape(-1)
         if fresh or self.rotated != before:
             self._bind_shapes()
-            self.state.statics_stale = True
+            self.state.statics_version += 1
         if needed:
             self._axes[:count] = axes_of(rotation, self.state.dimensions)
         if self.state.several_levels:  # a box that is stretched may reach out of the level around it
@@ -352,7 +353,7 @@ class Scene:
         """Static bodies are read, and their boxes made, again if any of them may have changed."""
         if self.table.static_version != self.static_version:
             self.static_version = self.table.static_version
-            self.state.statics_stale = self.state.statics_unread = True
+            self.state.statics_version += 1
 
 
 def any_rotated(rotation: np.ndarray) -> bool:

@@ -107,14 +107,15 @@ def measure_frame(state):
 
 
 @part
-def statics_moved(state):
-    """Whether a static body stands elsewhere than when its box was made: code of the game has written its place."""
+def follow_static_places(state):
+    """Static bodies have changed if one stands elsewhere than its box: code of the game has written its place."""
     bodies, moving, moved = state.bodies, state.moving, False
     for i in range(moving, state.count if state.positions_exposed else moving):
         here, before = bodies.position[i], bodies.static_position[i - moving]
         for k in range(len(here)):
             moved |= (item(here, k) != item(before, k)) & (item(here, k) == item(here, k))  # nan has not moved
-    return moved
+    if moved and state.boxed_version == state.statics_version:
+        state.statics_version += 1
 
 
 # Where the motion of a box begins and ends.
@@ -151,14 +152,13 @@ def box_rows(state, start, stop, motion):
 def box_statics(state, dt):
     """Boxes of what does not move, made again only when it has changed."""
     bodies, moving = state.bodies, state.moving
-    state.statics_changed = state.statics_stale or statics_moved(state)
-    if state.statics_changed:
+    follow_static_places(state)
+    if state.boxed_version != state.statics_version:
         for i in range(moving, state.count):
             bodies.previous_position[i] = bodies.origin[i] = bodies.position[i]
             bodies.static_position[i - moving] = bodies.position[i]
         call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
-        state.statics_stale = False
-        state.statics_version += 1
+        state.boxed_version = state.statics_version
     return OK
 
 

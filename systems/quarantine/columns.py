@@ -59,7 +59,7 @@ def is_column_sound(state, checked):
     """Whether all rows of a column hold what the field allows; static ones only if they may have changed."""
     first = state.moving if checked.rows == STATIC_ROWS else 0
     last = state.dynamic if checked.rows == DYNAMIC_ROWS else state.moving
-    if checked.rows != DYNAMIC_ROWS and (state.statics_unread or checked.exposed):
+    if checked.rows != DYNAMIC_ROWS and (state.read_version != state.statics_version or checked.exposed):
         last = state.count
     start, stop, low, high = first * checked.width, last * checked.width, checked.low, checked.high
     if checked.turns:

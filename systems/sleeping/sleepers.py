@@ -72,7 +72,7 @@ class Sleepers:
         words, table = self._words, self._table
         if self._all_wake:
             self._wake_all()
-            self._all_wake, self.on = False, self._state.sleeping
+            self._all_wake = False
         seen = table.version + table.members_version + table.static_version + table.columns_version  # these only grow
         if seen != self._seen:
             self._scene.reserve(*SLEEPING)
@@ -92,6 +92,7 @@ class Sleepers:
         elif self._words[self._due]:
             self._followed = self._structure()
             self._note_links()
+        self.on = self._state.sleeping or self._all_wake
 
     def _structure(self) -> tuple[int, ...]:
         table = self._table
@@ -231,7 +232,8 @@ class Sleepers:
         state.candidates.active_count = ALL  # in this step more are awake than were noted
         state.asleep = int(np.count_nonzero(still[: self._table.stops[0]] > AWAKE))
         if not state.asleep:
-            still[still > AWAKE] = AWAKE
+            state.bodies.rest_steps[: len(still)][still == DISTURBED] = 0  # woken before it fell asleep
+            still[:] = AWAKE
             state.fresh_statics = 0
         now = memory.now
         dt = float(memory.step[now])
@@ -278,7 +280,7 @@ class Sleepers:
             names = [name for name in ("still", "rest_steps", "island") if len(getattr(bodies, name))]
             self.kept = (
                 {name: getattr(bodies, name)[:count].copy() for name in names},
-                self._saved_parts(), self._followed,
+                self._saved_parts(), self._followed, self._all_wake,
                 saved_rows(state.warm_start, WARM_START), saved_rows(state.contacts, CONTACT_NUMBERS),
             )  # fmt: skip
 
@@ -286,7 +288,9 @@ class Sleepers:
         """Back to the start of the step; the records show the contacts and impulses of that time."""
         if self.kept is None:
             return
-        (columns, parts, self._followed, impulses, contacts), self.kept, self._seen = self.kept, None, -1
+        (columns, parts, self._followed, all_wake, impulses, contacts), self.kept, self._seen = self.kept, None, -1
+        self._all_wake = self.on = self._all_wake or all_wake
+        self.on |= self._state.sleeping
         for name, column in columns.items():
             getattr(self._state.bodies, name)[: len(column)] = column
         self._take_parts(parts)
@@ -321,6 +325,7 @@ class Sleepers:
         """The table is what it was then; if this world does not sleep, all of them wake."""
         state = self._state
         self.kept, self._followed, self._seen = None, None, -1
+        state.watched_version = -1  # statics may have changed between that time and the step after it
         if saved is None:
             self.contacts.clear()
             self.impulses.clear()

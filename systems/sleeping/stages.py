@@ -10,7 +10,7 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import record_at, zero_of
 from ...framework.vectors import dot, item, length, sub
 from ..broad_phase.active_rows import ALL, add_active
-from ..broad_phase.boxes import statics_moved
+from ..broad_phase.boxes import follow_static_places
 from ..codes import OK, WAKE, WAKE_TOUCHED
 from ..forces.stages import is_zero
 from ..islands import root_of
@@ -123,7 +123,9 @@ def stands(state, i):
 def find_disturbed(state, dt):
     """Mark the still rows that are not what they were; returns how many there are, with those marked before."""
     still, disturbed = state.bodies.still, 0
-    stop = state.count if state.statics_stale or statics_moved(state) else state.moving
+    follow_static_places(state)
+    stop = state.moving if state.watched_version == state.statics_version else state.count
+    state.watched_version = state.statics_version
     print_rows(state, 0, stop)
     for i in range(stop):
         if still[i] > AWAKE:

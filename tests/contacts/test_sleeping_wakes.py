@@ -399,3 +399,58 @@ def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it():
     world.step()
     assert not any(is_asleep(world, *boxes))
     assert world.component_for_entity(boxes[2], Transform).position[0] > 0.0
+
+
+@pytest.mark.parametrize("fails", ["the step in which all wake", "the step after"])
+def test_turned_off_a_failed_step_puts_nobody_back_to_sleep(fails):
+    class Failing(System):
+        phase = Phase.RESPONSE
+
+        def process(self, dt):
+            raise ValueError("no")
+
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    world.settings = world.settings.replace(sleeping=False)
+    if fails == "the step after":
+        world.step()
+    failing = Failing()
+    world.add_system(failing)
+    with pytest.raises(Exception, match="no"):
+        world.step()
+    world.remove_system(failing)
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+    assert len(world.contacts) == 3
+
+
+@pytest.mark.parametrize("cause", ["floor moved", "floor without friction"])
+@pytest.mark.parametrize("restored", [False, True])
+def test_a_query_hides_no_change_of_what_sleepers_stand_on(cause, restored):
+    world = sleepy_world()
+    boxes = tower(world, 0.0)
+    sleep(world, *boxes)
+    ground = min(world.get_entities())
+    if cause == "floor moved":
+        world.component_for_entity(ground, Transform).position = (0.0, -2.0)
+    else:
+        world.component_for_entity(ground, AABBCollider).friction = 0.0
+    assert world.query_point((0.0, 0.5)) == [boxes[0]]
+    if restored:
+        snapshot = world.snapshot()
+        world.step()
+        world.restore(snapshot)
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+
+
+def test_woken_as_it_is_about_to_sleep_it_sleeps_later():
+    world = sleepy_world()
+    boxes = tower(world, 0.0, 1)
+    while not is_asleep(world, *boxes)[0]:
+        world.step()
+    world.wake(boxes[0])
+    world.step()
+    assert not any(is_asleep(world, *boxes))
+    sleep(world, *boxes)
