@@ -20,7 +20,7 @@ from carom.plugins.springs import Springs
 
 MODES = ("discrete", "continuous", "event_driven")
 METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
-STEPS = 25
+STEPS = 14
 
 gems = Plugin("gems")
 
@@ -278,7 +278,7 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
         yield f"break shot {d}D {mode}", lambda d=d, mode=mode: play(break_shot(d, mode), 5)
     for d in (2, 3):
         yield f"buried {d}D", lambda d=d: play(buried(d), 5)
-        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 15)
+        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 4)
         yield f"asked {d}D", lambda d=d: asked(d)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)

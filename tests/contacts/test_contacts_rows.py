@@ -39,15 +39,15 @@ def test_canonical_order_whatever_the_history():
     world = make_world()
     rng = np.random.default_rng(3)
     kinds = ("dynamic", "kinematic", "static")
-    entities = [ball(world, rng.uniform(-3, 3, 2), kind=kinds[k % 3]) for k in range(60)]
+    entities = [ball(world, rng.uniform(-5, 5, 2), kind=kinds[k % 3]) for k in range(60)]
     world.step()
     for k in (3, 10, 17, 30, 44):
         world.delete_entity(entities[k])
     for k in range(10):
-        ball(world, rng.uniform(-3, 3, 2), kind=kinds[k % 3])
+        ball(world, rng.uniform(-5, 5, 2), kind=kinds[k % 3])
     world.step()
     pairs = ids(world.contacts)
-    assert len(pairs) > 100
+    assert len(pairs) > 30
     assert all(a < b for a, b in pairs)
     assert pairs == sorted(set(pairs))
     assert not {entities[k] for k in (3, 10, 17, 30, 44)} & {entity for pair in pairs for entity in pair}

@@ -215,7 +215,7 @@ def test_it_stands_still_until_it_is_mended():
         run(world, 1)
         assert (position(world, a) != before).any()
         before, speed = position(world, a).copy(), velocity(world, a).copy()
-    run(world, 200)
+    run(world, 60)
     assert position(world, a)[1] == pytest.approx(0.5, abs=1e-2)  # it lies on the floor
     world.faults.clear()
     world.bodies.mass[world.bodies.row_of(a)] = math.nan
