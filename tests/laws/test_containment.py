@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from laws.helpers_laws import SWEPT, beyond, seeds, walls
-from worlds import ball, box, make_world
+from worlds import ball, both_dimensions, box, make_world
 
 TOO_FAST = "so fast that discrete collisions may miss"
 IMPACTS = 50_000  # of a room, then it ends: elastic bodies of very different masses have millions
@@ -93,3 +93,29 @@ def test_what_is_swept_stays_inside_under_any_pull(seed, mode):
         for _ in range(60):
             world.step()
             assert beyond(world, half + wall) == 0, (world.step_count, world.faults[-1:])
+
+
+@pytest.mark.parametrize("mode", SWEPT)
+@both_dimensions
+@pytest.mark.parametrize("seed", seeds(4, 100))
+def test_nothing_leaves_a_room_at_any_speed(seed, d, mode):
+    """Sixty bodies of 1 to 1e4 m/s, sizes to 1:100, masses to 1:1e6; walls of 1 cm to 2 m, steps of 1/20 to 1/240 s."""
+    random = np.random.default_rng([seed, 15])
+    e, masses = random.choice([0.0, 0.3, 0.8, 1.0]), random.choice([0.0, 1.0, 2.0, 3.0])
+    smallest, dt = 0.6 * random.choice([1.0, 0.1, 0.01]), 1 / random.choice([20, 60, 240])
+    wall, speed, half = random.choice([0.01, 0.1, 2.0]), 10.0 ** random.uniform(0.0, 4.0), 10.0
+    with make_world(d, 9.81, collision=mode, dt=dt) as world:
+        walls(world, half, wall, restitution=e)
+        row = 8 if d == 2 else 4
+        for k in range(60):
+            place = (np.array(np.unravel_index(k, (row,) * d)) - 0.5 * (row - 1)) * 2.2
+            way, radius = random.normal(size=d), np.exp(random.uniform(*np.log((smallest, 0.6))))
+            mass = 10.0 ** random.uniform(-masses, masses)
+            ball(world, place, speed * way / np.linalg.norm(way), radius=radius, mass=mass, restitution=e)
+        # Light ones between fast heavy ones have forty times as many impacts.
+        for _ in range(max(10, round(min(2.0, 2000.0 / speed) / dt))):
+            world.step()
+            assert beyond(world, half + wall) == 0, (world.step_count, world.faults[:1])
+            if world.stats().counters["impacts"] > 20_000:
+                break
+        assert len(world.bodies.dynamic) == 60

@@ -72,6 +72,15 @@ def test_a_load_beyond_all_bounds_passes_through_nothing(count, load, mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("masses", [(1, 1, 1, 1e4), (1, 1e4, 1, 1e4), (1e4, 1, 1, 1e4), (1e4, 1, 1e4, 1)])
+def test_heavy_on_light_comes_to_rest(mode, masses):
+    found = stand(mode, masses)
+    assert found.speed < 1e-3
+    assert found.overlap < 0.05
+    assert found.sinks < 0.05
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_ten_boxes_hardly_sink(mode):
     found = stand(mode, (1.0,) * 10)
     assert found.sinks < 0.007

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers_pairwise import pairwise
 from helpers_rest import SLOP, heights
-from worlds import box, make_world, run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -57,15 +56,3 @@ def test_a_stack_of_any_shipped_shape_keeps_its_order_and_its_place(case, mode, 
         y = heights(world, bodies)
         assert (np.diff(y) > 0).all(), (world.step_count, y)
         assert np.abs(y - places).max() < ALLOWED, (world.step_count, y)
-
-
-@pytest.mark.parametrize("size", [2e-3, 5e-4])
-@pytest.mark.parametrize("mode", MODES)
-def test_two_grains_on_each_other(size, mode):
-    """Boxes of 2 mm at 60 Hz on Earth changed places, those of 0.5 mm fell through a floor two sizes thick."""
-    world = make_world(2, 9.81, collision=mode)
-    box(world, (0.0, -size), half=(20 * size, size), kind="static")
-    grains = [box(world, (0.0, size * (0.5 + k)), half=0.5 * size) for k in range(2)]
-    run(world, 300)
-    assert np.abs(heights(world, grains) / size - (0.5, 1.5)).max() < ALLOWED
-    assert not world.faults

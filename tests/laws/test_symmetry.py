@@ -154,3 +154,27 @@ MISSED_FRAMES = [case for case in FRAMES if case[1] == "event_driven"]
 def test_what_sticks_is_the_same_in_a_moving_frame(seed, mode, d):
     """e = 0: whether what just touches is a contact must not depend on rounding. Rounding of 1e3 m is 1e-13."""
     check_frame(seed, mode, d, 0.0)
+
+
+@pytest.mark.parametrize("e", [0.5, 1.0])
+@pytest.mark.parametrize(("mode", "d"), list(itertools.product(MODES, (2, 3))))
+def test_what_bounces_is_the_same_in_a_moving_frame(mode, d, e):
+    check_frame(23, mode, d, e)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_stack_on_a_moving_floor(mode):
+    """Bodies at rest on a floor that moves along with them stay where they are on it."""
+
+    def stack(drift):
+        world = make_world(2, G, collision=mode)
+        box(world, (0.0, -0.5), (drift, 0.0), half=(50.0, 0.5), kind="kinematic")
+        for k in range(4):
+            (box, ball)[k % 2](world, (0.0, 0.5 + k), (drift, 0.0))
+        for _ in range(60):
+            world.step()
+        moving = world.bodies.dynamic
+        return moving.position - (drift, 0.0), moving.linear_velocity - (drift, 0.0)
+
+    for still, drifting in zip(stack(0.0), stack(1e3), strict=True):
+        np.testing.assert_allclose(drifting, still, rtol=0, atol=1e-9)

@@ -115,11 +115,14 @@ def test_damping_never_makes_a_rope_push():
     assert rope.tension == pytest.approx(0.1 - 50.0)
 
 
-@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet"])
+@pytest.mark.parametrize(
+    ("integrator", "collision"),
+    [("semi_implicit_euler", "discrete"), ("velocity_verlet", "continuous"), ("semi_implicit_euler", "event_driven")],
+)
 @pytest.mark.compiled
-def test_the_limit_of_stiffness_is_where_the_page_says(integrator):
+def test_the_limit_of_stiffness_is_where_the_page_says(integrator, collision):
     for ratio, holds in ((1.98, True), (2.02, False)):
-        world, springs = make(integrator=integrator, dt=1 / 60)
+        world, springs = make(integrator=integrator, dt=1 / 60, collision=collision)
         a, b = body(world, 0.0, 0.0, mass=1.0), body(world, 1.01, 0.0, mass=4.0)
         springs.connect(a, b, 1.0, stiffness=(ratio * 60) ** 2 / 1.25)
         for _ in range(300):
