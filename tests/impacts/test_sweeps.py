@@ -146,18 +146,6 @@ def test_boxes_by_face_edge_and_corner():
     assert box_box_sweep(point, point, (1.0, 2.0, -3.0), (-4.0, -8.0, 11.0)) == MISS
 
 
-def test_a_capsule_by_its_side_and_its_ends():
-    upright = Capsule(0.5, 2.0, ((1.0, 0.0), (0.0, 1.0)))
-    mote = Sphere(0.5)
-    assert capsule_sphere_sweep(upright, mote, (3.0, 1.0), (-4.0, 0.0)) == (True, 0.5)
-    assert capsule_sphere_sweep(upright, mote, (0.0, -5.0), (0.0, 4.0)) == (True, 0.5)
-    assert capsule_sphere_sweep(upright, mote, (3.0, 2.6), (-4.0, 0.0))[1] == pytest.approx(0.55, rel=1e-15)
-    assert capsule_sphere_sweep(upright, mote, (3.0, 5.0), (-4.0, -8.0))[1] == pytest.approx(0.5, rel=1e-15)
-    assert capsule_sphere_sweep(upright, mote, (1.5, 5.0), (0.0, -9.0)) == MISS  # along it
-    assert capsule_sphere_sweep(upright, mote, (1.0, 0.0), (4.0, 0.0)) == AT_ONCE
-    assert capsule_sphere_sweep(upright, mote, (1.5, 0.0), (4.0, 0.0)) == MISS
-
-
 def test_finite_numbers_of_any_size_give_a_time():
     """Lengths from 1e-300 to 1e300, all in one call."""
     rng = np.random.default_rng(4)

@@ -28,15 +28,6 @@ def closed_form(method, dt, steps, v0, g):
     return v0 * t - g * t * t / 2 + DRIFT.get(method, 0) * g * dt * t / 2
 
 
-def test_fiedler_ten_steps_of_one_second():
-    """A7 (a): F = 10, m = 1 from rest, dt = 1: small integers, so exact."""
-    world = make_world(dt=1.0, integrator="explicit_euler")
-    world.create_entity(Transform((0, 0)), RigidBody(1.0, constant_force=(10.0, 0.0)))
-    positions, velocities = record(world, 10)
-    assert positions[:, 0, 0].tolist() == [0, 0, 10, 30, 60, 100, 150, 210, 280, 360, 450]
-    assert velocities[-1, 0, 0] == 100
-
-
 # B1: v0, g (per second), Hz, and the published apex of EE, SI and the others
 ARCS = [
     *((240.0, 450.0, hz, *apex) for hz, *apex in (
@@ -220,3 +211,66 @@ def test_forces_that_depend_on_time(method):
         t = dt * np.arange(steps + 1)
         np.testing.assert_allclose(positions[:, 0, 0], t**3, rtol=1e-12, atol=1e-13)
         np.testing.assert_allclose(velocities[:, 0, 0], 3 * t**2, rtol=1e-12, atol=1e-13)
+
+
+# -- bodies that attract each other: the figure eight (published and measured figures)
+
+
+class NewtonianGravity(ForceSystem):
+    """Bodies of mass 1 that attract each other, G = 1."""
+
+    def add_forces(self, bodies, time):
+        bodies.force[:] += self.pull(bodies.position)
+
+    def pull(self, x):
+        apart = x[None] - x[:, None]
+        cube = np.sum(apart**2, axis=2) ** 1.5
+        np.fill_diagonal(cube, 1.0)
+        return np.sum(apart / cube[..., None], axis=1)
+
+
+# B5: return error after one period with 1000 and 10000 steps
+FIGURE_EIGHT = {
+    "explicit_euler": (0.86, 0.081),
+    "semi_implicit_euler": (1.0e-2, 1.0e-3),
+    "velocity_verlet": (6.4e-5, 6.7e-7),
+    "rk4": (2.4e-8, 3e-8),
+    "yoshida4": (None, 3e-8),  # not published; limited by the eight digits of the start as RK4 is
+}
+
+
+def figure_eight(method, steps):
+    """Positions of the three bodies at the start and after one period, by the engine and by the textbook."""
+    x1, v3 = np.array([0.97000436, -0.24308753]), np.array([-0.93240737, -0.86473146])
+    x0, v0 = np.array([x1, -x1, 0 * x1]), np.array([-v3 / 2, -v3 / 2, v3])
+    dt = 6.32591398 / steps
+    world = make_world(dt=dt, integrator=method)
+    world.create_entities(3, Transform.many(x0), RigidBody.many(1.0, v0))
+    world.add_system(NewtonianGravity())
+    for _ in range(steps):
+        world.step()
+    np.testing.assert_allclose(world.momentum(), 0, atol=1e-12)
+    return x0, world.bodies.position.copy(), dt, v0
+
+
+@pytest.mark.early
+@all_methods
+def test_figure_eight(method):
+    """B5: Chenciner and Montgomery's orbit comes back after one period; 1.25 times the published two digits."""
+    x0, x, dt, v0 = figure_eight(method, 1000)
+    pull = NewtonianGravity().pull
+    expected, _ = naive.trajectory(method, x0, v0, dt, 1000, lambda x, v, t: pull(x))
+    np.testing.assert_allclose(x, expected[-1], rtol=0, atol=1e-10)
+    error, published = np.abs(x - x0).max(), FIGURE_EIGHT[method][0]
+    if published is not None:
+        assert error < 1.25 * published
+    else:
+        assert error < FIGURE_EIGHT["velocity_verlet"][0] / 10  # fourth order against second
+
+
+@pytest.mark.long
+@all_methods
+def test_figure_eight_with_ten_thousand_steps(method):
+    """B5."""
+    x0, x, *_ = figure_eight(method, 10_000)
+    assert np.abs(x - x0).max() < 1.25 * FIGURE_EIGHT[method][1]

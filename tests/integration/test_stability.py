@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 from helpers_motion import (
-    METHODS,
     ORDERS,
     STIFFNESS,
     Oscillator,
@@ -17,7 +16,6 @@ from helpers_motion import (
     oscillators,
     record,
 )
-from helpers_pairwise import pairwise
 from oracles import integrators_naive as naive
 from worlds import EPS, make_world
 
@@ -111,29 +109,22 @@ def damped_fall(method, dt, steps, staged=False):
     return positions[:, 0, 0], velocities[:, 0, 0]
 
 
-@pytest.mark.parametrize(
-    ("method", "dt", "staged"), pairwise(METHODS, (1e-9, 1 / 60, 2.5 * TAU, 100 * TAU), (False, True))
-)
-def test_linear_damping_has_the_exact_velocity(method, dt, staged):
-    """B7: v = v_t (1 - e^(-t/tau)) for every method and step, monotone; Yoshida magnifies rounding by 70."""
+@all_methods
+@pytest.mark.parametrize("dt", [1e-9, 1 / 60, 2.5 * TAU, 100 * TAU])
+@pytest.mark.parametrize("staged", [False, True])
+def test_linear_damping_is_exact(method, dt, staged):
+    """B7: v = v_t (1 - e^(-t/tau)) for every method and step, monotone; Yoshida magnifies rounding by 70.
+
+    y = v_t (t - tau (1 - e^(-t/tau))): where no force depends on the state, and in every Verlet step.
+    """
     steps = 200
-    _, velocity = damped_fall(method, dt, steps, staged)
+    y, velocity = damped_fall(method, dt, steps, staged)
     t = dt * np.arange(steps + 1)
     magnified = 70 if method == "yoshida4" and staged else 1
     np.testing.assert_allclose(velocity, -V_T * np.expm1(-t / TAU), rtol=magnified * 10 * steps * EPS)
     assert (np.diff(velocity) >= -magnified * 4 * EPS * V_T).all()
-
-
-@pytest.mark.parametrize(
-    ("method", "staged"),
-    [("velocity_verlet", False), ("rk4", False), ("yoshida4", False), ("velocity_verlet", True), ("yoshida4", True)],
-)
-@pytest.mark.parametrize("dt", [1 / 60, 2.5 * TAU, 100 * TAU])
-def test_linear_damping_has_the_exact_position(method, staged, dt):
-    """B7: y = v_t (t - tau (1 - e^(-t/tau))): where no force depends on the state, and in every Verlet step."""
-    y, _ = damped_fall(method, dt, 200, staged)
-    t = dt * np.arange(201)
-    np.testing.assert_allclose(y, V_T * (t + TAU * np.expm1(-t / TAU)), rtol=1e-11, atol=1e-15)
+    if ORDERS[method] > 1 and (method, staged) != ("rk4", True):
+        np.testing.assert_allclose(y, V_T * (t + TAU * np.expm1(-t / TAU)), rtol=1e-11, atol=1e-15)
 
 
 @all_methods

@@ -72,21 +72,6 @@ def test_casts_through_many_bodies(d, n, sizes):
     world.close()
 
 
-def test_b13_radius_zero_is_a_ray():
-    world = make_world(3)
-    box(world, (0, 0, 0), half=1.0, kind="static")
-    rng = np.random.default_rng(0)
-    for _ in range(200):
-        start, way = 4 * rng.standard_normal(3), rng.standard_normal(3)
-        ray = world.ray_cast(start, way, 10.0)
-        sphere = world.shape_cast(SphereCollider(0.0), start, 10.0 * way / np.linalg.norm(way))
-        assert [hit.entity for hit in ray] == [hit.entity for hit in sphere]
-        for one, two in zip(ray, sphere, strict=True):
-            assert one.distance == pytest.approx(two.distance, rel=1e-14)
-            np.testing.assert_allclose(one.point, start + one.distance * way / np.linalg.norm(way), atol=1e-14)
-    world.close()
-
-
 @pytest.mark.parametrize("scale", [1e-150, 1e-9, 1e9, 1e150])
 @both_dimensions
 def test_casts_at_extreme_sizes(d, scale):
@@ -183,35 +168,6 @@ def test_any_pair_meets_where_the_oracle_says(d, body, mover, way):
         assert np.linalg.norm(hits[0].normal) == pytest.approx(1.0, abs=1e-12)
         if hits[0].distance > 0.0:
             assert hits[0].normal @ way < 0.0
-
-WRONG = {
-    "ray_cast: origin": lambda w: w.ray_cast("here", (1, 0)),
-    "ray_cast: direction must not be zero": lambda w: w.ray_cast((0, 0), (0, 0)),
-    "ray_cast: direction must be 2": lambda w: w.ray_cast((0, 0), (1, 0, 0)),
-    "ray_cast: max_distance": lambda w: w.ray_cast((0, 0), (1, 0), math.nan),
-    "ray_cast: mask": lambda w: w.ray_cast((0, 0), (1, 0), mask=1 << 70),
-    "ray_cast: exclude": lambda w: w.ray_cast((0, 0), (1, 0), exclude="me"),
-    "ray_casts: directions must not be zero, as row 1": lambda w: w.ray_casts([(0, 0)] * 2, [(1, 0), (0, 0)]),
-    "ray_casts: directions must have shape": lambda w: w.ray_casts([(0, 0)] * 2, [(1, 0)] * 3),
-    "ray_casts: max_distances": lambda w: w.ray_casts([(0, 0)], (1, 0), -1.0),
-    "shape_cast: displacement": lambda w: w.shape_cast(SphereCollider(1), (0, 0), (math.inf, 0)),
-    "shape_cast: position": lambda w: w.shape_cast(SphereCollider(1), (0,), (1, 0)),
-    "shape_casts: positions": lambda w: w.shape_casts(SphereCollider(1), [(math.nan, 0)], (1, 0)),
-    "AABBCollider.half_extents": lambda w: w.shape_cast(AABBCollider((1, 1, 1)), (0, 0), (1, 0)),
-    "SphereCollider.radius": lambda w: w.shape_casts(SphereCollider.many(radius=[1, 2]), [(0, 0)], (1, 0)),
-}
-
-
-@pytest.mark.plain
-@pytest.mark.parametrize("message", WRONG)
-@pytest.mark.parametrize("empty", [True, False])
-def test_wrong_arguments(message, empty):
-    world = make_world()
-    if not empty:
-        ball(world, (0, 0))
-    with pytest.raises(ValueError, match=message):
-        WRONG[message](world)
-    world.close()
 
 
 @pytest.mark.plain

@@ -272,9 +272,24 @@ WRONG = {
     "query_nearests: exclude": lambda w: w.query_nearests([(0, 0)], exclude=[1, 2]),
     "neighbours: radius": lambda w: w.neighbours(math.inf),
     "neighbours: of": lambda w: w.neighbours(1.0, of=3),
+    "ray_cast: origin": lambda w: w.ray_cast("here", (1, 0)),
+    "ray_cast: direction must not be zero": lambda w: w.ray_cast((0, 0), (0, 0)),
+    "ray_cast: direction must be 2": lambda w: w.ray_cast((0, 0), (1, 0, 0)),
+    "ray_cast: max_distance": lambda w: w.ray_cast((0, 0), (1, 0), math.nan),
+    "ray_cast: mask": lambda w: w.ray_cast((0, 0), (1, 0), mask=1 << 70),
+    "ray_cast: exclude": lambda w: w.ray_cast((0, 0), (1, 0), exclude="me"),
+    "ray_casts: directions must not be zero, as row 1": lambda w: w.ray_casts([(0, 0)] * 2, [(1, 0), (0, 0)]),
+    "ray_casts: directions must have shape": lambda w: w.ray_casts([(0, 0)] * 2, [(1, 0)] * 3),
+    "ray_casts: max_distances": lambda w: w.ray_casts([(0, 0)], (1, 0), -1.0),
+    "shape_cast: displacement": lambda w: w.shape_cast(SphereCollider(1), (0, 0), (math.inf, 0)),
+    "shape_cast: position": lambda w: w.shape_cast(SphereCollider(1), (0,), (1, 0)),
+    "shape_casts: positions": lambda w: w.shape_casts(SphereCollider(1), [(math.nan, 0)], (1, 0)),
+    "AABBCollider.half_extents": lambda w: w.shape_cast(AABBCollider((1, 1, 1)), (0, 0), (1, 0)),
+    "SphereCollider.radius": lambda w: w.shape_casts(SphereCollider.many(radius=[1, 2]), [(0, 0)], (1, 0)),
 }
 
 
+@pytest.mark.plain
 @pytest.mark.parametrize("message", WRONG)
 @pytest.mark.parametrize("empty", [True, False])
 def test_wrong_arguments(message, empty):
@@ -316,13 +331,6 @@ def test_more_hits_than_there_is_room_for():
     hits = world.query_aabbs(lower, lower + 4 * side)  # 150,000 hits
     assert hits.counts.tolist() == [300] * 500
     assert all((found == np.sort(known.entity)).all() for found in hits)
-
-
-def test_hits_of_all_kinds_of_body_are_in_the_order_of_their_ids():
-    world, known, side = scene(2, 1000, 4)
-    assert world.query_aabb((-side, -side), (3 * side, 3 * side)) == sorted(known.entity.tolist())
-    neighbours = world.neighbours(side)
-    assert all((np.diff(found) > 0).all() for found in neighbours)
 
 
 @pytest.mark.parametrize("d", [2, 3])
