@@ -104,6 +104,13 @@ def run_python(code: str, *arguments, **more) -> subprocess.CompletedProcess[str
     return start_python(code, *arguments, **more).finish()
 
 
+def output_of(code: str, *arguments, **more) -> str:
+    """What it prints, if it ends well."""
+    done = run_python(code, *arguments, **more)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
 def run_carom(*arguments, **more) -> subprocess.CompletedProcess[str]:
     """The command ``carom`` with these arguments."""
     return run_python(RUN_CAROM, *arguments, **more)

@@ -139,13 +139,9 @@ def lines_of_code(text: str) -> int:
     return sum(1 for line in text.splitlines() if line.strip() and not line.strip().startswith("#"))
 
 
-def test_asteroids_is_a_game_in_60_lines():
-    game = [block for block in python_blocks(ROOT / "docs" / "asteroids.md") if "game" in block.info]
-    assert 40 < sum(lines_of_code(block.text) for block in game) <= 60
-
-
-def test_the_jump_and_run_has_60_lines():
-    game = [block for block in python_blocks(ROOT / "docs" / "platformer.md") if "game" in block.info]
+@pytest.mark.parametrize("page", ["asteroids.md", "platformer.md"])
+def test_it_is_a_game_in_60_lines(page):
+    game = [block for block in python_blocks(ROOT / "docs" / page) if "game" in block.info]
     assert 40 < sum(lines_of_code(block.text) for block in game) <= 60
 
 

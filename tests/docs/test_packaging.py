@@ -97,9 +97,7 @@ def test_each_floor_imports_only_from_the_floors_below(floor):
 
 
 def test_importing_physics_imports_no_drawing_and_no_command_line():
-    code = "import sys, carom.plugins; print('\\n'.join(sys.modules))"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    modules = result.stdout.split()
+    modules = run_elsewhere("import sys, carom.plugins; print('\\n'.join(sys.modules))", ROOT, ROOT / "src").split()
     unwanted = ("click", "rich", "matplotlib", "carom.lab", "carom.scenes")
     assert "carom.plugins" in modules
     assert not [m for m in modules if m in unwanted or m.startswith(tuple(f"{name}." for name in unwanted))]
@@ -167,5 +165,4 @@ def test_a_source_distribution_holds_the_tests(source_copy, tmp_path):
 def test_the_compiler_is_not_loaded_by_an_import(code):
     """numba and llvmlite take longer than all the rest; a program that asks for help or lists scenes needs neither."""
     check = f"{code}, sys; print([name for name in ('numba', 'llvmlite') if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert run_elsewhere(check, ROOT, ROOT / "src").strip() == "[]"

@@ -1,13 +1,14 @@
-"""Compiling while the game runs: nobody waits for it, nothing depends on it, and it ends with the program."""
+"""Linking many functions: while the game runs, or on several processes; nobody waits, errors arrive here."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import subprocess
-import sys
 
 import pytest
+from helpers_processes import output_of
+
+from carom.framework.jit.link_all import CAN_FORK
 
 FUNCTIONS = """
 import time
@@ -65,11 +66,26 @@ print(len(world.ray_cast((0.0, 5.0), (0.0, -1.0))), log.loaded == before, len(lo
 """
 
 
+SEVERAL = """
+import sys
+from carom.framework.jit.link_all import link_all
+
+log.processes = int(sys.argv[1])
+functions = [adding(number) for number in (1.0, 2.0, 3.0, 2.0)]
+told = []
+log.listeners.append(lambda kernel: told.append(log.left))
+link_all(functions)
+assert all(function.ready for function in functions)
+print(len(log.compiled), log.loaded, sorted(set(told), reverse=True), log.left)
+try:
+    link_all([Linked(wrong, signature) for _ in range(2)])
+except Exception as error:
+    print(type(error).__name__, "nothing" in str(error), log.left)
+"""
+
+
 def run(code, cache, background="1"):
-    environment = {**os.environ, "CAROM_CACHE_DIR": str(cache), "CAROM_BACKGROUND": background}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
+    return output_of(code, anew=True, CAROM_CACHE_DIR=str(cache), CAROM_BACKGROUND=background).splitlines()
 
 
 def test_one_function_after_the_other_and_nobody_waits(tmp_path):
@@ -93,3 +109,18 @@ def test_what_queries_need_is_compiled_while_the_game_runs(tmp_path):
         path.unlink()
     no_query = WORLD[: WORLD.rindex("print(")]
     assert run(no_query, tmp_path, background="0") == ["[] True"]
+
+
+@pytest.mark.skipif(not CAN_FORK, reason="processes are not forked here")
+def test_several_processes_compile_the_same_functions_as_one(tmp_path):
+    """Of the two that are alike the second is loaded, or compiled by the other process at the same time."""
+    printed, files = [], []
+    for processes in (1, 2):
+        folder = tmp_path / str(processes)
+        folder.mkdir()
+        printed.append(output_of(FUNCTIONS + SEVERAL, processes, CAROM_CACHE_DIR=str(folder)).splitlines())
+        files.append(sorted(path.name for path in folder.glob("*.kernel")))
+    assert printed[0][0] == "3 1 [4, 3, 2] 0"
+    assert printed[0][1] == printed[1][1] == "TypingError True 0"
+    assert files[0] == files[1]
+    assert len(files[0]) == 3

@@ -5,13 +5,11 @@ For a run of the tests with NUMBA_DISABLE_JIT=1, as ``make coverage`` does; else
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import helpers_zoo
 import pytest
+from helpers_processes import output_of
 
 from carom.framework.jit.lazy import JIT
 
@@ -23,12 +21,9 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def compiled():
     """What another process sees whose kernels are compiled, by scenario."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.helpers_zoo"], env={**os.environ, "NUMBA_DISABLE_JIT": "0"},
-        cwd=Path(__file__).parents[2], capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return {line.split(",")[0]: line.split(",")[1:] for line in done.stdout.splitlines()}
+    zoo = "import runpy; runpy.run_module('tests.helpers_zoo', run_name='__main__')"
+    printed = output_of(zoo, cwd=Path(__file__).parents[2], NUMBA_DISABLE_JIT="0")
+    return {line.split(",")[0]: line.split(",")[1:] for line in printed.splitlines()}
 
 
 @pytest.mark.parametrize(("name", "run"), list(helpers_zoo.scenarios()), ids=lambda value: str(value)[:30])

@@ -7,7 +7,7 @@ from pathlib import Path
 import esper
 import numpy as np
 import pytest
-from helpers_processes import run_python
+from helpers_processes import output_of
 from worlds import ball, floor, make_world, run
 
 from carom.components import AABBCollider, Collider, RigidBody, SphereCollider, Transform
@@ -156,8 +156,7 @@ for integrator in ("semi_implicit_euler", "yoshida4", "rk4", "velocity_verlet", 
 def test_after_prepare_or_the_first_step_nothing_compiles_and_nothing_loads(d):
     """Every integrator, few bodies and hundreds, impacts, rest, levels, sensors, platforms, queries, a force system."""
     for how in ("prepared", "kept"):  # the second process has not prepared, but finds what the first one kept
-        result = run_python(GAME, d, how)
-        assert result.returncode == 0, result.stderr[-3000:]
+        output_of(GAME, d, how)
 
 
 README_LOOP = """
@@ -184,8 +183,7 @@ assert len(counts) > 500 and len(set(counts)) == 1, sorted(set(counts))
 
 def test_the_game_of_the_readme_waits_for_nothing_after_its_first_frame():
     readme = Path(__file__).parents[2] / "README.md"
-    result = run_python(README_LOOP, readme)
-    assert result.returncode == 0, result.stderr[-3000:]
+    output_of(README_LOOP, readme)
 
 
 def test_prepare_changes_nothing_that_can_be_seen():
