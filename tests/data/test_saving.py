@@ -6,6 +6,7 @@ import gc
 import json
 import os
 import pickle
+import stat
 import subprocess
 import sys
 import weakref
@@ -279,3 +280,45 @@ def test_the_context_of_a_world_outlives_switching_while_somebody_holds_the_worl
     assert world.entity_exists(e)
     world.close()
     assert world.name not in esper.list_worlds()
+
+
+# -- the file itself ---------------------------------------------------------------------------------
+
+
+def test_a_saved_world_takes_the_place_and_mode_of_the_file(tmp_path):
+    world, real, link = make_world(2), tmp_path / "real", tmp_path / "link"
+    real.write_bytes(b"")
+    real.chmod(0o640)
+    try:
+        link.symlink_to(real)
+    except OSError:
+        pytest.skip("no links here")
+    world.save(link)
+    assert link.is_symlink()
+    assert real.stat().st_size > 0
+    assert os.name == "nt" or stat.S_IMODE(real.stat().st_mode) == 0o640
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "real"]
+
+
+def test_the_longest_name_can_be_saved(tmp_path):
+    path = tmp_path / ("x" * 255)
+    make_world(2).save(path)
+    World.load(path, Physics(2)).close()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_what_is_no_file_stays(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(CaromError, match="no file that can be replaced"):
+        make_world(2).save(tmp_path / "pipe")
+    with pytest.raises(CaromError, match="no file that can be replaced"):
+        make_world(2).save(tmp_path)
+
+
+def test_what_a_killed_process_has_left_goes_with_a_later_save(tmp_path):
+    old, new = tmp_path / ".carom-part-1", tmp_path / ".carom-part-2"
+    for path in (old, new):
+        path.write_bytes(b"half")
+    os.utime(old, (0, 0))
+    make_world(2).save(tmp_path / "world")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".carom-part-2", "world"]

@@ -1,8 +1,9 @@
-"""What is nearly right is refused at once, with the name that was probably meant."""
+"""What is nearly right is refused where it is written, with the name that was probably meant, or told with its cure."""
 
 from __future__ import annotations
 
 import threading
+import warnings
 from typing import ClassVar
 
 import numpy as np
@@ -15,15 +16,18 @@ from carom.framework import (
     Component,
     ForceSystem,
     NoPhysicsError,
+    PhysicsWarning,
     Plugin,
     PluginError,
     StepError,
     System,
+    UnhandledPairError,
     World,
     column,
 )
 from carom.plugins import Physics
 from carom.plugins.capsule import CapsuleCollider
+from carom.plugins.springs import Springs
 from carom.plugins.tile_grid import TileGridCollider
 
 TILES = ((1, 0), (1, 1))
@@ -65,6 +69,10 @@ def bare(name):
     return decorate
 
 
+def set_to_one(component, name):
+    setattr(component, name, 1.0)
+
+
 REFUSED = {
     "event": (lambda: make_world(2).on("contact_started", print), ValueError, "did you mean 'contact_begin'"),
     "own event": (lambda: make_world(2).on("level_up", print), ValueError, "world.events.define('level_up')"),
@@ -79,6 +87,16 @@ REFUSED = {
     "tiles": (lambda: TileGridCollider(TILES, 1.0, bounce=1), TypeError, "did you mean 'restitution'"),
     "box": (lambda: AABBCollider(size=(1, 1)), TypeError, "did you mean 'half_extents'"),
     "body": (lambda: RigidBody(velocity=(1, 0)), TypeError, "did you mean 'linear_velocity'"),
+    **{
+        f"{read} {wrong}": (
+            lambda read=read, made=made, wrong=wrong: read(made, wrong), AttributeError, f"did you mean '{right}'"
+        )
+        for made, wrong, right in (
+            (RigidBody(), "velocity", "linear_velocity"), (RigidBody(), "apply_forse", "apply_force"),
+            (Transform((0, 0)), "pos", "position"), (SphereCollider(1.0), "bounce", "restitution"),
+        )
+        for read in (getattr, set_to_one) if (read, wrong) != (set_to_one, "apply_forse")
+    },
     "twice": (
         lambda: make_world(2).create_entity(Transform((0, 0)), RigidBody(), Transform((1, 1))),
         ValueError, "one component of each type, got 2 Transform",
@@ -169,3 +187,54 @@ def test_worlds_are_stepped_in_one_thread_at_a_time():
     assert (first.step_count, second.step_count) == (1, 0)
     second.step()
     assert second.step_count == 1
+
+
+def test_a_body_in_no_layer_is_refused():
+    world = make_world(2)
+    collider = world.component_for_entity(ball(world, (0, 0)), SphereCollider)
+    for make in (
+        lambda: SphereCollider(1.0, layer=0), lambda: setattr(collider, "layer", 0),
+        lambda: world.create_entities(
+            2, Transform.many(np.zeros((2, 2))), AABBCollider.many((1.0, 1.0), layer=np.array([2, 0]))
+        ),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=r"layer must not be 0.*mask=0"):
+            make()
+    collider.layer, collider.mask = -(2**63), 0
+    assert len(world.bodies) == 1
+
+
+def test_frames_in_milliseconds_are_told_once():
+    world = make_world(2)
+    world.advance(3.0)  # somebody has dragged the window
+    world.advance(0.016)
+    world.advance(16)
+    with pytest.warns(PhysicsWarning, match=r"advance takes seconds.*milliseconds / 1000"):
+        world.advance(17)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        world.advance(16)
+    assert len(world.faults) == 1
+
+
+def test_a_shape_of_carom_without_its_plugin_names_it():
+    world = make_world(2)
+    world.create_entity(Transform((0, 0)), RigidBody(), CapsuleCollider(0.2, 0.2))
+    with pytest.raises(UnhandledPairError, match=r"capsule\.plugin"):
+        world.step()
+
+
+def test_springs_before_physics_say_in_which_order():
+    with pytest.raises(NoPhysicsError, match=r"before them: World\(Physics"):
+        World(Springs(), Physics())
+
+
+def test_arrays_keep_their_last_values_when_the_world_closes():
+    world = make_world(2)
+    for x in range(100):
+        ball(world, (2.0 * x, 0), (1.0, 2.0))
+    position, velocity = world.bodies.position, world.bodies.dynamic.linear_velocity
+    before = position.copy()
+    world.close()
+    np.testing.assert_array_equal(position, before)
+    assert (velocity == (1.0, 2.0)).all()
