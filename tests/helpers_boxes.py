@@ -93,8 +93,12 @@ def pair_set(first, second):
 
 
 def overlapping(lower, upper, moving):
-    """By brute force: pairs of boxes that share a point, one of them among the first."""
-    meet = np.ones((moving, len(lower)), bool)
-    for q in range(lower.shape[1]):
-        meet &= (lower[:moving, None, q] <= upper[:, q]) & (lower[:, q] <= upper[:moving, None, q])
-    return {(i, j) for i, j in zip(*(rows.tolist() for rows in np.nonzero(meet)), strict=True) if i < j}
+    """By brute force: pairs (i, j), i < j, of boxes that share a point; the first is among the first ``moving``.
+
+    A box with nan, or empty (lower above upper), shares none.
+    """
+    real, found = (lower <= upper).all(axis=1), set()
+    for i in np.flatnonzero(real[:moving]).tolist():
+        meet = real[i + 1 :] & ((lower[i + 1 :] <= upper[i]) & (lower[i] <= upper[i + 1 :])).all(axis=1)
+        found |= {(i, i + 1 + j) for j in np.flatnonzero(meet).tolist()}
+    return found

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers_boxes import Boxes, overlapping, pair_set
-from helpers_tree import query
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
@@ -15,12 +14,10 @@ from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
 from carom.systems.broad_phase.stages import (
     ACTIVE_ROWS,
     BRUTE_FORCE,
-    CANDIDATE_LIMIT,
     STATIC_GRID,
     TREE,
     UNIFORM_GRID,
 )
-from carom.systems.broad_phase.tree.tree import CandidateLimitError
 from carom.systems.codes import FIND_IN_PYTHON
 
 
@@ -136,27 +133,3 @@ def test_one_pair_more_than_there_is_room_for():
     for room in range(len(expected) - 3, len(expected) + 3):
         boxes.state.candidates.first, boxes.state.candidates.second = (np.empty(room, np.int32) for _ in range(2))
         assert pair_set(*boxes.find()) == expected
-
-
-def test_the_limit_of_candidates():
-    """Each of 3,000 small boxes meets each of 2,900 that cover everything: the tree counts them and refuses."""
-    lower, upper = spread(np.random.default_rng(6), 5900, 2)
-    lower[3000:], upper[3000:] = -1.0, 1e3
-    boxes = Boxes(2)
-    boxes.set(lower, upper, 3000)
-    with pytest.raises(CandidateLimitError, match=f"exceed the limit of {CANDIDATE_LIMIT}"):
-        boxes.find()
-    assert len(boxes.state.candidates.first) == CANDIDATE_LIMIT
-
-
-@both_dimensions
-def test_indexes_for_queries(d):
-    lower, upper = spread(np.random.default_rng(8), 900, d)
-    boxes = Boxes(d)
-    for moving, count in ((300, 900), (10, 30)):
-        boxes.set(lower[:count], upper[:count], moving)
-        for index, rows in zip(boxes.search.partitions(), (range(moving), range(moving, count)), strict=True):
-            assert sorted(index.rows.tolist()) == list(rows)
-            assert (index.record.levels == 0) == (len(rows) <= BRUTE_FORCE_MAX)
-            meet = ((lower[rows] <= upper[5]) & (lower[5] <= upper[rows])).all(axis=1)
-            assert query(index, lower[5], upper[5]).tolist() == (rows[0] + np.flatnonzero(meet)).tolist()
