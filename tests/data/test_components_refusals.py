@@ -44,15 +44,10 @@ CASES = [(make, field, value) for make, field, values in WRONG for value in valu
 
 
 @pytest.mark.parametrize(("make", "field", "value"), CASES, ids=[f"{f}={str(v)[:20]}" for _, f, v in CASES])
-def test_wrong_values_are_refused_by_the_constructor(make, field, value):
-    """ACCURACY C8 to C13."""
+def test_wrong_values_are_refused_by_constructor_and_setter_which_names_the_entity(make, field, value):
     with pytest.raises(ValueError, match=re.escape(field)) as caught:
         make(value)
     assert "got" in str(caught.value)
-
-
-@pytest.mark.parametrize(("make", "field", "value"), CASES, ids=[f"{f}={str(v)[:20]}" for _, f, v in CASES])
-def test_wrong_values_are_refused_by_the_setter_which_names_the_entity(make, field, value):
     owner, name = field.split(".")
     world = make_world()
     e = world.create_entity(
