@@ -73,7 +73,9 @@ def scene(d, n, seed, sizes="even", kinds=("dynamic", "static", "kinematic")):
     side = 2.5 * n ** (1 / d)
     places = rng.random((n, d)) * side
     scale = np.ones(n)
-    if sizes == "power":
+    if sizes == "spread":
+        places = side * rng.standard_normal((n, d)) * 10.0 ** rng.uniform(-3, 3, (n, 1))
+    if sizes in ("power", "spread"):
         scale = 0.02 * rng.random(n) ** -0.7
     if sizes == "clusters":
         places = side * (rng.integers(0, 3, (n, d)) + 0.1 * rng.standard_normal((n, d)))

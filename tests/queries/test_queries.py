@@ -47,14 +47,15 @@ def test_nearest_of_many_bodies(d, n, sizes):
 
 
 @both_dimensions
-@pytest.mark.parametrize("n", [60, 800])
-def test_touching_many_bodies(d, n):
-    world, bodies, side = scene(d, n, seed=5)
+@pytest.mark.parametrize(("n", "sizes"), [(60, "even"), (800, "even"), (800, "spread")])
+def test_touching_many_bodies(d, n, sizes):
+    world, bodies, side = scene(d, n, seed=5, sizes=sizes)
     rng = np.random.default_rng(5)
-    centres = rng.random((50, d)) * side
-    radii, halves = 2 * rng.random(50), 2 * rng.random((50, d))
+    m, some = 1000, rng.integers(0, n, 1000)
+    centres = bodies.centre[some] + 0.1 * side * rng.standard_normal((m, d)) * 10.0 ** rng.uniform(-3, 0, (m, 1))
+    radii, halves = 2 * rng.random(m), 2 * rng.random((m, d)) * 10.0 ** rng.uniform(-1, 2, (m, 1))
     spheres, boxes = world.query_spheres(centres, radii), world.query_aabbs(centres - halves, centres + halves)
-    for i in range(50):
+    for i in range(m):
         expected = bodies.entity[bodies.gap(centres[i], radii[i : i + 1], True) <= 0]
         np.testing.assert_array_equal(spheres[i], expected)
         assert world.query_sphere(centres[i], radii[i]) == expected.tolist()
