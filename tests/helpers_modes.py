@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +27,11 @@ def mode_world(mode: str, d: int = 2, gravity: Any = 0.0, **settings: Any) -> Wo
 def along(d: int, *values: float) -> tuple[float, ...]:
     """The first d of the values, zeros where they end."""
     return (*values, *(0.0,) * d)[:d]
+
+
+def turn(d: int, angle: float) -> Any:
+    """A rotation in the plane of x and y."""
+    return angle if d == 2 else (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
 def bullet(

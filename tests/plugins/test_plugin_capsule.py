@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from worlds import both_dimensions, mostly_2d
+from helpers_modes import along, turn
+from worlds import both_dimensions, mostly_2d, position
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -21,30 +22,17 @@ G = 10.0
 def make_world(d, others=True, **settings):
     """A world with a floor, its top at 0, and a distant sphere: all three shapes, so that all tests share code."""
     options = {"integrator": "velocity_verlet"} | settings
-    world = World(Physics(dimensions=d, gravity=at(d, 0, -G)), capsule.plugin, settings=Settings(**options))
+    world = World(Physics(dimensions=d, gravity=along(d, 0, -G)), capsule.plugin, settings=Settings(**options))
     if others:
-        world.create_entity(Transform(at(d, 0, -1)), AABBCollider(at(d, 50, 1, 50), friction=1.0))
-        world.create_entity(Transform(at(d, 1e4, 0)), SphereCollider(1.0))
+        world.create_entity(Transform(along(d, 0, -1)), AABBCollider(along(d, 50, 1, 50), friction=1.0))
+        world.create_entity(Transform(along(d, 1e4, 0)), SphereCollider(1.0))
     return world
-
-
-def at(d, *place):
-    return tuple(map(float, (*place, 0, 0, 0)[:d]))
-
-
-def turn(d, angle):
-    """A rotation in the plane of x and y."""
-    return angle if d == 2 else (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
 def drop(world, d, x, y, angle=0.0, velocity=0.0, **collider):
     return world.create_entity(
-        Transform(at(d, x, y), turn(d, angle)), RigidBody(linear_velocity=velocity),
+        Transform(along(d, x, y), turn(d, angle)), RigidBody(linear_velocity=velocity),
         CapsuleCollider(0.25, 0.5, **collider))  # fmt: skip
-
-
-def place_of(world, entity):
-    return np.array(world.component_for_entity(entity, Transform).position)
 
 
 @mostly_2d
@@ -54,17 +42,17 @@ def test_rests_on_boxes_spheres_and_capsules(d):
     lying = math.pi / 2
     floor = drop(world, d, 0, 0.26, lying)
     on_sphere_at = 5.0
-    world.create_entity(Transform(at(d, on_sphere_at, 0.5)), SphereCollider(0.5))
+    world.create_entity(Transform(along(d, on_sphere_at, 0.5)), SphereCollider(0.5))
     on_sphere = drop(world, d, on_sphere_at, 1.76)
-    world.create_entity(Transform(at(d, 10, 0.25), turn(d, lying)), CapsuleCollider(0.25, 0.5))
+    world.create_entity(Transform(along(d, 10, 0.25), turn(d, lying)), CapsuleCollider(0.25, 0.5))
     on_capsule = drop(world, d, 10.2, 0.76, lying)
     upright = drop(world, d, 15, 0.76)
     on_upright = drop(world, d, 15, 2.27)
-    box = world.create_entity(Transform(at(d, 20, 1.02)), RigidBody(), AABBCollider(0.25))
-    world.create_entity(Transform(at(d, 20, 0.25), turn(d, lying)), CapsuleCollider(0.5, 0.5))
+    box = world.create_entity(Transform(along(d, 20, 1.02)), RigidBody(), AABBCollider(0.25))
+    world.create_entity(Transform(along(d, 20, 0.25), turn(d, lying)), CapsuleCollider(0.5, 0.5))
     for _ in range(240):
         world.step()
-    heights = [place_of(world, entity)[1] for entity in (floor, on_sphere, on_capsule, upright, on_upright, box)]
+    heights = [position(world, entity)[1] for entity in (floor, on_sphere, on_capsule, upright, on_upright, box)]
     assert np.abs(np.array(heights) - (0.25, 1.75, 0.75, 0.75, 2.25, 1.0)).max() < 0.005
     assert np.abs(world.bodies.dynamic.linear_velocity).max() < 1e-3
     world.close()
@@ -73,21 +61,21 @@ def test_rests_on_boxes_spheres_and_capsules(d):
 @both_dimensions
 def test_queries_and_casts_find_it(d):
     world = make_world(d)
-    place = np.array(at(d, 0, 100))
+    place = np.array(along(d, 0, 100))
     leaning = world.create_entity(Transform(place, turn(d, -math.pi / 4)), CapsuleCollider(0.5, 2.0))
-    axis = np.array(at(d, 1, 1)) / math.sqrt(2)
+    axis = np.array(along(d, 1, 1)) / math.sqrt(2)
     assert world.query_point(place + 2.4 * axis) == [leaning]
     assert world.query_point(place + 2.6 * axis) == []
-    assert world.query_point(place + at(d, 1.5, -1.5)) == []  # in its box, not in it
-    assert world.query_sphere(place + at(d, 1.0, -1.0), math.sqrt(2) - 0.4) == [leaning]
-    assert world.query_sphere(place + at(d, 1.0, -1.0), math.sqrt(2) - 0.6) == []
-    hit = world.ray_cast(place + at(d, 1, 10), at(d, 0, -1))[0]
+    assert world.query_point(place + along(d, 1.5, -1.5)) == []  # in its box, not in it
+    assert world.query_sphere(place + along(d, 1.0, -1.0), math.sqrt(2) - 0.4) == [leaning]
+    assert world.query_sphere(place + along(d, 1.0, -1.0), math.sqrt(2) - 0.6) == []
+    hit = world.ray_cast(place + along(d, 1, 10), along(d, 0, -1))[0]
     assert hit.entity == leaning
     assert hit.distance == pytest.approx(9 - 0.5 * math.sqrt(2))
     assert hit.normal[:2] == pytest.approx((-math.sqrt(0.5), math.sqrt(0.5)))
     end = world.ray_cast(place + 10 * axis, -axis)[0]
     assert end.distance == pytest.approx(7.5)
-    swept = world.shape_cast(CapsuleCollider(0.25, 1.0), place + at(d, 0.5, 10), at(d, 0, -20))[0]
+    swept = world.shape_cast(CapsuleCollider(0.25, 1.0), place + along(d, 0.5, 10), along(d, 0, -20))[0]
     assert swept.entity == leaning
     # its lower end, at x = 0.5, comes to within 0.75 of the line
     assert swept.distance == pytest.approx(9.5 - 0.75 * math.sqrt(2) - 1.0)

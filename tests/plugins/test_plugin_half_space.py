@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from worlds import both_dimensions, mostly_2d
+from helpers_modes import along, turn
+from worlds import both_dimensions, mostly_2d, position, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -16,32 +17,15 @@ from carom.plugins.half_space import HalfSpaceCollider
 G = 10.0
 
 
-def at(d, *place):
-    return tuple(map(float, (*place, 0, 0, 0)[:d]))
-
-
-def turn(d, angle):
-    """A rotation in the plane of x and y."""
-    return angle if d == 2 else (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
-
-
 def make_world(d, ground=None, angle=0.0, body=(), **settings):
     """Ground below y = 0, and a box and a ball far up, so that all tests share compiled code."""
     options = {"integrator": "velocity_verlet"} | settings
-    world = World(Physics(dimensions=d, gravity=at(d, 0, -G)), half_space.plugin, settings=Settings(**options))
-    ground = HalfSpaceCollider(at(d, 0, 1), friction=1.0) if ground is None else ground
-    world.create_entity(Transform(at(d), turn(d, angle)), ground, *body)
-    world.create_entity(Transform(at(d, 0, 1e6)), AABBCollider(0.5))
-    world.create_entity(Transform(at(d, 0, 2e6)), SphereCollider(0.5))
+    world = World(Physics(dimensions=d, gravity=along(d, 0, -G)), half_space.plugin, settings=Settings(**options))
+    ground = HalfSpaceCollider(along(d, 0, 1), friction=1.0) if ground is None else ground
+    world.create_entity(Transform(along(d), turn(d, angle)), ground, *body)
+    world.create_entity(Transform(along(d, 0, 1e6)), AABBCollider(0.5))
+    world.create_entity(Transform(along(d, 0, 2e6)), SphereCollider(0.5))
     return world
-
-
-def place_of(world, entity):
-    return np.array(world.component_for_entity(entity, Transform).position)
-
-
-def velocity_of(world, entity):
-    return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
 
 
 @pytest.mark.slow
@@ -52,7 +36,7 @@ def test_bounces_at_the_right_height_wherever_it_is(d, away):
     world, e = make_world(d), 0.5
     colliders = SphereCollider(0.5, restitution=e), AABBCollider(0.5, restitution=e), SphereCollider(0, restitution=e)
     entities = [
-        world.create_entity(Transform(at(d, away + 5 * k, 2 + low)), RigidBody(), collider)
+        world.create_entity(Transform(along(d, away + 5 * k, 2 + low)), RigidBody(), collider)
         for k, (collider, low) in enumerate(zip(colliders, (0.5, 0.5, 0.0), strict=True))
     ]
     fall, rise = math.sqrt(2 * 2 / G), math.sqrt(2 * 2 * e**2 / G)
@@ -60,7 +44,7 @@ def test_bounces_at_the_right_height_wherever_it_is(d, away):
     while world.time < fall + 2 * rise - 1 / 60:
         world.step()
         if world.time > fall:
-            heights.append([place_of(world, entity)[1] for entity in entities])
+            heights.append([position(world, entity)[1] for entity in entities])
     assert np.max(heights, 0) - (0.5, 0.5, 0.0) == pytest.approx([2 * e**2] * 3, abs=2e-3)
     assert len(world.contacts.of(1)) == 0  # a point in the air touches nothing
     world.close()
@@ -69,21 +53,21 @@ def test_bounces_at_the_right_height_wherever_it_is(d, away):
 @mostly_2d
 def test_bodies_rest_on_it_as_on_a_box(d):
     """The same heights as on a box of any size; a point has no size, so its slop is that of the box."""
-    colliders = SphereCollider(0.5), AABBCollider(0.5), SphereCollider(0), AABBCollider(at(d, 2, 0.25, 1))
+    colliders = SphereCollider(0.5), AABBCollider(0.5), SphereCollider(0), AABBCollider(along(d, 2, 0.25, 1))
     lows = np.array((0.5, 0.5, 0.0, 0.25))
     heights = []
-    for ground in (None, AABBCollider(at(d, 100, 1, 100), offset=at(d, 0, -1), friction=1.0)):
+    for ground in (None, AABBCollider(along(d, 100, 1, 100), offset=along(d, 0, -1), friction=1.0)):
         world = make_world(d, ground)
         entities = [
-            world.create_entity(Transform(at(d, 5 * k, 0.3 + low)), RigidBody(), collider)
+            world.create_entity(Transform(along(d, 5 * k, 0.3 + low)), RigidBody(), collider)
             for k, (collider, low) in enumerate(zip(colliders, lows, strict=True))
         ]
         for _ in range(240):
             world.step()
-        heights.append([place_of(world, entity)[1] for entity in entities])
+        heights.append([position(world, entity)[1] for entity in entities])
         assert [len(world.contacts.of(entity)) for entity in entities] == [1] * 4
         on_ground = world.contacts.of(entities[3])[0].point  # of a box: in the middle of its face
-        np.testing.assert_allclose(np.delete(on_ground, 1), np.delete(place_of(world, entities[3]), 1), atol=1e-9)
+        np.testing.assert_allclose(np.delete(on_ground, 1), np.delete(position(world, entities[3]), 1), atol=1e-9)
         world.close()
     heights = np.array(heights)
     assert np.abs(heights[0] - heights[1])[lows > 0].max() < 1e-12
@@ -95,14 +79,14 @@ def test_a_slope_made_by_the_transform(d):
     """Frictionless at 30 degrees: v = g sin 30 t; with friction 1 it stays."""
     angle, down = math.pi / 6, np.array((-math.cos(math.pi / 6), -0.5))
     for friction, speed in ((0.0, 5.0), (1.0, 0.0)):
-        world = make_world(d, HalfSpaceCollider(at(d, 0, 5), friction=friction), angle)
-        place = Transform(at(d, 0.5 * down[1], -0.5 * down[0]))
+        world = make_world(d, HalfSpaceCollider(along(d, 0, 5), friction=friction), angle)
+        place = Transform(along(d, 0.5 * down[1], -0.5 * down[0]))
         slider = world.create_entity(place, RigidBody(), SphereCollider(0.5, friction=friction))
-        start = place_of(world, slider)
+        start = position(world, slider)
         for _ in range(60):
             world.step()
-        assert velocity_of(world, slider)[:2] @ down == pytest.approx(speed, abs=0.02)
-        height = (place_of(world, slider) - start)[:2] @ (down[1], -down[0])
+        assert velocity(world, slider)[:2] @ down == pytest.approx(speed, abs=0.02)
+        height = (position(world, slider) - start)[:2] @ (down[1], -down[0])
         assert abs(height) < 0.0025
         world.close()
 
@@ -112,10 +96,10 @@ def test_a_slope_made_by_the_transform(d):
 def test_a_rising_one_lifts_what_is_on_it(d):
     """In one tree with moving bodies, among few and among many; half-spaces do not meet each other."""
     for count in (3, 300):
-        rises = RigidBody(kind="kinematic", linear_velocity=at(d, 0, 1))
+        rises = RigidBody(kind="kinematic", linear_velocity=along(d, 0, 1))
         world = make_world(d, body=(rises,))
         world.create_entity(
-            Transform(at(d, 0, -20)), HalfSpaceCollider(at(d, 1, 1)), RigidBody(kind="kinematic"))
+            Transform(along(d, 0, -20)), HalfSpaceCollider(along(d, 1, 1)), RigidBody(kind="kinematic"))
         places = np.zeros((count, d))
         places[:, 0], places[:, 1] = np.arange(count) * 1.5, 0.5
         world.create_entities(count, Transform.many(places), RigidBody.many(), SphereCollider.many(radius=0.5))
@@ -132,17 +116,17 @@ def test_a_rising_one_lifts_what_is_on_it(d):
 def test_queries_and_casts_find_it_everywhere(d):
     world = make_world(d)
     for where in (0.0, -5e7):
-        assert world.query_point(at(d, where, -1e-3)) == [1]
-        assert world.query_point(at(d, where, 1e-3)) == []
-        assert world.query_sphere(at(d, where, 1), 1.5) == [1]
-        assert world.query_aabb(at(d, where, 1, -1), at(d, where + 1, 2, 1)) == []
-        hit = world.ray_cast(at(d, where, 8), at(d, 1, -1))[0]
+        assert world.query_point(along(d, where, -1e-3)) == [1]
+        assert world.query_point(along(d, where, 1e-3)) == []
+        assert world.query_sphere(along(d, where, 1), 1.5) == [1]
+        assert world.query_aabb(along(d, where, 1, -1), along(d, where + 1, 2, 1)) == []
+        hit = world.ray_cast(along(d, where, 8), along(d, 1, -1))[0]
         assert hit.entity == 1
         assert hit.distance == pytest.approx(8 * math.sqrt(2))
-        assert np.allclose(hit.normal, at(d, 0, 1))
-        assert world.ray_cast(at(d, where, 8), at(d, 1, 0)) == []
-        assert world.query_nearest(at(d, where, 7)).distance == pytest.approx(7)
-        fallen = world.shape_cast(AABBCollider(0.5), at(d, where, 8), at(d, 0, -20))[0]
+        assert np.allclose(hit.normal, along(d, 0, 1))
+        assert world.ray_cast(along(d, where, 8), along(d, 1, 0)) == []
+        assert world.query_nearest(along(d, where, 7)).distance == pytest.approx(7)
+        fallen = world.shape_cast(AABBCollider(0.5), along(d, where, 8), along(d, 0, -20))[0]
         assert (fallen.entity, fallen.distance) == (1, pytest.approx(7.5))
     world.close()
 

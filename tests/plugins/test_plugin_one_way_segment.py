@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from worlds import position, velocity
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -39,20 +40,12 @@ def throw(world, place, velocity=(0.0, 0.0), shape="box", **collider):
     return world.create_entity(Transform(place), RigidBody(linear_velocity=velocity), made)
 
 
-def place_of(world, entity):
-    return np.array(world.component_for_entity(entity, Transform).position)
-
-
-def velocity_of(world, entity):
-    return np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
-
-
 def run(world, seconds, *entities):
     """Heights of the entities after each step, (steps, entities)."""
     heights = []
     for _ in range(round(60 * seconds)):
         world.step()
-        heights.append([place_of(world, entity)[1] for entity in entities])
+        heights.append([position(world, entity)[1] for entity in entities])
     return np.array(heights)
 
 
@@ -71,8 +64,8 @@ def test_a_jump_passes_and_lands(shape):
     for _ in range(120):
         world.step()
         begun += list(world.contacts.begin)
-    assert place_of(world, jumper)[1] == pytest.approx(0.5, abs=REST)
-    assert velocity_of(world, jumper)[1] == pytest.approx(0, abs=1e-6)
+    assert position(world, jumper)[1] == pytest.approx(0.5, abs=REST)
+    assert velocity(world, jumper)[1] == pytest.approx(0, abs=1e-6)
     assert [(contact.entity_a, contact.entity_b) for contact in begun] == [(1, jumper)]
     assert begun[0].normal == pytest.approx((0, 1))
     world.close()
@@ -160,7 +153,7 @@ def test_a_body_from_the_side_passes(shape):
         walker = world.create_entity(
             Transform((-4, height)), RigidBody(linear_velocity=(6, 0), gravity_scale=0), SHAPES[shape]())  # fmt: skip
         run(world, 1.3, walker)
-        assert place_of(world, walker) == pytest.approx((-4 + 6 * 78 / 60, height))
+        assert position(world, walker) == pytest.approx((-4 + 6 * 78 / 60, height))
         world.close()
 
 
@@ -169,11 +162,11 @@ def test_a_body_that_falls_past_the_end_is_not_caught():
     world = make_world()
     faller = throw(world, (-2.7, 2.0), (1.5, -20.0))
     run(world, 0.2, faller)
-    assert velocity_of(world, faller)[0] == pytest.approx(1.5)
-    assert place_of(world, faller)[1] < -1.0
+    assert velocity(world, faller)[0] == pytest.approx(1.5)
+    assert position(world, faller)[1] < -1.0
     on_the_edge = throw(world, (-2.45, 2.0), (0.0, -20.0))
     run(world, 0.5, on_the_edge)
-    assert place_of(world, on_the_edge)[1] == pytest.approx(0.5, abs=REST)
+    assert position(world, on_the_edge)[1] == pytest.approx(0.5, abs=REST)
     world.close()
 
 
@@ -183,10 +176,10 @@ def test_slides_off_the_end(shape):
     world = make_world()
     slider = throw(world, (0, 0.5), (2.0, 0.0), shape)
     heights = run(world, 2.2, slider)
-    assert velocity_of(world, slider)[0] == pytest.approx(2.0, abs=0.6 if shape == "ball" else 1e-9)
+    assert velocity(world, slider)[0] == pytest.approx(2.0, abs=0.6 if shape == "ball" else 1e-9)
     assert heights.max() < 0.5 + 1e-6
     assert heights[-1, 0] < -1.0
-    assert velocity_of(world, slider)[1] < -5.0
+    assert velocity(world, slider)[1] < -5.0
     world.close()
 
 
@@ -198,7 +191,7 @@ def test_a_row_of_segments_and_floors_has_no_seams(shape):
     world = make_world(*pieces, *floors)
     slider = throw(world, (-4, 0.5), (5.0, 0.0), shape)
     heights = run(world, 3.2, slider)
-    assert velocity_of(world, slider)[0] == pytest.approx(5.0, abs=1e-9)
+    assert velocity(world, slider)[0] == pytest.approx(5.0, abs=1e-9)
     assert abs(heights - 0.5).max() < REST
     world.close()
 
@@ -218,8 +211,8 @@ def test_the_front_turns_with_the_transform(angle, front):
         ahead = throw(world, middle + 2.9 * out, -5 * out, "ball")
         behind = throw(world, middle + turn @ (1.2, 0) - 3 * out, 5 * out, "ball")
         run(world, 1.0)
-        assert (place_of(world, ahead) - middle) @ out == pytest.approx(0.5 + 2.6, abs=1e-9)
-        assert (place_of(world, behind) - middle) @ out == pytest.approx(2.0)
+        assert (position(world, ahead) - middle) @ out == pytest.approx(0.5 + 2.6, abs=1e-9)
+        assert (position(world, behind) - middle) @ out == pytest.approx(2.0)
         world.close()
 
 
@@ -232,11 +225,11 @@ def test_a_lift_carries_and_is_jumped_through(shape):
     jumper = throw(world, (2, -2), (0, 12), shape)
     still = world.create_entity(Transform((3.5, 3)), RigidBody(gravity_scale=0), SHAPES[shape]())
     run(world, 3.0)
-    top = place_of(world, 1)[1]
+    top = position(world, 1)[1]
     assert top == pytest.approx(6.0)
     for entity in (rider, jumper, still):  # bodies at rest in the air are picked up
-        assert place_of(world, entity)[1] - top == pytest.approx(0.5, abs=0.01)
-        assert velocity_of(world, entity)[1] == pytest.approx(2, abs=0.01)
+        assert position(world, entity)[1] - top == pytest.approx(0.5, abs=0.01)
+        assert velocity(world, entity)[1] == pytest.approx(2, abs=0.01)
     world.close()
 
 
@@ -260,10 +253,10 @@ def test_dropping_through_by_the_mask():
     collider = world.component_for_entity(player, AABBCollider)
     collider.mask = ~2
     run(world, 0.15)
-    assert place_of(world, player)[1] > 0.3  # its feet are still in it
+    assert position(world, player)[1] > 0.3  # its feet are still in it
     collider.mask = -1
     run(world, 1.0)
-    assert place_of(world, player)[1] < -2
+    assert position(world, player)[1] < -2
     world.close()
 
 
@@ -283,7 +276,7 @@ def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
     heights = run(world, 3.0, *jumpers)
     assert heights.max(0) == pytest.approx([2.0 - 0.15 / 2] * 3, abs=0.1)
     assert heights[-1] == pytest.approx(lows, abs=REST)
-    assert place_of(world, low_jump)[1] < -5
+    assert position(world, low_jump)[1] < -5
     world.close()
 
 
@@ -313,7 +306,7 @@ def test_the_order_of_ids_does_not_matter():
         if first:
             world.create_entity(*segment)
         run(world, 2.0)
-        results.append([place_of(world, entity)[1] for entity in jumpers])
+        results.append([position(world, entity)[1] for entity in jumpers])
         world.close()
     assert results[0] == results[1] == pytest.approx([0.5, 0.5], abs=REST)
 
