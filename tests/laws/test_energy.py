@@ -43,6 +43,16 @@ def rises(world, steps):
     return Rise(step, run)
 
 
+def fill(world, random, masses, maker, **material):
+    """Sixty bodies of 1/masses to masses kg at 10 m/s, at equal distances."""
+    d, row = world.dimensions, math.ceil(BODIES ** (1 / world.dimensions))
+    size = {"radius": RADIUS} if maker is ball else {"half": RADIUS}
+    for k in range(BODIES):
+        place = (np.array(np.unravel_index(k, (row,) * d)) + 0.5) * (2 * HALF / row) - HALF
+        way, mass = random.normal(size=d), masses ** random.uniform(-1.0, 1.0)
+        maker(world, place, SPEED * way / np.linalg.norm(way), mass=mass, **material, **size)
+
+
 def room(seed, mode, e, masses=1.0, rate=60, substeps=4, *, d=2, maker=ball, steps=120):
     """Sixty bodies of 1/masses to masses kg at 10 m/s in a closed room without gravity.
 
@@ -52,14 +62,7 @@ def room(seed, mode, e, masses=1.0, rate=60, substeps=4, *, d=2, maker=ball, ste
     random = np.random.default_rng([seed, 1])
     with make_world(d, collision=mode, dt=1 / rate, substeps=substeps, on_fault="ignore") as world:
         walls(world, HALF, WALL, restitution=e)
-        row = math.ceil(BODIES ** (1 / d))
-        for k in range(BODIES):
-            place = (np.array(np.unravel_index(k, (row,) * d)) + 0.5) * (2 * HALF / row) - HALF
-            way = random.normal(size=d)
-            mass = masses ** random.uniform(-1.0, 1.0)
-            velocity = SPEED * way / np.linalg.norm(way)
-            size = {"radius": RADIUS} if maker is ball else {"half": RADIUS}
-            maker(world, place, velocity, mass=mass, restitution=e, **size)
+        fill(world, random, masses, maker, restitution=e)
         return rises(world, steps)
 
 
@@ -115,12 +118,7 @@ def tumble(seed, mode, e, masses, *, maker=ball, steps=150):
     random = np.random.default_rng([seed, 16])
     with make_world(2, G, collision=mode, on_fault="ignore") as world:
         walls(world, HALF, WALL, restitution=e)
-        row = math.ceil(math.sqrt(BODIES))
-        for k in range(BODIES):
-            place = (np.array((k % row, k // row)) + 0.5) * (2 * HALF / row) - HALF
-            way, mass = random.normal(size=2), masses ** random.uniform(-1.0, 1.0)
-            size = {"radius": RADIUS} if maker is ball else {"half": RADIUS}
-            maker(world, place, SPEED * way / np.linalg.norm(way), mass=mass, restitution=e, friction=0.4, **size)
+        fill(world, random, masses, maker, restitution=e, friction=0.4)
         on_floor = -G * HALF * float(world.bodies.dynamic.mass.sum())
         first = last = world.kinetic_energy() + world.potential_energy() - on_floor
         worst = 0.0
