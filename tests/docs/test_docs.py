@@ -289,20 +289,6 @@ def test_a_failing_block_is_reported_with_its_page_and_line(tmp_path):
         run(blocks, page, {})
 
 
-def test_blocks_links_and_headings_are_told_apart():
-    text = "a [b](c.md)\n~~~python\n[no](x.md)\n```\n~~~\n- list\n  ```sh\n  ls\n  ```\n"
-    blocks, prose = split(text, "text")
-    assert [(block.info, block.line, block.text) for block in blocks] == [
-        (["python"], 3, "[no](x.md)\n```\n"),
-        (["sh"], 8, "ls\n"),
-    ]
-    assert [line for line in prose if line] == ["a [b](c.md)", "- list"]
-    with pytest.raises(AssertionError, match="text:1: this block is never closed"):
-        split("```python\nx\n", "text")
-    targets = [match["target"] for match in LINK.finditer("[![p](q.png)](r.md) [s](t.md#u 'v') [w](x_(y).md)")]
-    assert targets == ["q.png", "r.md", "t.md#u", "x_(y).md"]
-
-
 def test_a_dead_link_is_found(tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# One `two`, three\n\n[a](page.md) [b](#one-two-three) [c](gone.md)\n[d](#gone) `[e](x.md)`\n")

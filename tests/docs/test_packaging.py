@@ -13,7 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from helpers_folders import FLOORS, ROOT, package_of
+from helpers_folders import FLOORS, ROOT, imported, package_of
 
 import carom
 
@@ -67,22 +67,12 @@ def test_importing_carom_loads_none_of_its_parts():
 
 def imported_floors(path: Path) -> set[str]:
     """The floors that a module imports from, for any form of import."""
-    package = package_of(path.parent).split(".")
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            targets = [alias.name.split(".") for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] if node.level else []
-            base = base + (node.module.split(".") if node.module else [])
-            targets = [[*base, alias.name] for alias in node.names]
-        else:
-            continue
-        for target in targets:
-            assert target[0] not in FLOORS, f"{path} imports {'.'.join(target)}: only carom.* is a package"
-            assert target[0] not in OUTSIDE, f"{path} imports {'.'.join(target)}, which is not installed"
-            if target[0] == "carom" and len(target) > 1 and target[1] in FLOORS:
-                found.add(target[1])
+    for target in imported(path):
+        first, second, *_ = (*target.split("."), "")
+        assert first not in FLOORS, f"{path} imports {target}: only carom.* is a package"
+        assert first not in OUTSIDE, f"{path} imports {target}, which is not installed"
+        found |= {second} & {*FLOORS} if first == "carom" else set()
     return found
 
 

@@ -3,33 +3,20 @@
 from __future__ import annotations
 
 import ast
+from pathlib import Path
 
-from helpers_folders import FLOORS, ROOT, package_of
+from helpers_folders import FLOORS, ROOT, imported, package_of
 
 
-def modules() -> dict[str, ast.Module]:
+def modules() -> dict[str, Path]:
     """All modules of the product by name; a package stands for its ``__init__``."""
-    found = {}
-    for floor in FLOORS:
-        for path in sorted((ROOT / floor).rglob("*.py")):
-            package = package_of(path.parent)
-            name = package if path.name == "__init__.py" else f"{package}.{path.stem}"
-            found[name] = ast.parse(path.read_text(encoding="utf-8"))
-            found[name].is_package = path.name == "__init__.py"
-    return found
+    paths = [path for floor in FLOORS for path in sorted((ROOT / floor).rglob("*.py"))]
+    return {f"{package_of(path.parent)}.{path.stem}".removesuffix(".__init__"): path for path in paths}
 
 
-def imports(name: str, tree: ast.Module, known: dict[str, ast.Module]) -> set[str]:
-    """The modules that a module imports, wherever the statement stands."""
-    found = set()
-    package = name.split(".") if tree.is_package else name.split(".")[:-1]
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] if node.level else []
-            base = ".".join([*base, *(node.module or "").split(".")]).rstrip(".")
-            found |= {inner if (inner := f"{base}.{alias.name}") in known else base for alias in node.names}
+def imports(name: str, path: Path, known: dict[str, Path]) -> set[str]:
+    """The modules that a module imports."""
+    found = {target if target in known else target.rpartition(".")[0] for target in imported(path)}
     return (found & known.keys()) - {name}
 
 
@@ -47,7 +34,7 @@ def circles(graph: dict[str, set[str]]) -> list[str]:
 
 def test_no_modules_import_each_other_in_a_circle():
     known = modules()
-    graph = {name: imports(name, tree, known) for name, tree in known.items()}
+    graph = {name: imports(name, path, known) for name, path in known.items()}
     assert len(graph["carom.framework.world.world"]) > 10  # imports are seen
     assert circles(graph) == []
 
