@@ -296,15 +296,6 @@ def test_the_columns_there_are_those_of_the_plan(build):
         assert sum(column.bytes for column in columns) * COUNT == arrays_per_body(world)
 
 
-def test_the_solver_has_room_for_the_bodies_at_rest():
-    with many(make_world(), BALLS, touching=True) as world:
-        world.step()
-        assert 2 <= len(world.physics.state.solver.body_row) < COUNT // 2
-        world.bodies.position[:] = 0.1 * np.arange(COUNT)[:, None]  # now all of them touch others
-        world.step()
-        assert len(world.physics.state.solver.body_row) >= COUNT
-
-
 @pytest.mark.plain
 def test_fields_at_their_defaults_are_distinguished_from_those_in_use():
     world = make_world()

@@ -245,14 +245,6 @@ def test_what_stands_still_keeps_its_offset_when_the_kernels_change():
     assert world.query_point((0.0, -0.9)) == [ground]
 
 
-def test_a_query_uses_the_last_level():
-    world = make_world()
-    entity = levelled(world, 0.0)
-    world.step()
-    assert world.query_point((0.49, 0.49)) == [entity]
-    assert world.query_point((0.0, 0.6)) == []  # in the circle, not in the square
-
-
 @pytest.mark.slow
 def test_the_example_runs(capsys):
     """Levels find the same contacts as the last one alone; bounds finds the first level's hits."""
@@ -331,25 +323,6 @@ def test_it_is_checked_once():
     run(world, 3)
     ball(world, 9.0)
     run(world, 3)
-
-
-@both_dimensions
-def test_many_at_once_are_checked_at_once(d):
-    """10,000 entities in bulk; of two that do not fit, the first is named."""
-    n = 10_000
-    world = make_world(d)
-    places = np.arange(n * d, dtype=float).reshape(n, d)
-    radii = np.full(n, 1.01 * math.sqrt(d))
-    radii[[777, 4000]] = 1.0
-    ids = world.create_entities(
-        n, Transform.many(places), SphereCollider.many(radius=radii), AABBCollider.many(half_extents=1.0)
-    )
-    sticks_out = f"{math.sqrt(d) - 1:.4g}"
-    with pytest.raises(ValueError, match=rf"entity {ids[777]}: .*sticks out by {sticks_out}: .*\(1 more entities"):
-        world.step()
-    for k in (777, 4000):
-        world.component_for_entity(ids[k], SphereCollider).radius = 2.0
-    world.step()
 
 
 def test_sensor_and_solid_do_not_mix():
