@@ -7,12 +7,11 @@ import math
 import numpy as np
 import pytest
 from oracles import integrators_naive as naive
-from worlds import make_world
+from worlds import METHODS, make_world
 
 from carom.components import RigidBody, Transform
 from carom.framework import Component, ForceSystem, column
 
-METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 ORDERS = dict(zip(METHODS, (1, 1, 2, 4, 4), strict=True))
 STAGES = dict(zip(METHODS, (1, 1, 2, 4, 4), strict=True))
 DRIFT = {"explicit_euler": 1, "semi_implicit_euler": -1}  # times g dt t / 2: the methods' error under constant force

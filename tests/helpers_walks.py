@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from worlds import MODES
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
@@ -14,7 +15,6 @@ from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.tile_grid import TileGridCollider
 
-MODES = ("discrete", "continuous", "event_driven")
 FLOORS = ("box", "polygon", "wedge", "capsule", "tiles")
 WALKERS = ("box", "polygon", "capsule", "ball")
 G = 30.0

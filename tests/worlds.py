@@ -8,11 +8,13 @@ import pytest
 from carom.lab.testing import ball, box, floor, make_world, position, run, velocity
 
 __all__ = [
-    "EPS", "Conserved", "ball", "both_dimensions", "box", "floor", "make_world", "mostly_2d", "position", "run",
-    "velocity",
+    "EPS", "METHODS", "MODES", "Conserved", "ball", "both_dimensions", "box", "floor", "make_world", "mostly_2d",
+    "position", "run", "velocity",
 ]  # fmt: skip
 
 EPS = np.finfo(float).eps
+MODES = ("discrete", "continuous", "event_driven")
+METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 both_dimensions = pytest.mark.parametrize("d", [2, 3])
 mostly_2d = pytest.mark.parametrize("d", [2, pytest.param(3, marks=pytest.mark.slow)])  # 3D compiles all again
 

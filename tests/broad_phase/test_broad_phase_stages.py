@@ -11,13 +11,7 @@ from worlds import both_dimensions
 
 from carom.systems.broad_phase.active_rows import MOST_ACTIVE
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.stages import (
-    ACTIVE_ROWS,
-    BRUTE_FORCE,
-    STATIC_GRID,
-    TREE,
-    UNIFORM_GRID,
-)
+from carom.systems.broad_phase.stages import ACTIVE_ROWS, BRUTE_FORCE, STATIC_GRID, TREE, UNIFORM_GRID
 from carom.systems.codes import FIND_IN_PYTHON
 
 

@@ -16,7 +16,7 @@ import esper
 import numpy as np
 import pytest
 from helpers_snapshots import Bullet, Tag, fill, log_events, make, plugins, springs_of
-from worlds import ball, make_world
+from worlds import MODES, ball, make_world
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Component, Plugin, World, column
@@ -26,7 +26,6 @@ from carom.plugins.springs import Springs
 pytestmark = [pytest.mark.plain, pytest.mark.usefixtures("invariants")]
 
 HERE = Path(__file__).resolve().parents[1]
-MODES = ("discrete", "continuous", "event_driven")
 STEPS = 90
 ELSEWHERE = """
 import sys

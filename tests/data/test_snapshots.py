@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from helpers_determinism import Charge, settled
 from helpers_snapshots import Bullet, Tag, fill, log_events, make, springs_of
-from worlds import ball, make_world
+from worlds import MODES, ball, make_world
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import CaromError, Component, ForceSystem, System, World, column
@@ -23,7 +23,6 @@ pytestmark = pytest.mark.usefixtures("invariants")
 
 ROOT = Path(__file__).resolve().parents[2]
 STEPS = 200
-MODES = ("discrete", "continuous", "event_driven")
 
 
 def contents(world):

@@ -6,17 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import (
-    MODES,
-    along,
-    bullet,
-    each_mode,
-    each_sweep,
-    mode_world,
-    positions,
-    strikes,
-    velocities,
-)
+from helpers_modes import MODES, along, bullet, each_mode, each_sweep, mode_world, positions, strikes, velocities
 from helpers_pairwise import pairwise
 from worlds import EPS, Conserved, ball, box, floor, make_world, mostly_2d, position, run, velocity
 

@@ -6,17 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers_modes import (
-    SWEPT,
-    along,
-    bullet,
-    each_mode,
-    each_sweep,
-    mode_world,
-    positions,
-    strikes,
-    velocities,
-)  # fmt: skip
+from helpers_modes import SWEPT, along, bullet, each_mode, each_sweep, mode_world, positions, strikes, velocities
 from helpers_pairwise import pairwise
 from worlds import ball, both_dimensions, box, make_world, position, run, velocity
 

@@ -121,14 +121,9 @@ def test_an_edit_in_a_function_of_another_file_is_noticed(compiled):
 NAMED = """
 import enum
 import numpy as np
-from types import SimpleNamespace
 import deeper
-from carom.framework.compilation import part
 
 TABLE = np.array([1.0, 2.0, 3.0])
-
-class Kind(enum.Enum):
-    HEAVY = 5
 
 class Level(enum.IntEnum):
     TOP = 7

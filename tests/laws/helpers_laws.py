@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from worlds import box
+from worlds import MODES, box
 
-MODES = ("discrete", "continuous", "event_driven")
-SWEPT = ("continuous", "event_driven")
+SWEPT = MODES[1:]
 
 
 def cases(every, few=None, missed=()):

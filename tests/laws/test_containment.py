@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from laws.helpers_laws import SWEPT, beyond, seeds, walls
-from worlds import ball, both_dimensions, box, make_world
+from worlds import METHODS, ball, both_dimensions, box, make_world
 
 TOO_FAST = "so fast that discrete collisions may miss"
 IMPACTS = 50_000  # of a room, then it ends: elastic bodies of very different masses have millions
-METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 
 
 class Kept(NamedTuple):

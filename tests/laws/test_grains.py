@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from helpers_pairwise import pairwise
 from laws.helpers_laws import MODES
-from worlds import ball, box, make_world
+from worlds import METHODS, ball, box, make_world
 
 GRAVITIES = (1e-6, 1e-4, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e4, 1e6)  # g dt² in sizes
-METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 SUBSTEPS = (1, 4, 32)
 WRONG = 0.06  # of a size
 TOO_FAST = "so fast that discrete collisions may miss"

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from helpers_pairwise import pairwise
 from helpers_rest import SLOP, heights
+from worlds import METHODS, MODES
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment, tile_grid
 
-MODES = ("discrete", "continuous", "event_driven")
-METHODS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
 DT = 1 / 60
 GRAVITIES = (1e-6, 1e-3, 0.05, 0.3, 1.0, 3.0, 10.0, 100.0, 1e4, 1e6)  # g dt^2 of a size
 ALLOWED = SLOP + 1e-3  # the slop, and the softness of a stack of five

@@ -7,10 +7,9 @@ import pytest
 
 from carom import scenes
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import PhysicsWarning, Settings, StepError, World
+from carom.framework import PhysicsWarning, Settings, World
 from carom.framework.jit.records.schema import Column
 from carom.plugins import Physics
-from carom.systems.codes import CHECK_FLIGHT
 
 
 def test_looks_for_impacts_of_fast_bodies():
@@ -69,32 +68,6 @@ def test_a_steady_state_makes_no_columns(scene):
         for _ in range(30):
             world.step()
         assert columns_of(*records) == before
-
-
-def free_world():
-    world = World(Physics(gravity=(0, -10)))
-    for k in range(5):
-        world.create_entity(Transform((k, 0)), RigidBody(linear_velocity=(k, 1)))
-    world.step()
-    return world
-
-
-def test_a_failed_step_without_colliders_is_put_back():
-    """It fails after the flight, when positions and velocities are those of the end of the step."""
-    with free_world() as world:
-        world.bodies.position[0], world.bodies.linear_velocity[0] = (1e20, 0), (5, 1)  # so far out it cannot move
-        before = {name: np.array(getattr(world.bodies, name)) for name in ("position", "linear_velocity")}
-        previous = world.physics.state.bodies.previous_position[:5].copy()
-
-        def fail(dt):
-            raise RuntimeError("as asked")
-
-        world.physics.program.handlers[CHECK_FLIGHT] = fail
-        with pytest.raises(StepError, match="as asked"):
-            world.step()
-        for name, values in before.items():
-            np.testing.assert_array_equal(getattr(world.bodies, name), values)
-        np.testing.assert_array_equal(world.physics.state.bodies.previous_position[:5], previous)
 
 
 def ball_above_a_box() -> tuple[World, int, int]:

@@ -12,12 +12,12 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from oracles.narrow_naive import box_box, sphere_box, sphere_sphere
+from worlds import MODES
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Component, Settings, StepError, World, column
 from carom.plugins import Physics
 
-MODES = ("discrete", "continuous", "event_driven")
 MOST = 12  # bodies: enough for heaps, few enough to look at each pair
 GRAVITY = 5.0  # m/s^2, where there is any
 NEAR = 0.02  # of the smaller of two: what overlaps by more must be told, what is further apart must not

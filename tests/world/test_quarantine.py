@@ -8,14 +8,13 @@ import esper
 import numpy as np
 import pytest
 from helpers_poison import column_of, complaints, rest_of, scenes, told
-from worlds import ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
+from worlds import MODES, ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Phase, System
 
 pytestmark = pytest.mark.plain
 
-MODES = ("discrete", "continuous", "event_driven")
 each_mode = pytest.mark.parametrize("mode", MODES)
 METHODS = ("explicit_euler", "velocity_verlet", "rk4", "yoshida4")
 WRONG = {
