@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from carom.framework.plugins.registry import Registry
 from carom.lab.testing import ball, box, floor, make_world, position, run, velocity
+from carom.plugins import Physics
 
 __all__ = [
     "EPS", "METHODS", "MODES", "Conserved", "ball", "both_dimensions", "box", "floor", "make_world", "mostly_2d",
-    "position", "run", "velocity",
+    "position", "registry", "run", "velocity",
 ]  # fmt: skip
 
 EPS = np.finfo(float).eps
@@ -46,3 +48,11 @@ class Conserved:
             np.testing.assert_allclose(self.world.momentum(), self.momentum, rtol=0, atol=1e-12 * self.scale)
         if energy:
             assert self.world.kinetic_energy() <= self.energy * (1 + 1e-12)
+
+
+def registry(*plugins):
+    """What physics and these plugins register."""
+    made = Registry()
+    for plugin in (Physics(), *plugins):
+        made.add(plugin)
+    return made

@@ -10,13 +10,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from worlds import both_dimensions, box, make_world
+from worlds import both_dimensions, box, make_world, registry
 
 from carom.components import AABBCollider, SphereCollider
-from carom.framework.plugins.registry import Registry
 from carom.lab.plugins.kernels import PairCode
 from carom.lab.plugins.samples import Rows, poses
-from carom.plugins import Physics, capsule, half_space
+from carom.plugins import capsule, half_space
 from carom.plugins.capsule import CapsuleCollider, capsule_sphere_sweep
 from carom.plugins.half_space import HalfSpaceCollider
 from carom.plugins.standard_sweeps import box_box_sweep, sphere_box_sweep, sphere_sphere_sweep
@@ -163,14 +162,7 @@ def test_finite_numbers_of_any_size_give_a_time():
             assert hit or time == 0.0
 
 
-def registry():
-    made = Registry()
-    for plugin in (Physics(), capsule.plugin, half_space.plugin):
-        made.add(plugin)
-    return made
-
-
-REGISTRY = registry()
+REGISTRY = registry(capsule.plugin, half_space.plugin)
 PAIRS = [
     (SphereCollider, SphereCollider), (SphereCollider, AABBCollider), (AABBCollider, AABBCollider),
     (CapsuleCollider, SphereCollider), (HalfSpaceCollider, SphereCollider), (HalfSpaceCollider, AABBCollider),

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from worlds import run
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import World
@@ -75,11 +76,6 @@ def make_world(gravity=(0, -10), others=False):
         world.create_entity(Transform((0, -600)), AABBCollider(1.0))
     world.create_entity(Transform((0, -700)), ConvexPolygonCollider.box(1.0))
     return world
-
-
-def run(world, steps):
-    for _ in range(steps):
-        world.step()
 
 
 FALLING = {

@@ -7,15 +7,12 @@ import math
 import numpy as np
 import pytest
 from helpers_modes import strikes
+from helpers_rest import energy
 
 from carom.framework import Settings
 from carom.scenes import bouncing, orbit, shots, spring, thermal_gas
 
 OMEGA = 2 * math.pi
-
-
-def energy(world):
-    return world.kinetic_energy() + world.potential_energy()
 
 
 def run(world, seconds):

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers_rest import SLOP, G, depths
 
 from carom.components import AABBCollider, Transform
 from carom.framework import Settings
@@ -106,10 +107,6 @@ def test_platforms_leave_ways_down_for_every_crate():
         np.testing.assert_allclose(world.bodies.dynamic.mass, 4 * half[:, 0] * half[:, 1], rtol=1e-15)
 
 
-G = 9.81
-SLOP = 0.005  # of a size: overlap that the solver does not correct
-
-
 def steps(world, seconds):
     for _ in range(round(seconds / world.settings.dt)):
         world.step()
@@ -121,16 +118,12 @@ def kinetic_energy_per_body(world):
     return 0.5 * (np.asarray(dynamic.linear_velocity) ** 2).sum(axis=1).mean() / G
 
 
-def solid_depths(world):
-    return np.maximum(np.asarray(world.contacts.depth), 0.0)
-
-
 def test_crates_come_to_rest_on_the_platforms():
     with platforms.build() as world:
         steps(world, 10.0)
         position = world.bodies.dynamic.position
         assert kinetic_energy_per_body(world) < 1e-4
-        assert solid_depths(world).mean() < 0.02
+        assert depths(world).mean() < 0.02
         assert ((position[:, 0] > 0) & (position[:, 0] < platforms.WIDTH) & (position[:, 1] > 0)).all()
         x, y = position.T
         for start, end, height in platforms.PLATFORMS:  # no centre inside one, and a crate on each

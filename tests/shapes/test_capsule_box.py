@@ -8,13 +8,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from worlds import both_dimensions
+from worlds import both_dimensions, registry
 
 from carom.components import AABBCollider
-from carom.framework.plugins.registry import Registry
 from carom.lab.plugins.kernels import PairCode
 from carom.lab.plugins.samples import Rows
-from carom.plugins import Physics, capsule
+from carom.plugins import capsule
 from carom.plugins.capsule import CapsuleCollider
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
@@ -26,11 +25,9 @@ Poses = namedtuple("Poses", "sizes directions boxes offsets")  # (n, 2): radius 
 @cache
 def compiled(d):
     """(the pair as worlds compile it, both shapes)."""
-    registry = Registry()
-    for plugin in (Physics(), capsule.plugin):
-        registry.add(plugin)
-    shapes = registry.shapes[CapsuleCollider], registry.shapes[AABBCollider]
-    return PairCode(registry.pair(CapsuleCollider, AABBCollider), *shapes, d), *shapes
+    made = registry(capsule.plugin)
+    shapes = made.shapes[CapsuleCollider], made.shapes[AABBCollider]
+    return PairCode(made.pair(CapsuleCollider, AABBCollider), *shapes, d), *shapes
 
 
 def meet(poses):

@@ -7,12 +7,12 @@ import itertools
 
 import numpy as np
 import pytest
+from worlds import registry
 
 from carom.components import AABBCollider, SphereCollider
-from carom.framework.plugins.registry import Registry
 from carom.lab.plugins.kernels import PairCode
 from carom.lab.plugins.samples import Poses, Rows, poses
-from carom.plugins import Physics, capsule, convex_polygon, half_space, one_way_segment
+from carom.plugins import capsule, convex_polygon, half_space, one_way_segment
 from carom.plugins.capsule import CapsuleCollider
 from carom.plugins.convex_polygon import ConvexPolygonCollider
 from carom.plugins.half_space import HalfSpaceCollider
@@ -25,14 +25,7 @@ DIRECTIONS = 24  # per pose: half of them anywhere, half near the normal
 ROUNDING = 1e-12  # of distance and sizes
 
 
-def registry():
-    made = Registry()
-    for plugin in (Physics(), capsule.plugin, convex_polygon.plugin, half_space.plugin, one_way_segment.plugin):
-        made.add(plugin)
-    return made
-
-
-REGISTRY = registry()
+REGISTRY = registry(capsule.plugin, convex_polygon.plugin, half_space.plugin, one_way_segment.plugin)
 PAIRS = [
     (first, second, d)
     for first, second in itertools.combinations_with_replacement(SHAPES, 2)

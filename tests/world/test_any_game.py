@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers_filters import pairs
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
@@ -86,11 +87,6 @@ def box_depth(a, half_a, b, half_b):
     depth = box_box(a, half_a, b, half_b)[0]
     gap = np.maximum(np.abs(b - a) - half_a - half_b, 0.0)
     return depth if depth >= 0 else -float(np.linalg.norm(gap))
-
-
-def told(rows):
-    """The pairs of rows of contacts."""
-    return list(zip(rows.entity_a.tolist(), rows.entity_b.tolist(), strict=True))
 
 
 class Game(RuleBasedStateMachine):
@@ -281,7 +277,7 @@ class Game(RuleBasedStateMachine):
         Game.steps += 1
         self.spoiled = {entity: state for entity, state in self.spoiled.items() if state == SPOILED}
         contacts = self.world.contacts
-        begin, end, now, impacts = map(told, (contacts.begin, contacts.end, contacts, contacts.impacts))
+        begin, end, now, impacts = map(pairs, (contacts.begin, contacts.end, contacts, contacts.impacts))
         assert len({*begin}) == len(begin)
         assert not self.touching & {*begin}
         assert {*end} <= self.touching
