@@ -25,8 +25,9 @@ def build(settings=None, seed=0):
 
 @pytest.fixture
 def carom(tmp_path, monkeypatch):
-    """Runs the command in an empty folder; the result has exit_code, stdout and stderr."""
+    """Runs the command in an empty folder, on wide screens; the result has exit_code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
 
     def run(*arguments: str):
         return CliRunner().invoke(cli, list(arguments))

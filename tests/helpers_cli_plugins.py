@@ -5,10 +5,9 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-import pytest
-from click.testing import CliRunner
+from helpers_cli import carom
 
-from carom.lab.cli.main import cli
+__all__ = ["BALL", "OFFERED", "ROOT", "carom", "offer", "refusal", "row_of"]
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -57,18 +56,6 @@ def ball_ball(a, b, d):
     normal = along(d, distance)
     return depth >= 0.0, depth, normal, scale(normal, a.radius - 0.5 * depth)
 """
-
-
-@pytest.fixture
-def carom(tmp_path, monkeypatch):
-    """Runs the command in an empty folder, on wide screens."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-
-    def run(*arguments: str):
-        return CliRunner().invoke(cli, list(arguments))
-
-    return run
 
 
 def row_of(output: str, start: str) -> str:
