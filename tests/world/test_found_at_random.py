@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from laws.helpers_laws import walls
 
 from carom.components import AABBCollider, RigidBody, Transform
 from carom.framework import Settings, World
@@ -24,12 +25,7 @@ def room(number, gravity, speed, collider, restitution, **settings):
         random.permutation(count)
     side = math.ceil(count**0.5 - 1e-9)
     half, wall = side + 0.5, 0.05
-    for axis in range(2):
-        for sign in (-1.0, 1.0):
-            centre, extents = np.zeros(2), np.full(2, half + wall)
-            centre[axis] = sign * (half + 0.5 * wall)
-            extents[axis] = 0.5 * wall
-            world.create_entity(Transform(tuple(centre)), AABBCollider(tuple(extents), restitution=restitution))
+    walls(world, half, wall, restitution=restitution)
     cells = random.permutation(side**2)[:count]
     places = 2.0 * (np.stack(np.unravel_index(cells, (side, side)), axis=1) - 0.5 * (side - 1))
     ways = random.normal(size=(count, 2))
