@@ -304,6 +304,11 @@ class Scene:
         self.parameters.fill(self.state.shapes)
         self._shapes_version = self.table.columns_version
 
+    def follow_arrays(self) -> None:
+        """Some rows have other arrays, perhaps in the middle of a step."""
+        if self.parameters is not None:
+            self.parameters.follow_arrays()
+
     def _rotated_column(self, key: str, own: np.ndarray) -> np.ndarray:
         """Room for a shape's parameter as it is in the world."""
         column = self.rotated_columns.get(key)

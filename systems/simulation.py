@@ -72,6 +72,7 @@ class Simulation:
         self._room = Room(self.state, self.scene, self.search)
         self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
         self.table.on_make, self.table.on_lend = self._follow_columns, self._follow_lent
+        self.table.on_arrays_changed = self._follow_arrays
         handlers = {
             **self._room.handlers(self),
             CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
@@ -80,6 +81,7 @@ class Simulation:
         }  # fmt: skip
         self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
         self.sleepers = Sleepers(self.state, self.table, self.scene, self.program, self._room)
+        self.sleepers.box_now, self.table.on_changed_inside = self._box_now, self.sleepers.follow_change
         source.finish_found = lambda: self.program.run_one("finish_found", world.clock.dt)
         source.stored, source.disturb = self.sleepers.contacts, self.sleepers.disturb
         self.wake, self.taken_out = self.sleepers.wake, self.quarantine.out_now
@@ -207,6 +209,11 @@ class Simulation:
         self.scene.bind_columns()
         if self.state.version == self.table.version:  # else the next refresh does it, when rows are known
             self.quarantine.bind()
+
+    def _follow_arrays(self) -> None:
+        """Rows have other arrays."""
+        self.scene.follow_arrays()
+        self.quarantine.follow_arrays()
 
     def _follow_lent(self) -> None:
         """Code of the game may write static rows of more columns than before."""

@@ -304,6 +304,9 @@ class RowStore:
     def written(self, column: Column, row: int) -> None:
         pass
 
+    def changed_inside(self, column: Column, row: int, before: int, inside: np.ndarray) -> None:
+        pass
+
 
 class _OtherWord:
     """A word that other engines have for a field; it can neither be read nor set, and the error names the field."""

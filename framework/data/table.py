@@ -57,6 +57,8 @@ class Table:
         self.exposed: set[str] = set()  # columns whose static rows code of the game may write unseen
         self.on_lend: Callable[[], None] = lambda: None  # called when these are more
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
+        self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
+        self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
         self.forces_are_summed: Callable[[], bool] = lambda: False  # whether ``force`` holds the sum of this step
         self.frames_applied = False  # whether a force was applied from outside since the last window
         self.stacks: dict[str, np.ndarray] = {}  # (types, capacity, ...): the same field of several component types
@@ -464,6 +466,11 @@ class Table:
     def is_frozen(self, row: int) -> bool:
         """Static rows are read in place and written by assignment only, so that no change goes unseen."""
         return row >= self.stops[1]
+
+    def changed_inside(self, column: Any, row: int, before: int, inside: np.ndarray) -> None:
+        """The array of a row is another one than that of number ``before``, but only inside of these boxes."""
+        self.on_arrays_changed()
+        self.on_changed_inside(column, row, before, inside)
 
     def written(self, column: Column, row: int) -> None:
         if row >= self.stops[1]:

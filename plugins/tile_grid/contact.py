@@ -12,25 +12,31 @@ from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, divided, length, sub
 from ..standard_shapes import convex_convex
+from .cells import BLOCK
 from .collider import ALL, WALLS
 from .rectangles import (
+    EMPTY,
+    MIXED,
     SLANT,
     TIE,
     WAITING,
     box_around,
     cell_at,
     cells_in,
+    contents,
     faces_like,
     gaps,
-    grown,
+    grid_of,
+    grown_within,
+    grows_further,
     halved,
+    has_tiles,
     hidden,
     load_cells,
     rectangle,
     sharp,
     store_cells,
     tile_support,
-    tiles_in,
 )
 
 DEEP = 16  # tiles: rectangles extend at most this far beyond a shape, so depth inside solid rock is exact up to it
@@ -69,16 +75,30 @@ def around(cells, ring, size):
 
 
 @part
-def ring_with_tiles(sums, stride, touched, size):
+def searched(cells, ring, size):
+    """The area to search: whole blocks where it is large."""
+    x0, y0, x1, y1 = around(cells, ring, size)
+    if ring < BLOCK:
+        return x0, y0, x1, y1
+    x1, y1 = min((x1 + BLOCK - 1) & -BLOCK, size[0]), min((y1 + BLOCK - 1) & -BLOCK, size[1])
+    return x0 & -BLOCK, y0 & -BLOCK, x1, y1
+
+
+@part
+def ring_with_tiles(grid, touched, size):
     """By how many cells to enlarge the searched area around the shape until it contains tiles; -1: there are none."""
-    ring = 0
+    if has_tiles(grid, touched):
+        return 0
+    ring = BLOCK  # most are near tiles, or far from all
+    if has_tiles(grid, searched(touched, ring, size)):
+        ring = 1
     while True:
-        cells = around(touched, ring, size)
-        if tiles_in(sums, stride, cells) > 0.0:
+        cells = searched(touched, ring, size)
+        if has_tiles(grid, cells):
             return ring
         if cells_in(cells) == size[0] * size[1]:
             return -1
-        ring = 2 * ring + 1
+        ring = 2 * ring + 1 if 2 * ring + 1 < BLOCK - 1 else max(BLOCK, 2 * ring)
 
 
 @part
@@ -93,22 +113,6 @@ def ring_to_search(ring, nearest, inner_depth, faces, tile, size):
     if faces != ALL:
         need = max(need, 1)  # floors may be nearer than the requested walls, or the reverse
     return need
-
-
-@part
-def grown_within(sums, stride, cells, limits, turn):
-    """A rectangle full of tiles, grown within limits: first in width, then in height; in turn 1 the other way round."""
-    for k in range(4):
-        side = k if turn == 0 else (k + 2) % 4
-        room = cells[0] - limits[0]
-        if side == 1:
-            room = limits[2] - cells[2]
-        elif side == 2:
-            room = cells[1] - limits[1]
-        elif side == 3:
-            room = limits[3] - cells[3]
-        cells = grown(sums, stride, cells, side, room)
-    return cells
 
 
 @part
@@ -129,6 +133,14 @@ def gaps_of_boxes(box, cells, tile):
 
 
 @part
+def is_farther(box, cells, tile, square):
+    """True if a rectangle is farther away from a box than the root of ``square``."""
+    gap_x, gap_y = gaps_of_boxes(box, cells, tile)
+    apart_x, apart_y = max(gap_x, 0.0), max(gap_y, 0.0)
+    return apart_x * apart_x + apart_y * apart_y > square
+
+
+@part
 def width_above_face(box, cells, n, tile):
     """How much of a box is above the face of a rectangle that has the normal n."""
     if abs(n[0]) > abs(n[1]):
@@ -139,15 +151,13 @@ def width_above_face(box, cells, n, tile):
 @part
 def deepest_contact(a, b, d, support, rounding):
     """The contact with the rectangle of tiles that the shape overlaps most, or is nearest to."""
-    sums, tile = a.sums, a.tile_size
-    columns = int(sums[0, 0])
-    stride = columns + 1
-    rows = (len(sums) - 1) // stride - 1
+    grid, tile = grid_of(a.packed), a.tile_size
+    columns, rows = grid[1], grid[2]
     size, middle = (columns, rows), (0.5 * columns * tile, 0.5 * rows * tile)
     at = add(d, middle)
     box = box_on_map(b, at, support, rounding)
     under, touched = cells_under(box, tile, size)
-    ring = ring_with_tiles(sums, stride, touched, size)
+    ring = ring_with_tiles(grid, touched, size)
     if ring < 0:
         return False, -math.inf, (0.0, 1.0), (0.0, 0.0)
     # How far rectangles may grow beyond the shape: cut ends must never be the nearest way out.
@@ -155,7 +165,7 @@ def deepest_contact(a, b, d, support, rounding):
     limits = around(touched, beyond, size)
     waiting, seen = stack_array(WAITING, (0, 0, 0, 0)), stack_array(SEEN, (0, 0, 0, 0))
     count, tested = 1, 0
-    store_cells(waiting, 0, around(touched, ring, size))
+    store_cells(waiting, 0, searched(touched, ring, size))
     hit, depth, normal, point, width = False, -math.inf, (0.0, 1.0), (0.0, 0.0), 0.0
     # The deepest wall and floor (ceiling) contacts: signed depth along their axis.
     wall, floor = 0.0, 0.0
@@ -170,20 +180,23 @@ def deepest_contact(a, b, d, support, rounding):
             if need <= ring:
                 break
             ring, count = need, 1
-            store_cells(waiting, 0, around(touched, ring, size))
+            store_cells(waiting, 0, searched(touched, ring, size))
         count -= 1
         block = load_cells(waiting, count)
-        inside = tiles_in(sums, stride, block)
-        gap_x, gap_y = gaps_of_boxes(box, block, tile)
-        apart_x, apart_y = max(gap_x, 0.0), max(gap_y, 0.0)
-        if inside == 0.0 or apart_x * apart_x + apart_y * apart_y > nearest_square:
+        if is_farther(box, block, tile, nearest_square):
             continue
-        if inside < cells_in(block):
+        inside, block = contents(grid, block)
+        if inside == EMPTY or is_farther(box, block, tile, nearest_square):
+            continue
+        if inside == MIXED:
             across, up = at[0] >= 0.5 * (block[0] + block[2]) * tile, at[1] >= 0.5 * (block[1] + block[3]) * tile
             count = halved(waiting, count, block, across, up)
             continue
+        cells = block
         for turn in range(2):
-            cells = grown_within(sums, stride, block, limits, turn)
+            if turn == 1 and not grows_further(grid, block, cells, limits):
+                continue  # to the same
+            cells = grown_within(grid, block, limits, turn == 0)
             if contains_cells(seen, min(tested, SEEN), cells):
                 continue
             store_cells(seen, tested % SEEN, cells)
@@ -193,7 +206,7 @@ def deepest_contact(a, b, d, support, rounding):
                 continue
             extent, centre = rectangle(cells, tile, middle)
             touches, deep, n, p = convex_convex(extent, b, sub(d, centre), tile_support, support, sharp, rounding)
-            if hidden(sums, stride, cells, n, under):
+            if hidden(grid, cells, n, under):
                 if deep > inner_depth:
                     inner_depth, inner_normal, inner_point = deep, n, add(centre, p)
                 continue

@@ -1,13 +1,19 @@
 """Rectangles of cells: (x0, y0, x1, y1) stands for columns x0 to x1, rows y0 to y1 (from below), with exclusive ends.
 
-Counting their tiles, growing them, and their shapes.
+Whether they are full of tiles or empty, growing them, and their shapes. Small ones are read by the bits of their rows,
+large ones by the sums over blocks; see :mod:`.cells` for both.
 """
 
 from __future__ import annotations
 
+import math
+
 from ...framework.compilation import part
+from .cells import BITS, BLOCK, HEAD, PER_BLOCK, PER_NUMBER
 from .collider import ALL, FLOORS, plugin
 
+EMPTY, MIXED, FULL = range(3)
+ALL_BITS = 2**BITS - 1
 WAITING = 64  # capacity of the stack of blocks to search: two for each halving of the map
 SLANT = 1e-9  # radians; faces that lean by less count as parallel to the tiles
 TIE = 1e-9  # of a tile: contacts whose depths differ by less count as equally deep
@@ -26,11 +32,51 @@ def store_cells(stored, i, cells):
 
 
 @plugin.kernel
-def tiles_in(sums, stride, cells):
-    """The number of tiles in a rectangle."""
-    x0, y0, x1, y1 = cells
-    low, high = 1 + y0 * stride, 1 + y1 * stride
-    return (sums[high + x1, 0] - sums[high + x0, 0]) - (sums[low + x1, 0] - sums[low + x0, 0])
+def grid_of(packed):
+    """A map as the functions here take it: its array, columns and rows of cells, numbers in a row of bits, the index of
+    the first sum over blocks, and numbers in a row of these."""
+    columns, rows = int(packed[0, 0]), int(packed[1, 0])
+    words = (columns + BITS - 1) >> PER_NUMBER
+    return packed, columns, rows, words, HEAD + rows * words, ((columns + BLOCK - 1) >> PER_BLOCK) + 1
+
+
+@plugin.kernel
+def is_tile(grid, x, y):
+    """Whether that cell is a tile."""
+    return (int(grid[0][HEAD + y * grid[3] + (x >> PER_NUMBER), 0]) >> (x & (BITS - 1))) & 1 == 1
+
+
+@plugin.kernel
+def row_is(grid, y, x0, x1, tiles):
+    """Whether columns x0 to x1 of a row, one at least, are all tiles, or all empty."""
+    packed, at, flip = grid[0], HEAD + y * grid[3], 0 if tiles else ALL_BITS
+    first, last = at + (x0 >> PER_NUMBER), at + ((x1 - 1) >> PER_NUMBER)
+    low, high = ALL_BITS << (x0 & (BITS - 1)) & ALL_BITS, ALL_BITS >> (-x1 & (BITS - 1))
+    if first == last:
+        low &= high
+        return (int(packed[first, 0]) ^ flip) & low == low
+    if (int(packed[first, 0]) ^ flip) & low != low or (int(packed[last, 0]) ^ flip) & high != high:
+        return False
+    k = first + 1
+    while k < last and int(packed[k, 0]) ^ flip == ALL_BITS:
+        k += 1
+    return k == last
+
+
+@part
+def alike(grid, cells, tiles):
+    """Whether all cells of a rectangle are tiles, or all empty."""
+    y = cells[1]
+    while y < cells[3] and row_is(grid, y, cells[0], cells[2], tiles):
+        y += 1
+    return y >= cells[3]
+
+
+@plugin.kernel
+def tiles_in_blocks(grid, x0, y0, x1, y1):
+    """The number of tiles in columns x0 to x1 and rows y0 to y1 of blocks."""
+    packed, low, high = grid[0], grid[4] + y0 * grid[5], grid[4] + y1 * grid[5]
+    return (packed[high + x1, 0] - packed[high + x0, 0]) - (packed[low + x1, 0] - packed[low + x0, 0])
 
 
 @plugin.kernel
@@ -39,37 +85,136 @@ def cells_in(cells):
     return (cells[2] - cells[0]) * (cells[3] - cells[1])
 
 
-@plugin.kernel
-def full(sums, stride, cells):
-    """True if all its cells are tiles."""
-    return tiles_in(sums, stride, cells) == cells_in(cells)
-
-
-@plugin.kernel
-def moved_side(cells, side, way):
-    """The rectangle with its side (left, right, lower, upper) moved outwards."""
+@part
+def contents_by_blocks(grid, cells):
+    """Like :func:`contents`, for large rectangles: the blocks in it and around it, and strips along its sides."""
     x0, y0, x1, y1 = cells
-    if side == 0:
-        return x0 - way, y0, x1, y1
-    if side == 1:
-        return x0, y0, x1 + way, y1
-    if side == 2:
-        return x0, y0 - way, x1, y1
-    return x0, y0, x1, y1 + way
+    columns, rows = grid[1], grid[2]
+    left, lower = x0 >> PER_BLOCK, y0 >> PER_BLOCK
+    right, upper = (x1 + BLOCK - 1) >> PER_BLOCK, (y1 + BLOCK - 1) >> PER_BLOCK
+    count = tiles_in_blocks(grid, left, lower, right, upper)
+    if count == 0.0:
+        return EMPTY
+    around = left * BLOCK, lower * BLOCK, min(right * BLOCK, columns), min(upper * BLOCK, rows)
+    if count == cells_in(around):
+        return FULL
+    if around == cells:
+        return MIXED
+    left, lower = (x0 + BLOCK - 1) >> PER_BLOCK, (y0 + BLOCK - 1) >> PER_BLOCK
+    right, upper = right if x1 == columns else x1 >> PER_BLOCK, upper if y1 == rows else y1 >> PER_BLOCK
+    if left >= right or lower >= upper:
+        tiles = is_tile(grid, x0, y0)
+        return (FULL if tiles else EMPTY) if alike(grid, cells, tiles) else MIXED
+    count = tiles_in_blocks(grid, left, lower, right, upper)
+    within = left * BLOCK, lower * BLOCK, min(right * BLOCK, columns), min(upper * BLOCK, rows)
+    if count > 0.0 and count < cells_in(within):
+        return MIXED
+    tiles, i0, j0, i1, j1 = count > 0.0, within[0], within[1], within[2], within[3]
+    same = alike(grid, (x0, y0, x1, j0), tiles) and alike(grid, (x0, j1, x1, y1), tiles)
+    same = same and (x0 == i0 or alike(grid, (x0, j0, i0, j1), tiles))
+    same = same and (x1 == i1 or alike(grid, (i1, j0, x1, j1), tiles))
+    return (FULL if tiles else EMPTY) if same else MIXED
+
+
+@plugin.kernel
+def has_tiles(grid, cells):
+    """Whether the rectangle has any."""
+    if cells_in(cells) > BLOCK * BLOCK:
+        return contents_by_blocks(grid, cells) != EMPTY
+    return not alike(grid, cells, False)
+
+
+@plugin.kernel
+def highest_bit(bits):
+    """Its place, from 0; bits has one."""
+    return math.frexp(float(bits))[1] - 1
 
 
 @part
-def grown(sums, stride, cells, side, room):
-    """A rectangle full of tiles with one side moved outwards, by at most ``room``, as far as it stays full."""
-    low, high = 0, max(room, 0)
-    step = high  # most often it can grow by all or by nothing
-    while low < high:
-        if full(sums, stride, moved_side(cells, side, step)):
-            low = step
+def trimmed(grid, cells):
+    """A rectangle of at most BITS columns without empty rows and columns at its sides: none, where all are empty."""
+    packed, words = grid[0], grid[3]
+    x0, y0, x1, y1 = cells
+    at, shift, both = HEAD + y0 * words + (x0 >> PER_NUMBER), x0 & (BITS - 1), 0
+    mask, more = ALL_BITS >> (BITS - (x1 - x0)), shift + x1 - x0 > BITS
+    lower, upper = y1, y1
+    for y in range(y0, y1):
+        bits = int(packed[at, 0]) >> shift
+        if more:
+            bits |= int(packed[at + 1, 0]) << (BITS - shift)
+        bits &= mask
+        if bits != 0:
+            lower, upper = min(lower, y), y + 1
+            both |= bits
+        at += words
+    if both == 0:
+        return x0, y1, x0, y1
+    return x0 + highest_bit(both & -both), lower, x0 + highest_bit(both) + 1, upper
+
+
+@part
+def contents(grid, cells):
+    """Whether a rectangle is EMPTY, FULL of tiles or MIXED, and the rectangle: a small one is trimmed before."""
+    if cells[2] - cells[0] > BLOCK or cells[3] - cells[1] > BLOCK:
+        return contents_by_blocks(grid, cells), cells
+    cells = trimmed(grid, cells)
+    if cells[0] == cells[2]:
+        return EMPTY, cells
+    return FULL if alike(grid, cells, True) else MIXED, cells
+
+
+@part
+def full_rows(grid, cells, way, room):
+    """How many rows above a rectangle (way 1) or below it (-1) are full of tiles, at most ``room``."""
+    x0, y0, x1, y1 = cells
+    y, count = y1 if way > 0 else y0 - 1, 0
+    while count < room and row_is(grid, y, x0, x1, True):
+        y += way
+        count += 1
+    return count
+
+
+@part
+def full_columns(grid, cells, way, room):
+    """How many columns right of a rectangle (way 1) or left of it (-1) are full of tiles, at most ``room``."""
+    x0, y0, x1, y1 = cells
+    for y in range(y0, y1):
+        low, high = 0, room
+        step = high  # most often it can grow by all or by nothing
+        while low < high:
+            start, stop = (x1 + low, x1 + step) if way > 0 else (x0 - step, x0 - low)
+            if row_is(grid, y, start, stop, True):
+                low = step
+            else:
+                high = step - 1
+            step = 1 if low == 0 and step == room else (low + high + 1) >> 1
+        room = low
+    return room
+
+
+@part
+def grown_within(grid, cells, limits, wide_first):
+    """A rectangle full of tiles, grown within limits: first in width, then in height; or the other way round."""
+    x0, y0, x1, y1 = cells
+    for turn in range(2):
+        if (turn == 0) == wide_first:
+            left, right = full_columns(grid, cells, -1, x0 - limits[0]), full_columns(grid, cells, 1, limits[2] - x1)
+            x0, x1 = x0 - left, x1 + right
         else:
-            high = step - 1
-        step = 1 if low == 0 and step == max(room, 0) else (low + high + 1) // 2
-    return moved_side(cells, side, low)
+            lower, upper = full_rows(grid, cells, -1, y0 - limits[1]), full_rows(grid, cells, 1, limits[3] - y1)
+            y0, y1 = y0 - lower, y1 + upper
+        cells = x0, y0, x1, y1
+    return cells
+
+
+@part
+def grows_further(grid, block, cells, limits):
+    """Whether a block grows higher, within limits, than what it has grown to, first in width: ``cells``."""
+    x0, _, x1, _ = block
+    below, above = cells[1] - 1, cells[3]
+    return (below >= limits[1] and row_is(grid, below, x0, x1, True)) or (
+        above < limits[3] and row_is(grid, above, x0, x1, True)
+    )
 
 
 @plugin.kernel
@@ -101,14 +246,18 @@ def sharp(half):
 
 @plugin.kernel
 def halved(waiting, count, cells, right_first, upper_first):
-    """Push both halves of a rectangle, cut across its longer side, at index ``count``; the first one goes on top."""
+    """Push both halves of a rectangle, cut across its longer side, at index ``count``; the first one goes on top.
+
+    Large ones are cut between blocks.
+    """
     x0, y0, x1, y1 = cells
     cut_x, cut_y = x1, y1  # of the left or lower half
+    unit = -BLOCK if max(x1 - x0, y1 - y0) > 2 * BLOCK else -1
     if x1 - x0 >= y1 - y0:
-        cut_x = (x0 + x1) // 2
+        cut_x = ((x0 + x1) >> 1) & unit
         second_first = right_first
     else:
-        cut_y = (y0 + y1) // 2
+        cut_y = ((y0 + y1) >> 1) & unit
         second_first = upper_first
     for turn in range(2):
         if (turn == 1) == second_first:
@@ -142,31 +291,31 @@ def faces_like(n, faces):
     return faces == ALL or (abs(n[1]) >= abs(n[0])) == (faces == FLOORS)
 
 
-@plugin.kernel
-def solid(sums, stride, cells):
+@part
+def solid(grid, cells):
     """True if the cells are all tiles; there are none beyond the map."""
     x0, y0, x1, y1 = cells
-    if x0 < 0 or y0 < 0 or x1 >= stride or 1 + (y1 + 1) * stride > len(sums):
+    if x0 < 0 or y0 < 0 or x1 > grid[1] or y1 > grid[2]:
         return False
-    return full(sums, stride, cells)
+    return alike(grid, cells, True)
 
 
 @part
-def hidden(sums, stride, cells, n, under):
+def hidden(grid, cells, n, under):
     """True if the face or corner where a shape meets a rectangle is internal: it borders on other tiles.
 
     n: the contact's normal; under: first column and row, last column and row under the shape's box.
     """
     x0, y0, x1, y1 = cells
     column0, row0, column1, row1 = under
-    beside = x1 if n[0] > 0.0 else x0 - 1
+    next_to = x1 if n[0] > 0.0 else x0 - 1
     above = y1 if n[1] > 0.0 else y0 - 1
     if abs(n[0]) > SLANT and abs(n[1]) > SLANT:
         x, y = x1 - 1 if n[0] > 0.0 else x0, y1 - 1 if n[1] > 0.0 else y0
-        side = solid(sums, stride, (beside, y, beside + 1, y + 1))
-        return side or solid(sums, stride, (x, above, x + 1, above + 1))
+        side = solid(grid, (next_to, y, next_to + 1, y + 1))
+        return side or solid(grid, (x, above, x + 1, above + 1))
     if abs(n[0]) > SLANT:
         first, last = min(max(row0, y0), y1 - 1), min(max(row1, y0), y1 - 1)
-        return solid(sums, stride, (beside, first, beside + 1, last + 1))
+        return solid(grid, (next_to, first, next_to + 1, last + 1))
     first, last = min(max(column0, x0), x1 - 1), min(max(column1, x0), x1 - 1)
-    return solid(sums, stride, (first, above, last + 1, above + 1))
+    return solid(grid, (first, above, last + 1, above + 1))

@@ -8,20 +8,24 @@ from ...framework.compilation import part
 from ...framework.jit.stack_arrays import stack_array
 from ...framework.vectors import add, add_scaled, dot, length, sub
 from ..standard_shapes import convex_convex
+from .cells import BLOCK
 from .collider import plugin
+from .contact import cells_under, searched
 from .rectangles import (
+    EMPTY,
+    MIXED,
     TIE,
     WAITING,
     box_around,
-    cells_in,
+    contents,
     faces_like,
+    grid_of,
     halved,
     load_cells,
     rectangle,
     sharp,
     store_cells,
     tile_support,
-    tiles_in,
 )
 
 LOOKS = 100  # iterations for the time of a touch; a graze takes about 30
@@ -38,35 +42,45 @@ def passing(low, high, v, start, stop, enter, leave):
 
 
 @part
+def passing_cells(box, v, cells, tile, until):
+    """The part of the time until ``until`` in which a box, moving by v, overlaps a rectangle or nearly does."""
+    tie = TIE * tile
+    enter, leave = passing(box[0], box[1], v[0], cells[0] * tile - tie, cells[2] * tile + tie, 0.0, until)
+    return passing(box[2], box[3], v[1], cells[1] * tile - tie, cells[3] * tile + tie, enter, leave)
+
+
+@part
 def first_touch(a, b, d, v, support, rounding):
     """When a moving shape first touches a tile, by testing all rectangles of tiles along its path, nearest first.
 
     Each is found as between convex shapes: a plane lies in the gap, and motion up to the plane is safe.
     """
-    sums, tile = a.sums, a.tile_size
-    columns = int(sums[0, 0])
-    stride = columns + 1
-    rows = (len(sums) - 1) // stride - 1
+    grid, tile = grid_of(a.packed), a.tile_size
+    columns, rows = grid[1], grid[2]
     middle = (0.5 * columns * tile, 0.5 * rows * tile)
     at = add(d, middle)
     left, right, lower, upper = box_around(b, support, rounding(b))
-    left, right, lower, upper = at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
+    box = at[0] + left, at[0] + right, at[1] + lower, at[1] + upper
     waiting = stack_array(WAITING, (0, 0, 0, 0))
-    store_cells(waiting, 0, (0, 0, columns, rows))
+    left, right, lower, upper = min(v[0], 0.0), max(v[0], 0.0), min(v[1], 0.0), max(v[1], 0.0)
+    swept = box[0] + left, box[1] + right, box[2] + lower, box[3] + upper
+    touched = cells_under(swept, tile, (columns, rows))[1]
+    small = max(touched[2] - touched[0], touched[3] - touched[1]) < BLOCK
+    store_cells(waiting, 0, searched(touched, 1 if small else BLOCK, (columns, rows)))
     count, best = 1, math.inf
-    tie = TIE * tile
     while count > 0:
         count -= 1
         cells = load_cells(waiting, count)
-        inside = tiles_in(sums, stride, cells)
-        if inside == 0.0:
-            continue
-        x0, y0, x1, y1 = cells
-        enter, leave = passing(left, right, v[0], x0 * tile - tie, x1 * tile + tie, 0.0, min(best, 1.0))
-        enter, leave = passing(lower, upper, v[1], y0 * tile - tie, y1 * tile + tie, enter, leave)
+        enter, leave = passing_cells(box, v, cells, tile, min(best, 1.0))
         if not enter <= leave:
             continue
-        if inside < cells_in(cells):
+        inside, cells = contents(grid, cells)
+        if inside == EMPTY:
+            continue
+        enter, leave = passing_cells(box, v, cells, tile, min(best, 1.0))
+        if not enter <= leave:
+            continue
+        if inside == MIXED:
             count = halved(waiting, count, cells, v[0] < 0.0, v[1] < 0.0)
             continue
         extent, centre = rectangle(cells, tile, middle)

@@ -97,9 +97,8 @@ class Quarantine:
             self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
             self._bound = bound
             self.follow_lent()
+        self.follow_arrays()
         for checked in self._checked:
-            if isinstance(checked.column, ArrayColumn):  # its bounds grow with the number of arrays
-                checked.record.low, checked.record.high = checked.column.bounds()
             if checked.partial:
                 checked.record.some = not checked.owned[self._rows(checked)].all()
         if self._generation != self._table.generation:  # ids mean other entities
@@ -109,6 +108,12 @@ class Quarantine:
         if self.told or len(self._state.bodies.quarantined):
             told = np.isin(self._table.column("entity"), list(self.told))  # also those that no column shows
             self._scene.take_out(self._find_bad() | told)
+
+    def follow_arrays(self) -> None:
+        """The bounds of columns of arrays grow with the number of these."""
+        for checked in self._checked:
+            if isinstance(checked.column, ArrayColumn):
+                checked.record.low, checked.record.high = checked.column.bounds()
 
     def follow_lent(self) -> None:
         """The stages look at static rows of these columns in every step."""

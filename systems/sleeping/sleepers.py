@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
@@ -48,6 +50,9 @@ class Sleepers:
         self.links = self.sizes = np.empty((0, 2), np.int64)
         self._followed: Any = None  # the structure that all this is of
         self._seen = -1
+        self.box_now: Callable[[], None] = lambda: None  # makes the boxes of all bodies where they are at this moment
+        self._changes: list[list[float]] = []  # boxes in which shapes have changed: what sleeps near them wakes
+        self._changes_taken: list[list[float]] = []  # those that this step has begun with
         self.on = False  # the settings say so, or those that sleep have to wake because they do not any more
         self._all_wake = False
         self.kept: Any = None  # before this step
@@ -81,12 +86,15 @@ class Sleepers:
             if structure != self._followed:
                 self._follow(structure)
             self._seen = seen
+        self._changes_taken, self._changes = self._changes, []
         if words[self._due] or (words[self._asleep] and words[self._fresh]):
             self._fall_asleep(table.stops[1])
+        if self._changes_taken and words[self._asleep]:
+            self._disturb_near(np.array(self._changes_taken))
 
     def end_step(self) -> None:
         """Note what those stand on that fall asleep; nothing may change until the next step."""
-        self.kept = None
+        self.kept, self._changes_taken = None, []
         if self._state.due < 0:
             self._all_wake, self._state.due = True, 0
         elif self._words[self._due]:
@@ -157,6 +165,32 @@ class Sleepers:
             rows = rows[(rows >= 0) & (rows < self._table.stops[0])]
             still[rows[still[rows] > AWAKE]] = DISTURBED
             self._state.candidates.active_count = ALL  # within a step they look for others already
+
+    def follow_change(self, column: ArrayColumn, row: int, before: int, inside: np.ndarray) -> None:
+        """The shape of a row has changed inside of these boxes: that disturbs nothing farther away."""
+        if not self.on:
+            return
+        table, watched = self._table, self._state.bodies.watched
+        if row < table.stops[0]:
+            self.disturb(table.column("entity")[row : row + 1])
+        place = table.column("position")[row]
+        self._changes += (inside + np.concatenate((place, place))).tolist()
+        bits = self._watching.follow_change(column, row, before)
+        if len(watched):
+            watched[row] ^= bits
+
+    def _disturb_near(self, changes: np.ndarray) -> None:
+        """Wake what sleeps in these boxes or touches them."""
+        state, bodies = self._state, self._state.bodies
+        known_until = state.neighbours_known_until
+        self.box_now()
+        state.neighbours_known_until = known_until
+        d, rows = state.dimensions, np.flatnonzero(bodies.still[: self._table.stops[0]] > AWAKE)
+        lower, upper = bodies.lower[rows, None], bodies.upper[rows, None]
+        near = ((lower <= changes[:, d:]) & (upper >= changes[:, :d])).all(axis=2).any(axis=1)
+        if near.any():
+            self._keep()
+            self.disturb(bodies.entity[rows[near]])
 
     def wake_disturbed(self, dt: float) -> np.ndarray:
         """Those that are marked, and their islands; returns the rows of the dynamic ones."""
@@ -286,6 +320,7 @@ class Sleepers:
 
     def abandon_step(self) -> None:
         """Back to the start of the step; the records show the contacts and impulses of that time."""
+        self._changes, self._changes_taken = self._changes_taken, []
         if self.kept is None:
             return
         (columns, parts, self._followed, all_wake, impulses, contacts), self.kept, self._seen = self.kept, None, -1
@@ -319,13 +354,15 @@ class Sleepers:
         if not self.on:
             return None
         followed = self._structure() == self._followed
-        return {**self._saved_parts(), "followed": followed, "all_wake": self._all_wake}
+        more = {"changes": list(self._changes)} if self._changes else {}
+        return {**self._saved_parts(), "followed": followed, "all_wake": self._all_wake, **more}
 
     def take_back(self, saved: Any) -> None:
         """The table is what it was then; if this world does not sleep, all of them wake."""
         state = self._state
         self.kept, self._followed, self._seen = None, None, -1
         state.watched_version = -1  # statics may have changed between that time and the step after it
+        self._changes = [] if saved is None else list(saved.get("changes", ()))
         if saved is None:
             self.contacts.clear()
             self.impulses.clear()

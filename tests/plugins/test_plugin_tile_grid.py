@@ -17,7 +17,7 @@ from carom.framework.compilation import inlined, kernel
 from carom.framework.vectors import row, store
 from carom.plugins import Physics, convex_polygon, tile_grid
 from carom.plugins.convex_polygon import ConvexPolygonCollider
-from carom.plugins.tile_grid import TileGridCollider, cells_of_text
+from carom.plugins.tile_grid import TileGridCollider, cells_of_text, rectangles
 from carom.plugins.tile_grid.contact import deepest_contact
 from carom.plugins.tile_grid.sweep import first_touch
 
@@ -95,14 +95,14 @@ def test_other_values_that_are_refused():
         TileGridCollider(((1,), (1,)), 1.0).cells = ((1,),)
 
 
-Grid = namedtuple("Grid", "sums tile_size faces")
+Grid = namedtuple("Grid", "packed tile_size faces")
 Polygon = namedtuple("Polygon", "vertices corner_radius axes")
 support, rounding = inlined(ConvexPolygonCollider.support), inlined(ConvexPolygonCollider.rounding)
 
 
 @kernel
-def meet_all(sums, tile, vertices, radii, offsets, ways, depths, normals, points, times, like):
-    grid = Grid(sums, tile, 0)
+def meet_all(packed, tile, vertices, radii, offsets, ways, depths, normals, points, times, like):
+    grid = Grid(packed, tile, 0)
     for i in range(len(offsets)):
         body = Polygon(vertices[i], radii[i], ((1.0, 0.0), (0.0, 1.0)))
         d = row(offsets, i, like)
@@ -116,8 +116,8 @@ def meet(cells, tile, vertices, radii, offsets, ways=None):
     """Depths, normals, points, times of touch; offsets from the map's middle."""
     n = len(offsets)
     results = np.zeros(n), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n)
-    sums = np.array(TileGridCollider(cells, tile).sums)
-    meet_all(sums, tile, vertices, radii, offsets, np.zeros((n, 2)) if ways is None else ways, *results, (0.0, 0.0))
+    packed = np.array(TileGridCollider(cells, tile).packed)
+    meet_all(packed, tile, vertices, radii, offsets, np.zeros((n, 2)) if ways is None else ways, *results, (0.0, 0.0))
     assert (abs(np.hypot(*results[1].T) - 1) < 1e-12).all()
     return results
 
@@ -158,6 +158,95 @@ def test_random_polygons_against_every_single_cell(size, tile):
     # The point lies in the middle of a gap or overlap: not farther from the body than half the depth.
     to_body = np.einsum("nvk,nk->nv", vertices + offsets[:, None] - points[:, None], normals).min(1) - radii
     assert abs(to_body + depths / 2)[apart].max() < 1e-9 * scale
+
+
+def random_map(rng, shape):
+    """Rocks, holes in them, single tiles and long floors, so that blocks are full, empty and mixed."""
+    tiles = np.zeros(shape, bool)
+    for _ in range(rng.integers(0, 6)):
+        low = rng.integers(0, shape)
+        high = low + rng.integers(1, 40, 2)
+        tiles[low[0] : high[0], low[1] : high[1]] ^= True
+    tiles[rng.random(shape) < rng.choice((0.0, 0.002, 0.1))] ^= True
+    return tiles
+
+
+@pytest.mark.plain
+def test_rectangles_against_counting():
+    rng = np.random.default_rng(11)
+    found = set()
+    for _ in range(60):
+        shape = rng.integers(1, 90, 2)
+        tiles = random_map(rng, shape)
+        grid, from_below = rectangles.grid_of(np.array(TileGridCollider(tiles, 1.0).packed)), tiles[::-1]
+        for _ in range(40):
+            x0, y0 = (int(rng.integers(n)) for n in shape[::-1])
+            x1, y1 = (int(rng.integers(a, n)) + 1 for a, n in zip((x0, y0), shape[::-1], strict=True))
+            if rng.random() < 0.3:  # whole blocks
+                x0, y0 = x0 // 16 * 16, y0 // 16 * 16
+                x1, y1 = min(x1 + 15 & -16, shape[1]), min(y1 + 15 & -16, shape[0])
+            inside = from_below[y0:y1, x0:x1]
+            assert rectangles.has_tiles(grid, (x0, y0, x1, y1)) == inside.any()
+            state, cells = rectangles.contents(grid, (x0, y0, x1, y1))
+            large = max(x1 - x0, y1 - y0) > 16
+            found.add((state, large))
+            if not inside.any():
+                assert state == rectangles.EMPTY
+                continue
+            if large:
+                assert cells == (x0, y0, x1, y1)
+            else:
+                y, x = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+                assert cells == (x0 + x[0], y0 + y[0], x0 + x[-1] + 1, y0 + y[-1] + 1)
+            filled = from_below[cells[1] : cells[3], cells[0] : cells[2]].all()
+            assert state == (rectangles.FULL if filled else rectangles.MIXED)
+            if filled:
+                limits = max(x0 - 20, 0), max(y0 - 20, 0), min(x1 + 20, shape[1]), min(y1 + 20, shape[0])
+                for wide_first in (True, False):
+                    more = rectangles.grown_within(grid, cells, limits, wide_first)
+                    assert more == grown_by_counting(from_below, cells, limits, wide_first)
+    assert len(found) == 6
+
+
+def grown_by_counting(tiles, cells, limits, wide_first):
+    """One column or row after the other."""
+    for side in (0, 2, 1, 3) if wide_first else (1, 3, 0, 2):
+        while cells[side] != limits[side]:
+            more = list(cells)
+            more[side] += 1 if side > 1 else -1
+            if not tiles[more[1] : more[3], more[0] : more[2]].all():
+                break
+            cells = tuple(more)
+    return cells
+
+
+@pytest.mark.parametrize("size", [0.4, 3.0, pytest.param(7.0, marks=pytest.mark.slow)])
+def test_large_maps_against_every_single_cell(size):
+    """Distances across many blocks, and times of touch on long ways."""
+    rng = np.random.default_rng(int(size))
+    shape, count = (70, 90), 60
+    tiles = rng.random(shape) < 0.004
+    tiles[-2:, 10:70], tiles[20:50, 85:] = True, True
+    low, high = boxes_of(tiles, 1.0)
+    turns = rng.uniform(0, 2 * np.pi, (count, 1)) + np.array((0.0, 1.5, 3.0, 4.8)) + rng.uniform(-0.5, 0.5, (count, 4))
+    vertices = size * np.stack((np.cos(turns), np.sin(turns)), 2)
+    offsets, ways = rng.uniform((-55, -45), (55, 45), (count, 2)), rng.normal(size=(count, 2)) * 40
+    radii = np.where(rng.random(count) < 0.5, 0.0, rng.uniform(0, 0.5 * size, count))
+    depths, _, _, times = meet(tiles, 1.0, vertices, radii, offsets, ways)
+    bodies = vertices + (offsets + np.array((45.0, 35.0)))[:, None]
+    single = cellwise(low, high, bodies).max(1) + radii
+    apart = single < 0
+    assert apart.sum() > 20
+    assert abs(depths - single)[apart].max() < 1e-11
+    assert depths[~apart].min() > -1e-11
+    met = np.isfinite(times) & apart
+    assert met.sum() > 5
+    at_touch = cellwise(low, high, bodies[met] + (times[met, None] * ways[met])[:, None]).max(1) + radii[met]
+    assert abs(at_touch).max() < 1e-11
+    for share in np.linspace(0.0, 1.0, 9):  # apart until then
+        before = np.where(np.isfinite(times), np.minimum(times, 1.0), 1.0) * share
+        on_way = cellwise(low, high, bodies[apart] + (before[apart, None] * ways[apart])[:, None]).max(1) + radii[apart]
+        assert on_way.max() < 1e-11
 
 
 def test_out_of_a_corner_it_goes_in_one_move():

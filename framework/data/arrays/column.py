@@ -24,7 +24,6 @@ class ArrayColumn(Column):
     rows: tuple[int, int] = (1, 2**31)
     check: Callable[[np.ndarray], str | None] | None = None
     convert: Callable[[Any], Any] | None = None
-    lengths: bool = True
     pool: Pool = field(default_factory=lambda: Pool(1))
 
     def bounds(self) -> tuple[float, float]:
@@ -61,6 +60,34 @@ class ArrayColumn(Column):
             self.pool.replaced(store, int(store.values(self.key, store.find(handle._entity))))
         super().__set__(handle, value)
 
+    def change(self, handle: Any, write: Callable[[np.ndarray], Iterable[int]], inside: np.ndarray) -> None:
+        """Give the handle's entity another array, like its own, changed by ``write``, see :meth:`Pool.changed`.
+
+        inside
+            (k, 2d) m, boxes, lower and upper corners relative to the Transform, that hold all that it changes of the
+            shape; the box around the shape stays as it is
+        """
+        store = handle._store
+        if store is None:
+            handle._values[self.name] = self.pool.changed(handle._values[self.name], write)
+            return
+        row = handle._row if handle._version == store.version else handle._locate()
+        before = int(store.values(self.key, row))
+        if getattr(store, "in_step", False):
+            self.pool.replaced(store, before)
+        number = self.pool.changed(before, write)
+        if number != before:
+            store.make(self.key)[row] = number
+            store.changed_inside(self, row, before, inside)
+
+    def view(self, handle: Any) -> np.ndarray:
+        """The array of a handle without a copy, for reading at once."""
+        store = handle._store
+        if store is None:
+            return self.pool.view(handle._values[self.name])
+        row = handle._row if handle._version == store.version else handle._locate()
+        return self.pool.view(int(store.values(self.key, row)))
+
     def empty_value(self, dimensions: int) -> Any:
         return 0
 
@@ -83,7 +110,7 @@ def hold_arrays(holder: Any, columns: Iterable[Column]) -> None:
 
 def array_column(
     width: int, *, rows: tuple[int, int] = (1, 2**31), check: Callable[[np.ndarray], str | None] | None = None,
-    convert: Callable[[Any], Any] | None = None, lengths: bool = True, kw_only: bool = False,
+    convert: Callable[[Any], Any] | None = None, leading: Callable[[np.ndarray], int] = len, kw_only: bool = False,
 ) -> Any:  # fmt: skip
     """A field of a component that is an array (n, width) of floats, with its own n on every entity.
 
@@ -93,19 +120,20 @@ def array_column(
         gets the array; returns what is wrong with it ("must be convex"), or None
     convert
         gets what a user gives, and returns the array to check and store
-    lengths
-        whether its numbers are lengths, which checks of the shape at other sizes multiply
+    leading
+        gets the array; returns how many of its first rows the others follow from
     kw_only
         whether the constructor takes it by name only
 
     Pair functions see the array itself, and cannot write to it. To change it, assign another.
     """
     return ArrayColumn(
-        item="array", dtype=np.int64, width=width, rows=rows, check=check, convert=convert, lengths=lengths,
-        kw_only=kw_only, pool=Pool(width), on_write=_array_changed,
+        item="array", dtype=np.int64, width=width, rows=rows, check=check, convert=convert, kw_only=kw_only,
+        pool=Pool(width, leading), on_write=_array_changed,
     )
 
 
 def _array_changed(table: Any, row: int) -> None:
     """The pool may have moved."""
     table.members_version += 1
+    table.on_arrays_changed()

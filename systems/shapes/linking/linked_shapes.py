@@ -16,7 +16,7 @@ from ....framework.plugins.registry import Pair, Registry, Shape
 from .linked_pair import LinkedPair, convex_sides, linked_pair
 from .linked_shape import LinkedShape, linked_shape
 from .mixing import linked_rule
-from .parameters import bind, make_parameter_record
+from .parameters import bind, make_parameter_record, show_pool
 
 
 def linked_shapes(registry: Registry, components: list[type[Component]], dimensions: int) -> LinkedShapes:
@@ -157,6 +157,15 @@ class ParameterRecords:
                 self.own[number].rounding,
             )
         bind(self.world[number], shape, rotated, axes)
+
+    def follow_arrays(self) -> None:
+        """Some rows have other arrays: their pools may have moved."""
+        for number, shape in enumerate(self._linked.shapes):
+            for name in shape.columns:
+                column = shape.component.columns[name]
+                if isinstance(column, ArrayColumn):
+                    show_pool(self.own[number], name, column)
+                    show_pool(self.world[number], name, column)
 
     def need_support(self, number: int) -> None:
         """Some pair takes this shape by the addresses of its support and rounding: put them into its records."""

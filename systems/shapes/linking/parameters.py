@@ -90,9 +90,14 @@ def bind(record: Record, shape: Shape, columns: Mapping[str, np.ndarray], axes: 
         record.show(f"column_{name}", columns[name])
         column = shape.component.columns[name]
         if isinstance(column, ArrayColumn):
-            record.show(f"data_{name}", column.pool.data)
-            record.show(f"starts_{name}", column.pool.starts)
+            show_pool(record, name, column)
     if axes is not None and shape.rotates:
         record.axes = axes
     if axes is not None and shape.turned is not None:
         record.matrices = axes.reshape(-1, axes.shape[-1])
+
+
+def show_pool(record: Record, name: str, column: ArrayColumn) -> None:
+    """Let the record show where the arrays of that column stand, again whenever one of the two is another array."""
+    record.show(f"data_{name}", column.pool.data)
+    record.show(f"starts_{name}", column.pool.all_starts)
