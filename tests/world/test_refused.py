@@ -88,7 +88,7 @@ REFUSED = {
     "box": (lambda: AABBCollider(size=(1, 1)), TypeError, "did you mean 'half_extents'"),
     "body": (lambda: RigidBody(velocity=(1, 0)), TypeError, "did you mean 'linear_velocity'"),
     **{
-        f"{read} {wrong}": (
+        f"{read.__name__} {wrong}": (
             lambda read=read, made=made, wrong=wrong: read(made, wrong), AttributeError, f"did you mean '{right}'"
         )
         for made, wrong, right in (
