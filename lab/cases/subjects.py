@@ -77,9 +77,12 @@ class Subject:
         return self._loaded.values_of(world)
 
     @property
-    def seconds(self) -> float:
-        """What the scene or file recommends."""
-        return (load_once(self.target).seconds if self.build is None else None) or DEFAULT_SECONDS
+    def recommended(self) -> tuple[float, Any]:
+        """The seconds that the scene or file recommends, and its view or None."""
+        if self.build is not None:
+            return DEFAULT_SECONDS, None
+        loaded = load_once(self.target)
+        return loaded.seconds or DEFAULT_SECONDS, loaded.view
 
     @property
     def description(self) -> str:

@@ -49,13 +49,22 @@ class Loaded:
     def build(
         self, settings: Settings | None, changes: dict[str, Any], seed: int, plugins: Sequence[Plugin] = ()
     ) -> World:
-        """A world with ``settings`` (None: those that the scene or the file has itself), with additional plugins, then
-        with these changes of its settings; Problem if it fails."""
-        world = self._call(settings or self.settings, seed)
-        if settings is not None and _is_ignored(settings, world.settings):
+        """A world with ``settings`` (None: those that the scene or the file has itself) and with additional plugins;
+        Problem if it fails."""
+        chosen = settings
+        if settings is None:
+            settings = self.settings
+        brought = {name for each in plugins for name in (*each.integrators, *each.broad_phases, *each.mixing_rules)}
+        late = {field: value for field, value in changes.items() if value in brought}
+        early = {field: value for field, value in changes.items() if field not in late}
+        if early:
+            settings = apply(settings or self._own_settings(seed), early)
+        world = self._call(settings, seed)
+        ignored = _what_is_ignored(world.settings, chosen, early)
+        if ignored is not None:
             world.close()
             raise Problem(
-                f"{self.name}: build ignores its settings, so --settings has no effect: give them to the world, "
+                f"{self.name}: build ignores its settings, so {ignored} has no effect: give them to the world, "
                 f"World(..., settings=settings)"
             )
         for plugin in plugins:
@@ -64,9 +73,9 @@ class Loaded:
                     world.add_plugin(plugin)
             except (Exception, SystemExit) as error:  # runs third-party code that creates systems
                 raise Problem(f"--plugin {plugin.name}: {one_line(error)}") from error
-        if changes:
+        if late:
             with self.attribute_errors():
-                world.settings = apply(world.settings, changes)
+                world.settings = apply(world.settings, late)
         return world
 
     def _call(self, settings: Settings | None, seed: int) -> World:
@@ -79,11 +88,23 @@ class Loaded:
             raise Problem(f"{self.name}: no physics in this world: World(Physics(...))")
         return world
 
+    @property
+    def _default(self) -> Settings | None:
+        """The default of the parameter of ``build``, if it has one."""
+        default = next(iter(inspect.signature(self.function).parameters.values())).default
+        return default if isinstance(default, Settings) else None
+
+    def _own_settings(self, seed: int) -> Settings:
+        """Those to be changed: of a build that makes its own of None, of a world that it has built."""
+        if self._default is not None:
+            return self._default
+        with contextlib.closing(self._call(None, seed)) as world:
+            return world.settings
+
     def _own_world(self, seed: int) -> Any:
         """With the settings that ``build`` has by default, or makes of None; Settings() if it cannot take None."""
-        default = next(iter(inspect.signature(self.function).parameters.values())).default
         try:
-            return self.function(default if isinstance(default, Settings) else None, seed=seed)
+            return self.function(self._default, seed=seed)
         except (AttributeError, TypeError):
             return self.function(Settings(), seed=seed)
 
@@ -124,11 +145,19 @@ class Loaded:
             raise Problem(f"{self.name}{_line_in(self.file, error)}: {one_line(error)}") from error
 
 
-def _is_ignored(chosen: Settings, found: Settings) -> bool:
-    """True if a world's settings show nothing of those; a build may change this and that in them, not all."""
-    names = [field.name for field in dataclasses.fields(Settings)]
-    told = [name for name in names if getattr(chosen, name) != getattr(Settings(), name)]
-    return bool(told) and all(getattr(found, name) != getattr(chosen, name) for name in told)
+def _what_is_ignored(found: Settings, chosen: Settings | None, changes: dict[str, Any]) -> str | None:
+    """The option that a world's settings show nothing of; of a preset a build may change this and that, not all."""
+    for field, value in changes.items():
+        if getattr(found, field) != value:
+            return f"--set {field}={value}"
+    if chosen is None:
+        return None
+    default = Settings()
+    told = [field.name for field in dataclasses.fields(Settings)]
+    told = [name for name in told if name not in changes and getattr(chosen, name) != getattr(default, name)]
+    if told and all(getattr(found, name) != getattr(chosen, name) for name in told):
+        return "--settings"
+    return None
 
 
 def stdout_kept_clean() -> contextlib.AbstractContextManager[Any]:

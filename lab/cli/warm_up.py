@@ -152,6 +152,13 @@ def _print(rows: list[Row], folder: Path, before: tuple[int, int], after: tuple[
     console = Console()
     cells = [(row.target, str(len(row.compiled)), str(row.found), f"{row.seconds:.1f}") for row in rows]
     TextTable("", ("needed by", "compiled", "in the cache already", "seconds"), cells).show()
+    variants: dict[str, list[float]] = {}  # seconds by kernel name: variants differ in shapes and dimensions
+    for kernel, seconds in (item for row in rows for item in row.compiled):
+        variants.setdefault(kernel, []).append(seconds)
+    if variants:
+        slowest = sorted(variants.items(), key=lambda item: -sum(item[1]))
+        words = (f"{kernel}{f' x{len(s)}' if len(s) > 1 else ''} {sum(s):.1f}" for kernel, s in slowest)
+        console.print(f"compiled, with seconds: {', '.join(words)}", highlight=False)
     console.print(
         f"cache: {folder}, {after[0]:,} kernels, {_megabytes(after[1])} ({before[0]:,} kernels before)",
         highlight=False,

@@ -48,12 +48,17 @@ Show = Callable[[CaseTrade], None]
 
 @dataclass(frozen=True)
 class Only:
-    """The requested part of the grid; empty: all that matters in the scene."""
+    """The requested part of the grid; empty: all that matters in the scene. TypeError for a name instead of several."""
 
     integrators: tuple[str, ...] = ()
     collisions: tuple[str, ...] = ()
     substeps: tuple[int, ...] = ()
     geometries: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            if isinstance(getattr(self, field.name), (str, int)):
+                raise TypeError(f"Only.{field.name} must be a sequence, got {getattr(self, field.name)!r}")
 
     def of(self, case: Case) -> tuple[Cell, ...]:
         """The methods of the case; a named field is varied even without effect. Problem if there is none."""

@@ -58,6 +58,7 @@ def test_the_second_time_everything_is_there_already(carom, tmp_path):
     needed = row["found"] + len(row["compiled"])
     assert second.stdout.splitlines()[1].split()[:3] == ["falling.py", "0", str(needed)]
     assert f"{len(files):,} kernels" in second.stdout.splitlines()[-1]
+    assert "compiled, with seconds" not in second.stdout
     assert "compiling kernels" not in second.stderr
 
     cleared = carom("--clear")

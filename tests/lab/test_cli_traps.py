@@ -10,7 +10,7 @@ import textwrap
 
 import helpers_cli
 import pytest
-from helpers_cli import FALLING_BALL, refusal, report_of
+from helpers_cli import FALLING_BALL, refusal
 from helpers_cli_plugins import offer
 
 from carom import scenes
@@ -107,12 +107,23 @@ def test_files_of_different_folders_have_their_own_siblings(tmp_path, text, fact
 # -- settings -------------------------------------------------------------------------------------
 
 
-def test_a_build_that_ignores_its_settings_takes_changes_and_refuses_a_preset(carom, tmp_path):
+def test_a_build_that_ignores_its_settings_is_refused(carom, tmp_path):
     (tmp_path / "deaf.py").write_text(FALLING_BALL.replace("settings=settings or Settings.balanced()", "settings=None"))
     arguments = ("run", "deaf.py", "--steps", "1", "--no-pictures")
-    assert report_of(carom(*arguments, "--set", "dt=1/120", "--json"))["settings"]["dt"] == 1 / 120
+    assert carom(*arguments).exit_code == 0
+    line = refusal(carom(*arguments, "--set", "dt=1/120"))
+    assert "deaf.py: build ignores its settings, so --set dt=0.00833" in line
     line = refusal(carom(*arguments, "--settings", "fast"))
     assert "deaf.py: build ignores its settings, so --settings has no effect" in line
+
+
+def test_set_builds_once_where_the_file_tells_its_settings(carom, tmp_path):
+    """Else a first world tells what the build makes of None."""
+    loud = FALLING_BALL.replace("    world = ", "    print('built')\n    world = ", 1)
+    (tmp_path / "loud.py").write_text(f"{loud}\nSETTINGS = Settings(substeps=8)\n")
+    result = carom("run", "loud.py", "--steps", "1", "--no-pictures", "--set", "dt=1/120")
+    assert result.exit_code == 0
+    assert result.stderr.count("built") == 1
 
 
 @pytest.mark.parametrize("name", scenes.names())

@@ -307,6 +307,14 @@ def test_an_integrator_that_there_is_not_is_refused_before_anything_runs():
         trade(planet, only=Only(integrators=("rk5",)), seconds=1.0, steps=(1 / 30, 1 / 60), workers=1)
 
 
+@pytest.mark.parametrize("field", ["integrators", "collisions", "substeps", "geometries"])
+def test_one_name_is_no_sequence_of_names(field):
+    with pytest.raises(TypeError, match=f"Only.{field} must be a sequence, got 4"):
+        Only(**{field: 4})
+    with pytest.raises(TypeError, match=f"Only.{field} must be a sequence, got 'rk4'"):
+        Only(**{field: "rk4"})
+
+
 def test_limits_are_those_of_a_world():
     with pytest.raises(TypeError, match="world must be a World, got <function planet"):
         suggest_dt(planet)
