@@ -17,4 +17,5 @@ RUN_BROAD, RUN_NARROW = 11, 12  # the phase before has not run: a phase is run a
 AFTERWARDS = 32
 FIND_IN_PYTHON = 33  # candidate pairs from a tree, or from the broad phase of a plugin
 ROTATE = 34  # axes of rotated bodies
+LOOK = 37  # code of the game may have changed what sleeps
 CHECK_COLUMNS, CHECK_FLIGHT = 35, 36  # name bodies that cannot be right, and take them out, or in again

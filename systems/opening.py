@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ..framework.compilation import part
 from ..framework.vectors import item
-from .broad_phase.active_rows import ALL
 from .codes import NEED_SWEEPS, OK, ROTATE
 
 DISCRETE = 0
@@ -49,14 +48,15 @@ def keep_state(state, dt):
     state.event_count, state.flight_usual = 0, False
     pairs.count = pairs.found = pairs.resting_count = pairs.disabled_count = pairs.touching_count = 0
     impacts.logged = impacts.capped = 0
-    state.candidates.count, state.candidates.active_count = 0, ALL
+    state.candidates.count = 0
     state.row_a, state.unsound = NOTHING_TESTED, 0
     state.all_still, state.sleep_stages = False, 0
     state.kept_rows = state.moving if state.collides and state.boxed_version == state.statics_version else state.count
-    state.kept = OPENED
+    state.kept, state.kept_first = OPENED, state.first
+    state.force_first = 0 if state.others_write or state.has_force_systems or state.pushes else state.first
     if not state.others_write and (state.collides or len(bodies.max_linear_speed) > 0):
         state.kept |= KEEPS_VELOCITY
-        for i in range(state.moving):
+        for i in range(state.first, state.moving):
             bodies.kept_velocity[i] = bodies.linear_velocity[i]
     state.warm_start.before, state.contacts.before = state.warm_start.now, state.contacts.now
     return OK
@@ -66,12 +66,12 @@ def read_bodies(state, dt):
     """1 / mass of what moves freely; whether any speed is limited, any body swept or rotated."""
     bodies, mass, inverse_mass, limited = state.bodies, state.bodies.mass, state.bodies.inverse_mass, False
     limit, out = bodies.max_linear_speed, bodies.quarantined
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         inverse_mass[i] = 1.0 / mass[i]
-    for i in range(state.dynamic if state.quarantining else 0):
+    for i in range(state.first, state.dynamic if state.quarantining else 0):
         if out[i]:
             inverse_mass[i] = 0.0
-    for i in range(state.dynamic if len(limit) > 0 else 0):
+    for i in range(state.first, state.dynamic if len(limit) > 0 else 0):
         limited |= (limit[i] == limit[i]) & (not out[i])
     every = state.read_version != state.statics_version or state.inverse_masses_exposed
     for i in range(state.dynamic, state.count if every else state.moving):
@@ -92,7 +92,7 @@ def check_finite(state, dt):
     bodies, finite = state.bodies, True
     position, velocity, out = bodies.position, bodies.linear_velocity, bodies.quarantined
     same = state.flight_usual and not state.collides and not state.others_write  # since the flight was checked
-    for i in range(0 if same else state.moving):
+    for i in range(state.moving if same else state.first, state.moving):
         x, v = position[i], velocity[i]
         for k in range(len(x)):
             finite &= (abs(item(x, k)) <= LARGEST) | out[i]
@@ -102,5 +102,5 @@ def check_finite(state, dt):
     if state.unsound == 0:  # else Python goes back after this stage
         state.kept = 0
     state.motion_version += 1
-    state.bodies_counted += state.moving
+    state.bodies_counted += state.moving - state.first
     return OK

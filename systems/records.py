@@ -1,8 +1,9 @@
 """The records of one world: all arrays and numbers that the compiled stages of a step read and write.
 
 ``State`` is what a stage gets; it holds the numbers of the step and the addresses of the other records. Units are SI; n
-rows of bodies are ordered dynamic, kinematic, static. A column that a scene does not need has no rows. Those with a
-default are on demand: kernels read the default while there are no rows, and ask for these (NEED_COLUMNS) to write.
+rows of bodies are ordered asleep, dynamic, kinematic, static. A column that a scene does not need has no rows. Those
+with a default are on demand: kernels read the default while there are no rows, and ask for these (NEED_COLUMNS) to
+write.
 """
 
 from __future__ import annotations
@@ -49,7 +50,6 @@ SLEEP_COLUMNS = Section(
     still=ints("int8", default=0),  # AWAKE and the like, see sleeping.stages
     rest_steps=ints("int32"),  # for how many steps it has been at rest
     island=ints(),  # entity id of the first body of those that sleep together; 0: none
-    watched=ints(),  # ``checksums`` as they were when it came to rest
     rest_position=vectors(),
     rest_force=vectors(),
     flown_position=vectors(),  # where free flight leads it from there
@@ -124,7 +124,6 @@ UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_veloci
 UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors())
 SLEEPING = Section(
     "body", "sleeping", "bodies may sleep: islands, and whether anything has changed them",
-    checksums=ints(),  # of what code of the game may change unseen
     rest_root=ints("int32"),
     keeps_awake=flags(),
 )  # fmt: skip
@@ -167,16 +166,6 @@ CHECKED = Schema(
     exposed=flag(),  # code of the game may write its static rows at any time
     some=flag(),  # not all of these bodies have the component,
     owned=flags(),  # but these
-)
-
-# A column whose changes wake bodies; one of the two arrays has rows.
-WATCHED = Schema(
-    "Watched",
-    words=ints(),  # bits of 8 bytes
-    small=ints("int8"),
-    width=integer(),  # numbers per body
-    turn=integer(),  # by which their bits are rotated, so that columns do not cancel each other
-    defaults=ints(),  # the bits of the default, as what has none of its own holds them
 )
 
 # Fields that every collider has, by the slot of its type and the row.
@@ -222,13 +211,8 @@ SORTED = Section(
 )  # fmt: skip
 CANDIDATES = Schema(
     "Candidates", FOUND, HALVES, Section("pair", "pairs", NEAR, starts=ints("int32")), SORTED,
-    Section(
-        "pair", "pairs", NEAR,
-        active_rows=ints("int32"),  # rows of bodies that look for others, all others being still, ascending
-    ),
     count=integer(),
     bucket_starts=ints("int32"),
-    active_count=integer(),  # how many; ALL: every body does
 )  # fmt: skip
 
 # Pairs whose layers meet, a's entity id the smaller, in canonical order.
@@ -382,7 +366,6 @@ STATE = Schema(
     links=ints(),  # addresses of parts of stages, see linking.parts
     needed=integer(),  # rows that a stage asks for
     checked=ints(),  # addresses of records of CHECKED
-    watching=ints(),  # and of WATCHED
     sleeping=flag(),  # the settings say so
     all_still=flag(),  # in this step nothing moves that could meet another
     asleep=integer(),  # bodies that sleep, or are about to
@@ -393,6 +376,10 @@ STATE = Schema(
     quarantining=flag(),  # some body is, or was told of and may be sound again
     # the scene
     count=integer(),
+    sleepers=integer(),  # rows before it sleep; ids ascend before it, and from it on,
+    first=integer(),  # rows before it take no part in this step: all that sleep, or none if some are disturbed
+    force_first=integer(),  # forces are summed from this row on: where they may be others than before, of all
+    pushes=flag(),  # code of the game may have pushed sleepers
     dynamic=integer(),  # rows before it are dynamic
     moving=integer(),  # rows before it move
     version=integer(),  # of the table's rows
@@ -443,7 +430,6 @@ STATE = Schema(
     statics_version=integer(),  # another whenever a static body may have changed; and the one that these are of:
     read_version=integer(),  # inverse masses, checked columns,
     boxed_version=integer(),  # boxes,
-    watched_version=integer(),  # what sleepers know
     frame=floats(),  # extent of the moving bodies' boxes
     pair_search=integer(),  # what finds candidates in this step, see broad_phase.stages
     response_idle=flag(),  # nothing is near anything, and nothing rested
@@ -485,7 +471,8 @@ STATE = Schema(
     false_positives=integer(),
     forces_summed=flag(),  # ``force`` holds the sum of this step
     sweeps_ready=flag(),
-    kept=integer(),  # what a failed step puts back, see stage_list.KEPT
+    kept=integer(),  # what a failed step puts back, see stage_list.KEPT,
+    kept_first=integer(),  # from this row on
     kept_rows=integer(),  # those of previous_position that the step may change
     flight_usual=flag(),  # after the flight no number was far out
     flight_seen=integer(),  # rows of which the integrator has noted that already

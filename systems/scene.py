@@ -117,7 +117,8 @@ class Scene:
         self._zero_rows = moving, count
         if self._columns_version != table.columns_version:
             self.bind_columns()
-        state.count, (state.dynamic, state.moving, _) = count, table.stops
+        state.count, (state.sleepers, state.dynamic, state.moving, _) = count, table.blocks
+        state.first = min(state.first, state.sleepers)
         state.version = table.version
 
     def _build(self, present: list[type[Any]]) -> None:

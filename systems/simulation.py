@@ -21,7 +21,7 @@ from ..framework.world.contacts import Contacts
 from ..framework.world.world import World
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, WAKE, WAKE_TOUCHED
+from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, WAKE, WAKE_TOUCHED
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
@@ -76,7 +76,8 @@ class Simulation:
         handlers = {
             **self._room.handlers(self),
             CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
-            WAKE: lambda dt: self.sleepers.wake_disturbed(dt),
+            LOOK: lambda dt: self.sleepers.look(),
+            WAKE: lambda dt: self.sleepers.wake_disturbed(),
             WAKE_TOUCHED: lambda dt: self.sleepers.wake_touched(self, dt),
         }  # fmt: skip
         self.program = Program(self.state, STAGES, handlers, AFTERWARDS)
@@ -94,9 +95,7 @@ class Simulation:
             self.state, self.table, world.registry, self.scene, self.search, self.refresh_for_queries
         )
         self.forces = ForceAccumulation(self.program, self.state, self.table, self.bodies)
-        self.integration = Integration(
-            self.program, self.scene, self.forces, world.registry, lambda: world.settings
-        )
+        self.integration = Integration(self.program, self.scene, self.forces, world.registry, lambda: world.settings)
         self.broad_phase = BroadPhase(self.program, self.search)
         self.narrow_phase = NarrowPhase(self.program, self.scene, world.registry, self.bodies)
         self.response = Response(self.program, self.contacts, lambda: world.settings)
@@ -215,8 +214,9 @@ class Simulation:
         self.scene.follow_arrays()
         self.quarantine.follow_arrays()
 
-    def _follow_lent(self) -> None:
-        """Code of the game may write static rows of more columns than before."""
+    def _follow_lent(self, key: str) -> None:
+        """Code of the game may write rows of one more column unseen."""
+        self.sleepers.watch(key)
         exposed = self.table.exposed
         self.state.positions_exposed = "position" in exposed
         self.state.inverse_masses_exposed = "inverse_mass" in exposed
@@ -273,8 +273,8 @@ class Simulation:
             self.copies.put_back()
         for bit, column, copy, rows in KEPT:
             if state.kept & bit:
-                count = getattr(state, rows)
-                getattr(bodies, column)[:count] = getattr(bodies, copy)[:count]
+                kept = slice(state.kept_first, getattr(state, rows))
+                getattr(bodies, column)[kept] = getattr(bodies, copy)[kept]
         self.copies.kept = False
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before

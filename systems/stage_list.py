@@ -31,7 +31,7 @@ from .narrow_phase.system import NarrowPhase
 from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, check_finite, keep_state, read_bodies
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS
-from .sleeping.stages import take_checksums, update_sleep
+from .sleeping.stages import update_sleep
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
@@ -69,7 +69,6 @@ ON_DEMAND = (
     Stage(
         finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",), "colliders"
     ),
-    Stage(take_checksums, "what bodies are like, to tell when they change", ("watching",), ("checksums",), "sleeping"),
     *Integration.ON_DEMAND,
 )
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
@@ -122,6 +121,6 @@ SYSTEM_OF_STAGE = (
     *("" for _ in OPENING),
     *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
     *("" for _ in CLOSING),
-    *(BroadPhase.__name__, NarrowPhase.__name__, NarrowPhase.__name__, ""),
+    *(BroadPhase.__name__, NarrowPhase.__name__, NarrowPhase.__name__),
     *(Integration.__name__ for _ in Integration.ON_DEMAND),
 )

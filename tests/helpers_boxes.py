@@ -16,7 +16,7 @@ from carom.systems.broad_phase.search import CandidateSearch
 from carom.systems.records import STATE
 
 SEARCH = (
-    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few, stages.test_active_rows,
+    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few,
     stages.search_static_grid,
 )  # fmt: skip
 
@@ -63,20 +63,20 @@ class Boxes:
 
         return handle
 
-    def set(self, lower, upper, moving, statics_changed=True):
-        """Take these corners (n, d)."""
+    def set(self, lower, upper, moving, statics_changed=True, first=0):
+        """Take these corners (n, d), of which those before ``first`` sleep."""
         state, d = self.state, lower.shape[1]
         state.bodies.lower, state.bodies.upper = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
         state.bodies.position = state.bodies.previous_position = np.zeros_like(lower)
-        state.count, state.moving = len(lower), moving
+        state.count, state.first, state.moving = len(lower), first, moving
         state.statics_version += statics_changed
         state.frame[LOWEST : LOWEST + 3], state.frame[HIGHEST : HIGHEST + 3] = np.inf, -np.inf
         state.frame[LARGEST] = 0.0
         with warnings.catch_warnings(), np.errstate(invalid="ignore"):
             warnings.simplefilter("ignore")  # all of a column may be nan
-            state.frame[LOWEST : LOWEST + d] = np.fmin.reduce(lower[:moving], axis=0, initial=np.inf)
-            state.frame[HIGHEST : HIGHEST + d] = np.fmax.reduce(upper[:moving], axis=0, initial=-np.inf)
-            state.frame[LARGEST] = np.fmax.reduce(upper[:moving] - lower[:moving], axis=None, initial=0.0)
+            state.frame[LOWEST : LOWEST + d] = np.fmin.reduce(lower[first:moving], axis=0, initial=np.inf)
+            state.frame[HIGHEST : HIGHEST + d] = np.fmax.reduce(upper[first:moving], axis=0, initial=-np.inf)
+            state.frame[LARGEST] = np.fmax.reduce(upper[first:moving] - lower[first:moving], axis=None, initial=0.0)
 
     def find(self):
         """Rows (first, second) of the candidates."""

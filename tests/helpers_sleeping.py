@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+
 import numpy as np
 from worlds import ball, box, floor, make_world
 
@@ -53,7 +55,7 @@ def part(world, entity, component):
 
 
 def write(world, entity, column, change):
-    values, row = getattr(world.bodies, column), world.bodies.row_of(entity)
+    values, row = operator.attrgetter(column)(world.bodies), world.bodies.row_of(entity)
     values[row] = change(values[row])
 
 
@@ -65,6 +67,9 @@ CAUSES = {  # what wakes the tower of these boxes
     "push": lambda world, boxes: part(world, boxes[1], RigidBody).apply_force((30.0, 0.0)),
     "constant force": lambda world, boxes: setattr(part(world, boxes[2], RigidBody), "constant_force", (0.5, 0.0)),
     "in a column": lambda world, boxes: write(world, boxes[0], "linear_velocity", lambda _: (0.5, 0.0)),
+    "in place": lambda world, boxes: part(world, boxes[0], RigidBody).linear_velocity.__setitem__(0, 0.5),
+    "size in a column": lambda world, boxes: write(world, boxes[1], "aabb_collider.half_extents", lambda _: 0.6),
+    "floor in a column": lambda world, boxes: write(world, ground(world), "position", lambda _: (0.0, -2.0)),
     "teleported": lambda world, boxes: write(world, boxes[2], "position", lambda place: np.add(place, (0.2, 0.5))),
     "grown": lambda world, boxes: setattr(part(world, boxes[1], AABBCollider), "half_extents", (0.6, 0.6)),
     "heavier": lambda world, boxes: write(world, boxes[2], "mass", lambda _: 5.0),
@@ -85,4 +90,4 @@ CAUSES = {  # what wakes the tower of these boxes
     "touched by kinematic": lambda world, boxes: box(world, (-1.6, 2.5), (3.0, 0.0), kind="kinematic"),
     "told": lambda world, boxes: world.wake(boxes[1]),
 }
-EVERYWHERE = {"gravity", "settings", "floor deleted", "floor moved", "floor without collider"}
+EVERYWHERE = {"gravity", "settings", "floor deleted", "floor moved", "floor in a column", "floor without collider"}

@@ -267,6 +267,12 @@ class Adoption:
             self._let_go([*changes.detached, *(handle for handle in lost if cleared or not self._has(handle))])
         for component, rows in changes.missing.items():
             self._empty(component, np.array(rows))
+        if table.on_written is not None:
+            for row in {
+                row for rows in (*changes.missing.values(), *(own.rows for own in fresh.values())) for row in rows
+            }:
+                if row >= 0:
+                    table.on_written("", row)
         carriers = fresh.get(table.kind_carrier)
         if carriers is not None and max(carriers.rows) >= 0:
             self._other_kinds(carriers)

@@ -96,8 +96,10 @@ class Bodies:
             view = self._table.make(name)[self.rows]
             if self._kind == STATIC or name in ("entity", "kind"):
                 view.flags.writeable = False
-            elif self._kind is None:
-                self._table.expose(name)
+            else:
+                self._table.lend(name)
+                if self._kind is None:
+                    self._table.expose(name)
             return view
         prefix = name + "."
         if not name.startswith("_") and any(component.prefix == prefix for component in self._table.component_types):

@@ -250,7 +250,7 @@ class Column:
         if array.ndim == 1:
             return self.shown(array.item(row))
         view = array[row]
-        if store.is_frozen(row):
+        if store.is_frozen(self.key, row):
             view.flags.writeable = False
         return view
 

@@ -298,7 +298,7 @@ class RowStore:
     def find(self, entity: int) -> int:
         raise KeyError(entity)  # handles into a store never lose their row
 
-    def is_frozen(self, row: int) -> bool:
+    def is_frozen(self, key: str, row: int) -> bool:
         return False
 
     def written(self, column: Column, row: int) -> None:

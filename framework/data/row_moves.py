@@ -15,13 +15,13 @@ from ..jit.records.schema import Schema, integer, ints
 
 ROW_PLAN = Schema(
     "RowPlan",
-    ids=ints(),  # of the bodies, ascending within each kind,
-    stops=ints(),  # and the first row after each kind: before, and when the rows have moved
+    ids=ints(),  # of the bodies, ascending within each block,
+    stops=ints(),  # and the first row after each block: before, and when the rows have moved
     leaving=integer(),  # how many leave,
     removed=ints(),  # and which rows, ascending
     coming=integer(),  # how many come,
     added=ints(),  # their ids,
-    kinds=ints(),  # by ascending kind and id,
+    blocks=ints(),  # by ascending block and id,
     places=ints(),  # the row that stands behind each of them,
     fresh=ints(),  # and their rows, afterwards
     # runs of rows that stay together and move
@@ -36,6 +36,7 @@ MOVED_COLUMNS = Schema(
     row_bytes=ints(),
     defaults=ints(),  # address of a row that new rows are copies of; 0: they stay as they are
 )
+BLOCKS = 4  # of rows: sleepers, dynamic, kinematic and static bodies
 MOST_KEPT = 128  # rows; the lists of more do not stay in memory
 
 _plan_at = record_at(ROW_PLAN, 2)
@@ -73,14 +74,14 @@ def place_of(ids, start, stop, entity):
 def find_places(plan):
     """The places of those that come, and the stops afterwards."""
     gone, come, start = 0, 0, 0
-    for kind in range(3):
-        stop = plan.stops[kind]
-        while come < plan.coming and plan.kinds[come] == kind:
+    for block in range(BLOCKS):
+        stop = plan.stops[block]
+        while come < plan.coming and plan.blocks[come] == block:
             plan.places[come] = place_of(plan.ids, start, stop, plan.added[come])
             come += 1
         while gone < plan.leaving and plan.removed[gone] < stop:
             gone += 1
-        plan.stops[kind] = stop - gone + come
+        plan.stops[block] = stop - gone + come
         start = stop
 
 
@@ -126,7 +127,7 @@ def move_rows(plan_address, columns_address, new_plan):
     """Move the rows of some columns as planned; new_plan, 0 or 1: find out first what has to move."""
     plan, columns = _plan_at(plan_address), _columns_at(columns_address)
     if new_plan != 0:
-        count = plan.stops[2]
+        count = plan.stops[BLOCKS - 1]
         find_places(plan)
         find_runs(plan, count)
     for column in range(len(columns.addresses)):
@@ -141,24 +142,24 @@ class RowPlan:
 
     def __init__(self) -> None:
         self.record = make_record(ROW_PLAN, 2)
-        self.record.stops = np.zeros(3, np.int64)
+        self.record.stops = np.zeros(BLOCKS, np.int64)
         self.new = False  # the runs have not been found yet
         self.count = 0  # rows before
 
-    def begin(self, ids: np.ndarray, removed: np.ndarray, added: np.ndarray, kinds: np.ndarray) -> None:
-        """removed: ascending rows; added: ids by ascending kind and id; the stops are those of the bodies before."""
+    def begin(self, ids: np.ndarray, removed: np.ndarray, added: np.ndarray, blocks: np.ndarray) -> None:
+        """removed: ascending rows; added: ids by ascending block and id; the stops are those of the bodies before."""
         plan, leaving, coming = self.record, len(removed), len(added)
         plan.show("ids", ids)
         if leaving > len(plan.removed) or coming > len(plan.added) or leaving + coming >= len(plan.source):
             plan.reserve(leaving, "removed")
-            plan.reserve(coming, "added", "kinds", "places", "fresh")
+            plan.reserve(coming, "added", "blocks", "places", "fresh")
             plan.reserve(leaving + coming + 1, "source", "target", "length")
         if leaving:
             plan.removed[:leaving] = removed
         if coming:
-            plan.added[:coming], plan.kinds[:coming] = added, kinds
+            plan.added[:coming], plan.blocks[:coming] = added, blocks
         plan.leaving, plan.coming = leaving, coming
-        self.count, self.new = int(plan.stops[2]), True
+        self.count, self.new = int(plan.stops[-1]), True
 
     @property
     def fresh(self) -> np.ndarray:
@@ -168,7 +169,7 @@ class RowPlan:
     def end(self) -> None:
         """Long lists do not stay in memory."""
         if len(self.record.source) > MOST_KEPT:
-            for name in ("removed", "added", "kinds", "places", "fresh", "source", "target", "length"):
+            for name in ("removed", "added", "blocks", "places", "fresh", "source", "target", "length"):
                 setattr(self.record, name, np.empty(0, np.int64))
 
 
@@ -205,7 +206,7 @@ class MovedColumns:
             else:
                 coming = record.coming
                 record.runs, record.fresh[:coming] = 0, np.arange(coming)
-                record.stops[:] = record.kinds[:coming].searchsorted((1, 2, 3))
+                record.stops[:] = record.blocks[:coming].searchsorted(np.arange(1, BLOCKS + 1))
         listed = (column[: record.runs].tolist() for column in (record.source, record.target, record.length))
         runs = list(zip(*listed, strict=True))
         down, up = [run for run in runs if run[1] < run[0]], [run for run in reversed(runs) if run[1] > run[0]]

@@ -1,7 +1,8 @@
-"""The table of bodies: one row each, one array per field, rows ordered [dynamic, kinematic, static] and by entity id.
+"""The table of bodies: one row each, one array per field, rows in four blocks, [asleep, dynamic, kinematic, static],
+in each by entity id.
 
-The order of rows is a function of the ids alone, so any history of creation and deletion that leads to the same ids
-leads to the same rows, the same order of every sum, the same bits.
+The order of rows is a function of the ids and of what sleeps alone, so any history of creation and deletion that leads
+to the same ids leads to the same rows, the same order of every sum, the same bits.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from .arrays.column import hold_arrays
 from .arrays.pool import Held
 from .columns import Column
 from .component import Component, RowStore
-from .row_moves import MovedColumns, RowPlan
+from .row_moves import BLOCKS, MovedColumns, RowPlan
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
+KIND_OF_BLOCK = np.array((DYNAMIC, DYNAMIC, KINEMATIC, STATIC))
 MANY = 200  # look-ups for which a table of all ids is worth its making
 FEW = 4  # look-ups one by one take as long as one for all
 HAS_OBJECTS = "has:objects"  # mask of the rows whose entity has a dict of components in esper
@@ -41,7 +43,8 @@ class Table:
         self.version = 1  # changes whenever rows move
         self.members_version = 0  # changes whenever a body gains or loses a component
         self.static_version = 0  # changes whenever a static body does
-        self.stops = (0, 0, 0)  # first row after the dynamic, kinematic and static bodies
+        self.blocks = (0,) * BLOCKS  # first row after those that sleep, the dynamic, kinematic and static bodies
+        self.stops = self.blocks[1:]  # and without the first
         self.in_step = False
         self.generation = 0  # counts esper.clear_database(): after it, ids mean other entities
         self.frame = 0  # counts the calls of step() and advance()
@@ -55,7 +58,9 @@ class Table:
         self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
         self.exposed: set[str] = set()  # columns whose static rows code of the game may write unseen
-        self.on_lend: Callable[[], None] = lambda: None  # called when these are more
+        self.lent: set[str] = set()  # and those of which it may write other rows, of sleepers too
+        self.on_lend: Callable[[str], None] = lambda key: None  # called when one of the two has one more
+        self.on_written: Callable[[str, int], None] | None = None  # called with what code of the game has written
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
@@ -223,7 +228,13 @@ class Table:
         ``static_version``, so what is known of them holds for columns that have never been lent."""
         if key not in self.exposed:
             self.exposed.add(key)
-            self.on_lend()
+            self.on_lend(key)
+
+    def lend(self, key: str) -> None:
+        """A view of rows of that column is given away that are not static."""
+        if key not in self.lent:
+            self.lent.add(key)
+            self.on_lend(key)
 
     def write(self, key: str, rows: Any, values: np.ndarray) -> None:
         """Values for those rows, a slice or indices; defaults need no array."""
@@ -293,7 +304,7 @@ class Table:
             return row
         if self._by_id_version == self.version:
             return self._by_id.item(entity) if 0 <= entity < len(self._by_id) else -1
-        for stop in self.stops:
+        for stop in self.blocks:
             if start < stop and ids.item(stop - 1) >= entity:  # what has come last is in no block
                 row = start + int(ids[start:stop].searchsorted(entity))
                 if ids.item(row) == entity:
@@ -321,7 +332,7 @@ class Table:
             return self._rows_by_id(entities)
         rows = np.full(len(entities), -1, np.int64) if len(entities) else entities
         start = 0
-        for stop in self.stops if len(entities) else ():
+        for stop in self.blocks if len(entities) else ():
             block = self.arrays["entity"][start:stop]
             if stop > start:
                 place = np.minimum(block.searchsorted(entities), stop - start - 1)
@@ -344,7 +355,7 @@ class Table:
         """The rows of entities (n,) that all have one, ascending ids: a slice if they stand next to each other."""
         count, start = len(entities), self.find(int(entities[0]))
         stop = start + count
-        if entities[-1] - entities[0] == count - 1 and not any(start < limit < stop for limit in self.stops):
+        if entities[-1] - entities[0] == count - 1 and not any(start < limit < stop for limit in self.blocks):
             rows = slice(start, stop)  # of one kind: if the last one is right, all are
             if self.arrays["entity"][rows][-1] == entities[-1]:
                 return rows
@@ -357,48 +368,60 @@ class Table:
         ids that have got other rows than those of their neighbours, which are these and those of another kind, and
         their rows.
         """
-        changed = self._changed_kinds(removed) if self.kind_changed else {}
-        if changed:
-            removed = np.concatenate((removed, self.rows_of(changed["entity"])))
-            added = np.concatenate((added, changed["entity"]))
-            added_kinds = np.concatenate((added_kinds, changed["kind"]))
+        moved = self._changed_kinds(removed) if self.kind_changed else np.empty(0, np.int64)
+        return self._regroup(
+            removed, added, added_kinds + 1, moved, self.arrays["kind"][moved] + 1 if len(moved) else moved
+        )
+
+    def settle(self, asleep: np.ndarray) -> None:
+        """Of the dynamic rows those of this mask sleep from now on, and no others."""
+        rows, none = np.flatnonzero(asleep != (np.arange(len(asleep)) < self.blocks[0])), np.empty(0, np.int64)
+        if len(rows):
+            self._regroup(none, none, none, rows, np.where(asleep[rows], 0, 1))
+
+    def _regroup(self, removed: Any, added: Any, blocks: Any, moved: Any, blocks_moved: Any) -> tuple[Any, Any]:
+        """As ``rebuild``, and the rows ``moved`` come into other blocks."""
+        values = {key: self.values(key, moved) for key in self.arrays} if len(moved) else {}
+        if values:
+            removed = np.concatenate((removed, moved))
+            added = np.concatenate((added, values["entity"]))
+            blocks = np.concatenate((blocks, blocks_moved))
         if len(removed) > 1:
             removed = np.sort(removed)
         if len(added) > 1:
-            keys = (added_kinds << 48) | added
+            keys = (blocks << 48) | added
             if (keys[1:] < keys[:-1]).any():
                 order = np.argsort(keys, kind="stable")  # fast on what is partly in order
-                added, added_kinds = added[order], added_kinds[order]
+                added, blocks = added[order], blocks[order]
         moving = self.stops[1]
-        if (len(added) and added_kinds[-1] == STATIC) or (len(removed) and removed[-1] >= moving):
+        if (len(added) and blocks[-1] == STATIC + 1) or (len(removed) and removed[-1] >= moving):
             self.static_version += 1
         self.reserve(self.count - len(removed) + len(added))
         if self._bound_columns != self.columns_version:
             self._bind_columns()
         plan = self._plan
-        plan.begin(self.arrays["entity"], removed, added, added_kinds)
+        plan.begin(self.arrays["entity"], removed, added, blocks)
         self._columns.move(plan)
         rows = plan.fresh
         self.arrays["entity"][rows] = added
         if self.kind_carrier is not None:
-            self.arrays["kind"][rows] = added_kinds
+            self.arrays["kind"][rows] = KIND_OF_BLOCK[blocks]
         self.on_rows_moved(plan)
         plan.end()
-        self.stops = tuple(plan.record.stops.tolist())
-        self.count = self.stops[2]
+        self.blocks = tuple(plan.record.stops.tolist())
+        self.stops, self.count = self.blocks[1:], self.blocks[-1]
         self.kind_changed = False
         self.version += 1
-        if changed:
-            places = self.rows_of(changed["entity"])
-            for key, values in changed.items():
-                self.arrays[key][places] = values
+        if values:
+            places = self.rows_of(values["entity"])
+            for key, column in values.items():
+                self.arrays[key][places] = column
         return added, rows
 
-    def _changed_kinds(self, removed: np.ndarray) -> dict[str, np.ndarray]:
-        """All columns of the bodies whose kind is another than that of their rows, but for those that go."""
-        kinds = np.repeat(np.arange(3), np.diff((0, *self.stops)))
-        rows = np.setdiff1d(np.flatnonzero(self.column("kind") != kinds), removed)
-        return {key: self.values(key, rows) for key in self.arrays} if len(rows) else {}
+    def _changed_kinds(self, removed: np.ndarray) -> np.ndarray:
+        """The rows of bodies whose kind is another than that of their rows, but for those that go."""
+        kinds = np.repeat(KIND_OF_BLOCK, np.diff((0, *self.blocks)))
+        return np.setdiff1d(np.flatnonzero(self.column("kind") != kinds), removed)
 
     def _bind_columns(self) -> None:
         columns = list(self.arrays.values())
@@ -414,11 +437,11 @@ class Table:
         if not np.array_equal(np.searchsorted(self.stops, rows, side="right"), kinds):
             self.kind_changed = True
 
-    def resize(self, stops: tuple[int, ...]) -> None:
+    def resize(self, blocks: tuple[int, ...]) -> None:
         """Rows for so many bodies, whatever they hold: all of them are about to be written."""
-        self.reserve(stops[2])
-        self.stops, self.count = stops, stops[2]
-        self._plan.record.stops[:] = stops
+        self.reserve(blocks[-1])
+        self.blocks, self.stops, self.count = blocks, blocks[1:], blocks[-1]
+        self._plan.record.stops[:] = blocks
         self.version += 1
 
     def reserve(self, count: int) -> None:
@@ -463,8 +486,11 @@ class Table:
 
     # -- written through handles ------------------------------------------------------------------
 
-    def is_frozen(self, row: int) -> bool:
-        """Static rows are read in place and written by assignment only, so that no change goes unseen."""
+    def is_frozen(self, key: str, row: int) -> bool:
+        """Static rows are read in place and written by assignment only, so that no change goes unseen; what sleeps, and
+        what that may stand on, is looked at from now on."""
+        if self.blocks[0] and (row < self.blocks[0] or self.stops[0] <= row < self.stops[1]):
+            self.lend(key)
         return row >= self.stops[1]
 
     def changed_inside(self, column: Any, row: int, before: int, inside: np.ndarray) -> None:
@@ -475,5 +501,7 @@ class Table:
     def written(self, column: Column, row: int) -> None:
         if row >= self.stops[1]:
             self.static_version += 1
+        if self.on_written is not None:
+            self.on_written(column.key, row)
         if column.on_write is not None:
             column.on_write(self, row)

@@ -28,7 +28,7 @@ from ..errors import CaromError
 from ..settings import Settings
 from .snapshots import Snapshot
 
-FORMAT = 3  # of the files; a reader refuses others
+FORMAT = 4  # of the files; a reader refuses others
 PARTS = ("dimensions", "plugins", "dead", "next_id", "contacts", "physics", "clock", "steps")  # of a snapshot, as it is
 ARRAY = "#array"
 PART = ".carom-part-"  # and a random number: a file that is being written
@@ -263,7 +263,7 @@ class SavedFile:
         table, loose = SavedTable.__new__(SavedTable), LooseValues.__new__(LooseValues)
         table.__setstate__({
             **contents["table"], "types": [types[n] for n in contents["table"]["types"]],
-            "stops": tuple(contents["table"]["stops"]),
+            "blocks": tuple(contents["table"]["blocks"]),
         })  # fmt: skip
         _check_columns(table, contents["dimensions"])
         loose.handles = contents["loose"]["handles"]
@@ -300,7 +300,7 @@ def _population_of(saved: dict[str, Any], types: list[type[Component]]) -> Popul
 
 def _check_columns(table: SavedTable, dimensions: int) -> None:
     """ValueError if a column of a component has another shape or type than the component says."""
-    count = table.stops[2]
+    count = table.blocks[-1]
     for component in table.types:
         for column in component.columns.values():
             array, shape = table.columns.get(column.key), (count, *column.item_shape(dimensions))

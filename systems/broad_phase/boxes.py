@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...framework.compilation import part
+from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, replace, scale
 from ..ccd.search_bounds import GIVE, find_margins, place_at
@@ -18,6 +18,18 @@ MARGIN = 0.1
 # Places in ``state.frame``, apart by 3: one value per axis. The largest is the longest edge of any box of what moves.
 LOWEST, HIGHEST, LARGEST = 0, 3, 6
 FRAME_SIZE = 7
+
+
+@inlined
+def fixed_count(state):
+    """How many bodies do not move in this step: sleepers and static ones."""
+    return state.first + state.count - state.moving
+
+
+@inlined
+def fixed_row(state, k):
+    """The row of the k-th of these."""
+    return k if k < state.first else k - state.first + state.moving
 
 
 @part
@@ -93,7 +105,7 @@ def measure_frame(state):
     frame, bodies, lowest, highest, largest = state.frame, state.bodies, zero_of(state), zero_of(state), 0.0
     for k in range(len(lowest)):
         lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         low, high, longest = bodies.lower[i], bodies.upper[i], 0.0
         for k in range(len(low)):  # comparisons with nan are false
             lowest = replace(lowest, k, item(low, k) if item(low, k) < item(lowest, k) else item(lowest, k))
@@ -142,7 +154,7 @@ def box_rows(state, start, stop, motion):
             low, high = box_level(state, level, i, starts[i], ends[i])
             add_level(state, i, low, high)
     if motion == STANDING:
-        state.thinnest_static = thinnest
+        state.thinnest_static = min(state.thinnest_static, thinnest)
     else:
         state.thinnest_moving = thinnest
         measure_frame(state)
@@ -150,13 +162,17 @@ def box_rows(state, start, stop, motion):
 
 
 def box_statics(state, dt):
-    """Boxes of what does not move, made again only when it has changed."""
+    """Boxes of what does not move and of sleepers, made again only when these have changed."""
     bodies, moving = state.bodies, state.moving
     follow_static_places(state)
     if state.boxed_version != state.statics_version:
-        for i in range(moving, state.count):
+        for k in range(fixed_count(state)):
+            i = fixed_row(state, k)
             bodies.previous_position[i] = bodies.origin[i] = bodies.position[i]
-            bodies.static_position[i - moving] = bodies.position[i]
+            if i >= moving:
+                bodies.static_position[i - moving] = bodies.position[i]
+        state.thinnest_static = math.inf
+        call_box_rows(state.links[BOX_ROWS], state, 0, state.first, STANDING)
         call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
         state.boxed_version = state.statics_version
     return OK
@@ -168,9 +184,9 @@ def box_motions(state, dt):
     state.neighbours_known_until, state.candidates_ready = math.inf, True
     if state.all_still:
         return OK
-    call_box_rows(state.links[BOX_ROWS], state, 0, state.moving, MOVING)
+    call_box_rows(state.links[BOX_ROWS], state, state.first, state.moving, MOVING)
     if state.sweeping and state.moved:
-        for i in range(state.moving):
+        for i in range(state.first, state.moving):
             bodies.search_lower[i], bodies.search_upper[i] = bodies.previous_position[i], bodies.position[i]
         call_bound_searches(state.links[BOUND_SEARCHES], state, 0.0, dt)
     return OK
@@ -186,10 +202,10 @@ def bound_searches(state, now, dt):
     crossing = find_margins(state, now, dt - now)
     state.neighbours_known_until = now + crossing if now + crossing < dt else math.inf
     if now > 0.0 or state.neighbours_known_until < dt:
-        for i in range(state.moving):
+        for i in range(state.first, state.moving):
             bodies.search_upper[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
-        call_box_rows(state.links[BOX_ROWS], state, 0, state.moving, SEARCHING)
-    for i in range(state.moving):
+        call_box_rows(state.links[BOX_ROWS], state, state.first, state.moving, SEARCHING)
+    for i in range(state.first, state.moving):
         margin = bodies.search_margin[i]
         give = margin + GIVE * bodies.min_extent[i]
         before, after, lower, upper = bodies.search_lower[i], bodies.search_upper[i], bodies.lower[i], bodies.upper[i]
@@ -208,7 +224,7 @@ def bound_searches(state, now, dt):
 def box_rest_of_step(state, dt):
     """Boxes for what is left of the step, after an impact has sent a body out of its search bounds."""
     now = state.impacts.until
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         state.bodies.search_lower[i] = place_at(state, i, now, now)
     call_bound_searches(state.links[BOUND_SEARCHES], state, now, dt)
     return OK

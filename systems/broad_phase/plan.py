@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ...framework.schedule.plan import PlannedKernel
 from .brute_force import BRUTE_FORCE_MAX
-from .stages import ACTIVE_ROWS, STATIC_GRID, TREE, UNIFORM_GRID, UNIFORM_GRID_MIN
+from .stages import STATIC_GRID, TREE, UNIFORM_GRID, UNIFORM_GRID_MIN
 
 
 def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
@@ -17,8 +17,6 @@ def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
     if search == STATIC_GRID:
         among = "uniform grid" if moving >= UNIFORM_GRID_MIN else "every pair"
         return f"{among} of {moving} moving bodies, which look into a uniform grid of {static} static ones"
-    if search == ACTIVE_ROWS:
-        return f"what is awake with each of {moving} moving and {static} static bodies"
     if search == TREE:
         beside = f" and against that of {static} static ones" if static else ""
         return f"{tree} of {moving} moving bodies against itself{beside}"

@@ -10,8 +10,7 @@ from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.settings import AUTOMATIC, Settings
 from ..codes import NEED_CANDIDATES, NEED_CELLS
-from .active_rows import ALL, MOST_ACTIVE
-from .boxes import FRAME_SIZE
+from .boxes import FRAME_SIZE, fixed_count
 from .plan import reason_of
 from .plugin_broad_phase import PluginBroadPhase
 from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_count
@@ -35,13 +34,11 @@ class CandidateSearch:
     ) -> None:
         self._state, self._settings, self._box_now = state, settings, box_now
         self._plugin = PluginBroadPhase(registry)
-        self._moving, self._static = SpatialTree(state.dimensions), SpatialTree(state.dimensions)
+        self._moving, self._asleep, self._static = (SpatialTree(state.dimensions) for _ in range(3))
         self._static_version, self._static_first = NEVER_BUILT, 0
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
             grid.reserve(OUTSIDE_MAX + 1, "longest", "outside")
-        state.candidates.reserve(MOST_ACTIVE, "active_rows")
-        state.candidates.active_count = ALL
         state.static_grid.version = NEVER_BUILT
         state.pair_search = NO_SEARCH
         self.read_settings()
@@ -63,7 +60,7 @@ class CandidateSearch:
             candidates = state.candidates
             candidates.reserve(state.needed, "first", "second", keep=candidates.count)
         elif code == NEED_CELLS:
-            static, searches_static = state.count - state.moving, state.pair_search == STATIC_GRID
+            static, searches_static = fixed_count(state), state.pair_search == STATIC_GRID
             if searches_static and len(state.views.count) < state.moving:
                 reserve_static_neighbours(state.views, state.moving)
             elif searches_static and len(state.static_grid.keys) < static:
@@ -78,10 +75,12 @@ class CandidateSearch:
             lower, upper = state.bodies.lower[: state.count], state.bodies.upper[: state.count]
             self._store(*self._plugin.pairs(self._settings().broad_phase, lower, upper, state.moving))
             return
-        self._build(self._moving, 0, state.moving)
+        self._build(self._moving, state.first, state.moving)
         self._build_static()
         self._store(*self._moving.pairs_within())
         self._store(*self._moving.pairs_between(self._static), after=state.candidates.count)
+        if state.first:
+            self._store(*self._moving.pairs_between(self._asleep), after=state.candidates.count)
 
     def _store(self, first: np.ndarray, second: np.ndarray, after: int = 0) -> None:
         candidates, stop = self._state.candidates, after + len(first)
@@ -109,6 +108,7 @@ class CandidateSearch:
         first = self._state.moving
         if self._static_version != self._state.statics_version:
             self._build(self._static, first, self._state.count)
+            self._build(self._asleep, 0, self._state.first)
             self._static_version = self._state.statics_version
         elif first != self._static_first:
             self._static.shift_rows(first - self._static_first)
@@ -121,7 +121,7 @@ class CandidateSearch:
         """What found the candidates of the last step, as ``state.pair_search``; before the first step what will."""
         state = self._state
         if state.pair_search in (NO_SEARCH, PLUGIN) or state.uses_plugin_broad_phase:
-            return choose_by_count(state.moving, state.count - state.moving)
+            return choose_by_count(state.moving - state.first, fixed_count(state))
         return state.pair_search
 
     def describe(self) -> str:
@@ -131,4 +131,4 @@ class CandidateSearch:
             return "no colliders: nothing to do"
         if name != AUTOMATIC:
             return f"{name}, as the settings say"
-        return reason_of(self.last, state.moving, state.count - state.moving, state.dimensions)
+        return reason_of(self.last, state.moving - state.first, fixed_count(state), state.dimensions)

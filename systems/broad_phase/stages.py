@@ -1,14 +1,13 @@
 """The stages of BROAD that find candidate pairs: bodies whose boxes overlap, at least one of them moving.
 
-``choose_search`` decides by the numbers of moving and static bodies; of the others each does its share:
+Sleepers count as
+static. ``choose_search`` decides by the numbers of moving and static bodies; of the others each does its share:
 
     moving                       static                        index
     less than UNIFORM_GRID_MIN   no more than BRUTE_FORCE_MAX  brute force
     more                         no more than move             uniform grid of what moves; static bodies look into it
     any number                   more                          static grid, into which what moves looks; static bodies
                                                                that are not in it, and what moves, as above
-    a few of them awake          any number                    these look at what moves, and at static bodies: in their
-                                                               grid, or each
 
 Where boxes differ too much in size for a grid, or crowd in one place, trees are used: Python builds these
 (FIND_IN_PYTHON).
@@ -18,8 +17,7 @@ from __future__ import annotations
 
 from ...framework.compilation import packed, part
 from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
-from .active_rows import ALL
-from .boxes import FRAME_SIZE
+from .boxes import FRAME_SIZE, fixed_count, fixed_row
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
 from .static_grid import build_static_grid, follow_rows
 from .static_neighbours import follow_statics, test_known_statics
@@ -35,7 +33,7 @@ UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 BLOCK = 64  # boxes that are ruled out together
 
 # Values of ``state.pair_search``: what finds the candidates of this step.
-NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN, ACTIVE_ROWS = range(7)
+NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN = range(6)
 
 
 @part
@@ -55,9 +53,7 @@ def choose_search(state, dt):
     if state.uses_plugin_broad_phase:
         state.pair_search = PLUGIN
         return FIND_IN_PYTHON
-    state.pair_search = choose_by_count(state.moving, state.count - state.moving)
-    if state.candidates.active_count != ALL and state.pair_search != STATIC_GRID:
-        state.pair_search = ACTIVE_ROWS
+    state.pair_search = choose_by_count(state.moving - state.first, fixed_count(state))
     return OK
 
 
@@ -88,8 +84,8 @@ def place_statics(state, dt):
         state.needed = state.moving
         return NEED_CELLS
     if grid.version != state.statics_version:
-        if len(grid.keys) < state.count - state.moving:
-            state.needed = state.count - state.moving
+        if len(grid.keys) < fixed_count(state):
+            state.needed = fixed_count(state)
             return NEED_CELLS
         build_static_grid(state)
     elif grid.first != state.moving:
@@ -101,8 +97,8 @@ def place_statics(state, dt):
 def look_from_outside(state, found):
     """Static bodies that are in no grid look into that of what moves; returns the number of pairs, or FULL."""
     static_grid, all_static = state.static_grid, state.pair_search == UNIFORM_GRID
-    for k in range(state.count - state.moving if all_static else static_grid.outside_count):
-        i = state.moving + k if all_static else static_grid.outside[k]
+    for k in range(fixed_count(state) if all_static else static_grid.outside_count):
+        i = fixed_row(state, k) if all_static else static_grid.outside[k]
         found = look_inside(state, state.grid, i, state.bodies.lower[i], state.bodies.upper[i], found)
         if found == FULL:
             break
@@ -112,7 +108,7 @@ def look_from_outside(state, found):
 @part
 def do_without_grid(state):
     """The boxes of what moves are too uneven: trees of many, and every pair of few."""
-    if state.moving > BRUTE_FORCE_MAX:
+    if state.moving - state.first > BRUTE_FORCE_MAX:
         return leave_to_trees(state)
     if state.pair_search == UNIFORM_GRID:
         state.pair_search = BRUTE_FORCE
@@ -122,13 +118,13 @@ def do_without_grid(state):
 @part
 def use_uniform_grid(state):
     """A uniform grid of what moves, for its pairs and those with static bodies that are in no grid; returns a code."""
-    moving, grid, bodies = state.moving, state.grid, state.bodies
+    moving, grid, bodies = state.moving - state.first, state.grid, state.bodies
     if len(grid.keys) < moving:
         state.needed = moving
         return NEED_CELLS
     for k in range(FRAME_SIZE):
         grid.frame[k] = state.frame[k]
-    build_grid(grid, bodies.lower, bodies.upper, moving)
+    build_grid(grid, bodies.lower, bodies.upper, state.first, moving)
     if not grid.suits:
         return do_without_grid(state)
     at, found, count = 0, 0, grid.directory[grid.total]  # without invalid boxes
@@ -146,7 +142,7 @@ def use_uniform_grid(state):
 @packed
 def search_uniform_grid(state, dt):
     """Many bodies move."""
-    if state.moving < UNIFORM_GRID_MIN or state.candidates.active_count != ALL:
+    if state.moving - state.first < UNIFORM_GRID_MIN:
         return OK
     if state.pair_search != UNIFORM_GRID and state.pair_search != STATIC_GRID:
         return OK
@@ -169,20 +165,22 @@ def test_row(state, i, start, stop, found):
 
 def test_few(state, dt):
     """Few bodies move: every pair of them, and they with all static bodies that are in no grid."""
-    moving, candidates, grid, all_static = state.moving, state.candidates, state.static_grid, True
+    first, moving, candidates, grid, all_static = state.first, state.moving, state.candidates, state.static_grid, True
     if state.pair_search == STATIC_GRID:
-        if candidates.active_count != ALL or (moving >= UNIFORM_GRID_MIN and state.grid.suits):
+        if moving - first >= UNIFORM_GRID_MIN and state.grid.suits:
             return OK
         all_static = False
     elif state.pair_search != BRUTE_FORCE:
         return OK
     found, stop = 0, state.count if all_static else moving
-    for i in range(moving):
+    for i in range(first, moving):
         if found != FULL:
             found = test_blocks(state, i, i + 1, stop, found)
+        if found != FULL:
+            found = test_blocks(state, i, 0, first if all_static else 0, found)
     for k in range(0 if all_static else grid.outside_count):
         if found != FULL:
-            found = test_row(state, grid.outside[k], 0, moving, found)
+            found = test_row(state, grid.outside[k], first, moving, found)
     if found == FULL:
         return need_more_room(state)
     candidates.count = found
@@ -203,45 +201,14 @@ def test_blocks(state, i, start, stop, found):
     return found
 
 
-@part
-def test_others(state, s, stop, found):
-    """Pairs of active row s and all rows before ``stop`` but the active ones before it, which have looked at it."""
-    active_rows, start = state.candidates.active_rows, 0
-    i = active_rows[s]
-    for earlier in range(s + 1):
-        if found != FULL:
-            found = test_blocks(state, i, start, active_rows[earlier], found)
-        start = active_rows[earlier] + 1
-    return found if found == FULL else test_blocks(state, i, start, stop, found)
-
-
-def test_active_rows(state, dt):
-    """A few bodies are awake: they look at all others but for static ones that are in a grid."""
-    candidates, grid, found = state.candidates, state.static_grid, 0
-    all_static = state.pair_search == ACTIVE_ROWS
-    if candidates.active_count == ALL or not (all_static or state.pair_search == STATIC_GRID):
-        return OK
-    for s in range(candidates.active_count):
-        if found != FULL:
-            found = test_others(state, s, state.count if all_static else state.moving, found)
-        for k in range(0 if all_static else grid.outside_count):
-            if found != FULL:
-                found = test_row(state, candidates.active_rows[s], grid.outside[k], grid.outside[k] + 1, found)
-    if found == FULL:
-        return need_more_room(state)
-    candidates.count = found
-    return OK
-
-
 def search_static_grid(state, dt):
     """What moves looks into the grid of what does not."""
     if state.pair_search != STATIC_GRID:
         return OK
-    candidates, found = state.candidates, state.candidates.count
-    every = candidates.active_count == ALL
+    found = state.candidates.count
     follow_statics(state)
-    for k in range(state.moving if every else candidates.active_count):
-        found = test_known_statics(state, k if every else candidates.active_rows[k], found)
+    for i in range(state.first, state.moving):
+        found = test_known_statics(state, i, found)
         if found == FULL:
             return need_more_room(state)
     state.candidates.count = found

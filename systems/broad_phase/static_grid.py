@@ -10,7 +10,7 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item
-from .boxes import HIGHEST, LARGEST, LOWEST
+from .boxes import HIGHEST, LARGEST, LOWEST, fixed_count, fixed_row
 from .uniform_grid import build_grid, reserve_grid
 
 OUTSIDE_MAX = 64  # boxes that may stay outside the grid, so that its cells need not be as large as they are
@@ -36,7 +36,8 @@ def longest_inside(state, grid):
     bodies, longest = state.bodies, grid.longest
     for k in range(OUTSIDE_MAX + 1):
         longest[k] = -math.inf
-    for i in range(state.moving, state.count):
+    for k in range(fixed_count(state)):
+        i = fixed_row(state, k)
         edge = longest_edge(bodies.lower[i], bodies.upper[i])
         if edge > longest[0]:  # the shortest of those kept makes way
             k = 0
@@ -55,7 +56,8 @@ def divide_boxes(state, grid):
     for q in range(len(zero)):
         frame[LOWEST + q], frame[HIGHEST + q] = math.inf, -math.inf
     frame[LARGEST] = limit
-    for i in range(state.moving, state.count):
+    for k in range(fixed_count(state)):
+        i = fixed_row(state, k)
         low, high = bodies.lower[i], bodies.upper[i]
         edge = longest_edge(low, high)
         if edge > limit:
@@ -78,7 +80,7 @@ def build_static_grid(state):
     inside = divide_boxes(state, grid)
     grid.suits = False
     if inside > 0:
-        build_grid(grid, grid.lower, grid.upper, inside)
+        build_grid(grid, grid.lower, grid.upper, 0, inside)
     if grid.suits:
         for k in range(grid.directory[grid.total]):
             order[k] = grid.rows[order[k]]
@@ -87,12 +89,13 @@ def build_static_grid(state):
 
 @part
 def follow_rows(state):
-    """Static bodies have moved to other rows, all by as many, because others have come or gone before them."""
+    """Static bodies have moved to other rows, all by as many, because others have come or gone before them; sleepers
+    have not."""
     grid, by = state.static_grid, state.moving - state.static_grid.first
     for k in range(grid.directory[grid.total] if grid.suits else 0):
-        grid.order[k] += by
+        grid.order[k] += by if grid.order[k] >= grid.first else 0
     for k in range(grid.outside_count):
-        grid.outside[k] += by
+        grid.outside[k] += by if grid.outside[k] >= grid.first else 0
     grid.first = state.moving
 
 

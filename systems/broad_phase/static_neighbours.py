@@ -24,7 +24,7 @@ def follow_statics(state):
     """No body knows what it sees any more if static bodies have changed, or any body has another row."""
     views = state.views
     if views.version != state.version or views.statics_version != state.statics_version:
-        for i in range(state.moving):
+        for i in range(state.first, state.moving):
             views.count[i] = NOT_KNOWN
         views.version, views.statics_version = state.version, state.statics_version
 

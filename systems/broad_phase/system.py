@@ -9,7 +9,7 @@ from ...framework.schedule.plan import PlannedKernel
 from ...framework.schedule.stages import Program, Stage
 from ..sleeping.stages import leave_out_still
 from ..staged import StagedSystem
-from .boxes import box_motions, box_statics
+from .boxes import box_motions, box_statics, fixed_count
 from .brute_force import BRUTE_FORCE_MAX
 from .plan import planned_passes
 from .search import CandidateSearch
@@ -20,7 +20,6 @@ from .stages import (
     place_statics,
     search_static_grid,
     search_uniform_grid,
-    test_active_rows,
     test_few,
 )
 
@@ -60,10 +59,6 @@ class BroadPhase(StagedSystem):
             ("candidates",), "colliders", f"less than {UNIFORM_GRID_MIN} bodies move",
         ),
         Stage(
-            test_active_rows, "the few bodies that are awake, with all others but for static ones in a grid", BOXES,
-            ("candidates",), "sleeping", "few bodies are awake",
-        ),
-        Stage(
             search_static_grid, "what moves looks into the grid of what does not, unless it has seen what is there",
             (*BOXES, "static_grid"), ("candidates", "views"), MANY, "more bodies are static than move",
         ),
@@ -81,7 +76,7 @@ class BroadPhase(StagedSystem):
         """The stages, and the passes of trees where the last step needed them."""
         yield from super().kernels()
         if self._state.collides and self._search.last == TREE:
-            yield from planned_passes(self._state.count - self._state.moving)
+            yield from planned_passes(fixed_count(self._state))
 
     def reason(self) -> str:
         return self._search.describe()

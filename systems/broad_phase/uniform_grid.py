@@ -71,7 +71,7 @@ def choose_cells(grid, count):
 
 
 @part
-def find_cells(grid, lower, upper, count):
+def find_cells(grid, lower, upper, start, count):
     """The cell of each box, invalid ones behind the last; afterwards directory[key + 1] is where cell ``key`` begins.
 
     Returns whether the boxes are spread evenly enough.
@@ -84,7 +84,7 @@ def find_cells(grid, lower, upper, count):
         origin = replace(origin, q, frame[LOWEST + q])
     for i in range(count):
         key, valid = 0, True
-        low, high = lower[i], upper[i]
+        low, high = lower[start + i], upper[start + i]
         for q in range(len(origin)):
             fits = item(low, q) <= item(high, q)
             valid &= fits
@@ -122,7 +122,7 @@ def choose_codes(grid):
 
 
 @part
-def place_boxes(grid, lower, upper, count):
+def place_boxes(grid, lower, upper, start, count):
     """The counting sort's last pass; afterwards directory[key] is where cell ``key`` begins."""
     frame, total, scale, origin = grid.frame, grid.total, grid.scale[0], zero_of(grid)
     keys, directory, order, cells, codes = grid.keys, grid.directory, grid.order, grid.cells, grid.codes
@@ -136,9 +136,9 @@ def place_boxes(grid, lower, upper, count):
             continue
         place = directory[key + 1]
         directory[key + 1] += 1
-        order[place] = i
+        order[place] = start + i
         cells[place] = key
-        code, low, high = np.int64(0), lower[i], upper[i]
+        code, low, high = np.int64(0), lower[start + i], upper[start + i]
         for q in range(d):
             code |= np.int64((item(low, q) - item(origin, q)) * item(scale, q)) << (q * field)
             code |= (largest - np.int64((item(high, q) - item(origin, q)) * item(scale, q))) << ((d + q) * field)
@@ -146,12 +146,13 @@ def place_boxes(grid, lower, upper, count):
 
 
 @part
-def build_grid(grid, lower, upper, count):
-    """Sort rows 0..count-1 of these columns into the cells; ``grid.suits``: whether they are even enough for it."""
-    grid.suits = choose_cells(grid, count) and find_cells(grid, lower, upper, count)
+def build_grid(grid, lower, upper, start, count):
+    """Sort ``count`` rows from ``start`` on of these columns into the cells; ``grid.suits``: whether they are even
+    enough for it."""
+    grid.suits = choose_cells(grid, count) and find_cells(grid, lower, upper, start, count)
     if grid.suits:
         choose_codes(grid)
-        place_boxes(grid, lower, upper, count)
+        place_boxes(grid, lower, upper, start, count)
 
 
 @part

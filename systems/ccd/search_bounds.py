@@ -124,7 +124,7 @@ def measure_crowd(state, now):
     lowest, highest = zero_of(state), zero_of(state)
     for k in range(len(lowest)):
         lowest, highest = replace(lowest, k, math.inf), replace(highest, k, -math.inf)
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         x, known = bodies.search_lower[i], bodies.shape[i] >= 0
         for k in range(len(x)):
             lowest = replace(lowest, k, min(item(lowest, k), item(x, k) if known else math.inf))
@@ -153,7 +153,7 @@ def find_margins(state, now, span):
     energy, shaped, extents = measure_crowd(state, now)
     cell = width_that_holds(1.0 / max(1, shaped), extents)
     crowd, wide = 0.0, 0
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         speed = max(margin[i], SPREAD * math.sqrt(2.0 * energy * inverse_mass[i]))
         margin[i] = 0.0
         if inverse_mass[i] > 0.0 and shape[i] >= 0 and has_search_bounds(state, i, speed, span):
@@ -166,7 +166,7 @@ def find_margins(state, now, span):
         return math.inf
     largest = 0.5 * width_that_holds(CROWD / max(1, wide), extents)
     speeds, fast = 0.0, 0
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         speed = speed_at(state, i, now)
         if shape[i] >= 0 and speed * span > largest:
             speeds += speed
@@ -175,7 +175,7 @@ def find_margins(state, now, span):
     if crossing < (now + span) / MOST_SEARCHES:  # rather more neighbours than more searches
         largest *= (now + span) / (MOST_SEARCHES * crossing)
         crossing = (now + span) / MOST_SEARCHES
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         margin[i] = min(margin[i], largest)
     return crossing
 

@@ -34,7 +34,7 @@ def gather(state, dt):
     Neighbours of one colour share no body that moves, so that the processor can work on several at once.
     """
     solver, pairs, bodies = state.solver, state.pairs, state.bodies
-    for i in range(state.moving if len(bodies.held) > 0 else 0):
+    for i in range(state.first, state.moving if len(bodies.held) > 0 else 0):
         bodies.held[i] = False
     if solver.contacts == 0:
         return OK

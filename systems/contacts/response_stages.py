@@ -28,6 +28,6 @@ def begin_response(state, dt):
             bodies.previous_position[i] = bodies.position[i]
             bodies.path_velocity[i] = bodies.linear_velocity[i]
             bodies.start_velocity[i] = bodies.linear_velocity[i]
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         bodies.origin[i] = bodies.previous_position[i]
     return OK

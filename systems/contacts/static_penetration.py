@@ -115,7 +115,7 @@ def resolve_static_penetration(state, dt):
                     note_squeezed(state.solver, i)
         if not moved:
             break
-    for i in range(state.dynamic if not state.pairs_filtered else 0):
+    for i in range(state.first, state.dynamic if not state.pairs_filtered else 0):
         if state.bodies.shape[i] >= 0 and is_moved_by_solver(state, i) and is_astray(state, i, dt):
             for _ in range(ROUNDS):
                 if not keep_out_of_all(state, i):

@@ -36,7 +36,7 @@ def limit_velocities(state, dt):
     """Shorten the velocities of the dynamic bodies that exceed their max_linear_speed."""
     if state.limits_speed:
         bodies, zero = state.bodies, zero_of(state)
-        for i in range(state.dynamic):
+        for i in range(state.first, state.dynamic):
             if not bodies.quarantined[i]:
                 bodies.linear_velocity[i] = within(bodies.linear_velocity[i], zero, bodies.max_linear_speed[i])
     return 0
@@ -55,7 +55,7 @@ def is_zero(vector):
 def any_nonzero(state, vectors):
     """Whether some vector of a column on demand is not 0, of a dynamic body that takes part."""
     out, found = state.bodies.quarantined, False
-    for i in range(state.dynamic if len(vectors) > 0 else 0):
+    for i in range(state.force_first, state.dynamic if len(vectors) > 0 else 0):
         found |= (not is_zero(vectors[i])) & (not out[i])
     return found
 
@@ -70,7 +70,7 @@ def sum_forces(state, dt):
     pushed = any_nonzero(state, applied) or any_nonzero(state, for_step)
     given = pushed or state.has_force_systems or not is_zero(gravity) or any_nonzero(state, bodies.constant_force)
     if not given:
-        for i in range(dynamic if any_nonzero(state, force) else 0):
+        for i in range(state.force_first, dynamic if any_nonzero(state, force) else 0):
             force[i] = zero_of(state)
         state.unforced, state.pushed = True, False
         return 0
@@ -78,9 +78,9 @@ def sum_forces(state, dt):
         return NEED_COLUMNS
     state.force_evaluations += 1
     mass, gravity_scale, constant = bodies.mass, bodies.gravity_scale, bodies.constant_force
-    for i in range(dynamic):
+    for i in range(state.force_first, dynamic):
         force[i] = add(scale(gravity, mass[i] * gravity_scale[i]), constant[i])
-    for i in range(dynamic if pushed else 0):
+    for i in range(state.force_first, dynamic if pushed else 0):
         force[i] = add(add(force[i], applied[i]), for_step[i])
     state.pushed = pushed
     return 0

@@ -21,7 +21,7 @@ def link_pairs(state):
     """
     impacts, pairs = state.impacts, state.pairs
     heads, links = impacts.heads, impacts.links
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         heads[i] = -1
     for c in range(pairs.count - 1, -1, -1):
         for side in range(2):

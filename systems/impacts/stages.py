@@ -41,7 +41,7 @@ def may_sink(state, dt):
     """Whether some approach that is too slow to bounce may lead through the thinnest of all within the step."""
     bodies, fastest = state.bodies, max(0.0, state.restitution_threshold)
     thinnest = min(state.thinnest_static, state.thinnest_moving)
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         fastest = max(fastest, 2.0 * bodies.force_speed_change[i])
     return fastest * dt > FAST * thinnest
 
@@ -55,7 +55,7 @@ def begin_impacts(state, dt):
     if state.response_idle:
         return OK
     impacts.sweeps = state.sweeping and state.moved
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         bodies.impact_count[i], bodies.counted_impacts[i] = 0, 0
     for c in range(pairs.count):
         pairs.crossed[c] = False
@@ -73,7 +73,8 @@ def begin_impacts(state, dt):
 def begin_clusters(state):
     """Every body is a cluster of its own. Impacts change nothing of static ones."""
     impacts, bodies = state.impacts, state.bodies
-    for i in range(state.moving if impacts.clusters_version == state.version else state.count):
+    known = impacts.clusters_version == state.version
+    for i in range(state.first if known else 0, state.moving if known else state.count):
         bodies.caught[i] = 0
         bodies.last_impact[i], bodies.cluster_inverse_mass[i] = -1.0, bodies.inverse_mass[i]
         bodies.cluster_root[i], bodies.cluster_next[i], bodies.cluster_tail[i] = i, -1, i
@@ -220,7 +221,7 @@ def request_bodies(state, c):
 def halt(state):
     """Too many rounds: what impacts have sent elsewhere stays where it is until the step ends."""
     impacts, bodies = state.impacts, state.bodies
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         if bodies.inverse_mass[i] > 0.0 and 0 < bodies.impact_count[i] < STOPPED:
             if impacts.halted == 0:
                 impacts.halted_row = i

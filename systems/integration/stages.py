@@ -64,20 +64,20 @@ def keep_start(state, dt):
     state.flight_usual, state.flight_seen = True, 0
     previous, position = bodies.previous_position, bodies.position
     start, velocity = bodies.start_velocity, bodies.linear_velocity
-    # Of static bodies the two are equal, see box_statics.
+    # Of sleepers and static bodies the two are equal, see box_statics.
     if state.others_write:  # every column is kept
-        for i in range(state.kept_rows):
+        for i in range(state.first, state.kept_rows):
             previous[i] = position[i]
     else:
         state.kept |= KEEPS_START
-        for i in range(state.kept_rows):
+        for i in range(state.first, state.kept_rows):
             bodies.kept_previous[i] = previous[i]
             previous[i] = position[i]
     if state.limits_speed:  # systems may have pushed since the forces were summed
-        for i in range(state.dynamic):
+        for i in range(state.first, state.dynamic):
             if not bodies.quarantined[i]:
                 velocity[i] = within(velocity[i], zero_of(state), bodies.max_linear_speed[i])
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         start[i] = velocity[i]
     return 0
 
@@ -92,10 +92,11 @@ def is_near(x, v):
 
 
 @part
-def any_damping(bodies, dynamic):
+def any_damping(state):
     """Whether any dynamic body is damped."""
+    bodies = state.bodies
     damping, out, damped = bodies.linear_damping, bodies.quarantined, False
-    for i in range(dynamic if len(damping) > 0 else 0):
+    for i in range(state.first, state.dynamic if len(damping) > 0 else 0):
         damped |= (damping[i] != 0.0) & (not out[i])
     return damped
 
@@ -106,12 +107,12 @@ def drift(state, h):
     The stages of the integrator that follow do nothing in that case.
     """
     bodies, dynamic = state.bodies, state.dynamic
-    state.drifted = state.unforced and not state.others_write and not any_damping(bodies, dynamic)
+    state.drifted = state.unforced and not state.others_write and not any_damping(state)
     if state.drifted:
         state.path_degree = LINE
         position, velocity = bodies.position, bodies.linear_velocity
         usual = True
-        for i in range(dynamic):
+        for i in range(state.first, dynamic):
             x = add_scaled(position[i], velocity[i], h)
             position[i] = x
             usual &= is_near(x, velocity[i])
@@ -127,15 +128,15 @@ def euler(state, h, with_new_velocity):
     bodies, dynamic = state.bodies, state.dynamic
     position, velocity, force = bodies.position, bodies.linear_velocity, bodies.force
     inverse_mass, damping = bodies.inverse_mass, bodies.linear_damping
-    damped, usual = any_damping(bodies, dynamic), True
-    for i in range(0 if damped else dynamic):  # no exponentials and no branches in this loop
+    damped, usual = any_damping(state), True
+    for i in range(dynamic if damped else state.first, dynamic):  # no exponentials and no branches in this loop
         old = velocity[i]
         new = add(old, scale(scale(force[i], inverse_mass[i]), h))
         x = add_scaled(position[i], new if with_new_velocity else old, h)
         velocity[i], position[i] = new, x
         usual &= is_near(x, new)
     state.flight_usual, state.flight_seen = usual, 0 if damped else dynamic
-    for i in range(dynamic if damped else 0):
+    for i in range(state.first, dynamic if damped else 0):
         c, decay, gain = damping[i], 1.0, h
         if c != 0.0:
             decay, gain = math.exp(-c * h), h * phi1(-c * h)
@@ -166,7 +167,7 @@ def verlet_drift(state, h):
     bodies, light_h, keep = state.bodies, h, state.force_changes
     position, velocity, force = bodies.position, bodies.linear_velocity, bodies.force
     damping, acceleration = bodies.linear_damping, bodies.acceleration
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         c = damping[i]
         h = light_h if c <= state.heavy_damping else state.heavy_step
         decay, first, second = 1.0, 1.0, 0.5
@@ -189,7 +190,7 @@ def verlet_kick(state, h):
     """
     bodies, light_h = state.bodies, h
     velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.linear_damping
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         h = light_h if damping[i] <= state.heavy_damping else state.heavy_step
         z, gain = -damping[i] * h, 0.5 * h
         if z != 0.0:
@@ -210,7 +211,7 @@ def runge_kutta_stage(state, h):
     position, velocity = bodies.position, bodies.linear_velocity
     x0, v0 = bodies.previous_position, bodies.start_velocity
     first, middle, speeds, kicks = bodies.acceleration, bodies.rk_middle, bodies.rk_speeds, bodies.rk_kicks
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         z = -bodies.linear_damping[i] * h
         f1 = f2 = f3 = 1.0 / 6.0
         decay = half_decay = half_gain = 1.0
@@ -246,7 +247,7 @@ def first_half_kick(state, h):
         return 0
     bodies, damped = state.bodies, False
     position, velocity, damping = bodies.position, bodies.linear_velocity, bodies.linear_damping
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         decay = 1.0
         if damping[i] != 0.0:
             decay, damped = math.exp(-0.5 * damping[i] * h), damped or not bodies.quarantined[i]
@@ -265,7 +266,7 @@ def second_half_kick(state, h):
     if state.drifted or not (state.force_changes or state.damped):
         return 0
     velocity, force, damping = bodies.linear_velocity, bodies.force, bodies.linear_damping
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         decay = math.exp(-0.5 * damping[i] * h) if damping[i] != 0.0 else 1.0
         change = sub(scale(scale(force[i], 0.5), bodies.inverse_mass[i]), bodies.acceleration[i])
         velocity[i] = scale(add_scaled(velocity[i], change, h), decay)
@@ -282,7 +283,7 @@ def end_flight(state, dt):
         return NEED_COLUMNS
     if state.limits_speed:
         state.flight_usual, state.flight_seen = True, 0
-        for i in range(dynamic):
+        for i in range(state.first, dynamic):
             limit = bodies.max_linear_speed[i]
             velocity[i] = within(velocity[i], zero_of(state), limit)
             position[i] = within(position[i], bodies.previous_position[i], limit * dt)
@@ -290,9 +291,9 @@ def end_flight(state, dt):
         position[i] = add_scaled(position[i], velocity[i], dt)
     if keeps:
         state.kept |= KEEPS_FORCE
-        for i in range(dynamic):
+        for i in range(state.force_first, dynamic):
             bodies.kept_step_force[i] = bodies.step_force[i]
-    for i in range(dynamic if pushed else 0):
+    for i in range(state.force_first, dynamic if pushed else 0):
         bodies.step_force[i] = zero_of(state)
     state.forces_summed, state.moved = False, True
     state.motion_version += 1
@@ -319,12 +320,12 @@ def check_flight(state, dt):
     """
     bodies, usual = state.bodies, state.flight_usual
     position, velocity = bodies.position, bodies.linear_velocity
-    for i in range(state.flight_seen, state.moving):
+    for i in range(max(state.flight_seen, state.first), state.moving):
         usual &= is_near(position[i], velocity[i])
     state.flight_usual = usual
     if state.quarantining or (state.others_write and not are_columns_sound(state)):
         return CHECK_FLIGHT
-    for i in range(0 if usual else state.moving):
+    for i in range(state.moving if usual else state.first, state.moving):
         if is_astray(state, i, dt):
             return CHECK_FLIGHT
     return OK
@@ -334,16 +335,16 @@ def note_path(state, dt):
     """x(t) = x0 + p1 t + p2 t^2 + p3 t^3 for the dynamic bodies, x0 + v t for the kinematic ones."""
     bodies, degree, dynamic = state.bodies, state.path_degree, state.dynamic
     v0, v1, path = bodies.start_velocity, bodies.linear_velocity, bodies.path_velocity
-    for i in range(state.moving if state.sweeping else 0):
+    for i in range(state.first, state.moving if state.sweeping else 0):
         bodies.origin[i] = bodies.previous_position[i]
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         path[i] = v1[i] if degree == LINE and not state.moves_with_old_velocity else v0[i]
     if degree == LINE:
         return 0
     second, third, zero = bodies.path_second, bodies.path_third, zero_of(state)
     for i in range(dynamic, state.moving):
         second[i], third[i] = zero, zero
-    for i in range(dynamic):
+    for i in range(state.first, dynamic):
         travel = sub(bodies.position[i], bodies.previous_position[i])
         if state.flies:  # event-driven: the parabola itself
             path[i], second[i], third[i] = bodies.flight_velocity[i], bodies.acceleration[i], zero

@@ -17,7 +17,7 @@ from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ..forces.accumulation import ForceAccumulation
 from ..scene import Scene
-from ..sleeping.stages import rest_sleepers
+from ..sleeping.stages import look_at_sleepers, rest_sleepers
 from ..staged import StagedSystem
 from .integrators import STANDARD_INTEGRATORS, Flight, Integrator
 from .motion import Motion
@@ -54,6 +54,10 @@ class Integration(StagedSystem):
     writes = ("position", "linear_velocity", "previous_position")
     STAGES = (
         Stage(
+            look_at_sleepers, "what code of the game has done to sleepers in this step", ("force", "rest_force"),
+            ("still",), "sleeping", "bodies sleep",
+        ),
+        Stage(
             keep_start, "keeps where the step starts, and the step before", (*MOTION, "previous_position"),
             ("kept_previous", "previous_position", "start_velocity", "linear_velocity"),
         ),
@@ -78,7 +82,7 @@ class Integration(StagedSystem):
             note_path, "the path within the step, on which impacts are found", MOTION, ("path_velocity",), "colliders",
         ),
         Stage(
-            rest_sleepers, "puts sleepers back, unless something has changed them or their flight", MOTION,
+            rest_sleepers, "puts sleepers back that have flown with the others, as some were disturbed", MOTION,
             (*MOTION, "path_velocity", "still"), "sleeping", "bodies sleep",
         ),
     )  # fmt: skip
@@ -96,7 +100,7 @@ class Integration(StagedSystem):
         self._scene, self._forces, self._registry, self._settings = scene, forces, registry, settings
         self._made: dict[Any, Integrator] = {}
         self._motion: Motion
-        self._viewed = -1  # the scene's version when the views in the motion were taken
+        self._viewed: Any = None  # the scene's version and the first row when the views in the motion were taken
 
     # -- which integrator -------------------------------------------------------------------------
 
@@ -157,7 +161,7 @@ class Integration(StagedSystem):
         if not self.in_python:
             return [self.segment()]
         return [
-            self.segment("keep_start", "drift"),
+            self.segment(last="drift"),
             PythonPart(self.name, self._advance),
             self.segment("end_flight", "rest_sleepers"),
         ]
@@ -166,7 +170,7 @@ class Integration(StagedSystem):
         state, integrator = self._state, self.integrator
         if not state.dynamic or (state.drifted and type(integrator) in STANDARD):
             return
-        if self._viewed != self._scene.version:
+        if self._viewed != (self._scene.version, state.first):
             self._take_views()
         motion = self._motion
         motion.evaluator = self._evaluator(motion.force) if self.world.force_systems else None
@@ -178,13 +182,13 @@ class Integration(StagedSystem):
 
     def _take_views(self) -> None:
         """The arrays are the same until the structure changes."""
-        bodies, dynamic, table = self._state.bodies, self._state.dynamic, self._scene.table
+        bodies, first, dynamic, table = self._state.bodies, self._state.first, self._state.dynamic, self._scene.table
         table.make("force")
         table.make("linear_damping")
         names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping")
         names += ("previous_position", "start_velocity")
-        self._motion = Motion(*(getattr(bodies, name)[:dynamic] for name in names), None, self._program)
-        self._viewed = self._scene.version
+        self._motion = Motion(*(getattr(bodies, name)[first:dynamic] for name in names), None, self._program)
+        self._viewed = self._scene.version, first
 
     def _evaluator(self, force: np.ndarray) -> Callable[[float], None]:
         """Sums the forces at a later moment of the step."""
@@ -208,7 +212,7 @@ class Integration(StagedSystem):
             yield from super().kernels()
             return
         linked = {kernel.kernel: kernel for kernel in super().kernels()}
-        for name in ("keep_start", "drift"):
+        for name in ("look_at_sleepers", "keep_start", "drift"):
             if name in linked:
                 yield linked[name]
         called: Any = getattr(self.integrator, "kernels", None)  # a plugin's need not say
@@ -224,7 +228,5 @@ class Integration(StagedSystem):
     def reason(self) -> str:
         integrator, name = self.integrator, self.integrator_name
         if isinstance(integrator, Flight):
-            return (
-                "exact flight between impacts, whatever Settings.integrator; order 2 in force systems and damping"
-            )
+            return "exact flight between impacts, whatever Settings.integrator; order 2 in force systems and damping"
         return f"{name}, order {integrator.order}, {integrator.evaluations} force evaluations a step"

@@ -15,18 +15,21 @@ SURE = 1.0 - 1e-12  # factor that makes a number less than the exact one, whatev
 
 @part
 def rank_rows(state):
-    """The place of each row in the order of entity ids: three sorted runs are merged."""
+    """The place of each row in the order of entity ids: four sorted runs are merged."""
     entity, rank = state.bodies.entity, state.bodies.rank
-    dynamic, kinematic, static = 0, state.dynamic, state.moving
+    asleep, dynamic, kinematic, static = 0, state.sleepers, state.dynamic, state.moving
     for place in range(state.count):
         row, lowest = -1, 0
-        if dynamic < state.dynamic:
+        if asleep < state.sleepers:
+            row, lowest = asleep, entity[asleep]
+        if dynamic < state.dynamic and (row < 0 or entity[dynamic] < lowest):
             row, lowest = dynamic, entity[dynamic]
         if kinematic < state.moving and (row < 0 or entity[kinematic] < lowest):
             row, lowest = kinematic, entity[kinematic]
         if static < state.count and (row < 0 or entity[static] < lowest):
             row = static
         rank[row] = place
+        asleep += row == asleep
         dynamic += row == dynamic
         kinematic += row == kinematic
         static += row == static
@@ -145,10 +148,10 @@ def find_hasty(state, dt):
     any_fast = False
     if state.sweeping or not state.moved:
         return
-    for i in range(state.moving):  # seldom; squares, so that there are no roots, nor divisions
+    for i in range(state.first, state.moving):  # seldom; squares, so that there are no roots, nor divisions
         v, room = bodies.start_velocity[i], SURE * (bodies.min_extent[i] + thinnest)
         any_fast |= not dot(v, v) * (dt * dt) <= room * room
-    for i in range(state.moving if any_fast else 0):
+    for i in range(state.first, state.moving if any_fast else 0):
         if bodies.shape[i] >= 0:
             extent = bodies.min_extent[i]
             beyond = length(bodies.start_velocity[i]) * dt - extent
@@ -164,7 +167,7 @@ def select_pairs(state, dt):
         return NEED_PAIRS
     velocity, start = bodies.linear_velocity, bodies.start_velocity
     changed = state.moved and (state.limits_speed or not state.drifted)
-    for i in range(state.moving):  # that of static bodies is always 0
+    for i in range(state.first, state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
     state.too_fast_for_discrete = False
     find_hasty(state, dt)

@@ -11,16 +11,16 @@ from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record
 from ...framework.schedule.stages import Program
-from ..broad_phase.active_rows import ALL
 from ..record_buffers import Room
 from ..records import SLEEP_COLUMNS, SLEEPING
-from ..scene import Scene
+from ..scene import ZERO_WHERE_STATIC, Scene
 from ..tracking import CONTACTS as CONTACT_NUMBERS
 from ..tracking import WARM_START, put_rows_back, saved_rows
+from .lent_columns import LentColumns
 from .stages import AWAKE, DISTURBED, FALLING, STILL
 from .stored import CONTACTS, IMPULSES, Stored
-from .watching import Watching
 
+PUSHES = ("applied_force", "applied_frame", "step_force")
 PATH = ("origin", "path_velocity", "path_second", "path_third")
 
 
@@ -43,7 +43,10 @@ class Sleepers:
 
     def __init__(self, state: Record, table: Table, scene: Scene, program: Program, room: Room) -> None:
         self._state, self._table, self._scene, self._program = state, table, scene, program
-        self._watching = Watching(state, table, scene)
+        self._lent = LentColumns(table, scene)
+        self._disturbed = False  # some are marked, or may be
+        self._pushed = False
+        self._placed: Any = None  # rows and arrays in which sleepers are as what does not move
         self.contacts = Stored(state.contacts, CONTACTS, room.reserve_contacts)
         self.impulses = Stored(state.warm_start, IMPULSES, room.reserve_warm_start)
         self._dt = 1.0  # s, of the step that the impulses are of
@@ -58,6 +61,7 @@ class Sleepers:
         self.kept: Any = None  # before this step
         self._words = state.words
         self._due, self._asleep, self._fresh = (state.word_of(n) for n in ("due", "asleep", "fresh_statics"))
+        self._pushing = state.word_of("pushed")
 
     # -- settings ---------------------------------------------------------------------------------
 
@@ -66,6 +70,7 @@ class Sleepers:
         if sleeping or self._state.asleep or self._state.due:
             self._all_wake = True
         self._state.sleeping, self.on = sleeping, sleeping or self._all_wake
+        self._table.on_written = self._mark_row if self.on else None
         if sleeping:
             for name in SLEEP_COLUMNS:
                 self._table.make(f"_{name}")
@@ -74,33 +79,82 @@ class Sleepers:
 
     def begin_step(self) -> None:
         """The scene is up to date: follow bodies that have come or gone, and let those fall asleep that are due."""
-        words, table = self._words, self._table
+        words, state, table = self._words, self._state, self._table
         if self._all_wake:
             self._wake_all()
             self._all_wake = False
         seen = table.version + table.members_version + table.static_version + table.columns_version  # these only grow
+        fresh = False
         if seen != self._seen:
             self._scene.reserve(*SLEEPING)
-            self._watching.bind()
             structure = self._structure()
             if structure != self._followed:
                 self._follow(structure)
             self._seen = seen
+            fresh = bool(words[self._asleep]) and (self._still()[table.stops[1] :] == AWAKE).any()
         self._changes_taken, self._changes = self._changes, []
         if words[self._due] or (words[self._asleep] and words[self._fresh]):
             self._fall_asleep(table.stops[1])
-        if self._changes_taken and words[self._asleep]:
-            self._disturb_near(np.array(self._changes_taken))
+        if words[self._asleep]:
+            self._mark(self._lent.changed())
+            if self._changes_taken:
+                self._disturb_near(np.array(self._changes_taken))
+        quiet = not self._disturbed and not fresh and state.asleep == table.blocks[0]
+        state.pushes = self._pushed or words[self._pushing] or not table.lent.isdisjoint(PUSHES)
+        self._disturbed = self._pushed = False
+        self._leave_out(table.blocks[0] if quiet else 0)
 
     def end_step(self) -> None:
-        """Note what those stand on that fall asleep; nothing may change until the next step."""
+        """Note what those stand on that fall asleep; what sleeps stands in rows of its own."""
+        state, table = self._state, self._table
         self.kept, self._changes_taken = None, []
-        if self._state.due < 0:
-            self._all_wake, self._state.due = True, 0
+        if state.due < 0:
+            self._all_wake, state.due = True, 0
         elif self._words[self._due]:
             self._followed = self._structure()
             self._note_links()
-        self.on = self._state.sleeping or self._all_wake
+        if state.due or (state.first == 0 and (state.asleep or table.blocks[0])):
+            table.settle(self._still()[: table.stops[0]] == STILL)
+            self._followed = self._structure()
+            self._lent.take(np.flatnonzero(self._still() > AWAKE))
+        self.on = state.sleeping or self._all_wake
+        table.on_written = self._mark_row if self.on else None
+
+    def _leave_out(self, rows: int) -> None:
+        """That many rows take no part in the step; they are to others as what does not move."""
+        state, bodies = self._state, self._state.bodies
+        placed = rows, self._scene.version
+        if placed == self._placed:
+            return
+        self._placed = placed
+        state.support_version = state.impacts.clusters_version = -1
+        if rows != state.first:
+            state.first = rows
+            state.statics_version += 1
+        for name in ZERO_WHERE_STATIC if rows else ():
+            getattr(bodies, name)[:rows] = 0
+        if rows:
+            bodies.force_speed_change[:rows] = np.linalg.norm(bodies.flown_velocity[:rows], axis=1)
+
+    def _join(self) -> None:
+        """Within a step: all take part in what is left of it."""
+        state, bodies, rows = self._state, self._state.bodies, self._state.first
+        if not rows:
+            return
+        self._leave_out(0)
+        state.force_first, state.all_still = 0, False
+        if len(bodies.cluster_root):
+            here = np.arange(rows)
+            bodies.caught[:rows], bodies.last_impact[:rows] = 0, -1.0
+            bodies.cluster_root[:rows] = bodies.cluster_tail[:rows] = here
+            bodies.cluster_next[:rows] = bodies.cluster_holder[:rows] = -1
+            bodies.cluster_inverse_mass[:rows] = bodies.inverse_mass[:rows]
+
+    def look(self) -> None:
+        """Code of the game has run within the step, before the flight."""
+        self._mark(self._lent.changed())
+        if self._state.first and (self._still() == DISTURBED).any():
+            self._join()
 
     def _structure(self) -> tuple[int, ...]:
         table = self._table
@@ -120,21 +174,19 @@ class Sleepers:
         self._keep()
         table, links = self._table, self.links
         islands = [links[table.rows_of(links[:, 0]) < 0, 1]] if len(links) else []
-        ids, sizes = np.unique(self._islands(), return_counts=True)
-        now = dict(zip(ids.tolist(), sizes.tolist(), strict=True))
-        islands.append(np.array([i for i, size in self.sizes.tolist() if now.get(i) != size], np.int64))
+        now = self._islands()
+        if len(now) != self._state.asleep:  # some have gone: of which islands?
+            known, sizes = self.sizes.T
+            islands.append(known[np.bincount(known.searchsorted(now), minlength=len(known))[: len(known)] != sizes])
         if not self._state.collides or (before is not None and before[3] != structure[3]):  # ids mean other entities
-            islands.append(ids)
+            islands.append(now)
         self._wake(np.concatenate(islands))
 
     def _fall_asleep(self, moving: int) -> None:
         """What is due is still from now on; so is all that cannot move."""
         self._keep()
         state, table, bodies = self._state, self._table, self._state.bodies
-        self._program.run_one("take_checksums", 0.0)
-        fixed = slice(moving, table.count)
-        bodies.still[fixed] = STILL
-        bodies.watched[fixed], bodies.rest_position[fixed] = bodies.checksums[fixed], bodies.position[fixed]
+        bodies.still[moving : table.count] = STILL
         state.due = state.fresh_statics = 0
         self._exchange()
 
@@ -147,9 +199,10 @@ class Sleepers:
         some = (fixed >= dynamic) & (body < dynamic)
         fixed, body = fixed[some], body[some]
         due = bodies.still[body] == FALLING
-        found = set(zip(bodies.entity[fixed[due]].tolist(), bodies.island[body[due]].tolist(), strict=True))
-        found |= set(map(tuple, self.links.tolist()))
-        self.links = np.array(sorted(found), np.int64).reshape(-1, 2)
+        found = np.stack((bodies.entity[fixed[due]], bodies.island[body[due]]), axis=1)
+        links = np.concatenate((self.links, found))
+        links = links[np.lexsort((links[:, 1], links[:, 0]))]
+        self.links = links[np.append(True, (links[1:] != links[:-1]).any(axis=1))[: len(links)]]
 
     # -- waking -----------------------------------------------------------------------------------
 
@@ -160,24 +213,42 @@ class Sleepers:
 
     def disturb(self, entities: np.ndarray) -> None:
         """The islands of those that sleep are awake from the next step on."""
-        still, rows = self._table.arrays.get("_still"), self._table.rows_of(entities)
-        if still is not None:
-            rows = rows[(rows >= 0) & (rows < self._table.stops[0])]
-            still[rows[still[rows] > AWAKE]] = DISTURBED
-            self._state.candidates.active_count = ALL  # within a step they look for others already
+        rows = self._table.rows_of(entities)
+        self._mark(rows[(rows >= 0) & (rows < self._table.stops[0])])
+
+    def _mark(self, rows: np.ndarray) -> None:
+        """What is still in these rows is disturbed."""
+        still = self._table.arrays.get("_still")
+        if still is None or not len(rows := rows[still[rows] > AWAKE]):
+            return
+        still[rows] = DISTURBED
+        self._disturbed = True
+        if self._table.in_step and self._state.moved:  # they look for others already
+            self._join()
+
+    def _mark_row(self, key: str, row: int) -> None:
+        """Code of the game has written to that row. A push that is the same in each step wakes nothing."""
+        if key in PUSHES:
+            self._pushed = True
+            return
+        still = self._table.arrays.get("_still")
+        if still is not None and still.item(row) > AWAKE:
+            still[row], self._disturbed = DISTURBED, True
+
+    def watch(self, key: str) -> None:
+        """Code of the game may write that column in place from now on."""
+        self._lent.add(key)
 
     def follow_change(self, column: ArrayColumn, row: int, before: int, inside: np.ndarray) -> None:
         """The shape of a row has changed inside of these boxes: that disturbs nothing farther away."""
         if not self.on:
             return
-        table, watched = self._table, self._state.bodies.watched
+        table = self._table
         if row < table.stops[0]:
             self.disturb(table.column("entity")[row : row + 1])
         place = table.column("position")[row]
         self._changes += (inside + np.concatenate((place, place))).tolist()
-        bits = self._watching.follow_change(column, row, before)
-        if len(watched):
-            watched[row] ^= bits
+        self._lent.replace(column.key, row)
 
     def _disturb_near(self, changes: np.ndarray) -> None:
         """Wake what sleeps in these boxes or touches them."""
@@ -192,7 +263,7 @@ class Sleepers:
             self._keep()
             self.disturb(bodies.entity[rows[near]])
 
-    def wake_disturbed(self, dt: float) -> np.ndarray:
+    def wake_disturbed(self) -> np.ndarray:
         """Those that are marked, and their islands; returns the rows of the dynamic ones."""
         self._keep()
         state, bodies = self._state, self._state.bodies
@@ -204,7 +275,8 @@ class Sleepers:
 
     def wake_touched(self, simulation: Any, dt: float) -> None:
         """An awake body has come near: the islands have the flight that they were spared, and their pairs."""
-        rows = self.wake_disturbed(dt)
+        self._join()
+        rows = self.wake_disturbed()
         if self._state.moved:
             self._fly(rows, dt)
         simulation.broad_phase.process(dt)
@@ -221,7 +293,11 @@ class Sleepers:
         if not len(rows):
             return False
         still[rows] = DISTURBED
-        self._fly(self.wake_disturbed(dt), dt)
+        joins = state.first > 0
+        self._join()
+        self._fly(self.wake_disturbed(), dt)
+        if joins:
+            self._program.run_one("box_rest_of_step", dt)
         return True
 
     def _fly(self, rows: np.ndarray, dt: float) -> None:
@@ -229,6 +305,8 @@ class Sleepers:
         bodies, moving = self._state.bodies, self._state.moving
         kept = {name: column[:moving].copy() for name in PATH if len(column := getattr(bodies, name))}
         bodies.position[rows], bodies.linear_velocity[rows] = bodies.flown_position[rows], bodies.flown_velocity[rows]
+        if self._state.flies:
+            bodies.flight_velocity[rows], bodies.acceleration[rows] = 0.0, 0.5 * bodies.flown_velocity[rows] / dt
         self._program.run_one("note_path", dt)
         others = np.ones(moving, bool)
         others[rows] = False
@@ -263,7 +341,6 @@ class Sleepers:
     def _exchange(self) -> None:
         """The pairs of which both are still are kept here, the others in the records; if nothing sleeps, nothing is."""
         state, memory, still = self._state, self._state.warm_start, self._still()
-        state.candidates.active_count = ALL  # in this step more are awake than were noted
         state.asleep = int(np.count_nonzero(still[: self._table.stops[0]] > AWAKE))
         if not state.asleep:
             state.bodies.rest_steps[: len(still)][still == DISTURBED] = 0  # woken before it fell asleep
@@ -321,17 +398,22 @@ class Sleepers:
     def abandon_step(self) -> None:
         """Back to the start of the step; the records show the contacts and impulses of that time."""
         self._changes, self._changes_taken = self._changes_taken, []
+        state, bodies, left_out = self._state, self._state.bodies, slice(0, self._state.kept_first)
+        self._disturbed = True
+        if state.first < state.kept_first and not state.others_write:  # woken within the step
+            bodies.position[left_out] = bodies.previous_position[left_out] = bodies.rest_position[left_out]
+            bodies.linear_velocity[left_out] = 0.0
         if self.kept is None:
             return
         (columns, parts, self._followed, all_wake, impulses, contacts), self.kept, self._seen = self.kept, None, -1
         self._all_wake = self.on = self._all_wake or all_wake
-        self.on |= self._state.sleeping
+        self.on |= state.sleeping
         for name, column in columns.items():
-            getattr(self._state.bodies, name)[: len(column)] = column
+            getattr(bodies, name)[: len(column)] = column
         self._take_parts(parts)
-        put_rows_back(self._state.warm_start, impulses)
-        put_rows_back(self._state.contacts, contacts)
-        self._state.warm_start.rows_version[:] = -1
+        put_rows_back(state.warm_start, impulses)
+        put_rows_back(state.contacts, contacts)
+        state.warm_start.rows_version[:] = -1
 
     def _saved_parts(self) -> dict[str, Any]:
         state = self._state
@@ -353,6 +435,7 @@ class Sleepers:
         """For snapshots; also whether bodies have come or gone since the last step, and whether all wake."""
         if not self.on:
             return None
+        self._mark(self._lent.changed())
         followed = self._structure() == self._followed
         more = {"changes": list(self._changes)} if self._changes else {}
         return {**self._saved_parts(), "followed": followed, "all_wake": self._all_wake, **more}
@@ -361,7 +444,8 @@ class Sleepers:
         """The table is what it was then; if this world does not sleep, all of them wake."""
         state = self._state
         self.kept, self._followed, self._seen = None, None, -1
-        state.watched_version = -1  # statics may have changed between that time and the step after it
+        state.first, self._placed, self._disturbed = 0, None, True  # what was written after that time is not known
+        self._lent.take(np.flatnonzero(self._still() > AWAKE))
         self._changes = [] if saved is None else list(saved.get("changes", ()))
         if saved is None:
             self.contacts.clear()

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...framework.compilation import inlined, part
-from ...framework.jit.records.record_type import record_at, zero_of
+from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import dot, item, length, sub
-from ..broad_phase.active_rows import ALL, add_active
-from ..broad_phase.boxes import follow_static_places
-from ..codes import OK, WAKE, WAKE_TOUCHED
+from ..codes import LOOK, OK, WAKE, WAKE_TOUCHED
 from ..forces.stages import is_zero
 from ..islands import root_of
-from ..records import WATCHED
 from ..shapes.tolerances import contact_margin
 
 # Values of ``bodies.still``. FALLING: its first step asleep is the next one. What cannot be moved is still, too.
@@ -37,8 +32,6 @@ LOOK_EVERY = 4  # steps; islands need not be joined in each
 FIRST_SHARE = 0.05  # of what forces change: they may differ by it when its velocity has become 0
 THROW = 3.0  # times the highest speed there is: what an impact may make of a body within the step
 
-_watched_at = record_at(WATCHED, 2)
-
 
 @inlined
 def same(one, other):
@@ -49,128 +42,73 @@ def same(one, other):
     return equal
 
 
-@inlined
-def rotated_bits(word, by):
-    """The 64 bits rotated by 1 to 62 places."""
-    return (word << by) | ((word >> (64 - by)) & ((np.int64(1) << by) - 1))
-
-
-@part
-def add_to_checksums(watched, checksums, start, stop):
-    """The column's share in the prints of rows start..stop-1; none where it holds the default."""
-    words, small, width = watched.words, watched.small, watched.width
-    for k in range(width):
-        by, default = 1 + (watched.turn + 13 * k) % 62, watched.defaults[k]
-        for i in range(start, stop if len(words) > 0 else start):
-            checksums[i] ^= rotated_bits(words[i * width + k] ^ default, by)
-        for i in range(start, stop if len(small) > 0 else start):
-            checksums[i] ^= rotated_bits(np.int64(small[i * width + k]) ^ default, by)
-
-
-@part
-def print_rows(state, start, stop):
-    """prints[i]: all that is watched of rows start..stop-1, each in one number that changes with any of it."""
-    checksums, watching = state.bodies.checksums, state.watching
-    for i in range(start, stop):
-        checksums[i] = 0
-    for q in range(len(watching)):
-        add_to_checksums(_watched_at(watching[q]), checksums, start, stop)
-
-
-def take_checksums(state, dt):
-    """The prints of all rows."""
-    print_rows(state, 0, state.count)
-    return OK
-
-
 # -- what sleeps on ----------------------------------------------------------------------------------------------------
 
 
 @part
-def sleeps_on(state, i, dt):
-    """Whether a sleeper is what it was, and free flight has led where it always does.
+def is_pushed_otherwise(state, i, dt):
+    """Whether another force acts on a sleeper than in the step before.
 
-    In the first step its flight is noted. Its velocity has just become 0, so that what depends on velocities may differ
+    In its first step that force is noted. Its velocity has just become 0, so that what depends on velocities may differ
     a little: force systems, and code of the game.
     """
     bodies, free = state.bodies, state.has_force_systems or state.others_write
-    if not (same(bodies.previous_position[i], bodies.rest_position[i]) and is_zero(bodies.start_velocity[i])):
+    if len(bodies.force) == 0:
         return False
-    if bodies.checksums[i] != bodies.watched[i]:
-        return False
-    if bodies.still[i] == FALLING:
-        push = length(sub(bodies.force[i], bodies.rest_force[i])) * bodies.inverse_mass[i] * dt
-        if not push <= (FIRST_SHARE * bodies.force_speed_change[i] if free else 0.0):
-            return False
-        bodies.flown_position[i], bodies.flown_velocity[i] = bodies.position[i], bodies.linear_velocity[i]
-        return True
-    return same(bodies.position[i], bodies.flown_position[i]) and same(
-        bodies.linear_velocity[i], bodies.flown_velocity[i]
-    )
+    if bodies.still[i] == STILL:
+        return not same(bodies.force[i], bodies.rest_force[i])
+    push = length(sub(bodies.force[i], bodies.rest_force[i])) * bodies.inverse_mass[i] * dt
+    bodies.rest_force[i] = bodies.force[i]
+    return not push <= (FIRST_SHARE * bodies.force_speed_change[i] if free else 0.0)
+
+
+def look_at_sleepers(state, dt):
+    """Disturb what other forces act on; Python looks for what code of the game has written in this step."""
+    still, disturbed = state.bodies.still, False
+    if state.asleep == 0:
+        return OK
+    for i in range(state.force_first, state.dynamic):
+        if still[i] > AWAKE and is_pushed_otherwise(state, i, dt):
+            still[i], disturbed = DISTURBED, True
+    return LOOK if state.others_write or (disturbed and state.first > 0) else OK
 
 
 @part
-def stands(state, i):
-    """Whether a body that cannot be moved is what it was, where it was."""
-    bodies = state.bodies
-    at, before = bodies.position[i], bodies.previous_position[i] if i < state.moving else bodies.rest_position[i]
-    moves = i < state.moving and not is_zero(bodies.linear_velocity[i])
-    at_place = same(at, bodies.rest_position[i]) and same(before, bodies.rest_position[i])
-    return at_place and not moves and bodies.checksums[i] == bodies.watched[i]
-
-
-@part
-def find_disturbed(state, dt):
-    """Mark the still rows that are not what they were; returns how many there are, with those marked before."""
-    still, disturbed = state.bodies.still, 0
-    follow_static_places(state)
-    stop = state.moving if state.watched_version == state.statics_version else state.count
-    state.watched_version = state.statics_version
-    print_rows(state, 0, stop)
-    for i in range(stop):
-        if still[i] > AWAKE:
-            stays = sleeps_on(state, i, dt) if i < state.dynamic else stands(state, i)
-            if not stays:
-                still[i] = DISTURBED
-        disturbed += still[i] == DISTURBED
-    for i in range(stop, state.count):
-        disturbed += still[i] == DISTURBED
-    return disturbed
-
-
-@part
-def put_to_rest(state):
-    """Sleepers are where they rest, without speed; notes whether anything moves that could meet another."""
-    bodies, still, zero, lively, fresh = state.bodies, state.bodies.still, zero_of(state), False, 0
-    state.candidates.active_count = 0
-    for i in range(state.moving):
-        if still[i] == AWAKE:
-            lively |= bodies.shape[i] >= 0
-            add_active(state, i)
-            continue
-        still[i] = STILL
-        if i < state.dynamic:
-            bodies.position[i], bodies.linear_velocity[i] = bodies.rest_position[i], zero
-            bodies.path_velocity[i] = zero
-            if state.path_degree > 1:
-                bodies.path_second[i], bodies.path_third[i] = zero, zero
-    for i in range(state.moving, state.count):
-        fresh += still[i] == AWAKE
-    if fresh > 0:  # sleepers have to look at these
-        state.candidates.active_count = ALL
-    state.fresh_statics = fresh
-    state.all_still = not lively and fresh == 0
+def is_lively(state):
+    """Whether anything is awake that could meet another."""
+    bodies, lively = state.bodies, False
+    for i in range(state.first, state.moving):
+        lively |= bodies.still[i] == AWAKE and bodies.shape[i] >= 0
+    return lively
 
 
 def rest_sleepers(state, dt):
-    """Compare what is still with what it was, and put sleepers back to where they rest."""
+    """Where some are disturbed all have flown: what sleeps on is back where it rests, without speed."""
+    bodies, still, zero, disturbed, fresh = state.bodies, state.bodies.still, zero_of(state), 0, 0
     state.sleep_stages |= RESTED
     if state.asleep == 0:
         return OK
-    state.disturbed = find_disturbed(state, dt)
-    if state.disturbed > 0:
+    for i in range(state.count if state.first == 0 else 0):
+        disturbed += still[i] == DISTURBED
+    state.disturbed = disturbed
+    if disturbed > 0:
         return WAKE
-    put_to_rest(state)
+    for i in range(state.dynamic if state.first == 0 else 0):
+        if still[i] == AWAKE:
+            continue
+        if still[i] == FALLING:
+            bodies.flown_position[i], bodies.flown_velocity[i] = bodies.position[i], bodies.linear_velocity[i]
+        still[i] = STILL
+        bodies.position[i], bodies.linear_velocity[i] = bodies.rest_position[i], zero
+        bodies.path_velocity[i] = zero
+        if state.path_degree > 1:
+            bodies.path_second[i], bodies.path_third[i] = zero, zero
+    for i in range(state.moving, state.count if state.first == 0 else 0):
+        fresh += still[i] == AWAKE
+    for i in range(state.dynamic, state.moving):
+        still[i] = STILL if still[i] == FALLING else still[i]
+    state.fresh_statics = fresh
+    state.all_still = fresh == 0 and not is_lively(state)
     return OK
 
 
@@ -195,7 +133,7 @@ def leave_out_still(state, dt):
 def weigh_sleepers(state, dt):
     """What forces would change of the speed of sleepers, for the margins of their pairs."""
     bodies = state.bodies
-    for i in range(state.dynamic if state.asleep > 0 and state.pairs.count > 0 else 0):
+    for i in range(state.dynamic if state.asleep > 0 and state.first == 0 and state.pairs.count > 0 else 0):
         if bodies.still[i] == STILL:
             bodies.force_speed_change[i] = length(bodies.flown_velocity[i])
     return OK
@@ -205,7 +143,7 @@ def weigh_sleepers(state, dt):
 def highest_speed(state):
     """Of all that moves, before the step or after its flight."""
     bodies, fastest = state.bodies, 0.0
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         u, v = bodies.start_velocity[i], bodies.linear_velocity[i]
         square = max(dot(u, u), dot(v, v))
         if bodies.still[i] == AWAKE and square > fastest:
@@ -280,7 +218,7 @@ def count_rest(state, dt, needed):
     """For how many steps each moving body has been at rest; returns whether some body has for long enough: also one
     that cannot be moved, where others sleep."""
     bodies, ripe, last = state.bodies, False, state.moving if state.asleep > 0 else state.dynamic
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         if bodies.still[i] == AWAKE:
             rests = is_at_rest(state, i, dt) if i < state.dynamic else stands_still(state, i)
             bodies.rest_steps[i] = bodies.rest_steps[i] + 1 if rests else 0
@@ -299,7 +237,7 @@ def join_islands(state, dt, needed):
     """
     bodies, pairs, root, keeps_awake = state.bodies, state.pairs, state.bodies.rest_root, state.bodies.keeps_awake
     still = bodies.still
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         root[i], keeps_awake[i] = i, bodies.rest_steps[i] < needed or not is_unmoved(state, i, dt)
     for c in range(pairs.count):
         a, b = pairs.a[c], pairs.b[c]
@@ -317,7 +255,7 @@ def join_islands(state, dt, needed):
         for i in (pairs.a[pairs.disabled[k]], pairs.b[pairs.disabled[k]]):
             if i < state.dynamic:
                 keeps_awake[i] = True
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         if keeps_awake[i]:
             keeps_awake[root_of(root, i)] = True
     for c in range(pairs.count):
@@ -331,7 +269,7 @@ def join_islands(state, dt, needed):
 def put_to_sleep(state, i):
     """Row i is still from the next step on, if nothing changes until then."""
     bodies = state.bodies
-    bodies.still[i], bodies.watched[i], bodies.rest_position[i] = FALLING, bodies.checksums[i], bodies.position[i]
+    bodies.still[i], bodies.rest_position[i] = FALLING, bodies.position[i]
     bodies.linear_velocity[i] = zero_of(state)
 
 
@@ -347,8 +285,7 @@ def update_sleep(state, dt):
     if not count_rest(state, dt, needed) or state.step_number % LOOK_EVERY != 0:
         return OK
     join_islands(state, dt, needed)
-    print_rows(state, 0, state.moving)
-    for i in range(state.dynamic):
+    for i in range(state.first, state.dynamic):
         first = root_of(bodies.rest_root, i)
         if bodies.still[i] == AWAKE and not bodies.keeps_awake[first]:
             put_to_sleep(state, i)

@@ -25,8 +25,16 @@ def merged(one: Columns, other: Columns) -> tuple[Columns, np.ndarray]:
     if not count or not more:  # usual, for whole piles
         return dict(one if count else other), np.full(max(count, more), count > 0)
     joined = {name: np.concatenate((column, other[name])) for name, column in one.items()}
-    order = np.lexsort((joined["entity_b"], joined["entity_a"]))
+    first, second = joined["entity_a"], joined["entity_b"]
+    if max(first.max(), second.max()) >> 31:
+        order = np.lexsort((second, first))
+    else:
+        order = np.argsort(first << 31 | second, kind="stable")  # fast, as both are in order
     return {name: column[order] for name, column in joined.items()}, order < count
+
+
+def _part_of(columns: Columns, mask: np.ndarray) -> Columns:
+    return {name: column[mask] for name, column in columns.items()}
 
 
 class Stored:
@@ -56,27 +64,22 @@ class Stored:
 
     def exchange(self, both_still: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> None:
         """Keep the pairs of which both are still, and no others; the record gets the rest."""
-        live = self._live()
-        if not len(self) and not len(live["entity_a"]):
+        live, kept = self._live(), self.columns
+        sleeps, falls = (both_still(each["entity_a"], each["entity_b"]) for each in (kept, live))
+        if sleeps.all() and not falls.any():
             return
-        joined, was_live = merged(live, self.columns)
-        still = both_still(joined["entity_a"], joined["entity_b"])
-        if np.array_equal(still, ~was_live):
-            return
-        stays = self._stays(was_live)[~still]
-        self.columns = {name: column[still] for name, column in joined.items()}
-        self._write({name: column[~still] for name, column in joined.items()})
+        record, now = self._record, self._record.now
+        stays = np.zeros(len(falls), bool)  # of the live ones, those that were there in the step before, too
         if self._lists_stays:
-            record, rows = self._record, np.flatnonzero(stays)
-            record.stayed[record.now, : len(rows)], record.stays[record.now] = rows, len(rows)
-
-    def _stays(self, was_live: np.ndarray) -> np.ndarray:
-        """Mask of what was there in the step before, too: all that sleeps, and what the record says."""
-        stays = ~was_live
+            stays[record.stayed[now, : record.stays[now]]] = True
+        self.columns, _ = merged(_part_of(kept, sleeps), _part_of(live, falls))
+        live, was_live = merged(_part_of(live, ~falls), _part_of(kept, ~sleeps))
+        self._write(live)
         if self._lists_stays:
-            record, now = self._record, self._record.now
-            stays[np.flatnonzero(was_live)[record.stayed[now, : record.stays[now]]]] = True
-        return stays
+            stayed = ~was_live  # and all that slept
+            stayed[was_live] = stays[~falls]
+            rows = np.flatnonzero(stayed)
+            record.stayed[now, : len(rows)], record.stays[now] = rows, len(rows)
 
     def _write(self, columns: Columns) -> None:
         record, count = self._record, len(columns["entity_a"])

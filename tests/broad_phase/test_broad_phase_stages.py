@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import both_dimensions
 
-from carom.systems.broad_phase.active_rows import MOST_ACTIVE
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.stages import ACTIVE_ROWS, BRUTE_FORCE, STATIC_GRID, TREE, UNIFORM_GRID
+from carom.systems.broad_phase.stages import BRUTE_FORCE, STATIC_GRID, TREE, UNIFORM_GRID
 from carom.systems.codes import FIND_IN_PYTHON
 
 
@@ -49,22 +48,14 @@ def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
 @both_dimensions
 @pytest.mark.parametrize("crowd", [spread, mixed])
 @pytest.mark.parametrize(("moving", "static"), [(1, 0), (40, 10), (300, 20), (300, 400)])
-@pytest.mark.parametrize("count", [0, 1, 2, MOST_ACTIVE])
-def test_a_few_bodies_look_for_all_others(d, crowd, moving, static, count):
-    rng = np.random.default_rng(7)
-    lower, upper = crowd(rng, moving + static, d)
-    active = np.sort(rng.choice(moving, min(count, moving), replace=False))
+@pytest.mark.parametrize("asleep", [1, 20, 250])
+def test_sleepers_are_found_by_what_moves_and_look_for_nothing(d, crowd, moving, static, asleep):
+    lower, upper = crowd(np.random.default_rng(7), asleep + moving + static, d)
     boxes = Boxes(d)
-    boxes.set(lower, upper, moving)
-    candidates = boxes.state.candidates
-    candidates.active_rows[: len(active)], candidates.active_count = active, len(active)
-    expected = {pair for pair in overlapping(lower, upper, moving) if set(pair) & set(active.tolist())}
-    found = pair_set(*boxes.find())
-    if boxes.state.pair_search == TREE:  # of all, as no grid suits the static boxes
-        found = {pair for pair in found if set(pair) & set(active.tolist())}
-    else:
-        assert boxes.state.pair_search == (STATIC_GRID if static > max(moving, BRUTE_FORCE_MAX) else ACTIVE_ROWS)
-    assert found == expected
+    boxes.set(lower, upper, asleep + moving, first=asleep)
+    awake = set(range(asleep, asleep + moving))
+    expected = {pair for pair in overlapping(lower, upper, asleep + moving) if awake & set(pair)}
+    assert pair_set(*boxes.find()) == expected
 
 
 @both_dimensions

@@ -380,15 +380,18 @@ def test_springs_and_other_force_systems_wake():
     assert is_asleep(world, *boxes) == [False]
 
 
-def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it():
+@pytest.mark.parametrize("column", [False, True])
+def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it(column):
     class Kick(System):
         phase = Phase.FORCES
         entity = 0
 
         def process(self, dt):
-            if self.entity:
+            if self.entity and column:
+                self.world.bodies.linear_velocity[self.world.bodies.row_of(self.entity), 0] = 1.0
+            elif self.entity:
                 self.world.component_for_entity(self.entity, RigidBody).linear_velocity = (1.0, 0.0)
-                self.entity = 0
+            self.entity = 0
 
     world = sleepy_world()
     boxes = tower(world, 0.0)

@@ -23,7 +23,7 @@ class SavedTable:
         the component types that have columns
     columns
         by key: those that have an array; "entity" has the ids
-    stops, frame
+    blocks, frame
         as the table has them
     held
         keeps the arrays that columns have numbers of
@@ -31,7 +31,7 @@ class SavedTable:
 
     types: list[type[Component]]
     columns: dict[str, np.ndarray]
-    stops: tuple[int, ...]
+    blocks: tuple[int, ...]
     frame: int
     held: list[Held]
 
@@ -40,7 +40,7 @@ class SavedTable:
         keep_freed_memory()
         count = table.count
         columns = {key: array[:count].copy() for key, array in table.arrays.items()}
-        return cls(list(table.component_types), columns, table.stops, table.frame, [table.held_arrays()])
+        return cls(list(table.component_types), columns, table.blocks, table.frame, [table.held_arrays()])
 
     def types_of(self, entity: int) -> list[type[Component]]:
         """The types of the components of that body; none if it is no body."""
@@ -54,7 +54,7 @@ class SavedTable:
         The table must know all these component types and have arrays for these columns.
         """
         columns, count = self.columns, len(self.columns["entity"])
-        same_rows = table.stops == self.stops and np.array_equal(table.column("entity"), columns["entity"])
+        same_rows = table.blocks == self.blocks and np.array_equal(table.column("entity"), columns["entity"])
         same_members = same_rows and all(
             np.array_equal(table.column(name), columns.get(name, np.zeros(count, bool)))
             for name in map(table.mask_name, table.component_types)
@@ -68,7 +68,7 @@ class SavedTable:
             np.array_equal(table.column(key), columns[key]) for key in array_columns(self.types) if key in columns
         )
         if not same_rows:
-            table.resize(self.stops)
+            table.resize(self.blocks)
         for key, column in columns.items():
             table.arrays[key][:count] = column
         for key in table.column_keys() - columns.keys():

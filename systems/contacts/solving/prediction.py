@@ -41,7 +41,7 @@ def find_closing(state):
     the remembered contact where that is most, m/s."""
     memory, bodies, now = state.warm_start, state.bodies, state.warm_start.now
     velocity, to_hold, nothing = bodies.linear_velocity, bodies.to_hold, zero_of(state)
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         bodies.warm_start_velocity[i] = velocity[i]  # of all, so that no branch asks which are supported
         to_hold[i] = nothing
     for m in range(memory.counts[now]):
@@ -74,7 +74,8 @@ def forget_support(state):
     """Nothing is supported yet; what cannot move never is, but other rows may have been there."""
     warm_started = state.bodies.warm_started
     if len(warm_started) > 0:
-        for i in range(state.moving if state.support_version == state.version else state.count):
+        known = state.support_version == state.version
+        for i in range(state.first if known else 0, state.moving if known else state.count):
             warm_started[i] = False
         state.support_version = state.version
 
@@ -101,7 +102,7 @@ def predict_rest(state, dt):
     find_closing(state)
     apply_remembered(state)
     travels = state.force_travels
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         if bodies.warm_started[i]:
             before = bodies.warm_start_velocity[i]
             dv = sub(bodies.linear_velocity[i], before)
@@ -124,7 +125,7 @@ def drop_support(state, dt):
     """Bodies that no contact has pushed after all fly as the integrator said. What has had an impact stays on the path
     that this has given it: beside it there may be a wall."""
     bodies, travels = state.bodies, state.force_travels
-    for i in range(state.moving):
+    for i in range(state.first, state.moving):
         if bodies.warm_started[i] and not bodies.held[i]:
             dv = bodies.warm_start_velocity[i]
             if bodies.impact_count[i] == 0:

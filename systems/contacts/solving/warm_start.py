@@ -30,14 +30,13 @@ def scale_to(state, dt):
 
 @part
 def row_of(state, wanted):
-    """The row of an entity; -1 if it is no body. Entities ascend within the dynamic, kinematic and static rows."""
-    entity = state.bodies.entity
-    for kind in range(3):
-        low = 0 if kind == 0 else (state.dynamic if kind == 1 else state.moving)
-        high = state.dynamic if kind == 0 else (state.moving if kind == 1 else state.count)
+    """The row of an entity; -1 if it is no body. Entities ascend within each block of rows."""
+    entity, low = state.bodies.entity, 0
+    for high in (state.sleepers, state.dynamic, state.moving, state.count):
         row = place_of(entity, low, high, wanted)
         if row < high and entity[row] == wanted:
             return row
+        low = high
     return -1
 
 
