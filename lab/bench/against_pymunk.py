@@ -59,22 +59,21 @@ Engines = dict[str, CaromWorld | PymunkSpace]
 class Case:
     """A subject at one size with its results.
 
-    ``found``: by window (or query) and engine, for each repeat the median of the times and the tenth percentile, in ms,
-    and the figures of quality.
+    ``found``: by window (or query) and engine, for each repeat the median of the times, in ms, and the
+    figures of quality.
     """
 
     subject: Subject
     size: int
     bodies: int = 0
     timed: dict[str, int] = field(default_factory=dict)
-    found: dict[str, dict[str, list[tuple[float, float, dict[str, float]]]]] = field(default_factory=dict)
+    found: dict[str, dict[str, list[tuple[float, dict[str, float]]]]] = field(default_factory=dict)
     peer: str | None = None
     compile_seconds: float = 0.0
 
     def note(self, window: str, engine: str, seconds: list[float], figures: dict[str, float]) -> None:
         """Record the result of one repeat for one engine."""
-        median, fast = (1e3 * float(np.percentile(seconds, share)) for share in (50, 10))
-        self.found.setdefault(window, {}).setdefault(engine, []).append((median, fast, figures))
+        self.found.setdefault(window, {}).setdefault(engine, []).append((1e3 * float(np.median(seconds)), figures))
 
     def build(self, seed: int, settings: Settings | None = None) -> World:
         """The scene's world, with the subject's settings if none are given."""
@@ -84,12 +83,9 @@ class Case:
 
 
 def bench(
-    subjects: Iterable[Subject],
-    sizes: tuple[int, ...],
-    repeats: int = 5,
-    peer: bool = True,
+    subjects: Iterable[Subject], sizes: tuple[int, ...], repeats: int = 5, peer: bool = True,
     progress: Progress = NO_PROGRESS,
-) -> Result:
+) -> Result:  # fmt: skip
     """Measure every subject at every size, ``repeats`` times; with ``peer=False`` only carom."""
     cases = [Case(subject, size) for subject in subjects for size in sizes_of(subject, sizes)]
     progress.begin(len(cases) * repeats)
@@ -152,9 +148,7 @@ def _run_windows(case: Case, other: World, engines: Engines) -> None:
         taken = window.last
 
 
-def _run_window(
-    case: Case, window: Window, engines: Engines, quality: dict[str, Quality]
-) -> dict[str, list[float]]:
+def _run_window(case: Case, window: Window, engines: Engines, quality: dict[str, Quality]) -> dict[str, list[float]]:
     """Seconds of each step, by engine; of steps in which a kernel came, none."""
     for seen in quality.values():
         seen.begin()
@@ -180,16 +174,15 @@ def _rows(case: Case) -> list[Row]:
     subject, rows = case.subject, []
     unit = "step" if subject.windows else f"{Query.COUNT:,} queries"
     for window, by_engine in case.found.items():
-        own, own_fast, figures = zip(*by_engine[CAROM], strict=True)
+        own, figures = zip(*by_engine[CAROM], strict=True)
         row = Row(
-            subject.scene, subject.variant, case.bodies, window, unit, case.timed[window],
-            subject.target(window, case.size), subject.energy, Spread.of(own), Spread.of(own_fast),
-            compile_seconds=case.compile_seconds, settings=dict(subject.settings),
+            subject.scene, subject.variant, case.bodies, window, unit, case.timed[window], subject.energy,
+            Spread.of(own), compile_seconds=case.compile_seconds, settings=dict(subject.settings),
         )  # fmt: skip
         row.quality[CAROM] = _together(figures)
         if case.peer is not None:
-            others, fast, figures = zip(*by_engine[case.peer], strict=True)
-            row.peer_index, row.peer_ms, row.peer_fast_ms = case.peer, Spread.of(others), Spread.of(fast)
+            others, figures = zip(*by_engine[case.peer], strict=True)
+            row.peer_index, row.peer_ms = case.peer, Spread.of(others)
             row.ratio = Spread.of([theirs / ours for theirs, ours in zip(others, own, strict=True)])
             row.quality["pymunk"] = _together(figures)
         rows.append(row)

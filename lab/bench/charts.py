@@ -13,7 +13,6 @@ from .report import Result
 
 BAR = "#4dabf7"
 SLOWER = "#ff6b6b"
-TARGET = "#ffd43b"
 ROW_HEIGHT = 0.42  # inches
 
 
@@ -33,19 +32,15 @@ def draw_ratios(result: Result, folder: Path) -> Path | None:
     colours = [BAR if ratio.median >= 1 else SLOWER for ratio in ratios]
     axes.barh(places, [ratio.median - 1 for ratio in ratios], left=1, color=colours, height=0.6)
     axes.hlines(places, [r.low for r in ratios], [r.high for r in ratios], color=canvas.TEXT, lw=1.2)
-    targets = [(place, row.target) for place, row in zip(places, rows, strict=True) if row.target]
-    axes.plot([t for _, t in targets], [p for p, _ in targets], "|", color=TARGET, ms=15, mew=2, label="target")
     for place, ratio in zip(places, ratios, strict=True):
         axes.text(max(ratio.high, 1) * 1.06, place, f"{ratio.median:.2g}", color=canvas.TEXT, fontsize=9, va="center")
     axes.set_xscale("log")
     axes.axvline(1, color=canvas.MUTED, lw=1)
     axes.set_yticks(list(places), [row.label for row in rows])
-    shown = [r.low for r in ratios] + [r.high for r in ratios] + [t for _, t in targets] + [1.0]
+    shown = [r.low for r in ratios] + [r.high for r in ratios] + [1.0]
     axes.set_xlim(min(shown) / 1.3, max(shown) * 1.5)
     axes.set_xlabel("times as fast (line: from the least to the largest repeat)")
     _plain_numbers(axes)
-    if targets:
-        axes.legend(loc="best")
     path = folder / "bench.png"
     figure.savefig(path, facecolor=canvas.BACKGROUND)
     return path

@@ -40,16 +40,9 @@ NAMES = ", ".join(dict.fromkeys(subject.scene for subject in SUITE))
 @out_option("Draw a chart into this folder.")
 @shown_options
 def bench_command(
-    scene_names: tuple[str, ...] | None,
-    sizes: tuple[int, ...] | None,
-    repeats: int | None,
-    large: bool,
-    quick: bool,
-    no_peer: bool,
-    out: Path | None,
-    as_json: bool,
-    as_markdown: bool,
-) -> None:
+    scene_names: tuple[str, ...] | None, sizes: tuple[int, ...] | None, repeats: int | None, large: bool, quick: bool,
+    no_peer: bool, out: Path | None, as_json: bool, as_markdown: bool,
+) -> None:  # fmt: skip
     """Time scenes of the library in carom and in pymunk, on the same bodies, in one process."""
     if quick and (sizes or large):
         raise Problem("--quick chooses the sizes: leave out --sizes and --large")

@@ -39,9 +39,8 @@ def times(rows: list[Row], repeats: int) -> TextTable:
 
     cells = [
         (
-            row.label, *map(median, (row.carom_ms, row.carom_fast_ms, row.peer_ms, row.peer_fast_ms)),
-            row.peer_index or NOTHING, median(row.ratio), span(row.ratio) if row.ratio else NOTHING,
-            f"{row.target:.3g}" if row.target else NOTHING,
+            row.label, median(row.carom_ms), median(row.peer_ms), row.peer_index or NOTHING, median(row.ratio),
+            span(row.ratio) if row.ratio else NOTHING,
         )
         for row in rows
     ]  # fmt: skip
@@ -49,9 +48,8 @@ def times(rows: list[Row], repeats: int) -> TextTable:
     if len({row.unit for row in rows}) > 1:
         what = "ms per step, of player_query per 1,000 queries"
     medians = f"medians of {repeats} repeats" if repeats > 1 else "one repeat"
-    title = f"{what}: {medians}; p10: a tenth of the steps took less; ratio: pymunk's median over carom's"
-    headings = ("scene", "carom", "p10", "pymunk", "p10", "index", "ratio", "from .. to", "target")
-    return TextTable(title, headings, cells)
+    title = f"{what}: {medians}; ratio: pymunk's median over carom's"
+    return TextTable(title, ("scene", "carom", "pymunk", "index", "ratio", "from .. to"), cells)
 
 
 def of_both(row: Row, name: str, scale: float = 1.0, digits: int = 3) -> str:
@@ -122,8 +120,8 @@ PACKAGES = ("carom", "numba", "numpy", "esper", "pymunk")
 class Row(Plain):
     """One window of one scene at one size, or one kind of query.
 
-    ``unit``: what the milliseconds are per; medians of the steps of a repeat, and ``fast``: a tenth of them took
-    less. ``ratio``: pymunk's median over carom's, within each repeat.
+    ``unit``: what the milliseconds are per; medians of the steps of a repeat. ``ratio``: pymunk's median over carom's,
+    within each repeat.
     ``peer_index``: the pymunk index that was faster in the first repeat; the times are those with it.
     ``settings``: carom's settings that differ from the default.
     ``quality``: figures by engine and name, see :meth:`carom.lab.engines.quality.Quality.figures`.
@@ -135,12 +133,9 @@ class Row(Plain):
     window: str
     unit: str
     timed: int
-    target: float | None
     energy: str
     carom_ms: Spread
-    carom_fast_ms: Spread
     peer_ms: Spread | None = None
-    peer_fast_ms: Spread | None = None
     ratio: Spread | None = None
     peer_index: str | None = None
     compile_seconds: float = 0.0
