@@ -9,12 +9,14 @@ import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import ForceSystem, Settings, System, World
+from carom.lab import testing as kit
 from carom.lab.measure.timing import Spread
 from carom.lab.reporting.text import TextTable, compact, span
 from carom.plugins import Physics
@@ -138,13 +140,12 @@ def axis(bodies: int, steps: int = STEPS) -> Axis:
     """Nanoseconds per body and step of each rung; bytes of the columns per body, and the kernels that a step calls."""
 
     def measure(feature: str, repeat: int) -> dict[str, float]:
-        with contextlib.closing(BY_FEATURE[feature].build(bodies, repeat)) as world:
-            return {"ns": nanoseconds_per_step(world, feature, steps) / bodies}
+        make = partial(BY_FEATURE[feature].build, bodies, repeat)
+        return {"ns": nanoseconds_per_step(make, feature, steps) / bodies}
 
     def facts(feature: str) -> dict[str, Any]:
         with contextlib.closing(BY_FEATURE[feature].build(bodies, 0)) as world:
-            for _ in range(WARM_UP_STEPS):
-                world.step()
+            kit.run(world, WARM_UP_STEPS)
             with world.profile():
                 world.step()
             kernels = list(dict.fromkeys(row.kernel for row in world.stats().kernels))

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from carom.framework import World
+from carom.lab import testing as kit
 from carom.lab.bench.report import machine
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.timing import Spread, no_garbage_collection, timed
 from carom.lab.plain import Plain
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
 
-WARM_UP_STEPS = 10
+WARM_UP_STEPS = 2
+ATTEMPTS = 3  # to time steps in which no kernel is compiled or loaded
 
 
 @dataclass
@@ -111,16 +115,18 @@ def _line(axis: Axis, repeats: int, progress: Progress) -> Line:
     return Line(axis.name, axis.of, list(samples.values()))
 
 
-def nanoseconds_per_step(world: World, what: str, steps: int) -> float:
-    """The mean over so many steps; what: names the world in the Problem if each try compiled kernels."""
-
-    def take(count: int) -> None:
-        for _ in range(count):
-            world.step()
-
-    take(WARM_UP_STEPS)
-    for _ in range(2):  # kernels loaded during the first try are ready in the second
-        seconds, counts, _ = timed(lambda: take(steps))
+def nanoseconds_per_step(make: Callable[[], World], what: str, steps: int, enough: float = 0.0) -> float:
+    """The mean over the first so many steps of new worlds, until they have taken ``enough`` s; what: names the world in
+    the Problem if each try compiled kernels."""
+    spent, taken, tries = 0.0, 0, 0
+    while tries < ATTEMPTS:
+        with contextlib.closing(make()) as world:
+            kit.run(world, WARM_UP_STEPS)
+            seconds, counts, _ = timed(partial(kit.run, world, steps))
         if counts:
-            return seconds / steps * 1e9
+            spent, taken = spent + seconds, taken + steps
+            if spent >= enough:
+                return spent / taken * 1e9
+        else:  # kernels loaded meanwhile are ready next time
+            tries += 1
     raise Problem(f"{what}: kernels were compiled in all steps; run it once more")

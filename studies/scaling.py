@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import tracemalloc
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 from carom.components import RigidBody, SphereCollider, Transform
@@ -44,8 +45,7 @@ def axis(sizes: tuple[int, ...], body_steps: int = BODY_STEPS) -> Axis:
 def _time(n: int, seed: int, body_steps: int) -> float:
     """Nanoseconds per body and step."""
     steps = min(MOST_STEPS, max(FEWEST_STEPS, body_steps // n))
-    with contextlib.closing(gas.gas2d(seed=seed, n=n)) as world:
-        return nanoseconds_per_step(world, f"{SCENE} {n:,}", steps) / n
+    return nanoseconds_per_step(partial(gas.gas2d, seed=seed, n=n), f"{SCENE} {n:,}", steps) / n
 
 
 @contextlib.contextmanager

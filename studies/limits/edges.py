@@ -114,7 +114,6 @@ def _between(quantity: Quantity, found: Edge) -> float | None:
     return middle if middle not in (bad, good) else float(round((bad + good) / 2))
 
 
-
 class BrokenError(Exception):
     """Raised by a measurement whose result is unusable; the message says why.
 

@@ -13,24 +13,14 @@ from typing import Any
 
 from carom.framework import Settings, World
 from carom.framework.settings import COLLISION_MODES
+from carom.lab import testing as kit
 from carom.lab.cases.grid import ALL_METHODS
 from carom.lab.engines.adapters import counts_of, work_of
-from carom.lab.measure.timing import timed
 
-from ..runner import Axis
+from ..runner import WARM_UP_STEPS, Axis, nanoseconds_per_step
 from . import scenes as at
 
 ENOUGH = 0.03  # s of processor time per repeat: shorter runs are repeated until then
-WARM_UP = 2  # steps, not timed
-ATTEMPTS = 5  # to time a run in which no kernel is compiled or loaded
-
-
-def steps(world: World, seconds: float) -> float:
-    """Take the number of whole steps closest to ``seconds``; returns the seconds simulated."""
-    count = max(1, round(seconds / world.settings.dt))
-    for _ in range(count):
-        world.step()
-    return count * world.settings.dt
 
 
 @dataclass(frozen=True)
@@ -74,29 +64,23 @@ class Varied:
 
     def facts(self, value: Any) -> dict[str, Any]:
         """The errors by name, and ``work``: the weighted counts of a simulated second, the same on every machine."""
-        return {**self.measure(partial(self.world, value), self.seconds), "work": self.run(value)[1]}
+        return {**self.measure(partial(self.world, value), self.seconds), "work": self.work(value)}
 
-    def run(self, value: Any) -> tuple[tuple[float, bool, float], float]:
-        """The timed span from the start of the scene: seconds taken, whether no kernel came meanwhile, and seconds
-        simulated; and the work of a simulated second."""
+    def work(self, value: Any) -> float:
+        """Of a simulated second of the span that is timed."""
         with self.world(value) as world:
-            steps(world, WARM_UP * world.settings.dt)
+            kit.run(world, WARM_UP_STEPS)
             before = counts_of(world)
-            span = timed(lambda: steps(world, self.timed))
-            done = {name: amount - before[name] for name, amount in counts_of(world).items()}
-        return span, work_of(done) / span[2]
+            kit.run(world, round(self.timed / world.settings.dt))
+            return (work_of(counts_of(world)) - work_of(before)) / self.timed
 
     def time(self, value: Any, repeat: int) -> dict[str, float]:
-        """Seconds per simulated second: the mean of as many runs as needed for ENOUGH."""
+        """Seconds per simulated second, from the start of the scene."""
         del repeat
-        spent = simulated = 0.0
-        while spent < ENOUGH:
-            for _ in range(ATTEMPTS):
-                (seconds, undisturbed, passed), _ = self.run(value)
-                if undisturbed:
-                    break
-            spent, simulated = spent + seconds, simulated + passed
-        return {"seconds": spent / simulated}
+        dt = self.base.replace(**{self.field: value}).dt
+        what = f"{self.field} {value}, {self.scene}"
+        taken = nanoseconds_per_step(partial(self.world, value), what, round(self.timed / dt), ENOUGH)
+        return {"seconds": 1e-9 * taken / dt}
 
 
 SWEPT = {"integrator": "velocity_verlet", "collision": "continuous"}

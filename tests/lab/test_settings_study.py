@@ -33,7 +33,7 @@ def errors(field, scene, *values):
 def works(field, scene):
     """The work of each value of a field, by value; counted, so reproducible."""
     varied = EVERY[field, scene]
-    return {value: varied.run(value)[1] for value in varied.values}
+    return {value: varied.work(value) for value in varied.values}
 
 
 # -- what is varied ------------------------------------------------------------------------------
