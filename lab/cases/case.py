@@ -215,16 +215,9 @@ class Case:
 
 
 def case_of(
-    target: Any,
-    *,
-    norms: Sequence[str] = (),
-    seconds: float | None = None,
-    repeats: int | None = None,
-    steps: Sequence[float] = (),
-    options: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    each: Each = one_by_one,
-) -> Case:
+    target: Any, *, norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None,
+    steps: Sequence[float] = (), options: Mapping[str, Any] | None = None, seed: int = 0, each: Each = one_by_one,
+) -> Case:  # fmt: skip
     """A case for a scene name, a file, or a function build(settings, seed=0) -> World.
 
     norms: the first is the main one; seconds: of each run; repeats; steps: s, the step lengths of the grid. Values not

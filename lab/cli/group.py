@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import sys
-from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -49,23 +48,13 @@ class Commands(click.Group):
         sys.exit(result if isinstance(result, int) else 0)
 
 
-@dataclass(frozen=True)
-class LateCommand:
-    """A command by its place in this package, ``module:name``, and its line in the help of the group."""
-
-    place: str
-    short_help: str
-
-    def load(self) -> click.Command:
-        """The command itself."""
-        module, _, name = self.place.partition(":")
-        return getattr(importlib.import_module(f"..{module}", __package__), name)
-
-
 class LateCommands(Commands):
-    """Commands that are imported when they are called: help and errors of the group need none of them."""
+    """Commands that are imported when they are called: help and errors of the group need none of them.
 
-    def __init__(self, *args: Any, late: dict[str, LateCommand], **options: Any) -> None:
+    late: by name, where it is in this package, ``module:name``, and its line in the help
+    """
+
+    def __init__(self, *args: Any, late: dict[str, tuple[str, str]], **options: Any) -> None:
         super().__init__(*args, **options)
         self.late = late
 
@@ -74,9 +63,10 @@ class LateCommands(Commands):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name in self.late and cmd_name not in self.commands:
-            self.add_command(self.late[cmd_name].load(), cmd_name)
+            module, _, name = self.late[cmd_name][0].partition(":")
+            self.add_command(getattr(importlib.import_module(f"..{module}", __package__), name), cmd_name)
         return super().get_command(ctx, cmd_name)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, self.late[name].short_help) for name in self.list_commands(ctx)])
+            formatter.write_dl([(name, self.late[name][1]) for name in self.list_commands(ctx)])

@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import hashlib
-import importlib.machinery
-import importlib.util
 import inspect
 import symtable
 import sys
@@ -210,7 +208,7 @@ def _load_file(path: Path) -> Loaded:
     compared = getattr(module, "compared", None)
     if compared is not None and not callable(compared):
         raise Problem(f"{path.name}: compared must be a function, compared(world) -> dict, not {compared!r}")
-    settings = getattr(module, "settings", getattr(module, "SETTINGS", None))
+    settings = _value_in(module, "settings")
     own = settings if isinstance(settings, Settings) else None
     return Loaded(path.name, function, path.resolve(), seconds, view, own, siblings, compared)
 
@@ -230,9 +228,14 @@ def _check_source(path: Path) -> None:
         raise Problem(f"{path.name} defines no build(settings, seed=0){hint if 'mean' in hint else ''}")
 
 
+def _value_in(module: Any, name: str) -> Any:
+    """What the file calls that, or the same in capitals."""
+    return getattr(module, name, getattr(module, name.upper(), None))
+
+
 def _seconds_of(path: Path, module: Any) -> float | None:
-    """The duration that the file recommends, as ``seconds`` or ``SECONDS``."""
-    value = getattr(module, "seconds", getattr(module, "SECONDS", None))
+    """The duration that the file recommends."""
+    value = _value_in(module, "seconds")
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < float("inf"):
@@ -242,7 +245,7 @@ def _seconds_of(path: Path, module: Any) -> float | None:
 
 def _view_of(path: Path, module: Any) -> Bounds | None:
     """The file's ``view``: its lower and its upper corner."""
-    value = getattr(module, "view", getattr(module, "VIEW", None))
+    value = _value_in(module, "view")
     if value is None or callable(value):
         return None
     try:
@@ -258,26 +261,18 @@ def _execute(path: Path, siblings: Siblings) -> Any:
     """Import the file under a name of its own."""
     folder = hashlib.sha256(str(path.resolve().parent).encode()).hexdigest()[:8]
     name = f"carom_file_{path.stem}_{folder}"
-    loader = _SourceLoader(name, str(path))
-    module = importlib.util.module_from_spec(importlib.machinery.ModuleSpec(name, loader, origin=str(path)))
+    module = ModuleType(name)
     module.__file__, module.__siblings__ = str(path), siblings  # type: ignore[attr-defined]
     sys.modules[name] = module  # dataclasses and pickle look here
     try:
         with siblings.at_hand(), stdout_kept_clean():
-            loader.exec_module(module)
+            exec(compile(path.read_bytes(), str(path), "exec", dont_inherit=True), vars(module))  # no byte code is kept
     except SyntaxError as error:
         file = Path(error.filename).name if error.filename else path.name
         raise Problem(f"{file}, line {error.lineno}: {error.msg}") from error
     except (Exception, SystemExit) as error:
         raise Problem(f"{path.name}{_line_in(path.resolve(), error)}: {one_line(error)}") from error
     return module
-
-
-class _SourceLoader(importlib.machinery.SourceFileLoader):
-    """Reads the current file and writes no byte code."""
-
-    def get_code(self, fullname: str) -> Any:
-        return self.source_to_code(self.get_data(self.path), self.path)
 
 
 def _check_signature(path: Path, function: Any) -> None:

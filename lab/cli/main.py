@@ -11,18 +11,18 @@ from carom import __version__
 
 from ...framework.compilation import log
 from ...framework.errors import PhysicsWarning
-from .group import LateCommand, LateCommands
+from .group import LateCommands
 
 # By name: where it is, and its line in the help.
 COMMANDS = {
-    "bench": LateCommand("bench.command:bench_command", "Time carom on this machine."),
-    "limits": LateCommand("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
-    "plan": LateCommand("cli.plan:plan_command", "Show what a step of a scene runs, and why."),
-    "plugins": LateCommand("plugins.command:plugins_command", "List plugins, or check one."),
-    "run": LateCommand("cli.run:run_command", "Run a scene or a file and show what happened."),
-    "scenes": LateCommand("cli.plan:scenes_command", "List the scenes of the library."),
-    "trade": LateCommand("trading.command:trade_command", "What speed costs in accuracy, and which settings to use."),
-    "warm-up": LateCommand("cli.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
+    "bench": ("bench.command:bench_command", "Time carom on this machine."),
+    "limits": ("limits.command:limits_command", "How long a scene's step may be, and what limits it."),
+    "plan": ("cli.plan:plan_command", "Show what a step of a scene runs, and why."),
+    "plugins": ("plugins.command:plugins_command", "List plugins, or check one."),
+    "run": ("cli.run:run_command", "Run a scene or a file and show what happened."),
+    "scenes": ("cli.plan:scenes_command", "List the scenes of the library."),
+    "trade": ("trading.command:trade_command", "What speed costs in accuracy, and which settings to use."),
+    "warm-up": ("cli.warm_up:warm_up_command", "Compile ahead, so that the first run does not wait."),
 }
 
 GONE = {"tune": "carom trade FILE --max-error E finds the cheapest settings that keep an error"}

@@ -52,20 +52,10 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 @click.option("--profile", is_flag=True, help="Time every kernel, and show where the step's time goes.")
 @traceback_option
 def run_command(
-    target: str,
-    steps: int | None,
-    seconds: float | None,
-    settings: Settings | None,
-    changes: dict[str, Any],
-    seed: int,
-    plugins: tuple[str, ...],
-    out: Path,
-    record: Path | None,
-    view_text: str | None,
-    as_json: bool,
-    no_pictures: bool,
-    profile: bool,
-) -> None:
+    target: str, steps: int | None, seconds: float | None, settings: Settings | None, changes: dict[str, Any],
+    seed: int, plugins: tuple[str, ...], out: Path, record: Path | None, view_text: str | None, as_json: bool,
+    no_pictures: bool, profile: bool,
+) -> None:  # fmt: skip
     """Run a scene of the library, or a file that defines build(settings, seed=0), and show what happened."""
     if steps is not None and seconds is not None:
         raise Problem("--steps and --seconds exclude each other")

@@ -48,16 +48,9 @@ DEFAULT_SECONDS = 10.0  # for a file that does not define it
 @thorough_option
 @traceback_option
 def limits_command(
-    target: str,
-    as_json: bool,
-    seconds: float | None,
-    way: float | None,
-    settings: Settings | None,
-    changes: dict[str, Any],
-    seed: int,
-    plugins: tuple[str, ...],
-    thorough: bool,
-) -> None:
+    target: str, as_json: bool, seconds: float | None, way: float | None, settings: Settings | None,
+    changes: dict[str, Any], seed: int, plugins: tuple[str, ...], thorough: bool,
+) -> None:  # fmt: skip
     """How long the step of a scene, or of a file that defines build(settings, seed=0), may be, and what limits it.
 
     The scene runs with longer and shorter steps until a player would notice the difference, and its forces and speeds

@@ -95,16 +95,10 @@ class Seen(Plain):
 
 
 def observe(
-    engine: Engine,
-    seconds: float,
-    dt: float,
-    phase: float = 1.0,
-    whole_steps: bool = False,
-    walled: bool = True,
-    far: float = math.inf,
-    inputs: Sequence[float] = (),
+    engine: Engine, seconds: float, dt: float, phase: float = 1.0, whole_steps: bool = False, walled: bool = True,
+    far: float = math.inf, inputs: Sequence[float] = (),
     values: Callable[[World], dict[str, list[float]]] | None = None,
-) -> Seen:
+) -> Seen:  # fmt: skip
     """Run ``engine`` for ``seconds``; phase: the first step's length in steps, above 0 up to 1.
 
     whole_steps: leave out the last partial step, because a change of the step length disturbs contacts at rest. walled:

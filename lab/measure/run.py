@@ -224,14 +224,9 @@ def _drift(values: NDArray[np.float64], scale: float) -> Drift:
 
 
 def run(
-    world: World,
-    steps: int,
-    *,
-    scene: str = "",
-    seed: int = 0,
-    after_step: Callable[[int], None] | None = None,
+    world: World, steps: int, *, scene: str = "", seed: int = 0, after_step: Callable[[int], None] | None = None,
     profile: bool = False,
-) -> Run:
+) -> Run:  # fmt: skip
     """Take ``steps`` steps of ``world`` and measure them; ``after_step`` is called with the number of steps done.
 
     ``profile``: time each kernel too, which makes each call slightly slower.

@@ -79,24 +79,12 @@ class Only:
 
 
 def trade(
-    *targets: Any,
-    norms: Sequence[str] = (),
-    seconds: float | None = None,
-    repeats: int | None = None,
-    steps: Sequence[float] = (),
-    only: Only | None = None,
-    target: Target | None = None,
-    against_pymunk: bool = False,
-    timing: bool = True,
-    options: Mapping[str, Any] | None = None,
-    seed: int = 0,
-    quick: bool = False,
-    workers: int | Workers | None = None,
-    store: Store | None = None,
-    progress: Progress = NO_PROGRESS,
-    command: str = "",
-    show: Show | None = None,
-) -> Trade:
+    *targets: Any, norms: Sequence[str] = (), seconds: float | None = None, repeats: int | None = None,
+    steps: Sequence[float] = (), only: Only | None = None, target: Target | None = None, against_pymunk: bool = False,
+    timing: bool = True, options: Mapping[str, Any] | None = None, seed: int = 0, quick: bool = False,
+    workers: int | Workers | None = None, store: Store | None = None, progress: Progress = NO_PROGRESS,
+    command: str = "", show: Show | None = None,
+) -> Trade:  # fmt: skip
     """Measure work and error of every setting that matters in each scene.
 
     targets: names of scenes, files, or functions build(settings, seed=0) -> World. norms: the first is the main one;
