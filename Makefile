@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE  # or every worker would compile all tests and 
 
 run: .venv/plot  # a scene, with pictures in out/
 	$(BIN)/carom run $(SCENE) --out out $(ARGS)
-install: .venv/test .venv/dev  # all that the checks need
+install: .venv/checks  # all that the checks need
 test: .venv/test
 	$(PYTEST) -m "not slow" $(ARGS)
 test-slow: .venv/test
@@ -35,6 +35,9 @@ lint: .venv/dev
 clean:
 	rm -rf .venv .kernels .coverage build dist out *.egg-info src/*.egg-info .pytest_cache .ruff_cache .hypothesis
 
+.venv/checks: pyproject.toml | .venv/bin/python
+	$(PIP) install --quiet --no-compile -e ".[test,dev]"
+	touch .venv/test .venv/dev $@
 .venv/%: pyproject.toml | .venv/bin/python  # the extras of pyproject.toml
 	$(PIP) install --quiet --no-compile -e ".[$*]"
 	touch $@
