@@ -16,9 +16,10 @@ from carom.lab.cli.usage_errors import Problem, did_you_mean
 from carom.lab.reporting.progress import Progress
 from carom.lab.reporting.text import TextTable
 
-from . import ladder, limits, scaling, settings, startup
+from . import ladder, scaling, settings, startup
 from .accuracy import accuracy_command
-from .page import PageOutput, shown_options
+from .limits import tables as limits
+from .page import between_marks, into_option, show
 from .runner import Axis, Result, run
 from .stages import stages_command
 
@@ -51,11 +52,17 @@ class Study:
         return [axis for axis in axes if axis.name in (names or self.usual or known)]
 
 
+def _draw_limits(result: Result, folder: Path) -> Path:
+    from .limits.chart import draw_limits  # matplotlib is needed for pictures alone
+
+    return draw_limits(result, folder)
+
+
 STUDIES = {
     "ladder": Study("What each feature costs, switched on alone.", ladder.axes, ladder.report, 5),
     "limits": Study(
         "Where carom fails: one quantity at a time, until the error passes 1 % and 10 %, and until it breaks.",
-        limits.axes, limits.report, long="Runs of a million steps too: about ten minutes more.", draw=limits.draw,
+        limits.axes, limits.report, long="Runs of a million steps too: about ten minutes more.", draw=_draw_limits,
     ),
     "scaling": Study(
         "How the time per body grows with their number.", scaling.axes, scaling.report, 3,
@@ -79,21 +86,22 @@ def _command(name: str, study: Study) -> click.Command:
     @click.argument("names", metavar="[AXIS...]", nargs=-1)
     @click.option("--quick", is_flag=True, help="One repeat, and fewer values.")
     @click.option("--repeats", type=click.IntRange(min=1), metavar="N", help=f"Runs (default: {study.repeats}).")
-    @shown_options
+    @into_option
     @traceback_option
     def command(
-        names: tuple[str, ...], quick: bool, repeats: int | None, as_json: bool, as_markdown: bool, into: Path | None,
-        long: bool = False, out: Path | None = None,
+        names: tuple[str, ...], quick: bool, repeats: int | None, into: Path | None, long: bool = False,
+        out: Path | None = None,
     ) -> None:  # fmt: skip
         if quick and long:
             raise Problem("--quick and --long exclude each other")
-        axes = study.chosen(names, quick, long)
-        output = PageOutput(as_json, as_markdown, into, f"studies {name}")
+        axes, mark = study.chosen(names, quick, long), f"studies {name}"
+        if into is not None:
+            between_marks(into, mark)  # Problem, before the long run, for a page without the marks
         if out is not None:
             writable_folder(out)
         with Progress(Console(stderr=True)) as bar:
             result = run(axes, repeats or (1 if quick else study.repeats), bar)
-        output.show(result, *study.report(result))
+        show(*study.report(result), into, mark)
         if out is not None and study.draw is not None:
             click.echo(f"chart: {study.draw(result, out)}", err=True)
 

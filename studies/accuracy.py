@@ -19,7 +19,7 @@ from carom.lab.trading.records import PYMUNK, CaseTrade, Cell, Curve, ErrorBar, 
 from carom.lab.trading.report import ENERGY_SQUARE, ERROR_UNIT, failures, order, remarks
 from carom.lab.trading.trade import trade
 
-from .page import PageOutput, shown_options
+from .page import between_marks, into_option, show
 
 
 @click.command("accuracy", cls=KeepsWords)
@@ -27,20 +27,21 @@ from .page import PageOutput, shown_options
 @click.option("--against", type=click.Choice([PYMUNK]), help="The same scene in this engine, on the same axes.")
 @click.option("--runs", "kept", type=click.Path(path_type=Path), default=Path("out/runs.sqlite"), show_default=True)
 @out_option("Draw charts into this folder.")
-@shown_options
+@into_option
 @click.pass_context
 def accuracy_command(
-    context: click.Context, scene: str, against: str | None, kept: Path, out: Path | None, as_json: bool,
-    as_markdown: bool, into: Path | None,
-) -> None:  # fmt: skip
+    context: click.Context, scene: str, against: str | None, kept: Path, out: Path | None, into: Path | None
+) -> None:
     """Measure a scene as `carom trade SCENE --thorough` does: a row per method."""
-    output = PageOutput(as_json, as_markdown, into, f"studies accuracy {scene}")
+    mark = f"studies accuracy {scene}"
+    if into is not None:
+        between_marks(into, mark)  # Problem, before the long run, for a page without the marks
     command = shlex.join(["python", "-m", "studies", "accuracy", *context.meta[WORDS]])
     with Store(kept) as store, Progress(Console(stderr=True)) as bar:
         result = trade(scene, against_pymunk=against == PYMUNK, store=store, progress=bar, command=command)
     (case,) = result.cases
     others = published(case.scene, case.norm)
-    output.show(result, [summary(case)], [*remarks(result), *[SOURCE] * bool(others)])
+    show([summary(case)], [*remarks(result), *[SOURCE] * bool(others)], into, mark)
     case.curves += others
     if out is not None:
         for path in draw(result, out):

@@ -1,44 +1,27 @@
-"""Tables in pages of the docs: between two comments that name the command which writes them."""
+"""Tables on the terminal, and in pages of the docs: between two comments that name the command which writes them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 
-from carom.lab.cli.options import shown_options as printed_options
-from carom.lab.cli.options import together
 from carom.lab.cli.usage_errors import Problem
-from carom.lab.reporting.output import Output, as_markdown
-from carom.lab.reporting.text import TextTable
+from carom.lab.reporting.output import show_tables
+from carom.lab.reporting.text import TextTable, as_markdown
 
 into_option = click.option(
     "--into", type=click.Path(path_type=Path, dir_okay=False), help="Put the tables between the marks of this page."
 )
-shown_options = together(printed_options, into_option)
 
 
-@dataclass(frozen=True)
-class PageOutput(Output):
-    """Output that also goes into a page, between the marks of that name."""
-
-    into: Path | None
-    mark: str
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.into is not None:
-            between_marks(self.into, self.mark)  # Problem, before the long run, for a page without the marks
-
-    def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
-        """Print the result, and write the tables into the page, the remarks as a list."""
-        super().show(result, tables, remarks)
-        if self.into is not None:
-            listed = ["\n".join(f"- {remark}" for remark in remarks)] if remarks else []
-            replace_between_marks(self.into, self.mark, as_markdown(tables, listed))
-            click.echo(f"tables: {self.into}", err=True)
+def show(tables: list[TextTable], remarks: list[str], into: Path | None, mark: str) -> None:
+    """Print the tables, and write them into the page, the remarks as a list."""
+    show_tables(tables, remarks)
+    if into is not None:
+        listed = ["\n".join(f"- {remark}" for remark in remarks)] if remarks else []
+        replace_between_marks(into, mark, as_markdown(tables, listed))
+        click.echo(f"tables: {into}", err=True)
 
 
 def between_marks(path: Path, name: str) -> tuple[str, str, str]:
@@ -58,7 +41,4 @@ def between_marks(path: Path, name: str) -> tuple[str, str, str]:
 def replace_between_marks(path: Path, name: str, text: str) -> None:
     """Replace the text between the two comments of a page; Problem if they are missing."""
     before, _, after = between_marks(path, name)
-    try:
-        path.write_text(f"{before}\n\n{text}\n\n{after}", encoding="utf-8")
-    except OSError as error:
-        raise Problem(f"--into {path}: {error.strerror or error}") from error
+    path.write_text(f"{before}\n\n{text}\n\n{after}", encoding="utf-8")

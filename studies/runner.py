@@ -14,7 +14,6 @@ from carom.lab import testing as kit
 from carom.lab.bench.report import machine
 from carom.lab.cli.usage_errors import Problem
 from carom.lab.measure.timing import Spread, no_garbage_collection, timed
-from carom.lab.plain import Plain
 from carom.lab.reporting.progress import NO_PROGRESS, Progress
 
 WARM_UP_STEPS = 2
@@ -22,7 +21,7 @@ ATTEMPTS = 3  # to time steps in which no kernel is compiled or loaded
 
 
 @dataclass
-class Sample(Plain):
+class Sample:
     """One value. ``figures``: with all repeats, by name; ``facts``: what was found once."""
 
     value: Any
@@ -31,7 +30,7 @@ class Sample(Plain):
 
 
 @dataclass
-class Line(Plain):
+class Line:
     """One axis in one scene, or by one method; the samples in the order of the values."""
 
     axis: str
@@ -47,7 +46,7 @@ class Line(Plain):
 
 
 @dataclass
-class Result(Plain):
+class Result:
     """All axes of a study, with the machine and the versions that they were measured on."""
 
     machine: dict[str, str]

@@ -13,7 +13,7 @@ from rich.console import Console
 
 from ..cli.options import writable_folder
 from ..cli.usage_errors import Problem
-from .text import TextTable
+from .text import TextTable, as_markdown
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,6 @@ class Output:
         if self.as_json and self.as_markdown:
             raise Problem("--json and --markdown exclude each other")
 
-    @property
-    def plain(self) -> bool:
-        """True if a person reads stdout."""
-        return not self.as_json and not self.as_markdown
-
     def show(self, result: Any, tables: list[TextTable], remarks: list[str]) -> None:
         """Print the result."""
         if self.as_json:
@@ -39,17 +34,17 @@ class Output:
         elif self.as_markdown:
             click.echo(as_markdown(tables, remarks))
         else:
-            console = Console()
-            for table in tables:
-                table.show()
-                console.print()
-            for remark in remarks:
-                console.print(remark, style="dim", highlight=False)
+            show_tables(tables, remarks)
 
 
-def as_markdown(tables: list[TextTable], remarks: list[str]) -> str:
-    """The tables, then the remarks, as Markdown."""
-    return "\n\n".join([*(table.markdown() for table in tables), *remarks])
+def show_tables(tables: list[TextTable], remarks: list[str]) -> None:
+    """For a person."""
+    console = Console()
+    for table in tables:
+        table.show()
+        console.print()
+    for remark in remarks:
+        console.print(remark, style="dim", highlight=False)
 
 
 def drawing_into(out: Path | None, charts: str) -> Any:

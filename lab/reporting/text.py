@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 NOTHING = "-"
 
@@ -29,17 +29,8 @@ def compact(value: float, digits: int = 3) -> str:
     return f"{float(f'{mantissa}e{power}'):,.{max(digits - 1 - power, 0)}f}"
 
 
-class Range(Protocol):
-    """The least and the largest of some values."""
-
-    @property
-    def low(self) -> float: ...
-    @property
-    def high(self) -> float: ...
-
-
-def span(spread: Range) -> str:
-    """`0.123 .. 0.456`."""
+def span(spread: Any) -> str:
+    """`0.123 .. 0.456`, the least and the largest of some values."""
     return f"{compact(spread.low)} .. {compact(spread.high)}"
 
 
@@ -88,3 +79,8 @@ class TextTable:
         rules = ["---" if place < self.words else "---:" for place in range(len(self.headings))]
         lines = [f"| {' | '.join(cells)} |" for cells in (self.headings, rules, *self.rows)]
         return "\n".join([f"**{self.title}**", "", *lines])
+
+
+def as_markdown(tables: list[TextTable], remarks: list[str]) -> str:
+    """The tables, then the remarks, as Markdown."""
+    return "\n\n".join([*(table.markdown() for table in tables), *remarks])

@@ -80,12 +80,12 @@ def trade_command(
     check_integrators(subjects, only.integrators)
     if against == PYMUNK:
         pymunk_module()
-    output = Output(as_json, as_markdown)
+    output, plain = Output(as_json, as_markdown), not as_json and not as_markdown
     target = _target(max_error, max_cost, absolute, no_timing)
     writable_folder(out)
 
     def show(case: Any) -> None:
-        if output.plain:
+        if plain:
             first, *lines = answer(case, target)
             click.echo("\n".join([f"first look: {first}", *lines, ""]))
 
@@ -100,7 +100,7 @@ def trade_command(
         charts = drawing_if_there("trading.charts", "no charts,")
         if charts is not None:
             files += [path for norm in norms or [None] for path in charts.draw(result, out, norm)]
-    if output.plain:
+    if plain:
         for case in result.cases:
             click.echo("\n".join(answer(case, target)) + "\n")
     output.show(result, [table for norm in norms or [None] for table in tables(result, norm)], remarks(result))

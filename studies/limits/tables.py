@@ -7,14 +7,19 @@ from collections.abc import Sequence
 
 from carom.lab.reporting.text import NOTHING, TextTable
 
-from ..runner import Line, Result
+from ..runner import Axis, Line, Result
 from . import contacts, motion
-from .edges import BREAKS, DOWN, LEVELS, Edge, Quantity, edge, home_of
+from .edges import BREAKS, DOWN, LEVELS, Edge, Quantity, axis_of, edge, home_of
 
 LONGEST = 90  # characters of a reason
 ROUNDING = 1e-9  # smaller errors count as rounding
 MOST = 10.0  # larger errors are shown as "over"
 QUANTITIES = (*motion.QUANTITIES, *contacts.QUANTITIES)
+
+
+def axes(quick: bool = False, long: bool = False) -> list[Axis]:
+    """Each quantity with each of its methods."""
+    return [axis_of(each, method, each.chosen(quick, long)) for each in QUANTITIES for method in each.methods]
 
 
 def by_quantity(result: Result) -> list[tuple[Quantity, list[Line]]]:

@@ -14,7 +14,6 @@ from carom.scenes import drops, jump, stack
 from carom.systems.contacts.constants import OWN_SAG
 from studies.runner import run
 from studies.settings import fields as settings_fields
-from studies.settings import scenes as settings_scenes
 from studies.settings.fields import VARIED
 from studies.settings.tables import default_of, report, times
 
@@ -30,23 +29,14 @@ def errors(field, scene, *values):
     return [varied.measure(partial(varied.world, value), varied.seconds) for value in values or varied.values]
 
 
-def works(field, scene):
-    """The work of each value of a field, by value; counted, so reproducible."""
-    varied = EVERY[field, scene]
-    return {value: varied.work(value) for value in varied.values}
-
-
 # -- what is varied ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("varied", VARIED, ids=lambda varied: f"{varied.field} {varied.scene}")
 def test_each_field_is_varied_alone(varied):
-    assert varied.default in varied.values
     assert varied.default == getattr(Settings(), varied.field)
-    assert len(set(varied.values)) == len(varied.values) > 1
-    assert varied.field not in varied.others
-    assert varied.errors
-    for value in varied.values:
+    assert {varied.default} < set(varied.values)
+    for value in (varied.values[0], varied.values[-1]):
         with varied.world(value) as world:
             assert world.settings == varied.base.replace(**{varied.field: value})
             steps = varied.timed / world.settings.dt  # whole ones, so that the ratios are true
@@ -76,22 +66,6 @@ def test_a_tower_gives_way_with_the_square_of_the_substep(field):
         assert found["speed"] < 1.0  # mm/s
 
 
-@pytest.mark.long
-def test_the_integrators_on_an_orbit():
-    names = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4", "yoshida4")
-    found = dict(zip(names, errors("integrator", "orbit"), strict=True))
-    assert found["explicit_euler"]["growth"] > 50  # it gains energy at every step
-    assert found["semi_implicit_euler"]["energy"] < 10
-    assert found["velocity_verlet"]["energy"] < 0.1 * found["semi_implicit_euler"]["energy"]
-    for name in ("rk4", "yoshida4"):
-        assert found[name]["energy"] < 0.01 * found["velocity_verlet"]["energy"]
-    assert found["rk4"]["growth"] < 0  # it loses
-    assert abs(found["yoshida4"]["growth"]) < 0.01 * found["yoshida4"]["energy"]  # symplectic: it returns
-    work = works("integrator", "orbit")
-    assert work["semi_implicit_euler"] == work["explicit_euler"] < work["velocity_verlet"] < work["rk4"]
-    assert work["rk4"] == work["yoshida4"]
-
-
 def test_what_each_kind_of_collision_loses():
     assert [found["wrong"] for found in errors("collision", "shots")] == [7, 0, 0]
     discrete, continuous, exact = errors("collision", "fast gas")
@@ -99,16 +73,6 @@ def test_what_each_kind_of_collision_loses():
     assert discrete["missing"] > 50
     assert continuous["outside"] == exact["outside"] == exact["missing"] == 0
     assert abs(continuous["missing"]) < 4
-
-
-@pytest.mark.parametrize(("scene", "share"), [
-    ("2,000 boxes in circles", 1 - 2 / math.pi),  # areas of the offsets at which two hit: 4 of 2 pi
-    ("2,000 boxes in spheres", 1 - 8 / (4 / 3 * math.pi * 3**1.5)),
-])  # fmt: skip
-def test_contacts_that_are_none(scene, share):
-    precise, bounds = errors("geometry", scene)
-    assert precise["false"] == 0
-    assert bounds["false"] == pytest.approx(100 * share, abs=6)  # of some hundred contacts
 
 
 def test_the_first_bounce_that_is_lost():
@@ -119,14 +83,6 @@ def test_the_first_bounce_that_is_lost():
         limit = 1000 * drops.RESTITUTION**2 * speed**2 / (2 * drops.GRAVITY)
         lost = errors(varied.field, varied.scene, threshold)[0]["lost"]
         assert drops.RESTITUTION**2 * limit < lost <= limit
-
-
-def test_corners_below_the_slop_are_not_noticed():
-    usual = 0.005  # of the size of 1 m
-    for slop, found in zip((usual, 0.0, 0.001, 0.02, 0.1), errors("slop", "tiles"), strict=True):
-        assert found["stuck"] == pytest.approx(0 if slop else 100, abs=1e-6)
-        passed = max((step for step in settings_scenes.STEPS_UP if step < slop), default=0)
-        assert found["passed"] == pytest.approx(1000 * passed)
 
 
 # -- the tables ----------------------------------------------------------------------------------

@@ -3,8 +3,8 @@ anything on a busy machine, so what is tested is their meaning."""
 
 from __future__ import annotations
 
-import json
 import os
+import re
 
 import helpers_trade as made
 import pytest
@@ -16,7 +16,7 @@ from carom.lab.trading.records import Trade
 from studies import ladder, startup
 from studies.__main__ import STUDIES, cli
 from studies.accuracy import published, summary
-from studies.runner import Axis, Result, run
+from studies.runner import Axis, run
 
 
 @pytest.fixture
@@ -40,7 +40,6 @@ def test_each_value_is_measured_in_each_repeat_another_one_first():
     assert taken == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (1, 1)]
     sample = result.line("n", "here").sample(2)
     assert (sample.figures["ns"].values, sample.facts) == ((20.0, 21.0), {"even": True})
-    assert Result.from_dict(json.loads(json.dumps(result.as_dict()))) == result
     with pytest.raises(KeyError, match="n, here: 4 was not measured"):
         result.line("n", "here").sample(4)
     with pytest.raises(KeyError, match="n, there was not measured"):
@@ -64,13 +63,12 @@ def test_an_axis_may_choose_by_what_it_has_found():
 # -- the command and its pages -------------------------------------------------------------------
 
 
-def test_a_study_prints_json_draws_and_fills_a_page(studies, tmp_path):
+def test_a_study_prints_draws_and_fills_a_page(studies, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("# Page\n\n<!-- studies limits -->\nold\n<!-- end of studies limits -->\nafter\n")
-    done = studies("limits", "mass", "--quick", "--json", "--into", "page.md", "--out", "pictures")
+    done = studies("limits", "mass", "--quick", "--into", "page.md", "--out", "pictures")
     assert done.exit_code == 0, done.output
-    found = Result.from_dict(json.loads(done.stdout))
-    assert {line.axis for line in found.lines} == {"mass"}
+    assert done.stdout.startswith("ratio of masses, in an impact")
     assert (tmp_path / "pictures" / "limits.png").read_bytes().startswith(b"\x89PNG")
     text = page.read_text()
     assert "| method | 1 % at | 10 % at | breaks at | worst | how |" in text
@@ -88,7 +86,6 @@ def test_a_study_prints_json_draws_and_fills_a_page(studies, tmp_path):
         (("limits", "--quick", "--long"), "--quick and --long exclude each other"),
         (("ladder", "--long"), "No such option"),
         (("scaling", "--repeats", "0"), "0 is not in the range x>=1"),
-        (("limits", "--json", "--markdown"), "--json and --markdown exclude each other"),
         (("limits", "--into", "nowhere.md"), "--into nowhere.md: No such file"),
         (("accuracy", "spring", "--into", "page.md"), "it has no line <!-- studies accuracy spring -->"),
     ],
@@ -141,12 +138,12 @@ def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
 
     monkeypatch.setattr(startup, "_ship", lambda scene, folder: shipped.append(scene))
     monkeypatch.setattr(startup, "_start", start)
-    done = studies("startup", "jump", "--repeats", "2", "--markdown")
+    done = studies("startup", "jump", "--repeats", "2")
     caches = [cache for cache, _ in started]
     assert shipped == ["jump"]
     assert [portable for _, portable in started] == [False, False, True] * 2
     assert [caches[0] == caches[1], len(set(caches))] == [True, 4]
-    assert "| jump | shipped | 3 | 4.50 | 3.00 .. 6.00 | 0.250 | 0.125 | 2.00 |" in done.stdout
+    assert "jump shipped 3 4.50 3.00 .. 6.00 0.250 0.125 2.00" in re.sub(" +", " ", done.stdout)
 
 
 def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
@@ -161,19 +158,8 @@ def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
 # -- accuracy ------------------------------------------------------------------------------------
 
 
-def test_published_points_follow_the_laws_that_are_known_of_them():
-    curves = {curve.label: curve for curve in published("bouncing", "energy_square")}
-    assert sum(len(curve.points) for curve in curves.values()) == 20
-    assert published("orbit", "energy_square") == published("bouncing", "position") == []
-    # ODE's error is the lag of semi-implicit Euler: (M g dt / 2)^2 2/3 g (H - R), M = 490 kg, H - R = 4.9 m
-    lag = (490 * 9.81 / 2) ** 2 * 2 / 3 * 9.81 * 4.9
-    of_ode = {point.cell.dt: point for point in curves["ODE, published"].points}
-    for dt in (1e-5, 1e-4, 1e-3):
-        assert of_ode[dt].errors["energy_square"].mean == pytest.approx(lag * dt**2, rel=1e-3)
-    assert of_ode[1e-3].milliseconds.median == pytest.approx(1.89 / 20 * 1000)
-
-
 def test_published_points_share_the_axes_of_wall_time():
+    assert published("orbit", "energy_square") == published("bouncing", "position") == []
     case = made.bouncing()
     case.curves += published("bouncing", "energy_square")
     drawn = {line.get_label(): line for line in figure(case, TIME).axes[0].get_lines()}
