@@ -23,18 +23,11 @@ def _seen(path: Path, seconds: float, world: World, struck: bool, times: list[fl
     start = path(0.0)
     places = np.array([path(t) for t in np.linspace(0.0, seconds, SAMPLES)])
     energy = world.kinetic_energy() + world.potential_energy()
-    values = {
-        "position": path(seconds),
-        "reach": float(np.linalg.norm(places - start, axis=2).max()),
-        "energy": energy,
-        "energy_start": energy,
-        "energy_scale": world.kinetic_energy(),
-        "impacts": len(times),
-        "times": times,
-        "struck": [struck] * len(start),
-        "seconds": seconds,
-    }
-    return Seen(**{**values, **found})
+    found.setdefault("energy_scale", world.kinetic_energy())
+    return Seen(
+        path(seconds), reach=float(np.linalg.norm(places - start, axis=2).max()), energy=energy, energy_start=energy,
+        impacts=len(times), times=times, struck=[struck] * len(start), seconds=seconds, **found,
+    )  # fmt: skip
 
 
 def flight(world: World, seconds: float) -> Seen:

@@ -29,12 +29,9 @@ GONE = {"tune": "carom trade FILE --max-error E finds the cheapest settings that
 
 
 @click.group(
-    cls=LateCommands,
-    late=COMMANDS,
-    gone=GONE,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=LateCommands, late=COMMANDS, gone=GONE, context_settings={"help_option_names": ["-h", "--help"]},
     invoke_without_command=True,
-)
+)  # fmt: skip
 @click.version_option(__version__, prog_name="carom")
 @click.pass_context
 def cli(context: click.Context) -> None:

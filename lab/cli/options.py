@@ -50,7 +50,7 @@ def above_zero(option: str, what: str = "a number above 0", zero: bool = False) 
     """A callback for click that refuses a number that is not finite and above 0; ``zero``: 0 will do."""
 
     def checked(value: float) -> float:
-        if not (math.isfinite(value) and (value > 0 or (zero and value == 0))):
+        if not (0 < value < math.inf or (zero and value == 0)):
             raise Problem(f"{option} takes {what}, not {value:g}")
         return value
 
@@ -211,14 +211,9 @@ shown_options = together(
 
 def out_option(help_text: str, default: Path | None = None) -> Option:
     """``--out FOLDER``."""
-    return click.option(
-        "--out",
-        type=click.Path(path_type=Path, file_okay=False),
-        metavar="FOLDER",
-        default=default,
-        show_default=default is not None,
-        help=help_text,
-    )
+    folder = click.Path(path_type=Path, file_okay=False)
+    shown = default is not None
+    return click.option("--out", type=folder, metavar="FOLDER", default=default, show_default=shown, help=help_text)
 
 
 def writable_folder(folder: Path, value: Path | None = None, option: str = "--out") -> None:
@@ -236,8 +231,7 @@ def writable_folder(folder: Path, value: Path | None = None, option: str = "--ou
 
 def _step(text: str) -> float:
     """"1/60" as seconds."""
-    step = real_number(text)
-    if not (math.isfinite(step) and step > 0):
+    if not 0 < (step := real_number(text)) < math.inf:
         raise ValueError
     return step
 

@@ -37,12 +37,9 @@ DEFAULT_SECONDS = 10.0  # seconds, for a file that does not define it
 )  # fmt: skip
 @world_options
 @click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    default=Path("out"),
-    show_default=True,
+    "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
     help="The folder where pictures go, or a file for that of the paths: NAME.png.",
-)
+)  # fmt: skip
 @click.option(
     "--record", type=click.Path(path_type=Path), metavar="FILE", help="A picture that moves: NAME.gif or NAME.webp."
 )

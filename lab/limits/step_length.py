@@ -171,16 +171,11 @@ def _first_to_grow(integrator: Integrator, modes: Modes) -> Oscillation | None:
         return None
     limits = stability_limits(integrator, modes.stiffness, modes.drag, modes.damping)
     stiffest = np.lexsort((modes.entity, -np.abs(modes.drag), -np.abs(modes.stiffness), limits))[0]
-    limit = float(limits[stiffest])
+    limit, damping = float(limits[stiffest]), float(modes.damping[stiffest])
     if limit == math.inf:
         return None
-    return Oscillation(
-        entity=int(modes.entity[stiffest]),
-        frequency=float(np.sqrt(np.abs(modes.stiffness[stiffest]))),
-        drag=float(np.abs(modes.drag[stiffest])),
-        damping=float(modes.damping[stiffest]),
-        limit=limit,
-    )
+    stiffness, drag = (float(np.abs(of[stiffest])) for of in (modes.stiffness, modes.drag))
+    return Oscillation(int(modes.entity[stiffest]), math.sqrt(stiffness), drag, damping, limit)
 
 
 def first_passage(world: World) -> Passage | None:

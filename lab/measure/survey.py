@@ -136,19 +136,10 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
     if not first.reach and not first.counts["solver_loops"]:
         raise Problem(f"{subject.name}: no body moves within {seconds:g} s: nothing to measure")
     return Survey(
-        settings,
-        growth=growth,
-        contacts=max(sum(first.struck), int(first.met)),
-        resting=int(first.counts["solver_loops"] > 0),
-        speed=first.speed,
-        seeded=seeded,
-        walled=walled,
-        levels=levels,
-        trial=first,
-        nudge=SEEN if growth == math.inf else 1e3 * NUDGE,
-        inputs=inputs,
-        **facts,
-    )
+        settings, growth=growth, contacts=max(sum(first.struck), int(first.met)), speed=first.speed, seeded=seeded,
+        resting=int(first.counts["solver_loops"] > 0), walled=walled, levels=levels, trial=first,
+        nudge=SEEN if growth == math.inf else 1e3 * NUDGE, inputs=inputs, **facts,
+    )  # fmt: skip
 
 
 def _facts(name: str, world: World) -> dict[str, Any]:

@@ -24,17 +24,10 @@ class Progress:
         self.done = 0.0
         self._console = console or Console(quiet=True)
         self._bar = rich.progress.Progress(
-            rich.progress.TextColumn("[bold]{task.description}"),
-            rich.progress.BarColumn(bar_width=None),
-            rich.progress.TaskProgressColumn(),
-            rich.progress.TimeRemainingColumn(),
-            rich.progress.TextColumn("left"),
-            console=self._console,
-            expand=True,
-            auto_refresh=False,
-            speed_estimate_period=120,
-            disable=not self._console.is_terminal,
-        )
+            "[bold]{task.description}", rich.progress.BarColumn(bar_width=None), rich.progress.TaskProgressColumn(),
+            rich.progress.TimeRemainingColumn(), "left", console=self._console, expand=True, auto_refresh=False,
+            speed_estimate_period=120, disable=not self._console.is_terminal,
+        )  # fmt: skip
         self._task = self._bar.add_task("starting", total=None)
         self._total: float | None = None
         self._what = ""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from ..cases.case import Case
@@ -24,6 +25,7 @@ MOST_TOLD = 5  # values of a game
 HARDLY = 1.25  # times the cost: within it, costs are the same
 CHEAPER = 1 / HARDLY
 SAVES = 0.7  # of the measured time, at most, for what is cheaper by work: far from what halving a step or nothing saves
+price = attrgetter("work")  # what a point costs, by the counts that are the same in every run
 SEEN = 1.0  # of what a player would notice (1 % of the smallest body): a gain below it is none
 
 
@@ -135,11 +137,6 @@ def _is_cheaper_by_work_only(point: Point, now: Point) -> bool:
     if not (point.alone and now.alone and point.milliseconds and now.milliseconds) or price(point) >= price(now):
         return False
     return point.milliseconds.low > SAVES * now.milliseconds.low
-
-
-def price(point: Point) -> float:
-    """What a point costs, by the counts that are the same in every run."""
-    return point.work
 
 
 def answer(case: CaseTrade, target: Target | None = None) -> list[str]:

@@ -20,8 +20,9 @@ from ..plain import Plain
 CAROM, PYMUNK = "carom", "pymunk"
 SMOOTH, IMPACTS, RESTING, CHAOTIC = "smooth", "impacts", "resting", "chaotic"  # kinds of scenes
 
+# Failures of runs; STOPPED: ended by an error.
 NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED = "not finite", "escaped", "tunnelled", "blew up", "stopped"
-FAILURES = (NOT_FINITE, ESCAPED, TUNNELLED, BLEW_UP, STOPPED)  # of runs; STOPPED: ended by an error
+FIELDS = ("integrator", "collision", "substeps", "geometry")  # of a cell, besides the step
 ENOUGH = 2  # settings with this many times fewer runs than others are not told of
 TRUSTED = 10.0  # an error counts as measured if the references agree better by this factor
 
@@ -43,17 +44,11 @@ class Cell:
     @classmethod
     def of(cls, settings: Settings) -> Cell:
         """carom with these settings."""
-        return cls(settings.dt, settings.integrator, settings.collision, settings.substeps, settings.geometry)
+        return cls(settings.dt, *(getattr(settings, name) for name in FIELDS))
 
     def settings(self, base: Settings) -> Settings:
         """``base`` with these fields; ValueError if Settings rejects one."""
-        return base.replace(
-            dt=self.dt,
-            integrator=self.integrator,
-            collision=self.collision,
-            substeps=self.substeps,
-            geometry=self.geometry,
-        )
+        return base.replace(dt=self.dt, **{name: getattr(self, name) for name in FIELDS})
 
     @property
     def method(self) -> Cell:
@@ -62,8 +57,7 @@ class Cell:
 
     def differences(self, other: Cell) -> int:
         """How many fields besides the step differ."""
-        names = ("integrator", "collision", "substeps", "geometry")
-        return sum(getattr(self, name) != getattr(other, name) for name in names)
+        return sum(getattr(self, name) != getattr(other, name) for name in FIELDS)
 
     @property
     def key(self) -> str:

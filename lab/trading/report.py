@@ -160,14 +160,11 @@ def write_csv(trade: Trade, path: Path) -> Path:
 
 def _rows(case: CaseTrade, curve: Curve, point: Point) -> Iterator[dict[str, object]]:
     of_point = {
-        **{name: getattr(case, name) for name in ("scene", "target", "kind", "seconds")},
-        "method": curve.label,
-        **dataclasses.asdict(point.cell),
-        "repeats": point.repeats,
+        **{name: getattr(case, name) for name in ("scene", "target", "kind", "seconds")}, "method": curve.label,
+        **dataclasses.asdict(point.cell), "repeats": point.repeats, "work": point.work,
         "failed": "; ".join(f"{kind} {count}" for kind, count in point.failures.items() if count),
-        "work": point.work,
         **{name: point.counts.get(name) for name in WEIGHTS},
-    }
+    }  # fmt: skip
     if point.milliseconds:
         time = point.milliseconds
         of_point |= {"wall_ms": time.median, "wall_ms_low": time.low, "wall_ms_high": time.high}

@@ -23,6 +23,7 @@ from ..reporting.text import counted
 from .answer import Target, clearly_worse, next_choice, price, recommended
 from .records import (
     CAROM,
+    FIELDS,
     PYMUNK,
     CaseTrade,
     Cell,
@@ -63,13 +64,7 @@ class Only:
     def of(self, case: Case) -> tuple[Cell, ...]:
         """The methods of the case; a named field is varied even without effect. Problem if there is none."""
         found = grids.methods(case.survey)
-        fields = {
-            "integrator": self.integrators,
-            "collision": self.collisions,
-            "substeps": self.substeps,
-            "geometry": self.geometries,
-        }
-        for field, wanted in fields.items():
+        for field, wanted in zip(FIELDS, dataclasses.astuple(self), strict=True):
             if wanted:
                 found = tuple(dataclasses.replace(cell, **{field: value}) for cell in found for value in wanted)
         if self != Only():
@@ -222,19 +217,12 @@ def summed_up(case: Case, reference: Reference, points: Iterable[Point]) -> Case
             curve.theory[norm] = case.theory(method, norm)
             curve.orders[norm] = order_of(found, norm, reference)
         curves.append(curve)
+    subject, norms = case.subject, {norm: norm_of(norm).text for norm in case.norms}
+    repeats = max((point.repeats for point in points), default=case.repeats)
     return CaseTrade(
-        case.subject.name,
-        case.subject.target or case.subject.name,
-        case.subject.description,
-        case.kind,
-        case.why,
-        {norm: norm_of(norm).text for norm in case.norms},
-        case.seconds,
-        max((point.repeats for point in points), default=case.repeats),
-        case.repeated,
-        reference,
-        curves,
-    )
+        subject.name, subject.target or subject.name, subject.description, case.kind, case.why, norms, case.seconds,
+        repeats, case.repeated, reference, curves,
+    )  # fmt: skip
 
 
 def order_of(points: Sequence[Point], norm: str, reference: Reference) -> float | None:
