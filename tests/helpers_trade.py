@@ -29,12 +29,9 @@ AGREEMENT = 1e-9  # of the reference of smooth cases
 
 # per method: order in the position, order in the energy, evaluations of the forces per step
 METHODS = {
-    "explicit_euler": (1, 1, 1),
-    "semi_implicit_euler": (1, 1, 1),
-    "velocity_verlet": (2, 2, 1),
-    "rk4": (4, 5, 4),
+    "explicit_euler": (1, 1, 1), "semi_implicit_euler": (1, 1, 1), "velocity_verlet": (2, 2, 1), "rk4": (4, 5, 4),
     "yoshida4": (4, 4, 3),
-}
+}  # fmt: skip
 
 
 def point(cell: Cell, orders: tuple[float, float], evaluations: int, failing: int = 0, timed: bool = True) -> Point:
@@ -52,35 +49,26 @@ def point(cell: Cell, orders: tuple[float, float], evaluations: int, failing: in
     counts = {"steps": steps, "force_evaluations": evaluations * steps, "candidates": 0.0, "impacts": 2.0}
     work = 50_000 * steps + 10_000 * evaluations * steps
     milliseconds = Spread.of([1.1e-6 * work, 1e-6 * work, 1.2e-6 * work])
-    return Point(
-        cell,
-        REPEATS,
-        {} if failing == REPEATS else errors,
-        {TUNNELLED: failing} if failing else {},
-        counts,
-        work,
-        milliseconds if timed else None,
-    )
+    failures = {TUNNELLED: failing} if failing else {}
+    errors = {} if failing == REPEATS else errors
+    return Point(cell, REPEATS, errors, failures, counts, work, milliseconds if timed else None)
+
+
+def observed_in(points: list[Point], norm: str) -> float | None:
+    sized = [one for one in points if norm in one.errors]
+    return observed_order([one.cell.dt for one in sized], [one.errors[norm].mean for one in sized])
 
 
 def curve(cell: Cell, label: str, failing: int = 0, timed: bool = True, steps: tuple[float, ...] = STEPS) -> Curve:
     """All steps of one method; ``failing`` repeats of the largest step tunnelled."""
     order, energy_order, evaluations = METHODS[cell.integrator]
+    cells = [dataclasses.replace(cell, dt=dt) for dt in steps]
+    failures = [failing, *[0] * len(steps)]
     points = [
-        point(
-            dataclasses.replace(cell, dt=dt),
-            (order, energy_order),
-            evaluations,
-            failing if dt == steps[0] else 0,
-            timed,
-        )
-        for dt in steps
+        point(one, (order, energy_order), evaluations, failed, timed)
+        for one, failed in zip(cells, failures, strict=False)
     ]
-    sized = [one for one in points if one.errors]
-    orders = {
-        norm: observed_order([one.cell.dt for one in sized], [one.errors[norm].mean for one in sized])
-        for norm in ("position", "energy")
-    }
+    orders = {norm: observed_in(points, norm) for norm in ("position", "energy")}
     return Curve(label, points, orders, {"position": float(order), "energy": float(energy_order)})
 
 
@@ -92,22 +80,16 @@ def smooth(timed: bool = True, against: bool = True) -> CaseTrade:
     if against:
         cell = Cell(1.0, "semi_implicit_euler", substeps=10, engine=PYMUNK)
         curves.append(curve(cell, "pymunk, 10 iterations", timed=timed))
+    norms = {
+        "position": "largest error of a position at the end, relative to the orbit's radius",
+        "energy": "largest error of the energy, relative to that of the start",
+    }
+    why = "no impact and no contact in a run of the default settings"
+    reference = Reference("own runs of rk4 and yoshida4 at 1/7,680 s", {"position": AGREEMENT, "energy": 0.0})
     return CaseTrade(
-        scene="orbit",
-        target="orbit",
-        description="A planet & its sun: one period <1 s>.",
-        kind=SMOOTH,
-        why="no impact and no contact in a run of the default settings",
-        norms={
-            "position": "largest error of a position at the end, relative to the orbit's radius",
-            "energy": "largest error of the energy, relative to that of the start",
-        },
-        seconds=10.0,
-        repeats=REPEATS,
-        repeated="start phases",
-        reference=Reference("own runs of rk4 and yoshida4 at 1/7,680 s", {"position": AGREEMENT, "energy": 0.0}),
-        curves=curves,
-    )
+        "orbit", "orbit", "A planet & its sun: one period <1 s>.", SMOOTH, why, norms, 10.0, REPEATS, "start phases",
+        reference, curves,
+    )  # fmt: skip
 
 
 def bouncing() -> CaseTrade:
@@ -125,21 +107,14 @@ def bouncing() -> CaseTrade:
             cell = Cell(dt, "semi_implicit_euler" if order else "velocity_verlet", collision)
             errors = {"energy_square": ErrorBar.of([error])}
             points.append(Point(cell, 1, errors, {}, {"steps": 1 / dt}, 6e4 / dt, Spread.of([0.05 / dt])))
-        observed = observed_order([one.cell.dt for one in points], [one.errors["energy_square"].mean for one in points])
+        observed = observed_in(points, "energy_square")
         curves.append(Curve(label, points, {"energy_square": observed}, {"energy_square": theory}))
     return CaseTrade(
-        scene="bouncing",
-        target="bouncing",
-        description="49 balls bounce for 20 s without loss.",
-        kind="impacts",
-        why="impacts without loss, and two near starts stay near",
-        norms={"energy_square": "mean over the steps of the squared error of the energy, J²"},
-        seconds=20.0,
-        repeats=1,
-        repeated="start phases",
-        reference=Reference("the energy of the start, which nothing changes"),
-        curves=curves,
-    )
+        "bouncing", "bouncing", "49 balls bounce for 20 s without loss.", "impacts",
+        "impacts without loss, and two near starts stay near",
+        {"energy_square": "mean over the steps of the squared error of the energy, J²"}, 20.0, 1, "start phases",
+        Reference("the energy of the start, which nothing changes"), curves,
+    )  # fmt: skip
 
 
 def crowded() -> CaseTrade:
@@ -158,19 +133,10 @@ def crowded() -> CaseTrade:
 def refused() -> CaseTrade:
     """A case that was not measured."""
     return CaseTrade(
-        scene="my_scene.py",
-        target="games/my_scene.py",
-        description="",
-        kind="chaotic",
-        why="two starts 1e-9 apart are 0.3 apart at the end",
-        norms={"pressure": "relative to the mean"},
-        seconds=5.0,
-        repeats=5,
-        repeated="seeds",
-        reference=Reference(""),
-        curves=[],
-        refused="there is no wall whose pressure could be measured",
-    )
+        "my_scene.py", "games/my_scene.py", "", "chaotic", "two starts 1e-9 apart are 0.3 apart at the end",
+        {"pressure": "relative to the mean"}, 5.0, 5, "seeds", Reference(""), [],
+        "there is no wall whose pressure could be measured",
+    )  # fmt: skip
 
 
 def trade(*cases: CaseTrade) -> Trade:

@@ -277,8 +277,8 @@ def scenarios() -> Iterator[tuple[str, Callable[[], list[str]]]]:
     for d, mode in ((2, MODES[0]), (3, MODES[2])):
         yield f"break shot {d}D {mode}", lambda d=d, mode=mode: play(break_shot(d, mode), 5)
     for d in (2, 3):
-        yield f"buried {d}D", lambda d=d: play(buried(d), 5)
-        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 4)
+        yield f"buried {d}D", lambda d=d: play(buried(d), 3)
+        yield f"heavy on light {d}D", lambda d=d: play(heavy_on_light(d), 2)
         yield f"asked {d}D", lambda d=d: asked(d)
     for d, mode in zip((2, 3, 2), MODES, strict=True):
         yield f"sleepers {d}D {mode}", lambda d=d, mode=mode: sleepers(d, mode)

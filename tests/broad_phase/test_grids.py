@@ -148,13 +148,9 @@ def test_what_does_not_suit(d):
     half[: OUTSIDE_MAX + 1] = 15.0
     nothing = np.full((1000, d), np.nan)
     for lower, upper in (
-        (centre - half, centre + half),
-        (0 * centre - 0.5, 0 * centre + 0.5),
-        (centre, centre),
-        (nothing, nothing),
-        (centre[:0], centre[:0]),
-        (centre[:OUTSIDE_MAX], centre[:OUTSIDE_MAX] + 1.0),
-    ):
+        (centre - half, centre + half), (0 * centre - 0.5, 0 * centre + 0.5), (centre, centre), (nothing, nothing),
+        (centre[:0], centre[:0]), (centre[:OUTSIDE_MAX], centre[:OUTSIDE_MAX] + 1.0),
+    ):  # fmt: skip
         assert check(lower, upper, 0) is None
 
 

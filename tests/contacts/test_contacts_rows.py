@@ -7,8 +7,6 @@ import pytest
 from helpers_filters import pairs as ids
 from worlds import ball, both_dimensions, box, floor, make_world, run
 
-pytestmark = pytest.mark.plain
-
 COLUMNS = {"entity_a": 1, "entity_b": 1, "point": 2, "normal": 2, "depth": 1, "normal_impulse": 1, "step": 1}
 
 
@@ -54,7 +52,6 @@ def test_canonical_order_whatever_the_history():
     assert pairs == sorted([*ids(world.contacts.begin), *ids(world.contacts.stay)])
 
 
-@pytest.mark.compiled
 def test_normal_impulse_is_the_momentum_exchanged():
     """Impact: m1 (1 + e) w / 2 for equal masses; at rest: m g dt in every step, of a pile the load above included."""
     world = make_world()

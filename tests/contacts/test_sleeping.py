@@ -353,3 +353,12 @@ def test_a_body_that_is_woken_within_a_step_finds_what_it_touches():
         world.step()
         assert is_asleep(world, *boxes) == [False, False, True, True, True, True]
         assert len(world.contacts) == contacts
+
+
+def test_what_bounced_in_the_last_swept_step_sleeps_in_a_discrete_world():
+    world = sleepy_world(collision="continuous")
+    thrown = ball(world, (0.0, 0.52), (0.0, -3.0), restitution=0.1)
+    while not len(world.contacts.impacts):
+        world.step()
+    world.settings = world.settings.replace(collision="discrete")
+    sleep(world, thrown)

@@ -12,8 +12,6 @@ from carom.framework import Phase, StepError, System
 from carom.framework.schedule.stages import PythonPart
 from carom.systems import ContactEvents, ForceAccumulation, Integration, Response
 
-pytestmark = pytest.mark.plain
-
 KEPT = ("position", "previous_position", "linear_velocity", "step_force", "applied_force", "applied_frame")
 
 

@@ -19,12 +19,10 @@ DT = 1 / 60
 # x = -5 and comes with 2 along x. What |v.n| = 4.5e-5 of |v| does to rounding of y is 1e-16 / 4.5e-5 of a length.
 GRAZE = math.sqrt(2e-9)
 SWEEPS = [
-    ((0.0, 0.0), 1.5, (1, 0, 0)),
-    ((1.6, 0.0), 1.6, (0.8, -0.6, 0)),
+    ((0.0, 0.0), 1.5, (1, 0, 0)), ((1.6, 0.0), 1.6, (0.8, -0.6, 0)),
     ((1 + 3 / 7, 1 + 6 / 7), 13 / 7, (2 / 7, -3 / 7, -6 / 7)),
-    ((2 - 1e-9, 0.0), (4 - GRAZE) / 2, (GRAZE, -1 + 1e-9, 0)),
-    ((2 + 1e-9, 0.0), None, None),
-]
+    ((2 - 1e-9, 0.0), (4 - GRAZE) / 2, (GRAZE, -1 + 1e-9, 0)), ((2 + 1e-9, 0.0), None, None),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -97,18 +97,10 @@ def test_the_hash_follows_calls_constants_captured_values_and_options():
         return x + 2.0
 
     different = [
-        summing(one),
-        summing(two),
-        summing(one, 1.0),
-        summing(one, 1),
-        summing(one, options=inlined),
-        summing(summing(one)),
-        summing(part(plus(1.0))),
-        summing(part(plus(2.0))),
-        summing(part(plus((1.0, 2.0)))),
-        summing(part(plus(np.array([1.0, 2.0])))),
-        summing(part(plus(np.array([1.0, 3.0])))),
-    ]
+        summing(one), summing(two), summing(one, 1.0), summing(one, 1), summing(one, options=inlined),
+        summing(summing(one)), summing(part(plus(1.0))), summing(part(plus(2.0))), summing(part(plus((1.0, 2.0)))),
+        summing(part(plus(np.array([1.0, 2.0])))), summing(part(plus(np.array([1.0, 3.0])))),
+    ]  # fmt: skip
     hashes = [deep_hash(function) for function in different]
     assert len(set(hashes)) == len(hashes)
     assert deep_hash(summing(one)) == hashes[0]

@@ -10,6 +10,7 @@ import pytest
 from helpers_cli_plugins import BALL, OFFERED, ROOT, offer, refusal, row_of
 
 from carom.framework import Plugin
+from carom.lab.plugins.command import plugins_of
 
 pytestmark = pytest.mark.slow  # its shapes take long to compile
 
@@ -54,6 +55,7 @@ def test_the_list_names_version_package_and_what_each_adds(carom, tmp_path, monk
     row = row_of(result.stdout, "balls")
     for part in ("1.2", "ballpack", "shapes BallCollider", "BallCollider and SphereCollider"):
         assert part in row
+    assert [plugin.name for plugin in plugins_of("balls")] == ["balls"]
 
 
 def test_broken_ones_are_shown_and_do_not_stop_the_command(carom, tmp_path, monkeypatch):

@@ -103,12 +103,10 @@ PERIODS = 10  # of the orbit with eccentricity 0.6
 @pytest.fixture(scope="module")
 def orbit() -> CaseTrade:
     steps = tuple(PERIODS * 2 * math.pi / count for count in (500, 1000, 2000))
-    return case_of("orbit", steps=steps, only=Only(integrators=("velocity_verlet", "rk4", "yoshida4")))
+    return case_of("orbit", steps=steps, only=Only(integrators=("velocity_verlet", "yoshida4")))
 
 
-@pytest.mark.parametrize(("method", "meets", "fails"), [
-    ("velocity verlet", 2000, 1000), ("rk4", 1000, 500), ("yoshida4", 1000, 500),
-])  # fmt: skip
+@pytest.mark.parametrize(("method", "meets", "fails"), [("velocity verlet", 2000, 1000), ("yoshida4", 1000, 500)])
 def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(orbit, method, meets, fails):
     """Known for Kepler's orbit, e = 0.6, ten periods, steps halved until |E - E0| / |E0| < 1e-2, the norm here."""
     found = {
@@ -122,7 +120,7 @@ def test_the_steps_that_keep_the_energy_of_an_orbit_within_a_hundredth(orbit, me
 def test_semi_implicit_euler_gains_an_order_after_whole_turns(turns, order):
     """It is velocity Verlet shifted by half a step; from the perihelion the shift vanishes after whole orbits."""
     seconds = turns * 2 * math.pi
-    steps = tuple(seconds / (turns * count) for count in (200, 400, 800))
+    steps = tuple(seconds / (turns * count) for count in (100, 200, 400))
     found = case_of(
         "orbit", steps=steps, seconds=seconds, only=Only(integrators=("semi_implicit_euler",)),
         options={"eccentricity": 0.1},
@@ -235,8 +233,9 @@ def test_a_bullet_through_a_wall_is_kept_as_a_failure(tmp_path):
         assert not coarse or not point.meets(case.norm, math.inf)
 
 
-def test_a_spring_too_stiff_for_its_step_fails(tmp_path):
+def test_a_spring_too_stiff_for_its_step_fails(tmp_path, monkeypatch):
     """z = 50 / 15 is above the limits of all five methods, z = 50 / 240 below those of all but explicit Euler."""
+    monkeypatch.setattr(case_module, "FINER", 2)
     mine = scene_file(tmp_path, SPRING.format(stiffness=2500.0))
     case = case_of(mine, repeats=1, seconds=0.8, steps=(1 / 15, 1 / 240))
     found = points(case)

@@ -100,7 +100,7 @@ def test_draws_png_and_svg_for_each_measured_case_of_whatever_name(tmp_path):
         draw(made.trade(made.bouncing()), tmp_path / "file")
 
 
-def test_cases_with_hardly_anything_to_draw_are_drawn(tmp_path):
+def test_cases_with_hardly_anything_to_draw_are_drawn():
     """No curve, one point, errors of 0 alone, errors that are no numbers, failures alone, costs that are not known."""
     none, one, zero, odd, costless = (made.bouncing() for _ in range(5))
     none.curves = []
@@ -114,4 +114,5 @@ def test_cases_with_hardly_anything_to_draw_are_drawn(tmp_path):
     for point in failed.points:
         point.errors, point.failures = {}, {"blew up": point.repeats}
     assert len(lines(figure(failed), "failed")) == 5 * len(made.STEPS)
-    assert len(draw(made.trade(none, one, zero, odd, costless, failed), tmp_path)) == 20
+    for case in (none, one, zero, odd, costless, failed):
+        figure(case).canvas.draw()

@@ -97,20 +97,13 @@ STEPS = st.one_of(
     st.integers(1, 10),
 )
 CELLS = st.builds(
-    Cell,
-    dt=STEPS,
-    integrator=NAMES,
-    collision=st.sampled_from(["discrete", "continuous", "event_driven"]),
-    substeps=st.integers(1, 100),
-    geometry=st.sampled_from(["precise", "bounds"]),
-)
+    Cell, dt=STEPS, integrator=NAMES, collision=st.sampled_from(["discrete", "continuous", "event_driven"]),
+    substeps=st.integers(1, 100), geometry=st.sampled_from(["precise", "bounds"]),
+)  # fmt: skip
 BASES = st.builds(
-    Settings,
-    slop=st.none() | st.floats(0, 1),
-    restitution_threshold=st.none() | st.floats(0, 10),
-    friction_mixing=st.sampled_from(["average", "geometric_mean"]),
-    debug=st.booleans(),
-)
+    Settings, slop=st.none() | st.floats(0, 1), restitution_threshold=st.none() | st.floats(0, 10),
+    friction_mixing=st.sampled_from(["average", "geometric_mean"]), debug=st.booleans(),
+)  # fmt: skip
 
 
 @given(CELLS, BASES)

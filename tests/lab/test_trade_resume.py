@@ -124,13 +124,6 @@ def test_results_of_another_scene_time_or_step_are_not_taken(ball, performed, tm
         assert len(performed) == before + 4, change  # the point and three references
 
 
-@pytest.mark.slow  # the next one needs two workers as well
-def test_two_workers_give_the_same_bits_as_one(ball, whole, tmp_path):
-    assert measured(ball, tmp_path, workers=2) == whole
-    found = keys(tmp_path)
-    assert len(found) == len(set(found)) == RUNS
-
-
 @needs_signals
 def test_a_killed_worker_loses_nothing_and_counts_nothing_twice(tmp_path):
     """The first process of two that builds the scene dies at once; another one repeats its run."""

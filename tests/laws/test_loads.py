@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from helpers_pairwise import pairwise
 from helpers_rest import G, heights, overlaps, speed, tower
 from laws.helpers_laws import MODES
 from worlds import ball, both_dimensions, floor, make_world
@@ -49,10 +50,7 @@ def stand(mode, masses, *, d=2, seconds=10, substeps=4):
         return Stand(deepest, last, sinks, in_order, list(world.faults))
 
 
-@both_dimensions
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("count", [1, 5])
+@pytest.mark.parametrize(("count", "load", "mode", "d"), pairwise((1, 5), LOADS, MODES, (2, 3)))
 def test_boxes_carry_a_load(count, load, mode, d):
     found = stand(mode, (1.0,) * count + (load,), d=d)
     assert found.in_order
@@ -61,9 +59,7 @@ def test_boxes_carry_a_load(count, load, mode, d):
     assert not found.faults
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("load", HUGE)
-@pytest.mark.parametrize("count", [1, 3, 5, 7])
+@pytest.mark.parametrize(("count", "load", "mode"), pairwise((1, 3, 5, 7), HUGE, MODES))
 def test_a_load_beyond_all_bounds_passes_through_nothing(count, load, mode):
     """It stands, or a fault says that it is too much; in any case all stay in order, and what lies below stays."""
     found = stand(mode, (1.0,) * count + (load,))

@@ -13,7 +13,6 @@ from worlds import ball, both_dimensions, box, floor, make_world, position, run,
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Phase, System
 
-pytestmark = pytest.mark.plain
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -68,7 +67,6 @@ def test_only_the_contact_that_is_disabled_is_out(d):
 
 @both_dimensions
 @pytest.mark.parametrize("shape", [ball, box])
-@pytest.mark.compiled
 def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
     """Disabled for one step it falls freely (v = -g dt) and the pair ends; then it begins again, and holds."""
     world = make_world(d, gravity=10.0)
@@ -99,7 +97,6 @@ def test_a_disabled_support_is_gone_and_leaves_nothing(d, shape):
     assert [contact.entity_b for contact in world.contacts.of(body)] == [ground]
 
 
-@pytest.mark.compiled
 @both_dimensions
 def test_a_pair_disabled_from_the_start_never_begins(d):
     """For any gap at the end of a step none of forty boxes is stopped, before it overlaps or after; no event."""
@@ -167,7 +164,6 @@ def one_way_world(**settings):
     return world, ground, platform, example
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("collider", [AABBCollider((0.4, 0.5)), SphereCollider(0.5)], ids=["box", "sphere"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
@@ -199,7 +195,6 @@ def test_a_jump_through_a_platform_from_below_ends_on_it(collider, restitution):
         assert sorted(begun) == [("begin", platform, player) for player in players]
 
 
-@pytest.mark.compiled
 def test_the_example_runs(capsys):
     runpy.run_path(str(ROOT / "examples" / "one_way_platform.py"), run_name="__main__")
     assert "stands on the platform" in capsys.readouterr().out

@@ -10,8 +10,6 @@ from worlds import ball, both_dimensions, box, floor, make_world, position, run,
 from carom.components import AABBCollider
 from carom.framework import Phase, System
 
-pytestmark = pytest.mark.plain
-
 
 @both_dimensions
 @pytest.mark.parametrize("shape", [ball, box])
@@ -57,7 +55,6 @@ def test_a_sensor_that_falls_or_lies_below_supports_nothing(d, mine):
 
 
 @both_dimensions
-@pytest.mark.compiled
 def test_a_sensor_on_a_body_at_rest(d):
     """In, on and just under the floor: a body at rest is unchanged; a sensor that it does not touch never begins."""
 
@@ -109,7 +106,6 @@ def test_sensors_meet_sensors_and_kinematic_bodies_and_are_found_by_queries():
     assert world.query_aabb((-3.0, -3.0), (3.0, 3.0)) == [one, two, three]
 
 
-@pytest.mark.compiled
 def test_a_body_may_become_a_sensor_and_back_between_steps():
     """As a sensor it falls freely and stays in contact; then solid, it is pushed out without gaining speed."""
     world = make_world(gravity=10.0)
@@ -151,7 +147,6 @@ def test_one_mask_that_refuses_is_enough(d, refuses):
     assert world.query_point(up(d, -0.1), mask=2) == []
 
 
-@pytest.mark.compiled
 def test_layers_changed_between_steps_let_go_and_catch_again():
     """A body at rest whose floor is excluded by its mask falls freely in that very step, without support."""
     world = make_world(gravity=10.0)

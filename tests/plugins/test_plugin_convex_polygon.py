@@ -86,9 +86,7 @@ FALLING = {
 }
 
 
-@pytest.mark.parametrize(
-    "shape", ["polygon", "rounded", *(pytest.param(shape, marks=pytest.mark.slow) for shape in ("sphere", "box"))]
-)
+@pytest.mark.parametrize("shape", ["polygon", "rounded", "sphere", "box"])
 def test_it_bounces_at_the_right_height_and_rests(shape):
     world = make_world(others=shape in ("sphere", "box"))
     world.create_entity(Transform((0, -1), rotation=math.pi / 2), ConvexPolygonCollider.box((1, 20)))
@@ -124,7 +122,6 @@ def test_it_slides_down_a_slope_as_fast_as_physics_says():
     assert world.component_for_entity(box, Transform).position @ up == pytest.approx(1.25, abs=1e-3)
 
 
-@pytest.mark.slow
 def test_turning_the_transform_turns_the_polygon():
     world = make_world(gravity=(0, 0))
     stick = world.create_entity(Transform((0, 0)), ConvexPolygonCollider.box((2, 0.1)))
@@ -138,7 +135,6 @@ def test_turning_the_transform_turns_the_polygon():
     assert world.query_aabb((0.05, 1), (1, 1.5)) == [stick]
 
 
-@pytest.mark.slow
 def test_rays_and_moving_shapes_meet_it():
     world = make_world(gravity=(0, 0), others=True)
     diamond = world.create_entity(Transform((5, 0), rotation=math.pi / 4), ConvexPolygonCollider.box(1.0))

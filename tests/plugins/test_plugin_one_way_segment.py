@@ -260,7 +260,6 @@ def test_dropping_through_by_the_mask():
     world.close()
 
 
-@pytest.mark.slow  # capsules: compiles all kernels again
 def test_shapes_of_other_plugins_and_bodies_with_levels_and_offsets():
     world = make_world(with_capsules=True)
     jumpers = [

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers_scenes import published_numbers
 
 from carom import scenes
 from carom.components import AABBCollider, SphereCollider, Transform
@@ -14,14 +15,6 @@ from carom.scenes.sizes import ceil_root, floor_root
 
 GENERATORS = ["gas2d", "gas3d", "mixed2d", "fastgas", "pile2d", "pile3d", "static_world", "freefall", "player_query"]
 CIRCLE, SPHERE = math.pi / 4, math.pi / 6
-
-
-def draws(seed=0):
-    """The published sequence, one number after the other."""
-    x = 12345 + seed
-    while True:
-        x = (1664525 * x + 1013904223) % 2**32
-        yield (x >> 8) / 2**24
 
 
 def make(name, **options):
@@ -34,7 +27,7 @@ def gas(n, dimensions, seed=0):
     cells = next(m for m in itertools.count(1) if m**dimensions >= n)
     s = side / cells
     a = 0.45 * (s - 1)
-    u = draws(seed)
+    u = published_numbers(seed)
     positions, velocities = [], []
     for k in range(n):
         cell = [k % cells, k // cells % cells, k // cells**2][:dimensions]
@@ -72,7 +65,7 @@ def test_gas(name, dimensions, n, seed):
 
 @pytest.mark.parametrize(("n", "seed"), [(1, 0), (10, 2), (1000, 0), (1024, 0)])
 def test_pile2d(n, seed):
-    width, per_row, u = 1.2 * math.sqrt(n), math.isqrt(n), draws(seed)
+    width, per_row, u = 1.2 * math.sqrt(n), math.isqrt(n), published_numbers(seed)
     positions = []
     for k in range(n):
         i, j = k % per_row, k // per_row

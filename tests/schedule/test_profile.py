@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import time
 
 import pytest
 from click.testing import CliRunner
@@ -12,6 +13,7 @@ from worlds import ball, floor, make_world, run
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, ForceSystem
 from carom.framework.compilation import kernel, log, timing
+from carom.framework.jit.tick_counter import TickClock
 from carom.framework.schedule.profile_report import Stats, Totals
 from carom.lab.cli.main import cli
 
@@ -226,3 +228,9 @@ def test_the_command_s_json_adds_up(carom):
     assert euler["calls"] == 1
     assert set(euler) == {"system", "kernel", "calls", "milliseconds", "nanoseconds"}
     assert json.loads(carom("--steps", "2", "--json").stdout)["profile"] is None
+
+
+def test_ticks_are_compared_with_seconds_over_two_milliseconds():
+    began, clock = time.perf_counter(), TickClock()
+    assert clock.seconds_per_tick > 0.0
+    assert time.perf_counter() - began >= TickClock.SHORTEST

@@ -13,8 +13,6 @@ from worlds import ball, make_world
 from carom.components import RigidBody, Transform
 from carom.framework import CaromError, Component, ForceSystem, NoPhysicsError, Phase, StepError, System, column
 
-pytestmark = pytest.mark.plain
-
 
 class Fuel(Component):
     left = column(10.0)

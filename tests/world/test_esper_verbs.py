@@ -14,18 +14,13 @@ from carom.framework import System, World
 from carom.systems import Response
 
 LEFT_OUT = {
-    "clear_cache": "esper's own affair",
-    "clear_database": "with world: esper.clear_database()",
-    "clear_dead_entities": "each step does it",
-    "delete_world": "world.close()",
-    "list_worlds": "no matter of one world",
-    "process": "world.step(), world.advance()",
-    "process_times": "world.stats()",
-    "remove_handler": "world.off()",
-    "set_handler": "world.on(), which holds handlers strongly",
-    "switch_world": "with world:",
+    "clear_cache": "esper's own affair", "clear_database": "with world: esper.clear_database()",
+    "clear_dead_entities": "each step does it", "delete_world": "world.close()",
+    "list_worlds": "no matter of one world", "process": "world.step(), world.advance()",
+    "process_times": "world.stats()", "remove_handler": "world.off()",
+    "set_handler": "world.on(), which holds handlers strongly", "switch_world": "with world:",
     "timed_process": "world.step(), and world.stats() for the times",
-}
+}  # fmt: skip
 
 
 def public_functions():

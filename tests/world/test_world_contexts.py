@@ -100,17 +100,10 @@ def test_closing_gives_the_context_back_and_ends_the_world():
     assert world.name not in esper.list_worlds()
     np.testing.assert_array_equal(transform.position, place)  # handles stay readable
     for use in (
-        world.step,
-        lambda: world.advance(1.0),
-        lambda: world.create_entity(Name()),
-        lambda: world.entity_exists(e),
-        lambda: world.get_component(Transform),
-        lambda: world.delete_entity(e),
-        lambda: world.bodies,
-        lambda: world.dispatch_event("x"),
-        lambda: world.add_system(Counter()),
-        lambda: world.__enter__(),
-    ):
+        world.step, lambda: world.advance(1.0), lambda: world.create_entity(Name()), lambda: world.entity_exists(e),
+        lambda: world.get_component(Transform), lambda: world.delete_entity(e), lambda: world.bodies,
+        lambda: world.dispatch_event("x"), lambda: world.add_system(Counter()), lambda: world.__enter__(),
+    ):  # fmt: skip
         with pytest.raises(CaromError, match="closed"):
             use()
     assert world.name not in esper.list_worlds(), "a verb has brought the context back"
@@ -179,23 +172,11 @@ def test_a_system_may_step_another_world():
 NO_PHYSICS = "no physics in this world: World(Physics(...))"
 
 
-@pytest.mark.parametrize(
-    "use",
-    [
-        lambda w: w.bodies,
-        lambda w: w.contacts,
-        lambda w: w.gravity,
-        lambda w: setattr(w, "gravity", (0, 0)),
-        lambda w: w.kinetic_energy(),
-        lambda w: w.potential_energy(),
-        lambda w: w.momentum(),
-        lambda w: w.snapshot(),
-        lambda w: w.state_hash(),
-        lambda w: w.query_point((0, 0)),
-        lambda w: w.prepare(),
-        lambda w: w.create_entities(3),
-    ],
-)
+@pytest.mark.parametrize("use", [
+    lambda w: w.bodies, lambda w: w.contacts, lambda w: w.gravity, lambda w: setattr(w, "gravity", (0, 0)),
+    lambda w: w.kinetic_energy(), lambda w: w.potential_energy(), lambda w: w.momentum(), lambda w: w.snapshot(),
+    lambda w: w.state_hash(), lambda w: w.query_point((0, 0)), lambda w: w.prepare(), lambda w: w.create_entities(3),
+])  # fmt: skip
 def test_what_needs_physics_says_so(use):
     with pytest.raises(NoPhysicsError) as caught:
         use(World())

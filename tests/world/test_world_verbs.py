@@ -53,23 +53,13 @@ def test_the_verbs_mean_what_esper_means():
     assert isinstance(world.component_for_entity(e, Name), Counter)
 
 
-@pytest.mark.parametrize(
-    "use",
-    [
-        lambda w: w.delete_entity(99),
-        lambda w: w.delete_entity(99, immediate=True),
-        lambda w: w.component_for_entity(99, Name),
-        lambda w: w.component_for_entity(1, Tag),
-        lambda w: w.components_for_entity(99),
-        lambda w: w.has_component(99, Name),
-        lambda w: w.has_components(99, Name),
-        lambda w: w.add_component(99, Name()),
-        lambda w: w.remove_component(99, Name),
-        lambda w: w.remove_component(1, Tag),
-        lambda w: w.remove_processor(Counter),
-        lambda w: w.remove_system(Counter()),
-    ],
-)
+@pytest.mark.parametrize("use", [
+    lambda w: w.delete_entity(99), lambda w: w.delete_entity(99, immediate=True),
+    lambda w: w.component_for_entity(99, Name), lambda w: w.component_for_entity(1, Tag),
+    lambda w: w.components_for_entity(99), lambda w: w.has_component(99, Name), lambda w: w.has_components(99, Name),
+    lambda w: w.add_component(99, Name()), lambda w: w.remove_component(99, Name), lambda w: w.remove_component(1, Tag),
+    lambda w: w.remove_processor(Counter), lambda w: w.remove_system(Counter()),
+])  # fmt: skip
 def test_unknown_things_are_key_errors_and_the_world_goes_on(use):
     world = World()
     world.create_entity(Name())
