@@ -53,7 +53,7 @@ class Settings:
     broad_phase
         automatic: what suits the scene, see ``world.plan()``; or one that a plugin brings
     debug
-        check the bodies' state for non-finite values at every system, not only at the end of the step
+        check the bodies' state for non-finite values at every system, not only after the flight
     on_fault
         warn: PhysicsWarning and a line of the logger ``carom``, once for each kind of fault and body; raise: FaultError
         at the end of the step that found it, which is complete; ignore: nothing. All are in ``world.faults``

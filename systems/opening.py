@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ..framework.compilation import part
-from ..framework.vectors import item
 from .codes import NEED_SWEEPS, OK, ROTATE
 
 DISCRETE = 0
@@ -87,17 +86,8 @@ def read_bodies(state, dt):
     return OK
 
 
-def check_finite(state, dt):
-    """Whether all positions and velocities of what moves are finite; the step is over."""
-    bodies, finite = state.bodies, True
-    position, velocity, out = bodies.position, bodies.linear_velocity, bodies.quarantined
-    same = state.flight_usual and not state.collides and not state.others_write  # since the flight was checked
-    for i in range(state.moving if same else state.first, state.moving):
-        x, v = position[i], velocity[i]
-        for k in range(len(x)):
-            finite &= (abs(item(x, k)) <= LARGEST) | out[i]
-            finite &= (abs(item(v, k)) <= LARGEST) | out[i]
-    state.finite = finite
+def close_step(state, dt):
+    """The step is over, and nothing is put back any more."""
     state.moved = False
     if state.unsound == 0:  # else Python goes back after this stage
         state.kept = 0

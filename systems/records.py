@@ -150,22 +150,19 @@ BODIES = Schema(
     level_not_enclosing=flags(),  # a rotated level may reach out of the one around it
 )  # fmt: skip
 
-DYNAMIC_ROWS, STATIC_ROWS, ALL_ROWS = range(3)
-
-# A column that code of the game may write, and what the field allows: one of the two arrays has rows.
+# A column that code of the game may write in place, and what the field allows.
 CHECKED = Schema(
     "Checked",
     values=floats(),
-    numbers=ints(),
+    owned=flags(),  # bodies that have the component
     width=integer(),  # numbers per body
-    rows=integer(),  # which bodies: DYNAMIC_ROWS and the like
+    start=integer(),  # rows
+    stop=integer(),
     low=number(),
     high=number(),
+    least=number(),  # sum of a row's magnitudes
+    statics=flag(),  # rows of static bodies may have been written, too
     optional=flag(),  # nan stands for None
-    turns=flag(),  # quaternions
-    exposed=flag(),  # code of the game may write its static rows at any time
-    some=flag(),  # not all of these bodies have the component,
-    owned=flags(),  # but these
 )
 
 # Fields that every collider has, by the slot of its type and the row.
@@ -442,7 +439,6 @@ STATE = Schema(
     too_fast_for_discrete=flag(),  # a body is so fast that discrete collisions may miss what it passes:
     too_fast_row=integer(),
     event_count=integer(),  # events of contacts that Python has to hear of
-    finite=flag(),
     # what an error names
     row_a=integer(),
     row_b=integer(),

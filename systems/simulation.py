@@ -108,8 +108,7 @@ class Simulation:
         self.copies = ColumnCopies(self.table)
         self._words = self.state.words
         self._step_number, self._others_write = (self.state.word_of(name) for name in ("step_number", "others_write"))
-        self._finite, self._pushed = (self.state.word_of(name) for name in ("finite", "pushed"))
-        self._found_current = self.state.word_of("found_current")
+        self._pushed, self._found_current = (self.state.word_of(name) for name in ("pushed", "found_current"))
         self.contacts_before: Any = None  # contacts that no RESPONSE has replaced, at the start of the step
         self._generation = self.table.generation
         self.settled, self.take_deferred = self.adoption.settled, self.contacts.take_deferred
@@ -212,14 +211,13 @@ class Simulation:
     def _follow_arrays(self) -> None:
         """Rows have other arrays."""
         self.scene.follow_arrays()
-        self.quarantine.follow_arrays()
 
     def _follow_lent(self, key: str) -> None:
-        """Code of the game may write rows of one more column unseen."""
+        """Code of the game may write one more column in place."""
         self.sleepers.watch(key)
-        exposed = self.table.exposed
-        self.state.positions_exposed = "position" in exposed
-        self.state.inverse_masses_exposed = "inverse_mass" in exposed
+        lent = self.table.lent
+        self.state.positions_exposed = lent.get("position", False)
+        self.state.inverse_masses_exposed = lent.get("inverse_mass", False)
         self.quarantine.follow_lent()
 
     def _check(self) -> None:
@@ -304,8 +302,6 @@ class Simulation:
             self.sleepers.end_step()
         if self._words[self._found_current]:  # no RESPONSE has replaced them: they are read at any time
             self.contacts.columns_now()
-        if not self._words[self._finite]:
-            self.report_faults("")
 
     def report_faults(self, prefix: str) -> None:
         """Name the bodies whose state is not finite in the world's faults; they are taken out of the next step."""

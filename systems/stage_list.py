@@ -28,7 +28,7 @@ from .linking.parts import (
 )
 from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
-from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, check_finite, keep_state, read_bodies
+from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, keep_state, read_bodies
 from .quarantine.columns import check_columns
 from .records import BODIES, COLLIDERS, STATE, TABLE_COLUMNS
 from .sleeping.stages import update_sleep
@@ -49,7 +49,7 @@ CLOSING = (
         update_sleep, "how long bodies have been at rest; islands fall asleep",
         ("pairs", "position", "linear_velocity"), ("still", "rest_steps", "linear_velocity"), "sleeping",
     ),
-    Stage(check_finite, "positions and velocities, for world.faults", ("position", "linear_velocity")),
+    Stage(close_step, "the step is over: nothing is put back any more", writes=("kept",)),
 )  # fmt: skip
 ON_DEMAND = (
     Stage(

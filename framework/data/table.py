@@ -57,10 +57,10 @@ class Table:
         self.on_demand: dict[str, Column] = {}  # all of these, whether they have an array or not
         self.columns_version = 0  # changes whenever a column gets another array
         self.on_make: Callable[[], None] = lambda: None  # called when one has got its array
-        self.exposed: set[str] = set()  # columns whose static rows code of the game may write unseen
-        self.lent: set[str] = set()  # and those of which it may write other rows, of sleepers too
-        self.on_lend: Callable[[str], None] = lambda key: None  # called when one of the two has one more
+        self.lent: dict[str, bool] = {}  # columns that code of the game may write in place; whether static rows, too
+        self.on_lend: Callable[[str], None] = lambda key: None  # called with one more
         self.on_written: Callable[[str, int], None] | None = None  # called with what code of the game has written
+        self.read_only = {"entity", "kind"}  # columns
         self.on_rows_moved: Callable[[RowPlan], None] = lambda plan: None
         self.on_arrays_changed: Callable[[], None] = lambda: None  # called when a row has got another array
         self.on_changed_inside: Callable[[Any, int, int, np.ndarray], None] = lambda *_: None  # see changed_inside
@@ -113,6 +113,7 @@ class Table:
         if "kind" in component.columns and not component.prefix:
             self.kind_carrier = component
         hold_arrays(self, component._pooled)
+        self.read_only.update(column.key for column in component._pooled)
         self.mask_names[component] = self.mask_name(component)
         self.add_array(self.mask_name(component), dtype=bool, fill=False)
         self.component_types.append(component)
@@ -223,17 +224,11 @@ class Table:
             self.on_make()
         return array
 
-    def expose(self, key: str) -> None:
-        """A view of all rows of that column is given away. Static rows change in no other way without a new
-        ``static_version``, so what is known of them holds for columns that have never been lent."""
-        if key not in self.exposed:
-            self.exposed.add(key)
-            self.on_lend(key)
-
-    def lend(self, key: str) -> None:
-        """A view of rows of that column is given away that are not static."""
-        if key not in self.lent:
-            self.lent.add(key)
+    def lend(self, key: str, statics: bool) -> None:
+        """A writable view of that column is given away. Other columns change by writes of handles alone, and so do, but
+        for ``statics``, static rows: with a new ``static_version``."""
+        if key not in self.lent or statics > self.lent[key]:
+            self.lent[key] = statics
             self.on_lend(key)
 
     def write(self, key: str, rows: Any, values: np.ndarray) -> None:
@@ -487,11 +482,13 @@ class Table:
     # -- written through handles ------------------------------------------------------------------
 
     def is_frozen(self, key: str, row: int) -> bool:
-        """Static rows are read in place and written by assignment only, so that no change goes unseen; what sleeps, and
-        what that may stand on, is looked at from now on."""
-        if self.blocks[0] and (row < self.blocks[0] or self.stops[0] <= row < self.stops[1]):
-            self.lend(key)
-        return row >= self.stops[1]
+        """Static rows are read in place and written by assignment only, so that no change goes unseen. A view of
+        another row may be written to."""
+        if row >= self.stops[1]:
+            return True
+        if key not in self.lent:
+            self.lend(key, False)
+        return False
 
     def changed_inside(self, column: Any, row: int, before: int, inside: np.ndarray) -> None:
         """The array of a row is another one than that of number ``before``, but only inside of these boxes."""

@@ -28,8 +28,8 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
     changes, dead, registry, name = contents.log, contents.dead, pipeline.world.registry, pipeline.world.name
     table, scene, links, sleepers = physics.table, physics.scene, physics.links, physics.sleepers
     contacts, copies, words, alarm = physics.contacts, physics.copies, program.state.words, program.alarm
-    number, others_write, found, finite, pushed = map(
-        program.state.word_of, ("step_number", "others_write", "found_current", "finite", "pushed")
+    number, others_write, found, pushed = map(
+        program.state.word_of, ("step_number", "others_write", "found_current", "pushed")
     )
     acquire, release, running = esper_bridge.stepping.acquire, esper_bridge.stepping.release, esper_bridge.running
     order_version, parts_version = order.version, physics.parts_version
@@ -68,8 +68,6 @@ def make_quiet_step(pipeline: Any, physics: Any) -> Callable[[], bool] | None:
             running.discard(name)
             if words[found]:
                 contacts.columns_now()
-            if not words[finite]:
-                physics.report_faults("")
             if words[pushed] or table.frames_applied:
                 physics.end_window()
             clock.step_count = count + 1

@@ -185,6 +185,7 @@ class Integration(StagedSystem):
         bodies, first, dynamic, table = self._state.bodies, self._state.first, self._state.dynamic, self._scene.table
         table.make("force")
         table.make("linear_damping")
+        table.lend("linear_damping", False)
         names = ("position", "linear_velocity", "force", "inverse_mass", "linear_damping")
         names += ("previous_position", "start_velocity")
         self._motion = Motion(*(getattr(bodies, name)[first:dynamic] for name in names), None, self._program)

@@ -16,16 +16,15 @@ import numpy as np
 
 from ...components import RigidBody, Transform
 from ...components.rigid_body import FASTEST
-from ...framework.data.arrays.column import ArrayColumn
 from ...framework.data.columns import Column
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record, make_record
 from ..integration.stages import UNMOVED
-from ..records import ALL_ROWS, CHECKED, DYNAMIC_ROWS, STATIC_ROWS
+from ..records import CHECKED
 from ..scene import Scene
-from .columns import LEAST_TURN
 
-LARGEST_TURN = 1 / LEAST_TURN  # of a quaternion's numbers, whose squares are summed
+LEAST_TURN, LARGEST_TURN = 1e-150, 1e150  # of a quaternion's numbers, whose squares are summed
+DYNAMIC, STATIC, ALL = range(3)  # rows
 
 
 @dataclass
@@ -34,29 +33,24 @@ class Checked:
 
     array
         all rows of the table, in use or not
-    owned
-        mask of the bodies that have the component
-    partial
-        whether rows without the component hold what the field does not allow
+    rows
+        those that the step reads
     """
 
     column: Column
     array: np.ndarray
-    owned: np.ndarray
-    partial: bool
+    rows: int
     record: Record
 
     def bad(self, rows: slice) -> np.ndarray:
         """Mask of those of these rows whose value cannot be."""
-        values, low, high = self.array[rows], self.record.low, self.record.high
-        good = (values >= low) & (values <= high)
-        if self.column.optional:
+        record = self.record
+        values = self.array[rows].reshape(-1, record.width)
+        good = (values >= record.low) & (values <= record.high)
+        if record.optional:
             good |= np.isnan(values)
-        if good.ndim > 1:
-            good = good.all(axis=1)
-        if self.record.turns:
-            good &= np.abs(values).sum(axis=1) >= LEAST_TURN
-        return ~good & self.owned[rows]
+        good = good.all(axis=1) & ~(np.abs(values).sum(axis=1) < record.least)
+        return ~good & record.owned[rows]
 
 
 class Quarantine:
@@ -77,7 +71,8 @@ class Quarantine:
     # -- snapshots --------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any]:
-        return {"told": [list(pair) for pair in self.told.items()], "far": sorted(self._far)}
+        told, lent = ([list(pair) for pair in known.items()] for known in (self.told, self._table.lent))
+        return {"told": told, "far": sorted(self._far), "lent": lent}
 
     def take_back(self, saved: dict[str, Any]) -> bool:
         """True if some body may have been out, or is: the scene has to be made again."""
@@ -85,6 +80,8 @@ class Quarantine:
         self.told = dict(saved["told"])
         self._far, self._generation = set(saved["far"]), self._table.generation
         self._state.quarantining = bool(self.told)
+        for key, statics in saved.get("lent", [(key, True) for key in self._table.arrays]):
+            self._table.lend(key, statics)  # they may hold what no step has looked at
         return out
 
     # -- what is looked at ------------------------------------------------------------------------
@@ -94,13 +91,8 @@ class Quarantine:
         bound = self._table.columns_version, self._scene.linked
         if bound != self._bound:
             self._checked = list(self._find_columns())
-            self._state.checked = np.array([checked.record.address for checked in self._checked], np.int64)
             self._bound = bound
-            self.follow_lent()
-        self.follow_arrays()
-        for checked in self._checked:
-            if checked.partial:
-                checked.record.some = not checked.owned[self._rows(checked)].all()
+        self.follow_lent()
         if self._generation != self._table.generation:  # ids mean other entities
             self._generation = self._table.generation
             self.told.clear()
@@ -109,55 +101,46 @@ class Quarantine:
             told = np.isin(self._table.column("entity"), list(self.told))  # also those that no column shows
             self._scene.take_out(self._find_bad() | told)
 
-    def follow_arrays(self) -> None:
-        """The bounds of columns of arrays grow with the number of these."""
-        for checked in self._checked:
-            if isinstance(checked.column, ArrayColumn):
-                checked.record.low, checked.record.high = checked.column.bounds()
-
     def follow_lent(self) -> None:
-        """The stages look at static rows of these columns in every step."""
+        """The stages look at the columns that code of the game can write in place; vectors also before a body has the
+        component that they are of."""
+        lent, addresses = self._table.lent, []
         for checked in self._checked:
-            checked.record.exposed = checked.column.key in self._table.exposed
+            key = checked.column.key
+            if key in lent or checked.column.item != "scalar":
+                rows, record = self._rows(checked), checked.record
+                record.start, record.stop, record.statics = rows.start, rows.stop, lent.get(key, False)
+                addresses.append(record.address)
+        if addresses or len(self._state.checked):
+            self._state.checked = np.array(addresses, np.int64)
 
     def _find_columns(self) -> Iterator[Checked]:
         """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
         for column in RigidBody.columns.values():
             if column.name != "linear_velocity":
-                yield from self._check(column, RigidBody, DYNAMIC_ROWS)
-        yield from self._check(Transform.columns["position"], Transform, STATIC_ROWS)
+                yield from self._check(column, RigidBody, DYNAMIC)
+        yield from self._check(Transform.columns["position"], Transform, STATIC)
         if self._scene.linked is not None:
-            yield from self._check(Transform.columns["rotation"], Transform, ALL_ROWS)
+            yield from self._check(Transform.columns["rotation"], Transform, ALL)
             for shape in self._scene.linked.shapes:
                 for column in shape.component.columns.values():
-                    yield from self._check(column, shape.component, ALL_ROWS)
+                    yield from self._check(column, shape.component, ALL)
 
     def _check(self, column: Column, component: Any, rows: int) -> Iterator[Checked]:
-        table, array = self._table, self._table.arrays.get(column.key)
-        bounds = column.bounds()
+        array, bounds = self._table.arrays.get(column.key), column.bounds()
         if array is None or bounds is None:
             return
-        (low, high), record = bounds, make_record(CHECKED, 2)
-        record.low, record.high, record.optional, record.rows = low, high, column.optional, rows
-        record.width = array[:1].size
-        if array.dtype == np.int64:
-            record.numbers = array.reshape(-1)
-        else:
-            record.values = array.reshape(-1)
+        record = make_record(CHECKED, 2)
+        record.values, record.width, record.owned = array.reshape(-1), array[:1].size, self._table.has_mask(component)
+        (record.low, record.high), record.optional = bounds, column.optional
         if column.item == "rotation" and array.ndim > 1:
-            record.low, record.high, record.turns = -LARGEST_TURN, LARGEST_TURN, True
-        owned, empty = table.has_mask(component), np.asarray(table.default_of(column.key))
-        partial = not column.optional and not ((empty >= low) & (empty <= high)).all()
-        if partial:
-            record.owned = owned
-        yield Checked(column, array, owned, partial, record)
+            record.low, record.high, record.least = -LARGEST_TURN, LARGEST_TURN, LEAST_TURN
+        yield Checked(column, array, rows, record)
 
     def _rows(self, checked: Checked) -> slice:
         """The rows that a step reads of that column."""
         dynamic, moving, count = self._table.stops
-        return {
-            DYNAMIC_ROWS: slice(0, dynamic), STATIC_ROWS: slice(moving, count), ALL_ROWS: slice(0, count),
-        }[checked.record.rows]  # fmt: skip
+        return (slice(0, dynamic), slice(moving, count), slice(0, count))[checked.rows]
 
     # -- what the stages ask for ------------------------------------------------------------------
 

@@ -39,7 +39,7 @@ class LentColumns:
 
     def add(self, key: str) -> None:
         """A column is lent, perhaps its static rows too."""
-        for group in (MOVABLE, STATIC) if key in self._table.exposed else (MOVABLE,):
+        for group in (MOVABLE, STATIC) if self._table.lent[key] else (MOVABLE,):
             if len(self._ids[group]) and (key, group) not in self._copies and key in self._watched():
                 self._copies[key, group] = self._table.values(key, self._rows_now()[group])
 

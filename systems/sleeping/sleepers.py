@@ -100,7 +100,7 @@ class Sleepers:
             if self._changes_taken:
                 self._disturb_near(np.array(self._changes_taken))
         quiet = not self._disturbed and not fresh and state.asleep == table.blocks[0]
-        state.pushes = self._pushed or words[self._pushing] or not table.lent.isdisjoint(PUSHES)
+        state.pushes = self._pushed or words[self._pushing] or not table.lent.keys().isdisjoint(PUSHES)
         self._disturbed = self._pushed = False
         self._leave_out(table.blocks[0] if quiet else 0)
 
@@ -173,14 +173,15 @@ class Sleepers:
             return
         self._keep()
         table, links = self._table, self.links
-        islands = [links[table.rows_of(links[:, 0]) < 0, 1]] if len(links) else []
+        islands = [links[table.rows_of(links[:, 0]) < 0, 1]]
         now = self._islands()
         if len(now) != self._state.asleep:  # some have gone: of which islands?
             known, sizes = self.sizes.T
             islands.append(known[np.bincount(known.searchsorted(now), minlength=len(known))[: len(known)] != sizes])
         if not self._state.collides or (before is not None and before[3] != structure[3]):  # ids mean other entities
             islands.append(now)
-        self._wake(np.concatenate(islands))
+        if any(map(len, islands)):
+            self._wake(np.concatenate(islands))
 
     def _fall_asleep(self, moving: int) -> None:
         """What is due is still from now on; so is all that cannot move."""

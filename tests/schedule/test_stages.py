@@ -101,7 +101,7 @@ def test_without_its_system_the_events_end_and_the_rest_goes_on():
     ids=["a condition that nothing has", "a column that nothing has", "a column that would not be undone"],
 )
 def test_a_stage_that_the_step_cannot_keep_its_promises_for_is_refused(change, message):
-    with pytest.raises(ValueError, match=f"stage check_finite.*{message}"):
+    with pytest.raises(ValueError, match=f"stage close_step.*{message}"):
         check_stages((dataclasses.replace(CLOSING[-1], **change),))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import esper
 import numpy as np
@@ -11,7 +12,8 @@ from helpers_poison import column_of, complaints, rest_of, scenes, told
 from worlds import MODES, ball, both_dimensions, box, make_world, mostly_2d, position, run, velocity
 
 from carom.components import RigidBody, SphereCollider, Transform
-from carom.framework import ForceSystem, Phase, System
+from carom.framework import ForceSystem, Phase, System, World
+from carom.plugins import Physics
 
 pytestmark = pytest.mark.plain
 
@@ -153,6 +155,60 @@ def test_what_a_system_of_the_game_writes(mode):
         spoils[0].field = name
         assert_like_deleted(broken, healthy)
         assert len(told(broken)) == 1
+
+
+def spoil_force(world):
+    world.component_for_entity(VICTIM, RigidBody).constant_force[0] = math.nan
+
+
+def spoil_offset(world):
+    world.component_for_entity(VICTIM, SphereCollider).offset[:] = math.inf
+
+
+def spoil_before(world):
+    collider = SphereCollider(0.5)
+    world.add_component(VICTIM, collider)
+    world.remove_component(VICTIM, SphereCollider)
+    collider.offset[0] = math.nan
+    world.add_component(VICTIM, collider)
+
+
+def spoil_mass(world):
+    world.bodies.dynamic.mass[world.bodies.row_of(VICTIM)] = -1.0
+
+
+def spoil_rotation(world):
+    world.component_for_entity(VICTIM, Transform).rotation[:] = 0.0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("d", "spoil", "field"),
+    [
+        (2, spoil_force, "constant_force"), (2, spoil_offset, "sphere_collider.offset"),
+        (2, spoil_before, "sphere_collider.offset"), (2, spoil_mass, "mass"), (3, spoil_rotation, "rotation"),
+    ],
+)  # fmt: skip
+def test_a_view_of_one_row_or_of_one_kind(d, spoil, field, tmp_path):
+    """The step looks at columns of which code has had a view, whatever kind of view; also in a world that was saved."""
+    healthy = pile(d)
+    run(healthy, 3)
+    for way in ("as it is", "restored", "loaded"):
+        broken = pile(d)
+        run(broken, 3)
+        spoil(broken)
+        if way == "restored":
+            snapshot = pickle.loads(pickle.dumps(broken.snapshot()))
+            broken = pile(d)
+            broken.restore(snapshot)
+        if way == "loaded":
+            broken.save(tmp_path / "spoilt")
+            broken = World.load(tmp_path / "spoilt", Physics(dimensions=d))
+        state = healthy.snapshot()
+        assert_like_deleted(broken, healthy, steps=3)
+        healthy.restore(state)
+        (fault,) = told(broken)
+        assert fault.startswith(f"entity {VICTIM}: {field} is "), way
 
 
 @pytest.mark.compiled

@@ -26,10 +26,6 @@ class ArrayColumn(Column):
     convert: Callable[[Any], Any] | None = None
     pool: Pool = field(default_factory=lambda: Pool(1))
 
-    def bounds(self) -> tuple[float, float]:
-        """Numbers of arrays in the pool that an entity may have."""
-        return 1, len(self.pool.digests) - 1
-
     def checked(self, value: Any, entity: int | None = None) -> Any:
         if self.convert is not None:
             value = self.convert(value)
