@@ -355,10 +355,10 @@ def test_a_body_that_is_woken_within_a_step_finds_what_it_touches():
         assert len(world.contacts) == contacts
 
 
-def test_what_bounced_in_the_last_swept_step_sleeps_in_a_discrete_world():
-    world = sleepy_world(collision="continuous")
-    thrown = ball(world, (0.0, 0.52), (0.0, -3.0), restitution=0.1)
-    while not len(world.contacts.impacts):
-        world.step()
-    world.settings = world.settings.replace(collision="discrete")
-    sleep(world, thrown)
+@pytest.mark.parametrize("mode", MODES)
+def test_what_an_impact_has_stopped_sleeps_alone(mode):
+    """In space, where nothing is near it any more: it has given its speed to another ball, which flies on."""
+    world = make_world(collision=mode, sleeping=True)
+    struck = ball(world, (0.0, 0.0), (3.0, 0.0), restitution=1.0)
+    ball(world, (2.0, 0.0), restitution=1.0)
+    sleep(world, struck, steps=180)
