@@ -13,8 +13,6 @@ import pytest
 from helpers_cli import FALLING_BALL, refusal
 from helpers_cli_plugins import offer
 
-from carom import scenes
-
 carom = helpers_cli.carom  # a fixture
 
 
@@ -124,10 +122,3 @@ def test_set_builds_once_where_the_file_tells_its_settings(carom, tmp_path):
     result = carom("run", "loud.py", "--steps", "1", "--no-pictures", "--set", "dt=1/120")
     assert result.exit_code == 0
     assert result.stderr.count("built") == 1
-
-
-@pytest.mark.parametrize("name", scenes.names())
-def test_scenes_name_the_settings_that_they_take(name):
-    world = scenes.get(name).build()
-    assert world.settings == scenes.get(name).settings
-    world.close()

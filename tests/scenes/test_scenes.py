@@ -69,9 +69,10 @@ class TestEveryScene:
         for world in (first, again, other):
             world.close()
 
-    def test_bodies_start_and_stay_in_view(self, name):
+    def test_has_its_settings_and_bodies_that_start_and_stay_in_view(self, name):
         scene = scenes.get(name)
         world = scene.build()
+        assert world.settings == scene.settings
         lower, upper = np.array(scene.view)
         for _ in range({"fastgas": 1, "shots": 6}.get(name, 20)):  # bodies leave the box in fastgas
             positions = world.bodies.dynamic.position
