@@ -33,11 +33,6 @@ class Motion:
         return self.position, self.velocity, self.force, self.inverse_mass, self.damping
 
     @property
-    def like(self) -> tuple[float, ...]:
-        """Zeros, one for each dimension."""
-        return (0.0,) * self.position.shape[1]
-
-    @property
     def force_changes(self) -> bool:
         """Whether some force depends on position, velocity or time; else the forces of the start hold throughout."""
         return self.evaluator is not None
