@@ -229,7 +229,7 @@ def case_of(
     subject = subject_of(target, {**dict(known.options), **(options or {})}, seed)
     for name in norms:
         check_norm(name, subject.names)
-    duration = seconds or known.seconds or subject.recommended[0]
+    duration = seconds or known.seconds or subject.seconds
     facts = survey(subject, duration, each)
     kind, why = facts.kind, facts.why
     chosen = tuple(norms) or known.norms or subject.names or OF_KIND[kind]

@@ -48,14 +48,11 @@ class Subject:
         """A new world; Problem for errors in a user's file. settings None: the recommended ones."""
         changes = dict(self.changes) if settings is None else {}
         added = [plugin_named(name) for name in self.plugins]
-        return self._loaded.build(settings or self.chosen, changes, self.seed if seed is None else seed, added)
-
-    def attribute_errors(self) -> contextlib.AbstractContextManager[None]:
-        """Convert exceptions raised inside to a Problem that names the line of the user's file."""
-        return self._loaded.attribute_errors()
+        return self.loaded.build(settings or self.chosen, changes, self.seed if seed is None else seed, added)
 
     @property
-    def _loaded(self) -> Loaded:
+    def loaded(self) -> Loaded:
+        """What builds the world, with the options."""
         if self.build is not None:
             build = functools.partial(self.build, **dict(self.options))
             return Loaded(self.name, build, compared=getattr(self.build, "compared", None))
@@ -67,22 +64,15 @@ class Subject:
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
         """The names of what the game says is compared; none for a scene."""
-        if self._loaded.compared is None:
+        if self.loaded.compared is None:
             return ()
         with contextlib.closing(self.world(None)) as world:
-            return tuple(self.values_of(world))
-
-    def values_of(self, world: World) -> dict[str, list[float]]:
-        """What the game compares, now; see ``Loaded.values_of``."""
-        return self._loaded.values_of(world)
+            return tuple(self.loaded.values_of(world))
 
     @property
-    def recommended(self) -> tuple[float, Any]:
-        """The seconds that the scene or file recommends, and its view or None."""
-        if self.build is not None:
-            return DEFAULT_SECONDS, None
-        loaded = load_once(self.target)
-        return loaded.seconds or DEFAULT_SECONDS, loaded.view
+    def seconds(self) -> float:
+        """The seconds that the scene or file recommends."""
+        return self.loaded.seconds or DEFAULT_SECONDS
 
     @property
     def description(self) -> str:

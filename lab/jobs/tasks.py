@@ -80,9 +80,9 @@ def bare_cost(task: Task) -> float | None:
     """Milliseconds per simulated second without observation, which takes longer than a cheap step: the least of some
     passes. None for a run that takes longer than AWHILE: there the observed run tells enough."""
     passes: list[float] = []
-    whole = 0.0
+    whole, loaded = 0.0, task.case.subject.loaded
     while len(passes) < PASSES[0] or (whole < BRIEF and len(passes) < PASSES[1]):
-        with task.case.subject.attribute_errors(), contextlib.closing(world_of(task.case, task.cell, 0)) as world:
+        with loaded.attribute_errors(), contextlib.closing(world_of(task.case, task.cell, 0)) as world:
             spent = simulated = 0.0
             world.step()  # the first one prepares what all others use
             left = max(int(task.case.seconds / task.cell.dt) - 1, 1)
@@ -105,12 +105,12 @@ def bare_cost(task: Task) -> float | None:
 def _observed(task: Task) -> Seen:
     engine = engine_of(task.case, task.cell, task.repeat + FIRST_REFERENCE_SEED * task.reference)
     try:
-        with task.case.subject.attribute_errors():
+        with task.case.subject.loaded.attribute_errors():
             case = task.case
             phase = case.phase(task.repeat)
             whole, walled = case.kind == RESTING, case.survey.walled
             far = math.inf if case.kind == CHAOTIC else FAR * case.survey.trial.reach or math.inf
-            inputs, values = () if task.sampled else case.survey.inputs, case.subject.values_of
+            inputs, values = () if task.sampled else case.survey.inputs, case.subject.loaded.values_of
             return observe(engine, case.seconds, task.cell.dt, phase, whole, walled, far, inputs, values)
     finally:
         engine.close()

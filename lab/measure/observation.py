@@ -53,7 +53,7 @@ class Seen(Plain):
     entities (n,): the bodies at the end; fixed: they are those of the start; created: how many came; met: something
     touched
     touches: pairs of entities and the time of their first contact, in order of time
-    values: what a game compares, see ``Subject.values_of``; spread: standard deviations from game to game, where these
+    values: what a game compares, see ``Loaded.values_of``; spread: standard deviations from game to game, where these
     are means over that many ``runs``
     doubt: m, of a reference: how far another one has a body elsewhere in the end
     """

@@ -113,7 +113,7 @@ def survey(subject: Subject, seconds: float, each: Each = one_by_one) -> Survey:
 
     with closing(_obedient(subject, exact.replace(dt=settings.dt / 2, substeps=settings.substeps + 1))) as other:
         forget_asked()
-        with subject.attribute_errors():
+        with subject.loaded.attribute_errors():
             each_step = _time_of_step(other)
         inputs = times_asked(seconds)
         run = functools.partial(_twin, subject, exact, seconds, inputs)
@@ -185,8 +185,8 @@ def _twin(
     if nudged:
         nudge(engine.world, nudged * engine.size)
     try:
-        with subject.attribute_errors():
-            seen = observe(engine, seconds, settings.dt, walled=walled, inputs=inputs, values=subject.values_of)
+        with subject.loaded.attribute_errors():
+            seen = observe(engine, seconds, settings.dt, walled=walled, inputs=inputs, values=subject.loaded.values_of)
         if seen.failure not in (None, ESCAPED):
             raise Problem(
                 f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed after {seen.simulated:.4g} s: "

@@ -281,9 +281,9 @@ def test_what_cannot_be_compared_is_refused(returned, words):
 def test_the_games_of_the_examples_play(name, options):
     game = subject_of(str(ROOT / "examples" / "games" / f"{name}.py"), options)
     with game.world(None) as world:
-        before = game.values_of(world)
+        before = game.loaded.values_of(world)
         for _ in range(90):
             world.step()
-        assert game.values_of(world).keys() == before.keys() == set(game.names)
-        assert game.values_of(world) != before
+        assert game.loaded.values_of(world).keys() == before.keys() == set(game.names)
+        assert game.loaded.values_of(world) != before
         assert world.faults == [] or name == "survivors"
