@@ -124,7 +124,7 @@ class Row(Plain):
     within each repeat.
     ``peer_index``: the pymunk index that was faster in the first repeat; the times are those with it.
     ``settings``: carom's settings that differ from the default.
-    ``quality``: figures by engine and name, see :meth:`carom.lab.engines.quality.Quality.figures`.
+    ``quality``: figures by engine and name, see ``against_pymunk.Quality.figures``.
     """
 
     scene: str
@@ -174,12 +174,10 @@ def machine() -> dict[str, str]:
 
 
 def machine_line(machine: dict[str, str]) -> str:
-    """Processor and system, then versions."""
-    rest = dict(machine)
-    place = [rest.pop(key) for key in ("processor", "system") if key in rest]
-    clock = [rest.pop("clock")] if "clock" in rest else []
-    versions = ", ".join(f"{name} {version}" for name, version in rest.items())
-    return "; ".join(filter(None, (", ".join(place), versions, *clock)))
+    """Processor and system, then versions, then the clock."""
+    others = ("processor", "system", "clock")
+    versions = ", ".join(f"{name} {version}" for name, version in machine.items() if name not in others)
+    return f"{machine['processor']}, {machine['system']}; {versions}; {machine['clock']}"
 
 
 def _processor() -> str:

@@ -17,7 +17,7 @@ from ..jobs.runs import Runs, Store, inputs_late, measure, refined_reference
 from ..jobs.tasks import Task, bare_cost, engine_of
 from ..jobs.workers import Workers
 from ..measure.norms import NORMS, check_norm, norm_of
-from ..measure.timing import CLOCK, Spread
+from ..measure.timing import Spread
 from ..reporting.progress import NO_PROGRESS, Progress
 from ..reporting.text import counted
 from .answer import Target, clearly_worse, next_choice, price, recommended
@@ -95,7 +95,7 @@ def trade(
     for name in norms:
         check_norm(name, () if name in NORMS else [own for subject in subjects for own in subject.names])
     runs = Runs(workers, store, progress)
-    result = Trade({**machine(), "clock": CLOCK}, command, [])
+    result = Trade(machine(), command, [])
     for scene in targets:
         name = scene if isinstance(scene, str) else getattr(scene, "__name__", "scene")
         progress.say(f"{name}: survey")
