@@ -249,7 +249,6 @@ class Simulation:
         """Boxes around the bodies where they are at this moment."""
         state = self.state
         before = state.moved, state.candidates_ready
-        self.links.link_boxes()
         state.moved = state.all_still = False
         self.program.run_one("box_statics", 0.0)
         self.program.run_one("box_motions", 0.0)

@@ -4,28 +4,16 @@ docs/architecture.md read; and the parts of stages that are called by address.""
 from __future__ import annotations
 
 from ..framework.schedule.stages import Stage
-from .broad_phase.boxes import bound_searches, box_rest_of_step, box_rows
+from .broad_phase.boxes import bound_searches, box_rest_of_step
 from .broad_phase.system import BroadPhase
 from .ccd.refresh_pairs import merge_pairs
 from .ccd.time_of_impact import first_touch
 from .contacts.events import ContactEvents
 from .contacts.response import Response
 from .forces.accumulation import ForceAccumulation
-from .impacts.bounds_exit import watch_bounds
-from .impacts.find import is_held_by_edge, kind_beyond_cap
-from .impacts.stages import take_swept_event
 from .impacts.together import resolve_simultaneous
 from .integration.system import Integration
-from .linking.parts import (
-    BOUND_SEARCHES,
-    BOX_ROWS,
-    FIRST_TOUCH,
-    HELD_BY_EDGE,
-    KIND_BEYOND_CAP,
-    TAKE_SWEPT,
-    TAKE_TOGETHER,
-    WATCH_BOUNDS,
-)
+from .linking.parts import BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER
 from .narrow_phase.manifolds import finish_found
 from .narrow_phase.system import NarrowPhase
 from .opening import KEEPS_FORCE, KEEPS_START, KEEPS_VELOCITY, close_step, keep_state, read_bodies
@@ -105,16 +93,7 @@ SYSTEMS = (ForceAccumulation, Integration, BroadPhase, NarrowPhase, Response, Co
 STAGES = check_stages((*OPENING, *(stage for system in SYSTEMS for stage in system.STAGES), *CLOSING, *ON_DEMAND))
 
 # Parts of stages by their place in ``state.links``.
-LINKED_PARTS = {
-    BOX_ROWS: box_rows,
-    BOUND_SEARCHES: bound_searches,
-    FIRST_TOUCH: first_touch,
-    HELD_BY_EDGE: is_held_by_edge,
-    KIND_BEYOND_CAP: kind_beyond_cap,
-    TAKE_SWEPT: take_swept_event,
-    WATCH_BOUNDS: watch_bounds,
-    TAKE_TOGETHER: resolve_simultaneous,
-}
+LINKED_PARTS = {BOUND_SEARCHES: bound_searches, FIRST_TOUCH: first_touch, TAKE_TOGETHER: resolve_simultaneous}
 
 # The system of each stage; "" for those that open and close a step.
 SYSTEM_OF_STAGE = (

@@ -9,7 +9,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, item, replace, scale
 from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
-from ..linking.parts import BOUND_SEARCHES, BOX_ROWS, call_bound_searches, call_box_rows
+from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
@@ -134,6 +134,7 @@ def follow_static_places(state):
 STANDING, MOVING, SEARCHING = range(3)
 
 
+@part
 def box_rows(state, start, stop, motion):
     """Boxes of rows start..stop-1: of bodies that stand, around their motion, or from search_lower to search_upper; the
     frame holds those of what moves.
@@ -158,7 +159,6 @@ def box_rows(state, start, stop, motion):
     else:
         state.thinnest_moving = thinnest
         measure_frame(state)
-    return 0
 
 
 def box_statics(state, dt):
@@ -172,8 +172,8 @@ def box_statics(state, dt):
             if i >= moving:
                 bodies.static_position[i - moving] = bodies.position[i]
         state.thinnest_static = math.inf
-        call_box_rows(state.links[BOX_ROWS], state, 0, state.first, STANDING)
-        call_box_rows(state.links[BOX_ROWS], state, moving, state.count, STANDING)
+        box_rows(state, 0, state.first, STANDING)
+        box_rows(state, moving, state.count, STANDING)
         state.boxed_version = state.statics_version
     return OK
 
@@ -184,7 +184,7 @@ def box_motions(state, dt):
     state.neighbours_known_until, state.candidates_ready = math.inf, True
     if state.all_still:
         return OK
-    call_box_rows(state.links[BOX_ROWS], state, state.first, state.moving, MOVING)
+    box_rows(state, state.first, state.moving, MOVING)
     if state.sweeping and state.moved:
         for i in range(state.first, state.moving):
             bodies.search_lower[i], bodies.search_upper[i] = bodies.previous_position[i], bodies.position[i]
@@ -204,7 +204,7 @@ def bound_searches(state, now, dt):
     if now > 0.0 or state.neighbours_known_until < dt:
         for i in range(state.first, state.moving):
             bodies.search_upper[i] = place_at(state, i, min(state.neighbours_known_until, dt), dt)
-        call_box_rows(state.links[BOX_ROWS], state, state.first, state.moving, SEARCHING)
+        box_rows(state, state.first, state.moving, SEARCHING)
     for i in range(state.first, state.moving):
         margin = bodies.search_margin[i]
         give = margin + GIVE * bodies.min_extent[i]

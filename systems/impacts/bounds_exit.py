@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ..ccd.search_bounds import leaves_bounds_at
-from ..linking.parts import WATCH_BOUNDS, call_watch_bounds
-
-
-def watch_bounds(state, i, dt):
-    """The body goes on from here: note when it may leave its search bounds."""
-    impacts = state.impacts
-    state.bodies.last_impact[i] = impacts.now
-    impacts.until = min(impacts.until, leaves_bounds_at(state, i, impacts.now, dt))
-    return 0
 
 
 @part
 def update_bounds_exit_time(state, i, dt):
-    """The same from another function."""
-    return call_watch_bounds(state.links[WATCH_BOUNDS], state, i, dt)
+    """The body goes on from here: note when it may leave its search bounds."""
+    impacts = state.impacts
+    state.bodies.last_impact[i] = impacts.now
+    impacts.until = min(impacts.until, leaves_bounds_at(state, i, impacts.now, dt))

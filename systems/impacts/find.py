@@ -20,14 +20,7 @@ from ..integration.trajectory import (
     relative_path,
     travel_of,
 )
-from ..linking.parts import (
-    FIRST_TOUCH,
-    HELD_BY_EDGE,
-    KIND_BEYOND_CAP,
-    call_first_touch,
-    call_held_by_edge,
-    call_kind_beyond_cap,
-)
+from ..linking.parts import FIRST_TOUCH, call_first_touch
 from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
@@ -145,6 +138,7 @@ def bounce_threshold(state, a, b):
     return fixed if fixed >= 0.0 else 2.0 * max(change[a], change[b])
 
 
+@part
 def is_held_by_edge(state, a, b, path, touch, speed, dt):
     """Whether a supported body that slides or rolls has sunk in a little, and only meets the edge of the next thing in
     its row: it does not get deeper than it may."""
@@ -184,7 +178,7 @@ def closing_speed(state, a, b, path, touch, kind, dt):
     if not speed < -(threshold + rounding):  # a contact at rest
         return LANDING if passes_unseen(state, a, b, path, touch, dt) else NONE, speed
     warm_started = kind == SWEPT and (bodies.warm_started[a] or bodies.warm_started[b])
-    if warm_started and call_held_by_edge(state.links[HELD_BY_EDGE], state, a, b, path, touch, speed, dt):
+    if warm_started and is_held_by_edge(state, a, b, path, touch, speed, dt):
         return NONE, speed
     return IMPACT, speed
 
@@ -203,6 +197,7 @@ def correct_speed(state, a, b, touch, speed, dt):
     return min(0.0, speed + bend * (t / dt - 0.5))
 
 
+@part
 def kind_beyond_cap(state, a, b, path, t, speed, restitution, dt):
     """STOP, STICK or SLIDE for a pair of which a body has had all the impacts it may have; -1: none, it is left."""
     bodies = state.bodies
@@ -321,7 +316,7 @@ def queue_next_impact(state, c, dt):
     if not passive and is_beyond_cap(state, a, b):
         event_kind = -1
         if impacts.sweeps:
-            event_kind = call_kind_beyond_cap(state.links[KIND_BEYOND_CAP], state, a, b, path, t, speed, e, dt)
+            event_kind = kind_beyond_cap(state, a, b, path, t, speed, e, dt)
         if event_kind < 0:
             impacts.capped += 1
             return

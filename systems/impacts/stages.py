@@ -8,7 +8,7 @@ from ...framework.compilation import part
 from ...framework.jit.records.record_type import request
 from ..ccd.search_bounds import FAST
 from ..codes import NEED_EVENTS, NEED_TOGETHER, OK, REFRESH_PAIRS
-from ..linking.parts import TAKE_SWEPT, TAKE_TOGETHER, call_take_swept, call_take_together
+from ..linking.parts import TAKE_TOGETHER, call_take_together
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import find_hasty
 from .bounds_exit import update_bounds_exit_time
@@ -109,6 +109,7 @@ def next_event(state):
     return -1
 
 
+@part
 def take_swept_event(state, event, dt):
     """Carry out what happens to swept bodies alone: a crossing, sticking together, standing still."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
@@ -137,7 +138,6 @@ def take_swept_event(state, event, dt):
             i = pairs.a[c] if side == 0 else pairs.b[c]
             if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
                 stop(state, i, impacts.now)
-    return 0
 
 
 @part
@@ -166,7 +166,7 @@ def take_event(state, event, dt):
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
     impacts.last_pair, impacts.now = c, impacts.event_time[event]
     if kind > TOUCHDOWN:
-        call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
+        take_swept_event(state, event, dt)
         return OK
     if kind != TOUCHDOWN and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:
@@ -177,7 +177,7 @@ def take_event(state, event, dt):
             return taken
     bounce(state, event, dt)
     if kind == TOUCHDOWN:
-        call_take_swept(state.links[TAKE_SWEPT], state, event, dt)
+        take_swept_event(state, event, dt)
     for side in range(2 if impacts.sweeps else 0):
         i = pairs.a[c] if side == 0 else pairs.b[c]
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:

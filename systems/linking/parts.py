@@ -1,8 +1,5 @@
-"""Parts of stages that are compiled on their own and called through their address.
-
-Swept bodies need them alone, so that a discrete world does not compile them; or several stages share one; or they are
-needed so seldom that they are linked when that happens first.
-"""
+"""Parts of stages that are compiled on their own and called through their address: those of swept bodies, and impacts
+at the same time, which take seconds to compile and which many worlds never need."""
 
 from __future__ import annotations
 
@@ -17,9 +14,9 @@ from ..records import STATE
 from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
-BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS, TAKE_TOGETHER = range(8)
-COUNT = 8
-SWEPT = BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE, KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS
+BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = range(3)
+COUNT = 3
+SWEPT = BOUND_SEARCHES, FIRST_TOUCH
 
 
 def _signature(make: Callable[..., Any]) -> Callable[[int], Any]:
@@ -39,31 +36,16 @@ def _first_touch(state: Any, vector: Any, path: Any, i: Any, f: Any) -> Any:
     return found(state, i, i, path, types.boolean, f, f, types.UniTuple(f, 3))
 
 
-def _held_by_edge(state: Any, vector: Any, path: Any, i: Any, f: Any) -> Any:
-    touch = types.Tuple((f, vector, vector, vector))  # (time, normal, point, from a's centre to b's)
-    return types.boolean(state, i, i, path, touch, f, f)
-
-
 SIGNATURES = {
     place: _signature(make)
     for place, make in {
-        BOX_ROWS: lambda state, vector, path, i, f: i(state, i, i, i),
         BOUND_SEARCHES: lambda state, vector, path, i, f: i(state, f, f),
         FIRST_TOUCH: _first_touch,
-        HELD_BY_EDGE: _held_by_edge,
-        KIND_BEYOND_CAP: lambda state, vector, path, i, f: i(state, i, i, path, f, f, f, f),
-        TAKE_SWEPT: lambda state, vector, path, i, f: i(state, i, f),
-        WATCH_BOUNDS: lambda state, vector, path, i, f: i(state, i, f),
         TAKE_TOGETHER: lambda state, vector, path, i, f: i(state, i, f),
     }.items()
 }
 
-call_box_rows, call_bound_searches, call_first_touch, call_held_by_edge = map(
-    call_in_dimension, [SIGNATURES[place] for place in (BOX_ROWS, BOUND_SEARCHES, FIRST_TOUCH, HELD_BY_EDGE)]
-)
-call_kind_beyond_cap, call_take_swept, call_watch_bounds, call_take_together = map(
-    call_in_dimension, [SIGNATURES[place] for place in (KIND_BEYOND_CAP, TAKE_SWEPT, WATCH_BOUNDS, TAKE_TOGETHER)]
-)
+call_bound_searches, call_first_touch, call_take_together = map(call_in_dimension, SIGNATURES.values())
 
 _linked: dict[tuple[Any, int], Linked] = {}
 

@@ -10,14 +10,13 @@ import numpy as np
 from ...framework.jit.link_all import link_all
 from ...framework.jit.linking import Called, Linked
 from ...framework.schedule.stages import Program, Stage
-from ..broad_phase.boxes import box_rows
 from ..broad_phase.search import CandidateSearch
 from ..ccd.search_bounds import DISCRETE
 from ..integration.system import Integration
 from ..records import SWEEPS
 from ..scene import Scene
 from ..stage_list import LINKED_PARTS
-from .parts import BOX_ROWS, COUNT, SWEPT, TAKE_TOGETHER, linked_part
+from .parts import COUNT, SWEPT, TAKE_TOGETHER, linked_part
 from .preparation import kind_of, link_possible
 
 NEVER = -1
@@ -122,9 +121,7 @@ class StepLinks:
         where there may be any."""
         if not self._state.collides:
             return {}
-        places = [BOX_ROWS]
-        if self._state.sweeps_ready:
-            places.extend(SWEPT)
+        places = [*SWEPT] if self._state.sweeps_ready else []
         if np.any(self._state.colliders.restitution[:, : self._state.count]):
             places.append(TAKE_TOGETHER)
         return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
@@ -136,12 +133,6 @@ class StepLinks:
             link_all(self._functions_of_shapes())
             self._scene.link_shapes(self._state.sweeps_ready)
             self._shapes_key = key
-
-    def link_boxes(self) -> None:
-        """What boxes around bodies need, where no step has been taken yet."""
-        links = self._state.links
-        if not links[BOX_ROWS]:
-            links[BOX_ROWS] = linked_part(BOX_ROWS, box_rows, self._state.dimensions).address
 
     def link_together(self) -> None:
         """What impacts at the same time need, where nothing could bounce when the stages were linked."""

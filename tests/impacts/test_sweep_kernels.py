@@ -48,8 +48,8 @@ def test_no_body_leaves_its_search_bounds_before_the_stated_time(mode, degree, d
     fill(bodies, origin=origin, path_velocity=path, path_second=second, path_third=zeros, min_extent=size)
     fill(bodies, ccd=rng.random(n) < 0.5, shape=zeros[:, 0], inverse_mass=10 ** rng.uniform(-2, 2, n))
     fill(bodies, search_lower=origin, search_upper=zeros, search_margin=zeros[:, 0], lower=zeros, upper=zeros)
-    fill(state, moving=n, mode=mode, path_degree=degree, frame=np.zeros(7), links=np.zeros(boxes.BOX_ROWS + 1))
-    monkeypatch.setattr(boxes, "call_box_rows", lambda *_: 0)  # compiled; the boxes around the paths are not used
+    fill(state, moving=n, mode=mode, path_degree=degree, frame=np.zeros(7), links=np.zeros(1))
+    monkeypatch.setattr(boxes, "box_rows", lambda *_: 0)  # the boxes around the paths are not used
     boxes.bound_searches(view, 0.0, DT)
     asked, until = 0, state.neighbours_known_until
     assert until < DT  # so search_upper is where the bodies are then
