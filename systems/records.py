@@ -150,14 +150,15 @@ BODIES = Schema(
     level_not_enclosing=flags(),  # a rotated level may reach out of the one around it
 )  # fmt: skip
 
+DYNAMIC_ROWS, STATIC_ROWS, ALL_ROWS = range(3)
+
 # A column that code of the game may write in place, and what the field allows.
 CHECKED = Schema(
     "Checked",
     values=floats(),
     owned=flags(),  # bodies that have the component
     width=integer(),  # numbers per body
-    start=integer(),  # rows
-    stop=integer(),
+    rows=integer(),  # which bodies: DYNAMIC_ROWS and the like
     low=number(),
     high=number(),
     least=number(),  # sum of a row's magnitudes

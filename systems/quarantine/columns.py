@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import record_at
 from ..codes import CHECK_COLUMNS, OK
-from ..records import CHECKED
+from ..records import CHECKED, DYNAMIC_ROWS, STATIC_ROWS
 
 _checked_at = record_at(CHECKED, 2)
 
@@ -23,12 +23,14 @@ def are_allowed(checked, start, stop):
 def is_column_sound(state, checked):
     """Whether all rows of a column hold what the field allows, static ones if they may have changed; those of bodies
     without the component do not count."""
-    values, owned, width, stop, sound = checked.values, checked.owned, checked.width, checked.stop, True
-    if not checked.statics and state.read_version == state.statics_version:
-        stop = min(stop, state.moving)
-    if checked.least == 0.0 and are_allowed(checked, checked.start * width, stop * width):
+    values, owned, width, sound = checked.values, checked.owned, checked.width, True
+    start = state.moving if checked.rows == STATIC_ROWS else 0
+    stop = state.dynamic if checked.rows == DYNAMIC_ROWS else state.moving
+    if checked.rows != DYNAMIC_ROWS and (checked.statics or state.read_version != state.statics_version):
+        stop = state.count
+    if checked.least == 0.0 and are_allowed(checked, start * width, stop * width):
         return True
-    for i in range(checked.start, stop):
+    for i in range(start, stop):
         total = 0.0
         for k in range(i * width, (i + 1) * width):
             total += abs(values[k])

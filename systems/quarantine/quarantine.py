@@ -20,11 +20,10 @@ from ...framework.data.columns import Column
 from ...framework.data.table import Table
 from ...framework.jit.records.record import Record, make_record
 from ..integration.stages import UNMOVED
-from ..records import CHECKED
+from ..records import ALL_ROWS, CHECKED, DYNAMIC_ROWS, STATIC_ROWS
 from ..scene import Scene
 
 LEAST_TURN, LARGEST_TURN = 1e-150, 1e150  # of a quaternion's numbers, whose squares are summed
-DYNAMIC, STATIC, ALL = range(3)  # rows
 
 
 @dataclass
@@ -33,13 +32,10 @@ class Checked:
 
     array
         all rows of the table, in use or not
-    rows
-        those that the step reads
     """
 
     column: Column
     array: np.ndarray
-    rows: int
     record: Record
 
     def bad(self, rows: slice) -> np.ndarray:
@@ -92,7 +88,7 @@ class Quarantine:
         if bound != self._bound:
             self._checked = list(self._find_columns())
             self._bound = bound
-        self.follow_lent()
+            self.follow_lent()
         if self._generation != self._table.generation:  # ids mean other entities
             self._generation = self._table.generation
             self.told.clear()
@@ -108,23 +104,21 @@ class Quarantine:
         for checked in self._checked:
             key = checked.column.key
             if key in lent or checked.column.item != "scalar":
-                rows, record = self._rows(checked), checked.record
-                record.start, record.stop, record.statics = rows.start, rows.stop, lent.get(key, False)
-                addresses.append(record.address)
-        if addresses or len(self._state.checked):
-            self._state.checked = np.array(addresses, np.int64)
+                checked.record.statics = lent.get(key, False)
+                addresses.append(checked.record.address)
+        self._state.checked = np.array(addresses, np.int64)
 
     def _find_columns(self) -> Iterator[Checked]:
         """All that a step reads and the game may write, but for what moves: ``check_flight`` sees to that."""
         for column in RigidBody.columns.values():
             if column.name != "linear_velocity":
-                yield from self._check(column, RigidBody, DYNAMIC)
-        yield from self._check(Transform.columns["position"], Transform, STATIC)
+                yield from self._check(column, RigidBody, DYNAMIC_ROWS)
+        yield from self._check(Transform.columns["position"], Transform, STATIC_ROWS)
         if self._scene.linked is not None:
-            yield from self._check(Transform.columns["rotation"], Transform, ALL)
+            yield from self._check(Transform.columns["rotation"], Transform, ALL_ROWS)
             for shape in self._scene.linked.shapes:
                 for column in shape.component.columns.values():
-                    yield from self._check(column, shape.component, ALL)
+                    yield from self._check(column, shape.component, ALL_ROWS)
 
     def _check(self, column: Column, component: Any, rows: int) -> Iterator[Checked]:
         array, bounds = self._table.arrays.get(column.key), column.bounds()
@@ -132,15 +126,15 @@ class Quarantine:
             return
         record = make_record(CHECKED, 2)
         record.values, record.width, record.owned = array.reshape(-1), array[:1].size, self._table.has_mask(component)
-        (record.low, record.high), record.optional = bounds, column.optional
+        (record.low, record.high), record.optional, record.rows = bounds, column.optional, rows
         if column.item == "rotation" and array.ndim > 1:
             record.low, record.high, record.least = -LARGEST_TURN, LARGEST_TURN, LEAST_TURN
-        yield Checked(column, array, rows, record)
+        yield Checked(column, array, record)
 
     def _rows(self, checked: Checked) -> slice:
         """The rows that a step reads of that column."""
         dynamic, moving, count = self._table.stops
-        return (slice(0, dynamic), slice(moving, count), slice(0, count))[checked.rows]
+        return (slice(0, dynamic), slice(moving, count), slice(0, count))[checked.record.rows]
 
     # -- what the stages ask for ------------------------------------------------------------------
 
@@ -207,9 +201,8 @@ class Quarantine:
             if not (np.abs(value) <= (FASTEST if field == "linear_velocity" else np.finfo(float).max)).all():
                 self.tell(row, field, value.tolist())
                 return
-        field = "position" if np.isfinite(arrays["linear_velocity"][row]).all() else "linear_velocity"
-        if field == "position" and np.isfinite(arrays["position"][row]).all():
-            field = "linear_velocity"
+        finite = {field: np.isfinite(arrays[field][row]).all() for field in ("position", "linear_velocity")}
+        field = "position" if finite["linear_velocity"] and not finite["position"] else "linear_velocity"
         self.tell(row, field, arrays[field][row].tolist())
 
     def _tell_of_distance(self, rows: np.ndarray, dt: float) -> None:
