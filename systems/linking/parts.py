@@ -14,45 +14,33 @@ from ..records import STATE
 from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
-BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = range(3)
-COUNT = 3
+BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = PLACES = range(3)
 SWEPT = BOUND_SEARCHES, FIRST_TOUCH
 
 
-def _signature(make: Callable[..., Any]) -> Callable[[int], Any]:
-    """By dimension: what ``make`` gives for (the types of the state, of a vector, of a path, int64, float64)."""
-
-    @cache
-    def signature_of(dimensions: int) -> Any:
-        vector = vector_type(dimensions)
-        path = types.UniTuple(vector, 4)  # (x0, x1, x2, x3), see trajectory
-        return make(record_type(STATE, dimensions), vector, path, types.int64, types.float64)
-
-    return signature_of
+@cache
+def _bound_searches(dimensions: int) -> Any:
+    return types.int64(record_type(STATE, dimensions), types.float64, types.float64)
 
 
-def _first_touch(state: Any, vector: Any, path: Any, i: Any, f: Any) -> Any:
+@cache
+def _first_touch(dimensions: int) -> Any:
+    vector, i, f = vector_type(dimensions), types.int64, types.float64
+    path = types.UniTuple(vector, 4)  # (x0, x1, x2, x3), see trajectory
     found = types.Tuple((i, f, vector, vector, vector))
-    return found(state, i, i, path, types.boolean, f, f, types.UniTuple(f, 3))
+    return found(record_type(STATE, dimensions), i, i, path, types.boolean, f, f, types.UniTuple(f, 3))
 
 
-SIGNATURES = {
-    place: _signature(make)
-    for place, make in {
-        BOUND_SEARCHES: lambda state, vector, path, i, f: i(state, f, f),
-        FIRST_TOUCH: _first_touch,
-        TAKE_TOGETHER: lambda state, vector, path, i, f: i(state, i, f),
-    }.items()
-}
-
-call_bound_searches, call_first_touch, call_take_together = map(call_in_dimension, SIGNATURES.values())
-
-_linked: dict[tuple[Any, int], Linked] = {}
+@cache
+def _take_together(dimensions: int) -> Any:
+    return types.int64(record_type(STATE, dimensions), types.int64, types.float64)
 
 
+SIGNATURES = _bound_searches, _first_touch, _take_together
+call_bound_searches, call_first_touch, call_take_together = map(call_in_dimension, SIGNATURES)
+
+
+@cache
 def linked_part(place: int, function: Callable[..., Any], dimensions: int) -> Linked:
     """The function that belongs to a place in ``state.links``, one for the process."""
-    key = (function, dimensions)
-    if key not in _linked:
-        _linked[key] = Linked(function, SIGNATURES[place](dimensions))
-    return _linked[key]
+    return Linked(function, SIGNATURES[place](dimensions))

@@ -16,7 +16,7 @@ from ..integration.system import Integration
 from ..records import SWEEPS
 from ..scene import Scene
 from ..stage_list import LINKED_PARTS
-from .parts import COUNT, SWEPT, TAKE_TOGETHER, linked_part
+from .parts import PLACES, SWEPT, TAKE_TOGETHER, linked_part
 from .preparation import kind_of, link_possible
 
 NEVER = -1
@@ -28,7 +28,7 @@ class StepLinks:
     def __init__(self, scene: Scene, program: Program, integration: Integration, search: CandidateSearch) -> None:
         self._scene, self._state, self._program = scene, scene.state, program
         self._integration, self._search = integration, search
-        self._state.links = np.zeros(COUNT, np.int64)
+        self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = self._forces = NEVER  # of the scene, and how many force systems there were
         self._key: Any = None  # what the linked stages depend on
         self._usual: Any = None  # what of that bodies may change
