@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ class Record:
     on. Scalars are read and written in place. ``address`` is what kernels get. Made by :func:`make_record`.
     """
 
-    __slots__ = ("__weakref__", "_arrays", "_floats", "_records", "_words", "address")
+    __slots__ = ("__weakref__", "_floats", "_words", "address")
 
     schema: Schema
     dimensions: int
@@ -34,8 +35,6 @@ class Record:
         self.address: int = self._words.ctypes.data
         if not JIT:
             remember(self.address, self)
-        self._arrays: dict[str, np.ndarray] = {}
-        self._records: dict[str, Record] = {}
         for name, field in self.schema.fields.items():
             if isinstance(field, Column):
                 shape = (0, 0) if field.stacked else (0,)
@@ -49,7 +48,7 @@ class Record:
     def reserve(self, rows: int, *names: str, keep: int = 0) -> None:
         """Give these columns room for at least ``rows`` rows; the first ``keep`` rows stay."""
         for name in names:
-            before = self._arrays[name]
+            before = getattr(self, name)
             if len(before) < rows:
                 after = self.schema.fields[name].empty(rows, self.dimensions)  # type: ignore[union-attr]
                 after[:keep] = before[:keep]
@@ -57,12 +56,12 @@ class Record:
 
     def show(self, name: str, array: np.ndarray) -> None:
         """Assign a column, unless it is that very array already."""
-        if self._arrays[name] is not array:
+        if getattr(self, name) is not array:
             setattr(self, name, array)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The arrays by name."""
-        return dict(self._arrays)
+        return {name: getattr(self, name) for name, field in self.schema.fields.items() if isinstance(field, Column)}
 
     def word_of(self, name: str) -> int:
         """The place of a scalar in :attr:`words`."""
@@ -76,7 +75,8 @@ class Record:
 
 @cache
 def _record_class(schema: Schema, dimensions: int) -> type[Record]:
-    body: dict[str, Any] = {"__slots__": (), "schema": schema, "dimensions": dimensions}
+    held = tuple(_slot(name) for name, field in schema.fields.items() if isinstance(field, (Column, Schema)))
+    body: dict[str, Any] = {"__slots__": held, "schema": schema, "dimensions": dimensions}
     for name, field in schema.fields.items():
         at = schema.layout[name] // WORD
         if isinstance(field, Schema):
@@ -94,32 +94,48 @@ def make_record(schema: Schema, dimensions: int) -> Record:
 
 
 def _scalar(dtype: str, at: int) -> property:
+    def put(self: Record, value: Any) -> None:
+        self._words[at] = value
+
+    def put_float(self: Record, value: float) -> None:
+        self._floats[at] = value
+
+    def put_bool(self: Record, value: Any) -> None:
+        self._words[at] = bool(value)
+
     if dtype == "float64":
-        return property(lambda self: self._floats.item(at), lambda self, value: self._floats.__setitem__(at, value))
+        return property(lambda self: self._floats.item(at), put_float)
     if dtype == "bool":
-        return property(lambda self: self._words[at] != 0, lambda self, value: self._words.__setitem__(at, bool(value)))
-    return property(lambda self: self._words.item(at), lambda self, value: self._words.__setitem__(at, value))
+        return property(lambda self: self._words.item(at) != 0, put_bool)
+    return property(lambda self: self._words.item(at), put)
+
+
+def _slot(name: str) -> str:
+    """The attribute that holds a column or a record inside: read without a call of Python."""
+    return f"held_{name}"
 
 
 def _inner(name: str, at: int) -> property:
+    slot = _slot(name)
+
     def put(self: Record, record: Record) -> None:
-        self._records[name] = record
+        setattr(self, slot, record)
         self._words[at] = record.address
 
-    return property(lambda self: self._records[name], put)
+    return property(attrgetter(slot), put)
 
 
 def _column(record: str, name: str, field: Column, at: int, dimensions: int) -> property:
     dtype, item = np.dtype(field.dtype), field.item_shape(dimensions)
-    leading = 2 if field.stacked else 1
+    leading, slot = 2 if field.stacked else 1, _slot(name)
 
     def put(self: Record, array: np.ndarray) -> None:
         if array.dtype != dtype or array.shape[leading:] != item or array.ndim != leading + len(item):
             raise ValueError(f"{record}.{name} takes arrays of {dtype} (..., {item}), got {array.dtype} {array.shape}")
         if not array.flags.c_contiguous:
             raise ValueError(f"{record}.{name} takes contiguous arrays")
-        self._arrays[name] = array
+        setattr(self, slot, array)
         self._words[at] = array.ctypes.data
         self._words[at + 1] = array.shape[leading - 1]
 
-    return property(lambda self: self._arrays[name], put)
+    return property(attrgetter(slot), put)
