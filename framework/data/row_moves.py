@@ -22,6 +22,7 @@ ROW_PLAN = Schema(
     coming=integer(),  # how many come,
     added=ints(),  # their ids,
     blocks=ints(),  # by ascending block and id,
+    kind_column=ints("int8"),  # where the table has the kinds; empty: nowhere
     places=ints(),  # the row that stands behind each of them,
     fresh=ints(),  # and their rows, afterwards
     # runs of rows that stay together and move
@@ -37,7 +38,12 @@ MOVED_COLUMNS = Schema(
     defaults=ints(),  # address of a row that new rows are copies of; 0: they stay as they are
 )
 BLOCKS = 4  # of rows: sleepers, dynamic, kinematic and static bodies
-MOST_KEPT = 128  # rows; the lists of more do not stay in memory
+MOST_KEPT = 4096  # rows; the lists of more do not stay in memory
+LISTS = ("removed", "added", "blocks", "places", "fresh", "source", "target", "length")  # of a plan, for its rows
+
+Rows = np.ndarray | list[int]
+
+NO_ROWS = np.empty(0, np.int64)
 
 _plan_at = record_at(ROW_PLAN, 2)
 _columns_at = record_at(MOVED_COLUMNS, 2)
@@ -124,7 +130,8 @@ def move_rows_of(plan, columns, column):
 
 @kernel
 def move_rows(plan_address, columns_address, new_plan):
-    """Move the rows of some columns as planned; new_plan, 0 or 1: find out first what has to move."""
+    """Move the rows of some columns as planned; new_plan, 0 or 1: find out first what has to move, and write ids and
+    kinds of those that come."""
     plan, columns = _plan_at(plan_address), _columns_at(columns_address)
     if new_plan != 0:
         count = plan.stops[BLOCKS - 1]
@@ -132,6 +139,10 @@ def move_rows(plan_address, columns_address, new_plan):
         find_runs(plan, count)
     for column in range(len(columns.addresses)):
         move_rows_of(plan, columns, column)
+    for k in range(plan.coming if new_plan != 0 else 0):
+        plan.ids[plan.fresh[k]] = plan.added[k]
+        if len(plan.kind_column):
+            plan.kind_column[plan.fresh[k]] = max(plan.blocks[k] - 1, 0)
 
 
 MOVE_ROWS = Called(move_rows, int, int, int)
@@ -145,31 +156,32 @@ class RowPlan:
         self.record.stops = np.zeros(BLOCKS, np.int64)
         self.new = False  # the runs have not been found yet
         self.count = 0  # rows before
+        self.fresh = NO_ROWS  # the rows of those that have come, in order
 
-    def begin(self, ids: np.ndarray, removed: np.ndarray, added: np.ndarray, blocks: np.ndarray) -> None:
+    def follow(self, ids: np.ndarray, kinds: np.ndarray | None) -> None:
+        """The columns where the table has ids and kinds of the bodies."""
+        self.record.ids = ids
+        if kinds is not None:
+            self.record.kind_column = kinds
+
+    def begin(self, removed: Rows, added: Rows, blocks: Rows) -> None:
         """removed: ascending rows; added: ids by ascending block and id; the stops are those of the bodies before."""
         plan, leaving, coming = self.record, len(removed), len(added)
-        plan.show("ids", ids)
-        if leaving > len(plan.removed) or coming > len(plan.added) or leaving + coming >= len(plan.source):
-            plan.reserve(leaving, "removed")
-            plan.reserve(coming, "added", "blocks", "places", "fresh")
-            plan.reserve(leaving + coming + 1, "source", "target", "length")
-        if leaving:
-            plan.removed[:leaving] = removed
-        if coming:
-            plan.added[:coming], plan.blocks[:coming] = added, blocks
+        if leaving + coming >= len(plan.source):
+            plan.reserve(leaving + coming + 1, *LISTS)
+        for column, values in ((plan.removed, removed), (plan.added, added), (plan.blocks, blocks)):
+            if len(values) == 1:
+                column[0] = values[0]  # much faster than a slice
+            elif len(values):
+                column[: len(values)] = values
         plan.leaving, plan.coming = leaving, coming
-        self.count, self.new = int(plan.stops[-1]), True
-
-    @property
-    def fresh(self) -> np.ndarray:
-        """The rows of those that have come, in order."""
-        return self.record.fresh[: self.record.coming].copy()
+        self.count, self.new = plan.stops.item(BLOCKS - 1), True
 
     def end(self) -> None:
         """Long lists do not stay in memory."""
+        self.fresh = NO_ROWS
         if len(self.record.source) > MOST_KEPT:
-            for name in ("removed", "added", "blocks", "places", "fresh", "source", "target", "length"):
+            for name in LISTS:
                 setattr(self.record, name, np.empty(0, np.int64))
 
 
@@ -195,7 +207,8 @@ class MovedColumns:
             move_rows(plan.record.address, self._record.address, int(plan.new))
         else:  # nothing moves where there are no rows yet, and most worlds need no kernel
             self._move_plain(plan)
-        plan.new = False
+        if plan.new:
+            plan.fresh, plan.new = plan.record.fresh[: plan.record.coming].copy(), False
 
     def _move_plain(self, plan: RowPlan) -> None:
         record = plan.record
@@ -216,3 +229,7 @@ class MovedColumns:
                 column[target : target + length] = column[source : source + length].copy()
             if default is not None:
                 column[rows] = default
+        if plan.new:
+            record.ids[rows] = record.added[: record.coming]
+            if len(record.kind_column):
+                record.kind_column[rows] = np.maximum(record.blocks[: record.coming] - 1, 0)

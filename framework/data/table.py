@@ -16,7 +16,7 @@ from .arrays.column import hold_arrays
 from .arrays.pool import Held
 from .columns import Column
 from .component import Component, RowStore
-from .row_moves import BLOCKS, MovedColumns, RowPlan
+from .row_moves import BLOCKS, NO_ROWS, MovedColumns, RowPlan, Rows
 
 KINDS = ("dynamic", "kinematic", "static")
 DYNAMIC, KINEMATIC, STATIC = range(3)
@@ -356,34 +356,33 @@ class Table:
                 return rows
         return self.rows_of(entities)
 
-    def rebuild(self, removed: np.ndarray, added: np.ndarray, added_kinds: np.ndarray) -> tuple[Any, Any]:
+    def rebuild(self, removed: Rows, added: Rows, added_kinds: Rows) -> tuple[Rows, np.ndarray]:
         """Take rows out, put rows in, and bring bodies of another kind to their place.
 
         removed: rows that go. added: entity ids that come, with their kinds; their rows hold the defaults. Returns the
         ids that have got other rows than those of their neighbours, which are these and those of another kind, and
         their rows.
         """
-        moved = self._changed_kinds(removed) if self.kind_changed else np.empty(0, np.int64)
-        return self._regroup(
-            removed, added, added_kinds + 1, moved, self.arrays["kind"][moved] + 1 if len(moved) else moved
-        )
+        moved = self._changed_kinds(removed) if self.kind_changed else NO_ROWS
+        blocks = [kind + 1 for kind in added_kinds] if type(added_kinds) is list else added_kinds + 1
+        return self._regroup(removed, added, blocks, moved, self.arrays["kind"][moved] + 1 if len(moved) else moved)
 
     def settle(self, asleep: np.ndarray) -> None:
         """Of the dynamic rows those of this mask sleep from now on, and no others."""
-        rows, none = np.flatnonzero(asleep != (np.arange(len(asleep)) < self.blocks[0])), np.empty(0, np.int64)
+        rows = np.flatnonzero(asleep != (np.arange(len(asleep)) < self.blocks[0]))
         if len(rows):
-            self._regroup(none, none, none, rows, np.where(asleep[rows], 0, 1))
+            self._regroup(NO_ROWS, NO_ROWS, NO_ROWS, rows, np.where(asleep[rows], 0, 1))
 
-    def _regroup(self, removed: Any, added: Any, blocks: Any, moved: Any, blocks_moved: Any) -> tuple[Any, Any]:
+    def _regroup(self, removed: Any, added: Any, blocks: Any, moved: Any, blocks_moved: Any) -> tuple[Rows, np.ndarray]:
         """As ``rebuild``, and the rows ``moved`` come into other blocks."""
         values = {key: self.values(key, moved) for key in self.arrays} if len(moved) else {}
         if values:
-            removed = np.concatenate((removed, moved))
-            added = np.concatenate((added, values["entity"]))
-            blocks = np.concatenate((blocks, blocks_moved))
+            pairs = (removed, moved), (added, values["entity"]), (blocks, blocks_moved)
+            removed, added, blocks = (np.concatenate((np.asarray(one, np.int64), other)) for one, other in pairs)
         if len(removed) > 1:
             removed = np.sort(removed)
         if len(added) > 1:
+            added, blocks = np.asarray(added, np.int64), np.asarray(blocks, np.int64)
             keys = (blocks << 48) | added
             if (keys[1:] < keys[:-1]).any():
                 order = np.argsort(keys, kind="stable")  # fast on what is partly in order
@@ -395,12 +394,9 @@ class Table:
         if self._bound_columns != self.columns_version:
             self._bind_columns()
         plan = self._plan
-        plan.begin(self.arrays["entity"], removed, added, blocks)
+        plan.begin(removed, added, blocks)
         self._columns.move(plan)
         rows = plan.fresh
-        self.arrays["entity"][rows] = added
-        if self.kind_carrier is not None:
-            self.arrays["kind"][rows] = KIND_OF_BLOCK[blocks]
         self.on_rows_moved(plan)
         plan.end()
         self.blocks = tuple(plan.record.stops.tolist())
@@ -424,6 +420,7 @@ class Table:
         for key, row in zip(self.arrays, defaults, strict=True):
             row[...] = self._fills[key]
         self._columns.bind(columns, defaults)
+        self._plan.follow(self.arrays["entity"], self.arrays.get("kind"))
         self._bound_columns = self.columns_version
 
     def set_kinds(self, rows: np.ndarray, kinds: np.ndarray) -> None:

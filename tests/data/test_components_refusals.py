@@ -255,7 +255,7 @@ def test_what_many_and_create_entities_refuse():
 def test_a_hundred_thousand_entities_at_once():
     """None of them costs a call."""
     rng, calls = np.random.default_rng(0), []
-    for n in (1_000, 100_000):
+    for n in (10, 10_000, 100_000):  # the first finds what is known from then on
         position, radius = rng.random((n, 2)), rng.random(n)
         world = make_world()
 
@@ -267,4 +267,4 @@ def test_a_hundred_thousand_entities_at_once():
         np.testing.assert_array_equal(world.bodies.position, position)
         assert world.component_for_entity(n, SphereCollider).radius == radius[-1]
         world.close()
-    assert calls[1] == calls[0]
+    assert calls[2] == calls[1]
