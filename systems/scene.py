@@ -59,6 +59,7 @@ class Scene:
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None
         self.levels = np.empty((1, 0), np.int8)
+        self._masks: list[np.ndarray] = []  # of the linked shapes: which bodies have them
         self._taken_out = np.empty(0, np.int64), self.levels  # rows without their shapes, and these
         self.stretches = np.zeros(0, bool)  # bodies whose box is stretched by rotation inside of a cheaper level
         self.rotated = False
@@ -97,29 +98,29 @@ class Scene:
         built_for = (table.members_version, self.registry.version, table.capacity, self._present_colliders())
         if built_for != self._built_for or not self._place_arrivals():
             self._built_for = None  # until it is done
-            self._build(built_for[-1])
+            self._build(in_order(self.registry, built_for[-1]))
             self._built_for = built_for
         return True
 
     def _count_rows(self) -> None:
         """What the records know of the table's rows."""
         state, table = self.state, self.table
-        bodies, count, moving = state.bodies, table.count, table.stops[1]
-        table.arrays["linear_velocity"][moving:count] = 0.0
+        count, (dynamic, moving, _) = table.count, table.stops
         if self._zero_version != self._columns_made:
-            self._zero = [column for name in ZERO_WHERE_STATIC if len(column := getattr(bodies, name))]
+            self._zero = [column for name in ZERO_WHERE_STATIC if len(column := getattr(state.bodies, name))]
             self._zero_version, self._zero_rows = self._columns_made, (0, 0)
-        start, stop = self._zero_rows if self._zero_rows[0] < self._zero_rows[1] else (count, count)
-        for low, high in ((moving, min(count, start)), (max(moving, stop), count)):
-            if low < high:
-                for column in self._zero:
-                    column[low:high] = 0
+        if moving < count:
+            table.arrays["linear_velocity"][moving:count] = 0.0
+            start, stop = self._zero_rows if self._zero_rows[0] < self._zero_rows[1] else (count, count)
+            for low, high in ((moving, min(count, start)), (max(moving, stop), count)):
+                if low < high:
+                    for column in self._zero:
+                        column[low:high] = 0
         self._zero_rows = moving, count
         if self._columns_version != table.columns_version:
             self.bind_columns()
-        state.count, (state.sleepers, state.dynamic, state.moving, _) = count, table.blocks
+        state.count, state.version, (state.sleepers, state.dynamic, state.moving, _) = count, table.version, table.blocks
         state.first = min(state.first, state.sleepers)
-        state.version = table.version
 
     def _build(self, present: list[type[Any]]) -> None:
         """Make everything that depends on which colliders there are."""
@@ -142,13 +143,14 @@ class Scene:
 
     def _move_rows(self, plan: RowPlan) -> None:
         """The table's rows move, and those of the columns that are kept go along; if they cannot, all is made again."""
-        if self._kept_version != (self._columns_made, self.table.capacity):
+        table = self.table
+        if self._kept_version != (self._columns_made, table.capacity):
             self._bind_kept()
         if self._keeps:
             self._moved.move(plan)
-            self._arrived, self._arrived_in = plan.fresh, -1
-            if self.structure == self.table.version + self.table.members_version + self.registry.version:
-                self._arrived_in = self.table.version + 1  # all that have come since the last refresh
+            followed = self.structure == table.version + table.members_version + self.registry.version
+            self._arrived = plan.fresh
+            self._arrived_in = table.version + 1 if followed else -1  # all that have come since the last refresh
         else:
             self._built_for = None
 
@@ -165,34 +167,34 @@ class Scene:
     def _place_arrivals(self) -> bool:
         """Find the shapes of the bodies that have come since the last time; False if all has to be made again."""
         state, table, count, moving = self.state, self.table, self.table.count, self.table.stops[1]
-        shapes, slots = state.bodies.shape[:count], state.shapes.slots
-        if len(self._taken_out[0]) or (self.linked and count - moving > len(state.bodies.static_position)):
+        bodies, linked = state.bodies, self.linked
+        if len(self._taken_out[0]) or (linked and count - moving > len(bodies.static_position)):
             return False
+        if linked and (self._shapes_version != table.columns_version or linked.has_array_columns):
+            self._bind_shapes()
+        shapes, slots, collides = bodies.shape[:count], state.shapes.slots, False
         arrived = self._arrived if self._arrived_in == table.version else (shapes == ARRIVED).nonzero()[0]
-        colliders = [] if self.linked is None else [table.has_mask(shape.component) for shape in self.linked.shapes]
         if len(arrived) <= FEW:
             for row in arrived.tolist():
-                own = [index for index, mask in enumerate(colliders) if mask.item(row)]
+                own = [index for index, mask in enumerate(self._masks) if mask.item(row)]
                 if len(own) > 1:
                     return False
-                shapes[row] = own[0] if own else -1
-                if self.linked is not None:
-                    state.bodies.collider_slot[row] = slots[shapes[row]]
+                shapes[row] = shape = own[0] if own else -1
+                if linked:
+                    bodies.collider_slot[row] = slots[shape]
+                collides = collides or (shape >= 0 and row < moving)
         else:
             shapes[arrived] = -1
-            for index, mask in enumerate(colliders):
+            for index, mask in enumerate(self._masks):
                 rows = arrived[mask[arrived]]
                 if np.count_nonzero(shapes[rows] >= 0):
                     return False
                 shapes[rows] = index
-            if self.linked is not None:
-                state.bodies.collider_slot[arrived] = slots[shapes[arrived]]
-        state.collides = bool(moving and shapes[:moving].max() >= 0)
-        if self.linked is not None:
-            if self._shapes_version != table.columns_version or self.linked.has_array_columns:
-                self._bind_shapes()
-            if self.rotated or self.linked.needs_axes:
-                state.rotation_stale = True
+            if linked:
+                bodies.collider_slot[arrived] = slots[shapes[arrived]]
+        state.collides = collides or bool(moving and shapes[:moving].max() >= 0)
+        if linked:
+            state.rotation_stale = state.rotation_stale or self.rotated or linked.needs_axes
         return True
 
     def forget(self) -> None:
@@ -200,10 +202,9 @@ class Scene:
         self.structure, self._built_for = -1, None
 
     def _present_colliders(self) -> list[type[Any]]:
-        table = self.table
+        table, count = self.table, self.table.count
         known = table.stacked_types(Collider.stack)
-        present = [c for c in known if c in self.prepared or np.count_nonzero(table.has_mask(c)[: table.count])]
-        return in_order(self.registry, present)
+        return [c for c in known if c in self.prepared or np.count_nonzero(table.has_mask(c)[:count])]
 
     def bind_columns(self) -> None:
         """The table's arrays, which are others after it has grown, and more when a column on demand is made."""
@@ -292,6 +293,8 @@ class Scene:
 
     def _bind_shapes(self) -> None:
         """The parameter columns of each shape: as the components have them, and as they are in the world."""
+        shapes = () if self.linked is None else self.linked.shapes
+        self._masks = [self.table.has_mask(shape.component) for shape in shapes]
         if self.linked is None or self.parameters is None:
             self.state.shapes.count = 0
             return

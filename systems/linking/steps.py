@@ -56,12 +56,13 @@ class StepLinks:
         """
         self.version = NEVER  # until it is done
         scene, state = self._scene, self._state
-        state.sweeps_ready = self.needs_sweeps()
+        collides = state.collides
+        state.sweeps_ready = sweeps = collides and self.needs_sweeps()
         usual = (
-            scene.linked, scene.registry.version, scene.table.capacity, force_systems, state.sweeps_ready,
-            state.collides, state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
+            scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
+            state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
         )  # fmt: skip
-        if self._key is not None and usual == self._usual and usual[5]:  # bodies have come or gone, no more
+        if self._key is not None and usual == self._usual and collides:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes
             self.version = scene.version
             return False
@@ -128,10 +129,10 @@ class StepLinks:
 
     def link_shapes(self) -> None:
         """The functions of the shapes alone, where they are not linked yet."""
-        key = (self._scene.linked, self._state.sweeps_ready)
+        key = _, sweeps = self._scene.linked, self._state.sweeps_ready
         if key != self._shapes_key:
             link_all(self._functions_of_shapes())
-            self._scene.link_shapes(self._state.sweeps_ready)
+            self._scene.link_shapes(sweeps)
             self._shapes_key = key
 
     def link_together(self) -> None:
