@@ -389,9 +389,10 @@ class Adoption:
 
 def _kind_of(carrier: Component) -> int:
     """The kind as it is stored."""
-    column = type(carrier).columns["kind"]
-    store = carrier._store
-    return carrier._values["kind"] if store is None else int(store.values(column.key, carrier._row))
+    column, store = type(carrier).columns["kind"], carrier._store
+    if store is None:
+        return carrier._values.get("kind", column.stored_default)  # type: ignore[union-attr]
+    return int(store.values(column.key, carrier._row))
 
 
 def _second_use(component: type[Component], owners: str) -> str:

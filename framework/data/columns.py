@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-SMALLEST_WITH_INVERSE = 1 / np.finfo(float).max  # 5.6e-309, a denormal
 LARGEST = float(np.finfo(float).max)
+SMALLEST_WITH_INVERSE = 1 / LARGEST  # 5.6e-309, a denormal
 REQUIRED: Any = type("Required", (), {"__repr__": lambda self: "<required>"})()
 
 
@@ -72,15 +72,22 @@ class Column:
 
     def bounds(self) -> tuple[float, float] | None:
         """From where to where numbers may be; None: any that the type holds."""
-        if self.dtype is not float:
-            return None
-        low = SMALLEST_WITH_INVERSE if self.positive else self.minimum
-        return (-self.largest if low is None else low), self.largest
+        return self.limits if self.dtype is float else None
+
+    @cached_property
+    def limits(self) -> tuple[float, float]:
+        """The smallest and the largest number that pass the checks."""
+        smallest = SMALLEST_WITH_INVERSE if self.positive else -self.largest
+        return smallest if self.minimum is None else max(smallest, self.minimum), self.largest
 
     # -- checks -----------------------------------------------------------------------------------
 
     def checked(self, value: Any, entity: int | None = None) -> Any:
         """``value`` as it is stored; ValueError (or TypeError) names entity, field and value if it cannot be."""
+        if type(value) is float and self.dtype is float:
+            low, high = self.limits
+            if low <= value <= high:
+                return value
         if self.choices:
             if not isinstance(value, str) or value not in self.choices:
                 raise self._error(value, f"must be one of {', '.join(self.choices)}", entity)
@@ -107,26 +114,20 @@ class Column:
 
     def _usual(self, value: Any) -> Any:
         """The most frequent values checked without numpy, which takes ten times as long; None: look closely."""
-        kind = type(value)
-        if kind is float or kind is int:
+        kind, (low, high) = type(value), self.limits
+        if kind is int:
             if self.dtype is np.int64:
                 bounded = self.positive or self.minimum is not None
                 refused = bounded or (self.nonzero and value == 0)
-                return value if kind is int and abs(value) < 2**63 and not refused else None
-            if -self.largest <= value <= self.largest and self._within(value):
+                return value if abs(value) < 2**63 and not refused else None
+            if low <= value <= high:
                 return float(value)
         elif self.item == "vector" and (kind is tuple or kind is list) and len(value) in (2, 3):
-            largest = self.largest
             for number in value:
-                if type(number) not in (float, int) or not -largest <= number <= largest or not self._within(number):
+                if type(number) not in (float, int) or not low <= number <= high:
                     return None
             return np.array(value, float)
         return None
-
-    def _within(self, number: float) -> bool:
-        if self.positive and number < SMALLEST_WITH_INVERSE:
-            return False
-        return self.minimum is None or number >= self.minimum
 
     def checked_many(self, values: Any, count: int, dimensions: int) -> np.ndarray:
         """An array for ``count`` rows, from one value for all or one per row."""
@@ -185,7 +186,8 @@ class Column:
 
     def check_numbers(self, array: np.ndarray, shown: Any, entity: int | None) -> None:
         """Finite and within the field's bounds; ``shown`` is what the message quotes (None: the first bad row)."""
-        usual = self.item != "rotation" and array.size and self._all_within(array.min(), array.max())
+        low, high = self.limits
+        usual = self.item != "rotation" and array.size and low <= array.min() and array.max() <= high  # none is nan
         if usual and (not self.nonzero or np.all(array)):
             return
         for bad, rule in (
@@ -204,10 +206,6 @@ class Column:
         if self.item == "rotation" and array.ndim and array.shape[-1] == 4 and not np.all(np.any(array, axis=-1)):
             where = "" if shown is not None else f" (row {int(np.argmin(np.any(array, axis=-1)))})"
             raise self._error([0.0] * 4 if shown is None else shown, f"must not be the zero quaternion{where}", entity)
-
-    def _all_within(self, low: Any, high: Any) -> bool:
-        """Whether the smallest and the largest of some numbers are what the field allows."""
-        return bool(-self.largest <= low and high <= self.largest and self._within(low))  # neither is nan then
 
     def _as_numbers(self, value: Any, entity: int | None) -> np.ndarray:
         try:
@@ -237,7 +235,9 @@ class Column:
             return self
         store = handle._store
         if store is None:
-            value = handle._values[self.name]
+            value = handle._values.get(self.name)
+            if value is None:
+                value = self.stored_default
             if type(value) is float and handle._version < -1 and self.item_shape(-handle._version):
                 value = handle._values[self.name] = self.whole(value, -handle._version)
             return self.shown(value)

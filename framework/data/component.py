@@ -26,12 +26,14 @@ class Component:
 
     __slots__ = ("__weakref__", "_entity", "_row", "_store", "_values", "_version")
 
+    _values: dict[str, Any] | None  # that it holds itself; what is missing has its default
+
     columns: ClassVar[dict[str, Column]] = {}
-    fields: ClassVar[tuple[tuple[str, str], ...]] = ()  # name and key in a table of each
     prefix: ClassVar[str] = ""  # of the columns' names in a table
     makes_body: ClassVar[bool] = False  # an entity that has it together with a Transform is a body
     _abstract: ClassVar[bool] = True
     _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
+    _held: ClassVar[tuple[str, ...]] = ()  # those whose default does not fit worlds of 2 and of 3 dimensions
     _arguments: ClassVar[dict[str, Column]] = {}  # of the constructor
     _positional: ClassVar[tuple[str, ...]] = ()  # those that need no name
     _required: ClassVar[tuple[str, ...]] = ()
@@ -68,7 +70,6 @@ class Component:
             if not hasattr(cls, word):
                 setattr(cls, word, _OtherWord(word))
         cls.columns = fields
-        cls.fields = tuple((name, field.key) for name, field in fields.items())
         if "__slots__" not in vars(cls):
             cls.__setattr__ = _set_field  # type: ignore[method-assign]
         cls._shaped = tuple(field for field in fields.values() if field.item != "scalar")
@@ -77,6 +78,11 @@ class Component:
         cls._required = tuple(name for name, field in cls._arguments.items() if field.default is REQUIRED)
         cls._pooled = tuple(field for field in fields.values() if isinstance(field, ArrayColumn))
         cls._defaults = {name: field.stored_default for name, field in fields.items()}  # ValueError for a wrong one
+        cls._held = tuple(
+            field.name for field in cls._shaped
+            if isinstance(field.stored_default, np.ndarray)
+            or (field.item == "rotation" and field.stored_default not in (0, REQUIRED))
+        )  # fmt: skip
 
     if not TYPE_CHECKING:  # checkers of types would take any name
 
@@ -92,18 +98,22 @@ class Component:
         return [name for name in super().__dir__() if not isinstance(vars(type(self)).get(name), _OtherWord)]
 
     def __init__(self, *args: Any, **values: Any) -> None:
-        self._fill({**self._named(args, values), **values} if args else values)
+        self._fill(self._named(args, values) if args else values)
 
     @classmethod
     def _named(cls, args: tuple[Any, ...], values: Mapping[str, Any]) -> dict[str, Any]:
-        """Positional arguments by their names; TypeError if they are too many, or among those given by name."""
+        """All arguments by their names; TypeError if positional ones are too many, or also given by name."""
         names = cls._positional
         if len(args) > len(names):
             more = ", others by name" if len(names) < len(cls._arguments) else ""
             raise TypeError(f"{cls.__name__} takes {len(names)} values ({', '.join(names)}{more}), got {len(args)}")
-        given = dict(zip(names, args, strict=False))
-        for name in given.keys() & values.keys():
-            raise TypeError(f"{cls.__name__} got {name!r} twice")
+        given = {}
+        for k, value in enumerate(args):
+            given[names[k]] = value
+        if values:
+            for name in given.keys() & values.keys():
+                raise TypeError(f"{cls.__name__} got {name!r} twice")
+            given.update(values)
         return given
 
     @classmethod
@@ -113,12 +123,14 @@ class Component:
         return TypeError(f"{cls.__name__} has no field {name!r}{near}; it has {', '.join(cls._arguments) or 'none'}")
 
     def _fill(self, given: Mapping[str, Any]) -> None:
-        """Set every column: the given value, else its default; TypeError for a name that is no argument."""
+        """Hold what is given, all else has its default; TypeError for a name that is no argument."""
         self._store = None
         self._entity = None
         self._row = -1
         self._version = -1
-        arguments, stored = self._arguments, self._defaults.copy()
+        arguments, stored = self._arguments, {}
+        for name in self._held:
+            stored[name] = copy.copy(self._defaults[name])
         for name, value in given.items():
             field = arguments.get(name)
             if field is None:
@@ -127,9 +139,6 @@ class Component:
         for name in self._required:
             if name not in given:
                 raise TypeError(f"{type(self).__name__} needs a value for {name!r}")
-        for field in self._shaped:
-            if type(stored[field.name]) is np.ndarray and field.name not in given:
-                stored[field.name] = stored[field.name].copy()
         self._values = stored
         if self._pooled:
             hold_arrays(self, self._pooled)
@@ -165,10 +174,15 @@ class Component:
         if self._store is not None and self._store.dimensions == dimensions:
             return
         for column in self._shaped:
-            value = self._values[column.name] if self._store is None else getattr(self, column.name)
-            if type(value) is np.ndarray and column.item == "vector" and len(value) == dimensions:
+            value = getattr(self, column.name) if self._store is not None else self._values.get(column.name)
+            if value is None:  # its default fits any world
                 continue
-            if type(value) is not float or column.item == "rotation":  # a number stands for any vector
+            vector = column.item == "vector"
+            if type(value) is float:
+                fits = vector or dimensions == 2 or value == 0.0  # a number stands for any vector
+            else:
+                fits = vector and type(value) is np.ndarray and len(value) == dimensions
+            if not fits:
                 column.check_dimensions(value, dimensions, entity)
 
     def fit(self, dimensions: int, entity: int | None = None) -> None:
@@ -216,7 +230,7 @@ class Component:
     @classmethod
     def many(cls, *args: Any, **values: Any) -> Many:
         """Values for many entities at once, for ``world.create_entities``: each one value for all, or one per row."""
-        given = {**cls._named(args, values), **values}
+        given = cls._named(args, values)
         for name in given:
             if name not in cls._arguments:
                 raise cls._unknown(name)

@@ -16,7 +16,7 @@ import numpy as np
 
 from .change_log import Arrival, ChangeLog, Stores
 from .component import Component, RowStore
-from .table import HAS_OBJECTS
+from .table import FEW, HAS_OBJECTS
 
 TRAIL = 32  # snapshots: a game over a network goes back by fewer
 
@@ -158,6 +158,25 @@ class Entities(dict[int, dict[type[Any], Any]]):
             mask &= table.has_mask(component)[: table.count]
         return table.column("entity")[mask]
 
+    def _have_no_objects(self, entities: np.ndarray) -> np.ndarray:
+        """(n,) which of these ids (n,) are entities without objects, or were deleted as such."""
+        there = np.zeros(len(entities), bool)
+        if self.table is not None and len(entities):
+            rows = self.table.rows_of(entities)
+            there = (rows >= 0) & ~self.table.arrays[HAS_OBJECTS][rows]
+        for one in self.log.arrivals:
+            there |= (entities >= one.first) & (entities < one.stop)
+        return there
+
+    def missing(self, entities: Iterable[Any]) -> list[Any]:
+        """Those of these ids that no entity has."""
+        others = [entity for entity in entities if not dict.__contains__(self, entity)]
+        if len(others) > FEW and set(map(type, others)) == {int} and min(others) >= 0 and max(others) < self.stop:
+            numbers = np.array(others, np.int64)
+            there = self._have_no_objects(numbers) & ~among(numbers, self.log.deleted)
+            return numbers[~there].tolist()
+        return [entity for entity in others if entity not in self]
+
     def mask(self, entities: np.ndarray, component: type[Any]) -> np.ndarray:
         """(n,) which of these ids (n,) have that component."""
         of, table, log = self.members.get(component), self.table, self.log
@@ -261,7 +280,10 @@ class Entities(dict[int, dict[type[Any], Any]]):
         if ours:
             self.log.dirty = True
             self.log.touched.add(entity)
-        self[entity] = components
+        self.saved = None
+        if self.unshared is not None:
+            self.unshared.add(entity)
+        dict.__setitem__(self, entity, components)
 
     def create_many(self, first: int, count: int, stores: Stores) -> None:
         self.note(())
@@ -280,8 +302,8 @@ class Entities(dict[int, dict[type[Any], Any]]):
         """What esper does for its dead; what does not exist (any more) is no error."""
         self.version += 1
         log, members = self.log, self.members
-        gone: dict[type[Any], list[int]] = {}
         handles: list[weakref.ref[Any]] = []
+        gone: list[int] = []
         components = handle = None
         others: list[Any] = []
         for entity in entities:
@@ -289,40 +311,29 @@ class Entities(dict[int, dict[type[Any], Any]]):
             if components is None:
                 others.append(entity)
                 continue
-            self.note((entity,))
-            ours = False
+            gone.append(entity)
             for component, handle in components.items():
-                ours = ours or members[component].ours
-                ids = gone.get(component)
-                if ids is None:
-                    ids = gone[component] = []
-                ids.append(entity)
-                if isinstance(handle, Component):
-                    handles.append(weakref.ref(handle))
-            if ours:  # the table does not know of others
-                log.dirty = True
-                log.touched.add(entity)
+                of = members[component]
+                of.listed.discard(entity)
+                if of.ours:  # the table does not know of others
+                    log.dirty = True
+                    log.touched.add(entity)
+                    if isinstance(handle, Component):
+                        handles.append(weakref.ref(handle))
+        self.note(gone)
         if others:
             log.dirty = True
             self._delete_without_objects(others)
         components = handle = None
         log.lost += [handle for one in handles if (handle := one()) is not None]  # those that somebody holds
-        for component, ids in gone.items():
-            members[component].listed.difference_update(ids)
-        for component in [component for component, of in members.items() if not of]:
+        for component in [component for component, of in members.items() if not (of.listed or of)]:
             del members[component]
 
     def _delete_without_objects(self, entities: list[Any]) -> None:
         numbers = np.array(entities)
         if numbers.dtype != np.int64 or numbers.ndim != 1:
             numbers = np.array([number for number in map(_number, entities) if number is not None], np.int64)
-        there = np.zeros(len(numbers), bool)
-        if self.table is not None and len(numbers):
-            rows = self.table.rows_of(numbers)
-            there = (rows >= 0) & ~self.table.arrays[HAS_OBJECTS][rows]
-        for one in self.log.arrivals:
-            there |= (numbers >= one.first) & (numbers < one.stop)
-        self.log.deleted.update(numbers[there].tolist())
+        self.log.deleted.update(numbers[self._have_no_objects(numbers)].tolist())
         self.saved = None
 
     def forget_all(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,41 +12,42 @@ from .component import Component
 from .table import Table
 
 
-def stored(handle: Component) -> Mapping[str, Any]:
-    """A handle's values by field, as they are stored; a single number may stand for a vector."""
+def stored(handle: Component, default: bool = True) -> Mapping[str, Any]:
+    """A handle's values by field, as they are stored; a single number may stand for a vector.
+
+    default: also those that a handle without a row has not been given.
+    """
     store = handle._store
     if store is None:
-        return handle._values  # type: ignore[return-value]
+        return {**handle._defaults, **handle._values} if default else handle._values  # type: ignore[dict-item]
     row = handle._row if handle._version == store.version else handle._locate()
     return {name: store.values(column.key, row) for name, column in handle.columns.items()}
 
 
-def as_column(values: list[Any], column: Column, dimensions: int) -> np.ndarray:
+def as_column(values: Sequence[Any], column: Column, dimensions: int) -> np.ndarray:
     """(n, ...) such values of one field."""
     shape = column.item_shape(dimensions)
-    if shape and not all(type(value) is np.ndarray for value in values):
+    if not shape:
+        return np.array(values, column.dtype)
+    if set(map(type, values)) != {np.ndarray}:
         values = [v if isinstance(v, np.ndarray) and v.shape else column.whole(float(v), dimensions) for v in values]
-    return np.array(values, column.dtype).reshape(len(values), *shape)
+    return np.concatenate(values).reshape(len(values), *shape)
 
 
 def write_handles(
     table: Table, component: type[Component], handles: list[Component], rows: list[int], fresh: bool
 ) -> None:
     """Write the values of handles into these rows of a table; fresh: the rows hold the defaults."""
-    defaults = table.defaults
-    sources = [stored(handle) for handle in handles]
+    sources, columns = [stored(handle, not fresh) for handle in handles], component.columns
     if len(sources) == 1:
-        row, values = rows[0], sources[0]
-        for name, key in component.fields:
-            value = values[name]
-            if value is not defaults[key] or not fresh:
-                table.write_one(key, row, value)
+        for name, value in sources[0].items():
+            table.write_one(columns[name].key, rows[0], value)
         return
-    at = np.array(rows)
-    for name, key in component.fields:
-        given = [values[name] for values in sources]
-        if not fresh or set(map(id, given)) != {id(defaults[key])}:
-            table.write(key, at, as_column(given, component.columns[name], table.dimensions))
+    at, names = np.array(rows), set().union(*sources)
+    for name, column in columns.items():
+        if name in names:
+            given = [values.get(name, column.stored_default) for values in sources]
+            table.write(column.key, at, as_column(given, column, table.dimensions))
 
 
 def bind_handles(table: Table, entities: list[int], handles: list[Component]) -> None:

@@ -197,11 +197,6 @@ class Table:
         default = np.asarray(self._fills[key], column.dtype)
         return np.broadcast_to(default, (*rows, *column.item_shape(self.dimensions)))
 
-    @property
-    def defaults(self) -> dict[str, Any]:
-        """By column, what rows hold that have no value of their own: do not change it."""
-        return self._fills
-
     def default_of(self, key: str) -> Any:
         """What rows of that column hold that have no value of their own."""
         return self._fills[key]

@@ -37,7 +37,7 @@ class EntityVerbs:
         """
         contents = self._contents()
         self._check(components, None)
-        by_type = {type(component): component for component in components}
+        by_type = dict(zip(map(type, components), components, strict=True))
         if len(by_type) < len(components):
             types = [type(component).__name__ for component in components]
             twice = next(name for name in types if types.count(name) > 1)
@@ -77,9 +77,8 @@ class EntityVerbs:
     def delete_entities(self, entities: Iterable[int]) -> None:
         """Delete all these at the start of the next step; KeyError, and none is deleted, if one does not exist."""
         contents, ids = self._contents(), list(entities)
-        for entity in ids:
-            if entity not in contents.entities:
-                raise KeyError(f"no entity {entity!r} in this world")
+        for entity in contents.entities.missing(ids):
+            raise KeyError(f"no entity {entity!r} in this world")
         contents.dead.update(map(int, ids))
 
     def entity_exists(self, entity: int) -> bool:
