@@ -193,8 +193,8 @@ class Scene:
             if linked:
                 bodies.collider_slot[arrived] = slots[shapes[arrived]]
         state.collides = collides or bool(moving and shapes[:moving].max() >= 0)
-        if linked:
-            state.rotation_stale = state.rotation_stale or self.rotated or linked.needs_axes
+        if linked and (self.rotated or linked.needs_axes):
+            state.rotation_stale = True
         return True
 
     def forget(self) -> None:

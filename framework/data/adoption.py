@@ -8,7 +8,7 @@ log.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import compress
 from typing import Any
 
@@ -18,43 +18,66 @@ from ..errors import MissingComponentError
 from .change_log import Arrival
 from .component import Component
 from .esper_bridge import Contents
-from .handles import bind_handles, write_handles
+from .handles import Contained, bind_handles, write_handles
 from .table import FEW, HAS_OBJECTS, STATIC, Table
 
 Ids = set[int]
 ByType = Mapping[type[Any], tuple[list[int], list[Any]]]  # entities that have one of the type, and these
-OTHER, OURS, PARTNER = range(3)  # component types: not carom's; with columns; such that make a body with the anchor
 
 
-@dataclass
-class Fresh:
-    """Handles of one type to adopt: their entities, and these one's rows (-1: it is no body yet)."""
+@dataclass(eq=False)
+class Archetype:
+    """What is known of all entities with the same types of components.
 
-    entities: list[int] = field(default_factory=list)
-    rows: list[int] = field(default_factory=list)
-    handles: list[Any] = field(default_factory=list)
+    columns
+        those types that have columns
+    partner
+        one of them that makes a body together with the anchor; None: no body
+    anchored
+        whether the anchor is among them
+    stacked
+        whether several are in a stack, so that they have to go together
+    known
+        the table has columns for all of them, and nothing is wrong with the types
+    """
+
+    columns: tuple[type[Component], ...]
+    partner: type[Component] | None
+    anchored: bool
+    stacked: bool
+    known: bool = False
+
+    def __post_init__(self) -> None:
+        self.masks = (HAS_OBJECTS, *map(Table.mask_name, self.columns))
 
 
-@dataclass
 class Changes:
     """What has to be done so that the table knows what esper has.
 
     come, left
-        ids that become bodies, ascending; rows of those that cease to be
+        ids that become bodies, with their components, by archetype; rows of those that cease to be
     fresh, missing
-        handles to adopt, and rows that stay and lose the component, by type
+        handles to adopt and rows that lose a component, by type, of bodies that stay; the former with their entities
+    given, several
+        all handles to adopt, with types and entities; the components of entities that have several of one stack
+    archetypes
+        those of bodies that come or change which were not known before, and an entity of each
     detached
         handles of entities that cease to be bodies and keep them
     arrivals
         with the ids of those of them that are to become bodies
     """
 
-    come: list[int] = field(default_factory=list)
-    left: list[int] = field(default_factory=list)
-    fresh: dict[type[Component], Fresh] = field(default_factory=dict)
-    missing: dict[type[Component], list[int]] = field(default_factory=dict)
-    detached: list[Component] = field(default_factory=list)
-    arrivals: list[tuple[Arrival, np.ndarray]] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.come: dict[Archetype, tuple[list[int], list[Contained]]] = {}
+        self.left: list[int] = []
+        self.fresh: dict[type[Component], list[tuple[int, Any]]] = {}
+        self.missing: dict[type[Component], list[int]] = {}
+        self.given: list[tuple[type[Component], int, Any]] = []
+        self.several: dict[int, Contained] = {}
+        self.archetypes: list[tuple[Archetype, int]] = []
+        self.detached: list[Component] = []
+        self.arrivals: list[tuple[Arrival, np.ndarray]] = []
 
 
 class Adoption:
@@ -69,7 +92,7 @@ class Adoption:
         self.table, self.anchor = table, anchor
         self._contents, self._log, self._entities = contents, contents.log, contents.entities
         self._check_together = check_together
-        self._roles: dict[Any, int] = {}  # by component type
+        self._archetypes: dict[tuple[Any, ...], Archetype] = {}  # by the types of all components
         contents.entities.table = table
 
     def settled(self) -> bool:
@@ -141,69 +164,83 @@ class Adoption:
         """Bind those of these handles that belong to bodies: the table has their rows."""
         bodies = self._bodies_of(by_type)
         for component, (entities, handles) in by_type.items():
-            role = self._role(component)
-            if role == OURS and not bodies.issuperset(entities):
+            alone = self._archetype((component,))
+            if alone.columns and not alone.partner and not bodies.issuperset(entities):
                 are = list(map(bodies.__contains__, entities))
                 entities, handles = list(compress(entities, are)), list(compress(handles, are))
-            if role != OTHER:
+            if alone.columns:
                 bind_handles(self.table, entities, handles)
 
     def _bodies_of(self, by_type: ByType) -> Ids:
-        return set().union(*(entities for c, (entities, _) in by_type.items() if self._role(c) == PARTNER))
+        return set().union(*(entities for c, (entities, _) in by_type.items() if self._archetype((c,)).partner))
 
     # -- what has changed -------------------------------------------------------------------------
 
-    def _role(self, component: Any) -> int:
-        role = self._roles.get(component)
-        if role is None:
-            ours = isinstance(component, type) and issubclass(component, Component)
-            role = self._roles[component] = OTHER if not ours else PARTNER if component.makes_body else OURS
-        return role
+    def _archetype(self, types: tuple[Any, ...]) -> Archetype:
+        known = self._archetypes.get(types)
+        if known is None:
+            columns = tuple(c for c in types if isinstance(c, type) and issubclass(c, Component))
+            partner = next((component for component in reversed(columns) if component.makes_body), None)
+            stacks = [stack for component in columns if (stack := getattr(component, "stack", None))]
+            stacked = len(set(stacks)) < len(stacks)
+            known = self._archetypes[types] = Archetype(columns, partner, self.anchor in columns, stacked)
+        return known
 
     def _find_changes(self) -> Changes:
-        changes, log, table, entities, roles = Changes(), self._log, self.table, self._entities, self._roles
-        touched = sorted(log.touched)
+        changes, log, table, entities = Changes(), self._log, self.table, self._entities
+        known, touched, given = self._archetypes, sorted(log.touched), changes.given
         rows = [-1] * len(touched)
         if touched and table.count and not log.cleared:  # else the ids mean other entities now
             few = len(touched) <= FEW
-            rows = [table.row_of(e) for e in touched] if few else table.rows_of(np.array(touched, np.int64)).tolist()
+            rows = list(map(table.row_of, touched)) if few else table.rows_of(np.array(touched, np.int64)).tolist()
         for entity, row in zip(touched, rows, strict=True):
             now: Any = dict.get(entities, entity, ())
-            partner = None
-            for component in now:
-                role = roles.get(component)
-                if role == PARTNER or (role is None and self._role(component) == PARTNER):
-                    partner = component
-            if partner is None:
+            types = tuple(now)
+            archetype = known.get(types) or self._archetype(types)
+            if archetype.partner is None:
                 if row >= 0:
                     changes.left.append(row)
                     changes.detached += now and now.values()
                 continue
-            if self.anchor not in now:
-                self._refuse_without_anchor(entity, partner)
+            if not archetype.anchored:
+                self._refuse_without_anchor(entity, archetype.partner)
+            if not archetype.known:
+                changes.archetypes.append((archetype, entity))
             if row < 0:
-                changes.come.append(entity)
+                own = changes.come.get(archetype)
+                if own is None:
+                    own = changes.come[archetype] = ([], [])
+                own[0].append(entity)
+                own[1].append(now)
+                given += [(component, entity, now[component]) for component in archetype.columns]
             else:
-                for component in table.types_in(row):
-                    if component not in now:
-                        changes.missing.setdefault(component, []).append(row)
-            for component, handle in now.items():
-                if roles[component] != OTHER and (row < 0 or handle._store is not table or handle._entity != entity):
-                    fresh = changes.fresh.get(component)
-                    if fresh is None:
-                        fresh = changes.fresh[component] = Fresh()
-                    fresh.entities.append(entity)
-                    fresh.rows.append(row)
-                    fresh.handles.append(handle)
+                fresh = self._compare(changes, archetype.columns, entity, row, now)
+            if archetype.stacked and (row < 0 or any(getattr(c, "stack", None) for c in fresh)):
+                changes.several[entity] = now
         for arrival in log.arrivals:
             ids = np.arange(arrival.first, arrival.stop)
             if log.deleted:
-                ids = np.setdiff1d(ids, np.fromiter(log.deleted, np.int64), assume_unique=True)
+                gone = np.fromiter(log.deleted, np.int64) - arrival.first
+                ids = np.delete(ids, gone[(gone >= 0) & (gone < len(ids))])
             if len(ids):
                 if self.anchor not in arrival.stores:
                     self._refuse_without_anchor(int(ids[0]), next(c for c in arrival.stores if c.makes_body))
                 changes.arrivals.append((arrival, ids))
         return changes
+
+    def _compare(
+        self, changes: Changes, columns: tuple[type[Component], ...], entity: int, row: int, now: Contained
+    ) -> list[type[Component]]:
+        """What a body that stays has lost, and what it has got: returns the types of the latter."""
+        table = self.table
+        for component in table.types_in(row):
+            if component not in now:
+                changes.missing.setdefault(component, []).append(row)
+        fresh = [c for c in columns if now[c]._store is not table or now[c]._entity != entity]
+        for component in fresh:
+            changes.fresh.setdefault(component, []).append((entity, now[component]))
+            changes.given.append((component, entity, now[component]))
+        return fresh
 
     def _refuse_without_anchor(self, entity: int, component: type[Component]) -> None:
         raise MissingComponentError(
@@ -214,29 +251,30 @@ class Adoption:
     # -- checks: every error is found before anything is written ----------------------------------
 
     def _check(self, changes: Changes) -> None:
-        table, dimensions, fits = self.table, self.table.dimensions, -self.table.dimensions
-        for component, fresh in changes.fresh.items():
-            table.check_component_type(component)
-            handles = fresh.handles
-            if len(handles) > 1 and len(set(map(id, handles))) < len(handles):
-                self._refuse_second_use(component, fresh)
-            for entity, handle in zip(fresh.entities, handles, strict=True):
-                if type(handle) is not component:
-                    self._refuse_other_type(component, handle, entity)
-                if handle._entity is not None:
-                    self._check_owner(component, handle, entity)
-                if handle._version != fits:
-                    handle.check_dimensions(dimensions, entity)
-        if changes.fresh:
-            self._check_together(changes.fresh, self._contents.components_of)
+        table, dimensions, fits, given = self.table, self.table.dimensions, -self.table.dimensions, changes.given
+        for archetype, entity in changes.archetypes:
+            for component in archetype.columns:
+                table.check_component_type(component)
+            self._check_together.check_types(archetype.columns, entity)
+        if len(given) > 1 and len({id(handle) for _, _, handle in given}) < len(given):
+            self._refuse_second_use(given)
+        for component, entity, handle in given:
+            if type(handle) is not component:
+                self._refuse_other_type(component, handle, entity)
+            if handle._entity is not None:
+                self._check_owner(component, handle, entity)
+            if handle._version != fits:
+                handle.check_dimensions(dimensions, entity)
+        if changes.several:
+            self._check_together(changes.several)
         for arrival, ids in changes.arrivals:
             for component in arrival.stores:
                 table.check_component_type(component)
             self._check_together.batch(arrival.stores, ids, ids - arrival.first)
 
-    def _refuse_second_use(self, component: type[Component], fresh: Fresh) -> None:
+    def _refuse_second_use(self, given: list[tuple[type[Component], int, Any]]) -> None:
         seen: dict[int, int] = {}
-        for entity, handle in zip(fresh.entities, fresh.handles, strict=True):
+        for component, entity, handle in given:
             other = seen.setdefault(id(handle), entity)
             if other != entity:
                 raise ValueError(_second_use(component, f"entities {other} and {entity}"))
@@ -261,36 +299,35 @@ class Adoption:
         table, log, fresh = self.table, self._log, changes.fresh
         lost, deleted, cleared = log.lost, log.deleted, log.cleared
         log.clear()
-        for component in (*fresh, *(component for arrival, _ in changes.arrivals for component in arrival.stores)):
-            self.know(component)
+        for archetype, _ in changes.archetypes:
+            for component in archetype.columns:
+                self.know(component)
+            archetype.known = True
+        for arrival, _ in changes.arrivals:
+            for component in arrival.stores:
+                self.know(component)
         if lost or changes.detached:
             self._let_go([*changes.detached, *(handle for handle in lost if cleared or not self._has(handle))])
-        for component, rows in changes.missing.items():
-            self._empty(component, np.array(rows))
+        for component, losing in changes.missing.items():
+            self._empty(component, np.array(losing))
         if table.on_written is not None:
-            for row in {
-                row for rows in (*changes.missing.values(), *(own.rows for own in fresh.values())) for row in rows
-            }:
-                if row >= 0:
-                    table.on_written("", row)
-        carriers = fresh.get(table.kind_carrier)
-        if carriers is not None and max(carriers.rows) >= 0:
-            self._other_kinds(carriers)
-        stays = bool(changes.missing)  # some body that stays has other components
-        places: dict[int, int] = {}
+            staying = [table.find(entity) for own in fresh.values() for entity, _ in own]
+            for row in {*staying, *(row for losing in changes.missing.values() for row in losing)}:
+                table.on_written("", row)
+        carriers = fresh.get(table.kind_carrier)  # type: ignore[arg-type]
+        if carriers is not None:
+            rows = table.rows_of(np.array([entity for entity, _ in carriers]))
+            table.set_kinds(rows, np.array([_kind_of(handle) for _, handle in carriers]))
         if changes.come or changes.left or changes.arrivals or deleted or cleared or table.kind_changed:
-            places = self._move_rows(changes, carriers, deleted, cleared)
+            self._move_rows(changes, deleted, cleared)
         for component, own in fresh.items():
-            stay = max(own.rows) >= 0
-            own.rows = [places[e] if e in places else table.find(e) for e in own.entities]
-            self._adopt(component, own, not stay)
-            stays = stays or stay
-        made = table.arrays[HAS_OBJECTS]
-        for row in places.values():
-            made[row] = True
+            alone = self._archetype((component,))
+            entities = [entity for entity, _ in own]
+            contents = [{component: handle} for _, handle in own]
+            self._adopt(alone, entities, list(map(table.find, entities)), contents, False)
         for arrival, ids in changes.arrivals:
             self._adopt_arrival(arrival, ids)
-        if stays:
+        if fresh or changes.missing:  # bodies that stay have other components
             table.members_version += 1
             table.static_version += 1
 
@@ -308,32 +345,35 @@ class Adoption:
         if component is table.kind_carrier:
             table.set_kinds(rows, np.full(len(rows), STATIC))
 
-    def _other_kinds(self, carriers: Fresh) -> None:
-        """Write the kinds of bodies that stay and get another carrier of it."""
-        staying = [(row, _kind_of(h)) for row, h in zip(carriers.rows, carriers.handles, strict=True) if row >= 0]
-        self.table.set_kinds(*map(np.array, zip(*staying, strict=True)))
-
-    def _move_rows(self, changes: Changes, carriers: Fresh | None, deleted: Ids, cleared: bool) -> dict[int, int]:
-        """Rows leave and others come; returns the rows of bodies that come one by one, by id."""
-        table, come = self.table, changes.come
-        kind_of = {} if carriers is None else dict(zip(carriers.entities, map(_kind_of, carriers.handles), strict=True))
-        added, kinds = np.array(come, np.int64), np.array([kind_of.get(e, STATIC) for e in come], np.int64)
-        removed = np.array(changes.left, np.int64)
+    def _move_rows(self, changes: Changes, deleted: Ids, cleared: bool) -> None:
+        """Rows leave and others come, and those that come one by one get their values."""
+        table, come, carrier = self.table, changes.come, self.table.kind_carrier
+        ids: list[int] = []
+        kinds: Any = []
+        for archetype, (entities, contents) in come.items():
+            ids += entities
+            moves = carrier in archetype.columns
+            kinds += [_kind_of(now[carrier]) if moves else STATIC for now in contents]
+        added: Any = ids
+        removed = changes.left
         if cleared:
             removed = np.arange(table.count)
             table.generation += 1  # ids mean other entities now
         elif deleted:
             rows = table.rows_of(np.fromiter(deleted, np.int64, len(deleted)))
-            removed = np.concatenate((removed, rows[rows >= 0]))
+            removed = np.concatenate((np.array(removed, np.int64), rows[rows >= 0]))
         if changes.arrivals:
-            added = np.concatenate((added, *(ids for _, ids in changes.arrivals)))
-            kinds = np.concatenate((kinds, *(self._kinds_of(*each) for each in changes.arrivals)))
-        added, rows = table.rebuild(removed, added, kinds)
+            of_arrivals = [self._kinds_of(*each) for each in changes.arrivals]
+            kinds = np.concatenate((np.array(kinds, np.int64), *of_arrivals))
+            added = np.concatenate((np.array(ids, np.int64), *(each for _, each in changes.arrivals)))
+        moved, rows = table.rebuild(removed, added, kinds)
         if not come:
-            return {}
-        if len(added) > len(come):
-            added, rows = np.array(come), table.rows_of(np.array(come))
-        return dict(zip(added.tolist(), rows.tolist(), strict=True))
+            return
+        if len(moved) > len(ids):
+            moved, rows = ids, table.rows_of(np.array(ids, np.int64))
+        row_of = dict(zip(map(int, moved), rows.tolist(), strict=True))
+        for archetype, (entities, contents) in come.items():
+            self._adopt(archetype, entities, [row_of[entity] for entity in entities], contents, True)
 
     def _kinds_of(self, arrival: Arrival, ids: np.ndarray) -> np.ndarray:
         """(n,) kinds of the bodies of an arrival."""
@@ -355,20 +395,26 @@ class Adoption:
             for index, handle in enumerate(own.values()):
                 handle._bind(store, None, index, store.version)
 
-    def _adopt(self, component: type[Component], own: Fresh, fresh: bool) -> None:
-        """Write the handles' values into their rows and bind the handles; fresh: the rows hold the defaults."""
-        table, version, handles, rows = self.table, self.table.version, own.handles, own.rows
-        write_handles(table, component, handles, rows, fresh)
+    def _adopt(
+        self, archetype: Archetype, entities: list[int], rows: list[int], contents: list[Contained], fresh: bool
+    ) -> None:
+        """Write the values of handles into rows and bind them; fresh: the rows hold the defaults."""
+        table, version, columns = self.table, self.table.version, archetype.columns
+        for component in columns:
+            write_handles(table, component, contents, rows, fresh)
         at: Any = rows[0] if len(rows) == 1 else rows  # one is much faster by its number
-        if component is self.anchor and "previous_position" in table.arrays:
+        for mask in archetype.masks:
+            table.arrays[mask][at] = True
+        if archetype.anchored and "previous_position" in table.arrays:
             table.arrays["previous_position"][at] = table.arrays["position"][at]
-        table.has_mask(component)[at] = True
-        for handle, entity, row in zip(handles, own.entities, rows, strict=True):
-            handle._store = table
-            handle._entity = entity
-            handle._row = row
-            handle._version = version
-            handle._values = None
+        for entity, row, now in zip(entities, rows, contents, strict=True):
+            for component in columns:
+                handle = now[component]
+                handle._store = table
+                handle._entity = entity
+                handle._row = row
+                handle._version = version
+                handle._values = None
 
     def _adopt_arrival(self, arrival: Arrival, ids: np.ndarray) -> None:
         """Write the values of an arrival into the table; handles are made when somebody asks for them."""

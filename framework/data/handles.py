@@ -11,6 +11,8 @@ from .columns import Column
 from .component import Component
 from .table import Table
 
+Contained = Mapping[type[Any], Any]  # the components of an entity
+
 
 def stored(handle: Component, default: bool = True) -> Mapping[str, Any]:
     """A handle's values by field, as they are stored; a single number may stand for a vector.
@@ -35,14 +37,18 @@ def as_column(values: Sequence[Any], column: Column, dimensions: int) -> np.ndar
 
 
 def write_handles(
-    table: Table, component: type[Component], handles: list[Component], rows: list[int], fresh: bool
+    table: Table, component: type[Component], contents: list[Contained], rows: list[int], fresh: bool
 ) -> None:
-    """Write the values of handles into these rows of a table; fresh: the rows hold the defaults."""
-    sources, columns = [stored(handle, not fresh) for handle in handles], component.columns
-    if len(sources) == 1:
-        for name, value in sources[0].items():
+    """Write the values of handles into these rows of a table; fresh: the rows hold the defaults.
+
+    contents: for each row the components of its entity, by type.
+    """
+    columns = component.columns
+    if len(rows) == 1:
+        for name, value in stored(contents[0][component], not fresh).items():
             table.write_one(columns[name].key, rows[0], value)
         return
+    sources = [stored(now[component], not fresh) for now in contents]
     at, names = np.array(rows), set().union(*sources)
     for name, column in columns.items():
         if name in names:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from ...components import AABBCollider, Collider, SphereCollider
-from ...framework.data.adoption import Fresh
 from ...framework.data.change_log import Stores
 from ...framework.data.component import Component
 from ...framework.data.handles import as_column, stored
@@ -69,24 +68,16 @@ class LevelCheck:
         self._table = table
         self._registry = registry
 
-    def __call__(
-        self, fresh: Mapping[type[Component], Fresh], components_of: Callable[[int], Mapping[type[Any], Any]]
-    ) -> None:
-        new = [component for component in fresh if issubclass(component, Collider)]
-        for component in new:
-            self._check_dimensions(component, fresh[component].entities[0])
-        types = {*new, *self._table.stacked_types(Collider.stack)}
-        if len(types) < 2:
-            return
-        several: dict[int, Mapping[type[Any], Any]] = {}  # entities that get a collider and have another
-        for component in new:
-            for entity in fresh[component].entities:
-                own = components_of(entity)
-                if len(types & own.keys()) > 1:
-                    several[entity] = own
-        if not several:
-            return
-        ordered = in_order(self._registry, {c for own in several.values() for c in own if c in types})
+    def check_types(self, types: Iterable[type[Component]], entity: int) -> None:
+        """Whether these colliders are shapes of this world; the entity is for messages."""
+        for component in types:
+            if issubclass(component, Collider):
+                self._check_dimensions(component, entity)
+
+    def __call__(self, several: Mapping[int, Mapping[type[Any], Any]]) -> None:
+        """several: the components of entities with more than one collider."""
+        types = {c for own in several.values() for c in own if isinstance(c, type) and issubclass(c, Collider)}
+        ordered = in_order(self._registry, types)
         entities = np.array(sorted(several), np.int64)
         has = np.array([[c in several[e] for e in entities.tolist()] for c in ordered], bool)
 
@@ -99,9 +90,8 @@ class LevelCheck:
         self._check_levels(ordered, has, entities, values)
 
     def batch(self, stores: Stores, entities: np.ndarray, rows: Any) -> None:
+        self.check_types(stores, int(entities[0]))
         types = [component for component in stores if issubclass(component, Collider)]
-        for collider in types:
-            self._check_dimensions(collider, int(entities[0]))
         if len(types) < 2:
             return
 
