@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 import esper
+import numpy as np
 
 from ..data import esper_bridge
 from ..data.component import Component, Many
@@ -76,7 +77,8 @@ class EntityVerbs:
 
     def delete_entities(self, entities: Iterable[int]) -> None:
         """Delete all these at the start of the next step; KeyError, and none is deleted, if one does not exist."""
-        contents, ids = self._contents(), list(entities)
+        contents = self._contents()
+        ids = entities.tolist() if isinstance(entities, np.ndarray) else list(entities)
         for entity in contents.entities.missing(ids):
             raise KeyError(f"no entity {entity!r} in this world")
         contents.dead.update(map(int, ids))

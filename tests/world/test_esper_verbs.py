@@ -115,9 +115,17 @@ def test_deleting_many_leaves_what_deleting_each_leaves(seed):
     assert many.state_hash() == one.state_hash()
 
 
-def test_one_that_does_not_exist_keeps_all():
+@pytest.mark.parametrize("steps", [0, 1])
+@pytest.mark.parametrize("missing", [3, 999999])
+def test_one_that_does_not_exist_keeps_all(missing, steps):
     world, ids, _ = crowd()
-    with pytest.raises(KeyError, match="999999"):
-        world.delete_entities([*ids, 999999])
     world.step()
-    assert len(world.bodies) == len(ids)
+    world.delete_entity(ids[3], immediate=True)
+    for _ in range(steps):
+        world.step()
+    before = len(world.get_entities())
+    missing = ids[3] if missing == 3 else missing
+    with pytest.raises(KeyError, match=str(missing)):
+        world.delete_entities([*ids[4:], missing])
+    world.step()
+    assert len(world.get_entities()) == before
