@@ -42,22 +42,6 @@ def _grid(group: str, why: str) -> Schema:
 GRID = _grid("broad phase, grid", "more bodies than are tested pair by pair")
 STATIC_GRID = _grid("broad phase, static grid", "more static bodies than are tested pair by pair")
 
-MOST_SEEN = 8  # static bodies that a view remembers; what sees more looks into the grid in every step
-
-# What moving bodies remember of the static grid, see :mod:`.static_neighbours`; one entry per moving body.
-VIEWS = Schema(
-    "Views",
-    Section(
-        "body", "broad phase, static grid", "what a moving body has seen in the grid",
-        lower=vectors(),
-        upper=vectors(),
-        count=ints("int32"),  # static bodies in the view; -1: not known
-        seen=table("int32", MOST_SEEN),  # their rows
-    ),
-    version=integer(),  # ``state.version`` and ``state.statics_version`` that they hold for
-    statics_version=integer(),
-)  # fmt: skip
-
 # A loose quadtree or octree, see :mod:`.tree`. Columns named level_* have one row per level: level 0 is the finest, row
 # ``levels`` the top level, row ``levels + 1`` the boxes that are in no level because they are empty or nan.
 TREE = Schema(

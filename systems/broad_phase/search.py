@@ -15,7 +15,6 @@ from .plan import reason_of
 from .plugin_broad_phase import PluginBroadPhase
 from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_count
 from .static_grid import NEVER_BUILT, OUTSIDE_MAX, reserve_static_grid
-from .static_neighbours import reserve_static_neighbours
 from .tree.tree import SpatialTree
 from .uniform_grid import reserve_grid
 
@@ -60,10 +59,8 @@ class CandidateSearch:
             candidates = state.candidates
             candidates.reserve(state.needed, "first", "second", keep=candidates.count)
         elif code == NEED_CELLS:
-            static, searches_static = fixed_count(state), state.pair_search == STATIC_GRID
-            if searches_static and len(state.views.count) < state.moving:
-                reserve_static_neighbours(state.views, state.moving)
-            elif searches_static and len(state.static_grid.keys) < static:
+            static = fixed_count(state)
+            if state.pair_search == STATIC_GRID and len(state.static_grid.keys) < static:
                 reserve_static_grid(state.static_grid, static)
             else:
                 reserve_grid(state.grid, state.moving)

@@ -20,8 +20,7 @@ from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
 from .boxes import FRAME_SIZE, fixed_count, fixed_row
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
 from .static_grid import build_static_grid, follow_rows
-from .static_neighbours import follow_statics, test_known_statics
-from .uniform_grid import FULL, build_grid, look_around, look_inside, test_notes
+from .uniform_grid import FULL, build_grid, look_around, look_inside, look_near, test_notes
 
 # 8 million candidates: with everything that is kept of a pair about 4 gigabytes. A game has 1 to 50 per body.
 CANDIDATE_LIMIT = 1 << 23
@@ -80,9 +79,6 @@ def place_statics(state, dt):
     grid = state.static_grid
     if state.pair_search != STATIC_GRID:
         return OK
-    if len(state.views.count) < state.moving:
-        state.needed = state.moving
-        return NEED_CELLS
     if grid.version != state.statics_version:
         if len(grid.keys) < fixed_count(state):
             state.needed = fixed_count(state)
@@ -205,11 +201,8 @@ def search_static_grid(state, dt):
     """What moves looks into the grid of what does not."""
     if state.pair_search != STATIC_GRID:
         return OK
-    found = state.candidates.count
-    follow_statics(state)
-    for i in range(state.first, state.moving):
-        found = test_known_statics(state, i, found)
-        if found == FULL:
-            return need_more_room(state)
+    found = look_near(state, state.static_grid, state.first, state.moving, state.candidates.count)
+    if found == FULL:
+        return need_more_room(state)
     state.candidates.count = found
     return OK

@@ -59,8 +59,8 @@ class BroadPhase(StagedSystem):
             ("candidates",), "colliders", f"less than {UNIFORM_GRID_MIN} bodies move",
         ),
         Stage(
-            search_static_grid, "what moves looks into the grid of what does not, unless it has seen what is there",
-            (*BOXES, "static_grid"), ("candidates", "views"), MANY, "more bodies are static than move",
+            search_static_grid, "what moves looks into the grid of what does not", (*BOXES, "static_grid"),
+            ("candidates",), MANY, "more bodies are static than move",
         ),
         Stage(
             leave_out_still, "pairs of two bodies that are still", ("candidates", "still"), ("candidates",), "sleeping",

@@ -34,6 +34,7 @@ SPARE_CELLS = 64
 CROWDED = 8.0  # mean number of boxes in a box's cell from which the tree is faster
 LOOSE = 1.0 + 2.0**-16  # cells exceed the largest box by this factor, which covers all rounding
 SLACK = 2.0**-16  # the same for boxes that are not in the grid, in cells
+LARGEST_EDGE = 1.0 - SLACK  # of a box that is not in the grid and for which the cells around its own are enough
 FARTHEST = 2.0**28  # distance from the origin, in boxes, up to which LOOSE and SLACK cover rounding
 FULLEST = 64  # most boxes in one cell
 CODE_BITS = 60
@@ -241,6 +242,65 @@ def outline(grid, low, high):
     for _ in range(2 * d):
         guards = (guards << field) | (largest + 1)
     return code | guards, guards
+
+
+@inlined
+def line_around(grid, key, k, d):
+    """The cell in the middle of line k of those around cell ``key``: 3 in 2D, 9 in 3D."""
+    return key + (k - 1) * grid.row if d == 2 else key + (k % 3 - 1) * grid.row + (k // 3 - 1) * grid.layer
+
+
+@part
+def look_near(state, grid, start, stop, found):
+    """Pairs of rows start..stop-1, which are not in the grid, with what of it overlaps their boxes; returns as
+    ``test_notes``.
+
+    Most boxes are inside of the frame and no longer than a cell: only the cells around their middle count. For others
+    there is ``look_inside``.
+    """
+    order, directory, codes = grid.order, grid.directory, grid.codes
+    lower, upper, first = state.bodies.lower, state.bodies.upper, state.candidates.first
+    second, row, layer, inverse, scale = state.candidates.second, grid.row, grid.layer, grid.inverse_cell, grid.scale[0]
+    origin, end, d, guards, one = zero_of(grid), zero_of(grid), len(zero_of(grid)), np.int64(0), np.int64(1)
+    field, largest = code_bits(d)
+    for q in range(d):
+        origin, end = replace(origin, q, grid.frame[LOWEST + q]), replace(end, q, grid.frame[HIGHEST + q])
+    for _ in range(2 * d):
+        guards = (guards << field) | (largest + 1)
+    width = 8 if d == 2 else 7  # boxes of a line that bits stand for
+    for i in range(start, stop):
+        low, high, fits = lower[i], upper[i], found + 64 <= len(first)
+        for q in range(d):
+            edge = (item(high, q) - item(low, q)) * inverse
+            fits &= (item(low, q) >= item(origin, q)) & (item(high, q) <= item(end, q))
+            fits &= (edge <= LARGEST_EDGE) & (edge >= 0.0)
+        bits, longest, key, code = np.int64(0), 64, 0, guards
+        if fits:
+            longest = 0
+            for q in range(d):
+                before, behind = item(low, q) - item(origin, q), item(high, q) - item(origin, q)
+                at = np.int64(0.5 * (before + behind) * inverse) + 1
+                key += at if q == 0 else at * (row if q == 1 else layer)
+                code |= np.int64(behind * item(scale, q)) << (q * field)
+                code |= (largest - np.int64(before * item(scale, q))) << ((d + q) * field)
+            for k in range(3 if d == 2 else 9):
+                at = line_around(grid, key, k, d)
+                begin = directory[at - 1]
+                length = directory[at + 2] - begin
+                longest = max(longest, length)
+                bits |= (eight_at(codes, begin, code, guards) & ((one << min(length, width)) - 1)) << (k * width)
+        if longest > width:
+            bits, found = np.int64(0), look_inside(state, grid, i, low, high, found)
+            if found == FULL:
+                return FULL
+        while bits != 0:
+            k = lowest_bit(bits)
+            bits &= bits - 1
+            line = k // width
+            there = order[directory[line_around(grid, key, line, d) - 1] + k - line * width]
+            first[found], second[found] = there, i
+            found += boxes_overlap(low, high, lower[there], upper[there])
+    return found
 
 
 @part

@@ -141,6 +141,28 @@ def test_any_boxes_look_into_even_ones(d, data):
 
 
 @both_dimensions
+@settings(max_examples=20, deadline=None)
+@given(data=st.data())
+def test_boxes_that_move_look_into_a_lattice(d, data):
+    """Most no longer than a cell and inside of the frame, some beyond; static ones that change now and then."""
+    rng = np.random.default_rng(data.draw(st.integers(0, 10**6)))
+    moving, side = 40, int(np.ceil(400 ** (1 / d)))
+    centre = np.stack(np.unravel_index(np.arange(400), (side,) * d), axis=1) * 2.0
+    centre = np.concatenate((rng.uniform(-1.0, 2.0 * side, (moving, d)), centre))
+    half = np.full((moving + 400, 1), 0.5)
+    half[:moving, 0] = rng.uniform(0.1, 1.5, moving)
+    boxes = Boxes(d)
+    for turn in range(6):
+        changed = turn == 0 or data.draw(st.booleans())
+        if changed:
+            centre[moving:] += rng.uniform(-0.1, 0.1, (400, d))
+        centre[:moving] += rng.standard_normal((moving, d))
+        centre[3, 0] = np.nan if turn == 3 else 1.0
+        boxes.set(centre - half, centre + half, moving, changed)
+        assert pair_set(*boxes.find()) == overlapping(centre - half, centre + half, moving)
+
+
+@both_dimensions
 def test_what_does_not_suit(d):
     """More large ones than may stay outside, all in one place, points, no shapes, no boxes, too few of them."""
     rng = np.random.default_rng(2)
