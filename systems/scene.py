@@ -105,7 +105,7 @@ class Scene:
     def _count_rows(self) -> None:
         """What the records know of the table's rows."""
         state, table = self.state, self.table
-        count, (dynamic, moving, _) = table.count, table.stops
+        count, moving = table.count, table.stops[1]
         if self._zero_version != self._columns_made:
             self._zero = [column for name in ZERO_WHERE_STATIC if len(column := getattr(state.bodies, name))]
             self._zero_version, self._zero_rows = self._columns_made, (0, 0)
@@ -119,7 +119,8 @@ class Scene:
         self._zero_rows = moving, count
         if self._columns_version != table.columns_version:
             self.bind_columns()
-        state.count, state.version, (state.sleepers, state.dynamic, state.moving, _) = count, table.version, table.blocks
+        state.count, state.version = count, table.version
+        state.sleepers, state.dynamic, state.moving, _ = table.blocks
         state.first = min(state.first, state.sleepers)
 
     def _build(self, present: list[type[Any]]) -> None:

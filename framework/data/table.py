@@ -359,7 +359,7 @@ class Table:
         their rows.
         """
         moved = self._changed_kinds(removed) if self.kind_changed else NO_ROWS
-        blocks = [kind + 1 for kind in added_kinds] if type(added_kinds) is list else added_kinds + 1
+        blocks = [kind + 1 for kind in added_kinds] if isinstance(added_kinds, list) else added_kinds + 1
         return self._regroup(removed, added, blocks, moved, self.arrays["kind"][moved] + 1 if len(moved) else moved)
 
     def settle(self, asleep: np.ndarray) -> None:

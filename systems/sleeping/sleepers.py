@@ -46,6 +46,7 @@ class Sleepers:
         self._lent = LentColumns(table, scene)
         self._disturbed = False  # some are marked, or may be
         self._pushed = False
+        self._still_count = -1  # with what cannot move, when the contacts were kept
         self._placed: Any = None  # rows and arrays in which sleepers are as what does not move
         self.contacts = Stored(state.contacts, CONTACTS, room.reserve_contacts)
         self.impulses = Stored(state.warm_start, IMPULSES, room.reserve_warm_start)
@@ -180,7 +181,7 @@ class Sleepers:
             islands.append(known[np.bincount(known.searchsorted(now), minlength=len(known))[: len(known)] != sizes])
         if not self._state.collides or (before is not None and before[3] != structure[3]):  # ids mean other entities
             islands.append(now)
-        if any(map(len, islands)):
+        if any(map(len, islands)) or np.count_nonzero(self._still() > AWAKE) != self._still_count:
             self._wake(np.concatenate(islands))
 
     def _fall_asleep(self, moving: int) -> None:
@@ -359,6 +360,7 @@ class Sleepers:
         memory.rows_version[now] = -1
         self.contacts.exchange(self._both_still)
         state.contacts.stored = int(np.count_nonzero(self.contacts.columns["enabled"]))
+        self._still_count = np.count_nonzero(still > AWAKE)
         ids, sizes = np.unique(self._islands(), return_counts=True)
         self.sizes = np.stack((ids, sizes), axis=1)
 
