@@ -312,14 +312,17 @@ class Entities(dict[int, dict[type[Any], Any]]):
                 others.append(entity)
                 continue
             gone.append(entity)
+            ours = False
             for component, handle in components.items():
                 of = members[component]
                 of.listed.discard(entity)
-                if of.ours:  # the table does not know of others
-                    log.dirty = True
-                    log.touched.add(entity)
+                if of.ours:
+                    ours = True
                     if isinstance(handle, Component):
                         handles.append(weakref.ref(handle))
+            if ours:  # the table does not know of others
+                log.dirty = True
+                log.touched.add(entity)
         self.note(gone)
         if others:
             log.dirty = True
