@@ -116,7 +116,7 @@ def test_ctrl_c_ends_at_once_with_what_is_known(tmp_path, monkeypatch, where):
     """The command prints what it knows after the first runs; nothing goes on running."""
     monkeypatch.chdir(tmp_path)
     scene_file(tmp_path, BALL)
-    words = ["trade", "mine.py", "--thorough", "--seconds", "20", "--no-timing", "--collisions", "discrete"]
+    words = ["trade", "mine.py", "--thorough", "--seconds", "3", "--no-timing", "--collisions", "discrete"]
 
     def stopped(*more):
         command = [sys.executable, "-c", ENDED, *words, *more]
