@@ -336,8 +336,9 @@ class Entities(dict[int, dict[type[Any], Any]]):
         numbers = np.array(entities)
         if numbers.dtype != np.int64 or numbers.ndim != 1:
             numbers = np.array([number for number in map(_number, entities) if number is not None], np.int64)
-        self.log.deleted.update(numbers[self._have_no_objects(numbers)].tolist())
-        self.saved = None
+        gone = numbers[self._have_no_objects(numbers)].tolist()
+        self.log.deleted.update(gone)
+        self.note(gone)  # a snapshot may be of a time at which they had objects
 
     def forget_all(self) -> None:
         """esper.clear_database()."""

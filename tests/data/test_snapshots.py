@@ -167,6 +167,20 @@ def test_bodies_in_bulk_before_and_after_somebody_has_looked_at_them():
         assert world.component_for_entity(loose[2], Bullet).expires == 9.0
 
 
+def test_a_body_that_was_made_in_bulk_and_looked_at_comes_back_each_time():
+    world = make_world()
+    ids = world.create_entities(3, Transform.many(np.zeros((3, 2))), RigidBody.many())
+    world.snapshot()
+    world.component_for_entity(ids[1], Transform)
+    snapshot = world.snapshot()
+    for _ in range(2):
+        world.delete_entity(ids[1])
+        world.step()
+        world.restore(snapshot)
+        assert world.get_entities() == list(ids)
+
+
+
 def test_arrays_of_array_columns_outlive_what_had_them():
     world = World(Physics(dimensions=2), convex_polygon.plugin)
     shape = np.array([(0, 0), (1, 0), (0.5, 0.8)])
