@@ -84,6 +84,8 @@ def _watched(loaded: Loaded, world: World, seconds: float, progress: Progress) -
             moving = world.bodies.dynamic
             out = world.physics is not None and world.physics.taken_out().any()
             if out or not (np.isfinite(moving.position).all() and np.isfinite(moving.linear_velocity).all()):
+                if world.physics is not None:
+                    world.physics.report_faults("")  # of what no step has looked at yet
                 raise Problem(": ".join((f"{loaded.name}: not finite after {world.time:.4g} s", *world.faults[:1])))
             found.append((world.time, step_limits(world)))
             progress.advance(world.step_count - before)

@@ -188,6 +188,8 @@ def _twin(
         with subject.loaded.attribute_errors():
             seen = observe(engine, seconds, settings.dt, walled=walled, inputs=inputs, values=subject.loaded.values_of)
         if seen.failure not in (None, ESCAPED):
+            if engine.world.physics is not None:
+                engine.world.physics.report_faults("")  # of what no step has looked at yet
             raise Problem(
                 f"{subject.name}: the trial run with {settings.dt:.4g} s steps failed after {seen.simulated:.4g} s: "
                 f"{'; '.join([seen.failure, *engine.world.faults[:1]])}"
