@@ -51,7 +51,7 @@ class ForceAccumulation(StagedSystem):
     def _add_of_first_evaluation(self, dt: float) -> None:
         self.add_systems(self.world.time)
         state = self._state
-        self.summed = state.bodies.force[state.first : state.dynamic].copy() if self.several_evaluations else None
+        self.summed = state.bodies.force[: state.dynamic].copy() if self.several_evaluations else None
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""

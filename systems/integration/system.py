@@ -197,6 +197,7 @@ class Integration(StagedSystem):
         # What systems of the game added after the forces were summed acts throughout the step.
         extra, summed = None, forces.summed
         if summed is not None:
+            summed = summed[self._state.first :]
             extra = np.subtract(force, summed, out=np.zeros_like(force), where=force != summed)  # inf - inf is nan
 
         def evaluator(seconds: float) -> None:

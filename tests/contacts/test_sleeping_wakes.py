@@ -353,9 +353,10 @@ def test_what_is_struck_in_the_second_place_wakes_before_it():
         assert (world.bodies.dynamic.position[:3, 1] > 0.4).all()
 
 
-def test_springs_and_other_force_systems_wake():
-    springs = Springs()
-    world = World(Physics(2, gravity=(0.0, -GRAVITY)), springs, settings=Settings(sleeping=True))
+@pytest.mark.parametrize("integrator", ["semi_implicit_euler", "rk4"])
+def test_springs_and_other_force_systems_wake(integrator):
+    springs, settings = Springs(), Settings(sleeping=True, integrator=integrator)
+    world = World(Physics(2, gravity=(0.0, -GRAVITY)), springs, settings=settings)
     floor(world)
     boxes = tower(world, 0.0, 1)
     hook = world.create_entity(Transform((0.0, 3.0)), RigidBody(kind="kinematic"))
