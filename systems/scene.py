@@ -120,6 +120,7 @@ class Scene:
         if self._columns_version != table.columns_version:
             self.bind_columns()
         state.count, state.version = count, table.version
+        state.statics_version += int(state.first > 0 and state.sleepers != table.blocks[0])  # other rows sleep
         state.sleepers, state.dynamic, state.moving, _ = table.blocks
         state.first = min(state.first, state.sleepers)
 

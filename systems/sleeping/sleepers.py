@@ -132,6 +132,7 @@ class Sleepers:
         if rows != state.first:
             state.first = rows
             state.statics_version += 1
+            state.motion_version += 1
         for name in ZERO_WHERE_STATIC if rows else ():
             getattr(bodies, name)[:rows] = 0
         if rows:
@@ -447,7 +448,8 @@ class Sleepers:
         """The table is what it was then; if this world does not sleep, all of them wake."""
         state = self._state
         self.kept, self._followed, self._seen = None, None, -1
-        state.first, self._placed, self._disturbed = 0, None, True  # what was written after that time is not known
+        self._leave_out(0)
+        self._placed, self._disturbed = None, True  # what was written after that time is not known
         self._lent.take(np.flatnonzero(self._still() > AWAKE))
         self._changes = [] if saved is None else list(saved.get("changes", ()))
         if saved is None:

@@ -362,3 +362,18 @@ def test_what_an_impact_has_stopped_sleeps_alone(mode):
     struck = ball(world, (0.0, 0.0), (3.0, 0.0), restitution=1.0)
     ball(world, (2.0, 0.0), restitution=1.0)
     sleep(world, struck, steps=180)
+
+
+def test_what_moves_meets_sleepers_after_others_have_gone():
+    """Rows of sleepers close up, also those that stand in a grid."""
+    world = make_world(2, sleeping=True)
+    balls = [ball(world, (3.0 * (k % 20), 3.0 * (k // 20)), restitution=0.0) for k in range(400)]
+    mover = world.create_entity(
+        Transform((-9.0, 9.0)), RigidBody(kind="kinematic", linear_velocity=(0.01, 0.0)), SphereCollider(0.5)
+    )
+    sleep(world, *balls)
+    world.delete_entity(balls[0])
+    world.component_for_entity(mover, Transform).position = (14.3, 9.0)
+    world.step()
+    assert (world.contacts.entity_a.tolist(), world.contacts.entity_b.tolist()) == ([balls[65]], [mover])
+    assert is_asleep(world, balls[65], balls[66]) == [False, True]
