@@ -11,6 +11,8 @@ from ..framework.jit.records.record import Record
 from ..framework.jit.records.schema import Column
 from . import codes, records
 from .broad_phase.search import CandidateSearch
+from .broad_phase.static_grid import reserve_static_grid
+from .broad_phase.uniform_grid import reserve_grid
 from .impacts.selection import FRESH
 from .scene import Scene
 
@@ -41,7 +43,7 @@ class Room:
     def handlers(self, simulation: Any) -> dict[int, Callable[[float], None]]:
         """What to do for each code; ``simulation`` has the systems that run when a phase before them has not."""
         state = self._state
-        growing: dict[int, Callable[[], None]] = {
+        growing: dict[int, Callable[[], Any]] = {
             codes.NEED_ORDER: self._grow_order,
             codes.NEED_EVENTS: self._grow_events,
             codes.NEED_SOLVER: self._grow_solver,
@@ -49,7 +51,9 @@ class Room:
             codes.NEED_MERGED: lambda: self._reserve_pairs(state.merged),
             codes.NEED_CONTACTS: lambda: self.reserve_contacts(state.needed),
             codes.NEED_WARM_START: lambda: self.reserve_warm_start(state.needed),
-            **{code: lambda code=code: self._search.grow(code) for code in (codes.NEED_CANDIDATES, codes.NEED_CELLS)},
+            codes.NEED_CANDIDATES: self._search.grow_candidates,
+            codes.NEED_CELLS: lambda: reserve_grid(state.grid, state.needed),
+            codes.NEED_STATIC_CELLS: lambda: reserve_static_grid(state.static_grid, state.needed),
         }  # fmt: skip
         return {
             **{code: self._named(grow) for code, grow in growing.items()},
@@ -63,7 +67,7 @@ class Room:
             codes.REFRESH_PAIRS: lambda dt: self._refresh_pairs(simulation, dt),
         }
 
-    def _named(self, grow: Callable[[], None]) -> Callable[[float], None]:
+    def _named(self, grow: Callable[[], Any]) -> Callable[[float], None]:
         def handler(dt: float) -> None:
             state = self._state
             try:
@@ -139,7 +143,7 @@ class Room:
         state, program = self._state, simulation.program
         now = state.impacts.until
         program.run_one("box_rest_of_step", dt)
-        found = simulation.broad_phase.segment("choose_search")
+        found = simulation.broad_phase.segment("place_statics")
         found(dt)
         while simulation.sleepers.wake_candidates(dt):
             found(dt)

@@ -13,7 +13,7 @@ from typing import Any
 from ..components import Collider, RigidBody
 from ..framework.jit.records.schema import Schema, Section, flag, flags, floats, integer, ints, number, vectors
 from ..framework.schedule.stages import PROGRAM_FIELDS
-from .broad_phase.records import GRID, STATIC_GRID
+from .broad_phase.records import GRID
 from .contacts.solving.records import SOLVER, WARM_START
 
 
@@ -490,5 +490,5 @@ STATE = Schema(
     contacts=CONTACTS,
     impacts=IMPACTS,
     grid=GRID,  # of what moves
-    static_grid=STATIC_GRID,
+    static_grid=GRID,
 )

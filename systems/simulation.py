@@ -68,7 +68,10 @@ class Simulation:
         self.bodies = Bodies(self.table)
         source = RecordedContacts(self.state)
         self.contacts = Contacts(dimensions, self._membership, self._running_step, source)
-        self.search = CandidateSearch(self.state, world.registry, lambda: world.settings, self._box_now)
+        self.search = CandidateSearch(
+            self.state, world.registry, lambda: world.settings, self._box_now,
+            lambda name: self.program.run_one(name, 0.0),
+        )  # fmt: skip
         self._room = Room(self.state, self.scene, self.search)
         self.quarantine = Quarantine(self.state, self.table, self.scene, world.report_fault)
         self.table.on_make, self.table.on_lend = self._follow_columns, self._follow_lent

@@ -4,7 +4,7 @@ docs/architecture.md read; and the parts of stages that are called by address.""
 from __future__ import annotations
 
 from ..framework.schedule.stages import Stage
-from .broad_phase.boxes import bound_searches, box_rest_of_step
+from .broad_phase.boxes import bound_searches, box_rest_of_step, box_standing
 from .broad_phase.system import BroadPhase
 from .ccd.refresh_pairs import merge_pairs
 from .ccd.time_of_impact import first_touch
@@ -41,6 +41,10 @@ CLOSING = (
 )  # fmt: skip
 ON_DEMAND = (
     Stage(
+        box_standing, "for queries: boxes where the bodies are, and which have left those of the grid",
+        ("position", "rotation"), ("lower", "upper", "grid"), "many bodies",
+    ),
+    Stage(
         box_rest_of_step,
         "boxes around the rest of the paths",
         ("path_velocity",),
@@ -58,7 +62,7 @@ ON_DEMAND = (
         finish_found, "contacts where free flight leads, for code that reads them", ("pairs",), ("pairs",), "colliders"
     ),
     *Integration.ON_DEMAND,
-)
+)  # fmt: skip
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
 WITH_COLLIDERS = frozenset(("colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies"))
 CONDITIONS = ("", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "sleeping", "on demand")
@@ -100,6 +104,6 @@ SYSTEM_OF_STAGE = (
     *("" for _ in OPENING),
     *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
     *("" for _ in CLOSING),
-    *(BroadPhase.__name__, NarrowPhase.__name__, NarrowPhase.__name__),
+    *(BroadPhase.__name__, BroadPhase.__name__, NarrowPhase.__name__, NarrowPhase.__name__),
     *(Integration.__name__ for _ in Integration.ON_DEMAND),
 )

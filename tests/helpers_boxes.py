@@ -11,32 +11,44 @@ from carom.framework.schedule.stages import Program, Stage
 from carom.framework.settings import Settings
 from carom.systems import codes
 from carom.systems.broad_phase import stages
-from carom.systems.broad_phase.boxes import FRAME_SIZE, HIGHEST, LARGEST, LOWEST
+from carom.systems.broad_phase.records import FRAME_SIZE, HIGHEST, LARGEST, LOWEST
 from carom.systems.broad_phase.search import CandidateSearch
+from carom.systems.broad_phase.static_grid import reserve_static_grid
+from carom.systems.broad_phase.uniform_grid import reserve_grid
 from carom.systems.records import STATE
 
 SEARCH = (
-    stages.choose_search, stages.place_statics, stages.search_uniform_grid, stages.test_few,
+    stages.place_statics, stages.place_moving, stages.choose_search, stages.search_uniform_grid, stages.test_few,
     stages.search_static_grid,
 )  # fmt: skip
 
 
-def uniform_grid_alone(state, dt):
+def begin_uniform_grid(state, dt):
     """A uniform grid of what moves, however few that is."""
     state.candidates.count = 0
-    state.pair_search = stages.UNIFORM_GRID
-    return stages.use_uniform_grid(state)
+    code = stages.build_moving_grid(state)
+    state.pair_search = stages.UNIFORM_GRID if state.grid.suits else stages.NO_SEARCH
+    return code
+
+
+def search_uniform_grid(state, dt):
+    return stages.search_moving_grid(state) if state.pair_search == stages.UNIFORM_GRID else codes.OK
 
 
 def begin_static_grid(state, dt):
     """Bodies that do not move are put into a grid, however few they are."""
     state.candidates.count = 0
-    state.pair_search = stages.STATIC_GRID
-    return codes.OK
+    code = stages.build_statics(state)
+    state.pair_search = stages.BRUTE_FORCE if state.static_grid.suits else stages.NO_SEARCH
+    return code
 
 
-UNIFORM_GRID_ALONE = (uniform_grid_alone,)
-STATIC_GRID_ALONE = (begin_static_grid, stages.place_statics, stages.search_static_grid)
+def search_static_grid(state, dt):
+    return stages.look_into_statics(state) if state.pair_search == stages.BRUTE_FORCE else codes.OK
+
+
+UNIFORM_GRID_ALONE = (begin_uniform_grid, search_uniform_grid)
+STATIC_GRID_ALONE = (begin_static_grid, search_static_grid)
 
 
 class Boxes:
@@ -46,20 +58,22 @@ class Boxes:
         self.state = make_record(STATE, dimensions)
         self.state.collides = True
         self.state.frame = np.zeros(FRAME_SIZE)
-        self.search = CandidateSearch(self.state, registry, lambda: settings or Settings(), lambda: None)
+        self.search = CandidateSearch(self.state, registry, lambda: settings or Settings(), lambda: None, None)
         self.asked = []
-        wanted = (codes.NEED_CANDIDATES, codes.NEED_CELLS, codes.FIND_IN_PYTHON)
-        handlers = {code: self._handler(code) for code in wanted}
+        room = {
+            codes.NEED_CANDIDATES: self.search.grow_candidates,
+            codes.NEED_CELLS: lambda: reserve_grid(self.state.grid, self.state.needed),
+            codes.NEED_STATIC_CELLS: lambda: reserve_static_grid(self.state.static_grid, self.state.needed),
+            codes.FIND_IN_PYTHON: lambda: self.search.find_in_python(0.0),
+        }
+        handlers = {code: self._handler(code, grow) for code, grow in room.items()}
         self._program = Program(self.state, [Stage(f, "") for f in functions], handlers, codes.AFTERWARDS)
         self._program.link(lambda stage: True)
 
-    def _handler(self, code):
+    def _handler(self, code, work):
         def handle(dt):
             self.asked.append(code)
-            if code == codes.FIND_IN_PYTHON:
-                self.search.find_in_python(dt)
-            else:
-                self.search.grow(code)
+            work()
 
         return handle
 

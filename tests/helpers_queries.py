@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
-from carom.framework import World
+from carom.framework import Settings, World
 from carom.plugins import Physics
 
 GRAZE = 1e-7  # relative to the sizes here, all about 1
@@ -67,7 +67,7 @@ class Bodies:
         return np.where(least <= 0, high, np.inf), least
 
 
-def scene(d, n, seed, sizes="even", kinds=("dynamic", "static", "kinematic")):
+def scene(d, n, seed, sizes="even", kinds=("dynamic", "static", "kinematic"), **settings):
     """A world of n spheres and boxes with the oracle's data; every third is turned, a fifth is a sensor."""
     rng = np.random.default_rng(seed)
     side = 2.5 * n ** (1 / d)
@@ -83,7 +83,7 @@ def scene(d, n, seed, sizes="even", kinds=("dynamic", "static", "kinematic")):
     half = rng.random((n, d)) * scale[:, None] * 0.8
     sphere = rng.random(n) < 0.5
     half[sphere] = half[sphere, :1]
-    world = World(Physics(dimensions=d))
+    world = World(Physics(dimensions=d), settings=Settings(**settings))
     entities = []
     for k in range(n):
         shape = SphereCollider(half[k, 0]) if sphere[k] else AABBCollider(half[k])

@@ -238,7 +238,7 @@ def _sizes(services: Any) -> tuple[Any, Any, Any]:
         return size, solid, group
     services.scene.refresh_rotation()
     with unmeasured(services.state):
-        services.search.partitions()  # makes the boxes
+        services.search.index_now()  # makes the boxes
     services.queries.forget()
     bodies, rows = services.state.bodies, np.arange(count)
     slot = bodies.collider_slot[:count]

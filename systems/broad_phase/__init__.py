@@ -3,7 +3,7 @@
 Reads positions and shapes, and search bounds where bodies are swept. Writes the boxes and the candidate pairs.
 
 boxes.py makes the boxes, stages.py decides how to search and holds the stages, in the order in which they run;
-brute_force.py, uniform_grid.py and static_grid.py are what these stages call. tree/ is for boxes that suit no grid, and
-for queries: search.py drives it from Python, owns all memory and calls broad phases of plugins. system.py lists the
-stages, plan.py describes them.
+brute_force.py, uniform_grid.py and static_grid.py are what these stages call. tree/ is for boxes that suit no grid:
+search.py drives it from Python, owns all memory, calls broad phases of plugins and has the indexes for queries.
+system.py lists the stages, plan.py describes them.
 """

@@ -11,13 +11,11 @@ from ..ccd.search_bounds import GIVE, find_margins, place_at
 from ..codes import OK
 from ..linking.parts import BOUND_SEARCHES, call_bound_searches
 from ..shapes.dispatch import half_extents, write_rotated
+from .records import HIGHEST, LARGEST, LOWEST
+from .uniform_grid import move_in_grid
 
 # Of the body's smallest half extent, on each side: bodies deflected within the step still meet their neighbours.
 MARGIN = 0.1
-
-# Places in ``state.frame``, apart by 3: one value per axis. The largest is the longest edge of any box of what moves.
-LOWEST, HIGHEST, LARGEST = 0, 3, 6
-FRAME_SIZE = 7
 
 
 @inlined
@@ -130,8 +128,8 @@ def follow_static_places(state):
         state.statics_version += 1
 
 
-# Where the motion of a box begins and ends.
-STANDING, MOVING, SEARCHING = range(3)
+# Where the motion of a box begins and ends. STAYING: where the body is, and the box may be one of the uniform grid.
+STANDING, MOVING, SEARCHING, STAYING = range(4)
 
 
 @part
@@ -148,7 +146,10 @@ def box_rows(state, start, stop, motion):
         starts, ends = bodies.search_lower, bodies.search_upper
     thinnest = find_extents(state, 0, start, stop)
     for i in range(start, stop):
-        bodies.lower[i], bodies.upper[i] = box_level(state, 0, i, starts[i], ends[i])
+        low, high = box_level(state, 0, i, starts[i], ends[i])
+        if motion == STAYING and not holds(bodies.lower[i], bodies.upper[i], low, high):
+            move_in_grid(state.grid, i, low, high)
+        bodies.lower[i], bodies.upper[i] = low, high
     for level in range(1, state.level_count):
         thinnest = find_extents(state, level, start, stop)
         for i in range(start, stop):
@@ -156,9 +157,18 @@ def box_rows(state, start, stop, motion):
             add_level(state, i, low, high)
     if motion == STANDING:
         state.thinnest_static = min(state.thinnest_static, thinnest)
-    else:
+    elif motion != STAYING:
         state.thinnest_moving = thinnest
         measure_frame(state)
+
+
+@part
+def holds(lower, upper, low, high):
+    """Whether lower..upper holds the box low..high, or this is of nan."""
+    held = True
+    for k in range(len(low)):
+        held &= (item(lower, k) <= item(low, k)) & (item(high, k) <= item(upper, k))
+    return held or low[0] != low[0]
 
 
 def box_statics(state, dt):
@@ -184,11 +194,19 @@ def box_motions(state, dt):
     state.neighbours_known_until, state.candidates_ready = math.inf, True
     if state.all_still:
         return OK
+    state.grid.suits = False  # until it is made of these boxes
     box_rows(state, state.first, state.moving, MOVING)
     if state.sweeping and state.moved:
         for i in range(state.first, state.moving):
             bodies.search_lower[i], bodies.search_upper[i] = bodies.previous_position[i], bodies.position[i]
         call_bound_searches(state.links[BOUND_SEARCHES], state, 0.0, dt)
+    return OK
+
+
+def box_standing(state, dt):
+    """For queries, when the uniform grid has the boxes of the last step: boxes where the bodies are now. Those that
+    have left theirs are outside the grid, which suits as long as these are few."""
+    box_rows(state, state.first, state.moving, STAYING)
     return OK
 
 
@@ -223,7 +241,7 @@ def bound_searches(state, now, dt):
 
 def box_rest_of_step(state, dt):
     """Boxes for what is left of the step, after an impact has sent a body out of its search bounds."""
-    now = state.impacts.until
+    now, state.grid.suits = state.impacts.until, False
     for i in range(state.first, state.moving):
         state.bodies.search_lower[i] = place_at(state, i, now, now)
     call_bound_searches(state.links[BOUND_SEARCHES], state, now, dt)

@@ -6,20 +6,20 @@ from collections.abc import Iterator
 
 from ...framework.schedule.plan import PlannedKernel
 from .brute_force import BRUTE_FORCE_MAX
-from .stages import STATIC_GRID, TREE, UNIFORM_GRID, UNIFORM_GRID_MIN
+from .stages import TREE, UNIFORM_GRID, has_many_static
 
 
 def reason_of(search: int, moving: int, static: int, dimensions: int) -> str:
     """How the candidates of so many bodies are found; search: a value of ``state.pair_search``."""
     tree = "quadtree" if dimensions == 2 else "octree"
-    if search == UNIFORM_GRID:
-        return f"uniform grid of {moving} moving bodies, and {static} static ones that look into it"
-    if search == STATIC_GRID:
-        among = "uniform grid" if moving >= UNIFORM_GRID_MIN else "every pair"
-        return f"{among} of {moving} moving bodies, which look into a uniform grid of {static} static ones"
     if search == TREE:
         beside = f" and against that of {static} static ones" if static else ""
         return f"{tree} of {moving} moving bodies against itself{beside}"
+    if has_many_static(moving, static):
+        among = "uniform grid" if search == UNIFORM_GRID else "every pair"
+        return f"{among} of {moving} moving bodies, which look into a uniform grid of {static} static ones"
+    if search == UNIFORM_GRID:
+        return f"uniform grid of {moving} moving bodies, and {static} static ones that look into it"
     more = f"above {BRUTE_FORCE_MAX} a uniform grid, or a {tree} where this does not suit"
     return f"every pair of {moving} moving and {static} static bodies; {more}"
 

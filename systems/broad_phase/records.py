@@ -4,43 +4,42 @@ from __future__ import annotations
 
 from ...framework.jit.records.schema import Schema, Section, flag, floats, integer, ints, number, table, vectors
 
+# Places in ``state.frame``, apart by 3: one value per axis. The largest is the longest edge of any box of what moves.
+LOWEST, HIGHEST, LARGEST = 0, 3, 6
+FRAME_SIZE = 7
 
-def _grid(group: str, why: str) -> Schema:
-    """A uniform grid of boxes, see :mod:`.uniform_grid`."""
-    return Schema(
-        "Grid",
-        Section(
-            "body", group, why,
-            # one entry per box
-            keys=ints("int32"),  # its cell
-            order=ints("int32"),  # rows in the order of their cells
-            cells=ints("int32"),  # these cells
-            codes=ints(),  # the boxes in small integers
-            # static grid alone: the rows in the grid with copies of their boxes, and the rows that are not in it
-            rows=ints("int32"),
-            lower=vectors(),
-            upper=vectors(),
-        ),
-        suits=flag(),  # the boxes are even enough for a grid
-        version=integer(),  # static grid: ``state.statics_version`` when it was built; -1: never
-        first=integer(),  # static grid: the first static row, of which the other rows are counted
-        # cells are numbered x + y * row + z * layer, with one empty cell around the outermost
-        inverse_cell=number(),  # 1/m
-        row=integer(),
-        layer=integer(),
-        total=integer(),
-        frame=floats(),  # extent of the boxes in the grid, as ``state.frame``
-        scale=vectors(),  # one row; integers of a code per metre
-        directory=ints("int32"),  # where each cell begins in ``order``
-        notes=table("int32", 4),  # what has to be tested, see uniform_grid.look_around
-        longest=floats(),  # static grid: the longest edges, ascending
-        outside_count=integer(),
-        outside=ints("int32"),
-    )  # fmt: skip
-
-
-GRID = _grid("broad phase, grid", "more bodies than are tested pair by pair")
-STATIC_GRID = _grid("broad phase, static grid", "more static bodies than are tested pair by pair")
+# A uniform grid of boxes, see :mod:`.uniform_grid`; one of what moves, one of what does not.
+GRID = Schema(
+    "Grid",
+    Section(
+        "body", "broad phase, grid", "more bodies than are tested pair by pair",
+        # one entry per box
+        keys=ints("int32"),  # its cell
+        order=ints("int32"),  # rows in the order of their cells
+        cells=ints("int32"),  # these cells
+        codes=ints(),  # the boxes in small integers
+        # static grid alone: the rows in the grid with copies of their boxes
+        rows=ints("int32"),
+        lower=vectors(),
+        upper=vectors(),
+    ),
+    suits=flag(),  # the boxes are even enough for a grid, and these are in it
+    serves=flag(),  # queries look into it
+    version=integer(),  # ``state.version`` when it was built; static grid: ``state.statics_version``, -1: never
+    first=integer(),  # the first row that moves; static grid: the first static row, of which the others are counted
+    # cells are numbered x + y * row + z * layer, with one empty cell around the outermost
+    inverse_cell=number(),  # 1/m
+    row=integer(),
+    layer=integer(),
+    total=integer(),
+    frame=floats(),  # extent of the boxes in the grid, as ``state.frame``
+    scale=vectors(),  # one row; integers of a code per metre
+    directory=ints("int32"),  # where each cell begins in ``order``
+    notes=table("int32", 4),  # what has to be tested, see uniform_grid.look_around
+    longest=floats(),  # static grid: the longest edges, ascending
+    outside_count=integer(),
+    outside=ints("int32"),  # rows that are not in the grid: static ones that are too long, moving ones that have left
+)  # fmt: skip
 
 # A loose quadtree or octree, see :mod:`.tree`. Columns named level_* have one row per level: level 0 is the finest, row
 # ``levels`` the top level, row ``levels + 1`` the boxes that are in no level because they are empty or nan.

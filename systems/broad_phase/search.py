@@ -9,14 +9,14 @@ import numpy as np
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.settings import AUTOMATIC, Settings
-from ..codes import NEED_CANDIDATES, NEED_CELLS
-from .boxes import FRAME_SIZE, fixed_count
+from .boxes import fixed_count
 from .plan import reason_of
 from .plugin_broad_phase import PluginBroadPhase
-from .stages import NO_SEARCH, PLUGIN, STATIC_GRID, UNIFORM_GRID_MIN, choose_by_count
-from .static_grid import NEVER_BUILT, OUTSIDE_MAX, reserve_static_grid
+from .records import FRAME_SIZE
+from .stages import BRUTE_FORCE, NO_SEARCH, PLUGIN, UNIFORM_GRID, UNIFORM_GRID_MIN
+from .static_grid import NEVER_BUILT
 from .tree.tree import SpatialTree
-from .uniform_grid import reserve_grid
+from .uniform_grid import OUTSIDE_MAX
 
 
 class CandidateSearch:
@@ -24,16 +24,17 @@ class CandidateSearch:
 
     state
         the record of the world; its columns ``bodies.lower``, ``bodies.upper`` hold the boxes
-    box_now
-        makes the boxes of all bodies where they are at this moment, for queries
+    box_now, run_stage
+        for queries: makes the boxes of all bodies where they are at this moment; runs the stage of that name
     """
 
     def __init__(
-        self, state: Record, registry: Registry, settings: Callable[[], Settings], box_now: Callable[[], None]
-    ) -> None:
-        self._state, self._settings, self._box_now = state, settings, box_now
+        self, state: Record, registry: Registry, settings: Callable[[], Settings], box_now: Callable[[], None],
+        run_stage: Callable[[str], None],
+    ) -> None:  # fmt: skip
+        self._state, self._settings, self._box_now, self._run_stage = state, settings, box_now, run_stage
         self._plugin = PluginBroadPhase(registry)
-        self._moving, self._asleep, self._static = (SpatialTree(state.dimensions) for _ in range(3))
+        self._moving, self._asleep, self._static, self._empty = (SpatialTree(state.dimensions) for _ in range(4))
         self._static_version, self._static_first = NEVER_BUILT, 0
         for grid in (state.grid, state.static_grid):
             grid.reserve(FRAME_SIZE, "frame")
@@ -52,18 +53,10 @@ class CandidateSearch:
 
     # -- what stages ask for ----------------------------------------------------------------------
 
-    def grow(self, code: int) -> None:
-        """Make the room that a stage asks for with NEED_CELLS, or NEED_CANDIDATES for its pairs."""
-        state = self._state
-        if code == NEED_CANDIDATES:
-            candidates = state.candidates
-            candidates.reserve(state.needed, "first", "second", keep=candidates.count)
-        elif code == NEED_CELLS:
-            static = fixed_count(state)
-            if state.pair_search == STATIC_GRID and len(state.static_grid.keys) < static:
-                reserve_static_grid(state.static_grid, static)
-            else:
-                reserve_grid(state.grid, state.moving)
+    def grow_candidates(self) -> None:
+        """Make the room that a stage asks for with NEED_CANDIDATES, and keep the pairs."""
+        candidates = self._state.candidates
+        candidates.reserve(self._state.needed, "first", "second", keep=candidates.count)
 
     def find_in_python(self, dt: float) -> None:
         """Candidates from the broad phase of a plugin, or from trees: no grid suits the boxes of this step."""
@@ -88,14 +81,32 @@ class CandidateSearch:
 
     # -- indexes for queries ----------------------------------------------------------------------
 
-    def partitions(self) -> tuple[SpatialTree, SpatialTree]:
-        """Indexes of what moves and of what does not, with boxes around where the bodies are at this moment."""
-        known_until = self._state.neighbours_known_until
-        self._box_now()
-        self._state.neighbours_known_until = known_until  # a system within the step may query
-        self._build(self._moving, 0, self._state.moving)
-        self._build_static()
-        return self._moving, self._static
+    def index_now(self) -> tuple[SpatialTree, SpatialTree]:
+        """Bring the grids that suit to where the bodies are at this moment, and let them ``serve`` queries. Returns
+        trees of the other bodies: of what moves and sleeps, and of what is static.
+
+        The grid of the last step goes on, if all bodies but a few are near their cells there.
+        """
+        state, grid, static_grid = self._state, self._state.grid, self._state.static_grid
+        known_until, state.all_still = state.neighbours_known_until, False
+        grid.suits &= (grid.version, grid.first) == (state.version, state.first) and not state.several_levels
+        if grid.suits:
+            self._run_stage("box_statics")
+            self._run_stage("box_standing")
+        if not grid.suits:
+            self._box_now()
+            self._run_stage("place_moving")
+        self._run_stage("place_statics")
+        state.neighbours_known_until = known_until  # a system within the step may query
+        grid.serves = grid.suits
+        made_for = static_grid.version, static_grid.first
+        static_grid.serves = static_grid.suits and made_for == (state.statics_version, state.moving)
+        start, stop = state.first if static_grid.serves else 0, state.first if grid.serves else state.moving
+        if start < stop:
+            self._build(self._moving, start, stop)
+        if not static_grid.serves:
+            self._build_static()
+        return self._moving if start < stop else self._empty, self._empty if static_grid.serves else self._static
 
     def _build(self, index: SpatialTree, start: int, stop: int) -> None:
         index.build(self._state.bodies.lower, self._state.bodies.upper, start, stop)
@@ -118,7 +129,7 @@ class CandidateSearch:
         """What found the candidates of the last step, as ``state.pair_search``; before the first step what will."""
         state = self._state
         if state.pair_search in (NO_SEARCH, PLUGIN) or state.uses_plugin_broad_phase:
-            return choose_by_count(state.moving - state.first, fixed_count(state))
+            return UNIFORM_GRID if state.moving - state.first >= UNIFORM_GRID_MIN else BRUTE_FORCE
         return state.pair_search
 
     def describe(self) -> str:

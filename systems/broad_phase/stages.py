@@ -1,13 +1,16 @@
 """The stages of BROAD that find candidate pairs: bodies whose boxes overlap, at least one of them moving.
 
-Sleepers count as
-static. ``choose_search`` decides by the numbers of moving and static bodies; of the others each does its share:
+Sleepers count as static. ``choose_search`` decides by the numbers of bodies, and by whether the grids suit these, which
+are made before:
 
-    moving                       static                        index
-    less than UNIFORM_GRID_MIN   no more than BRUTE_FORCE_MAX  brute force
-    more                         no more than move             uniform grid of what moves; static bodies look into it
-    any number                   more                          static grid, into which what moves looks; static bodies
-                                                               that are not in it, and what moves, as above
+    moving                       pairs of what moves
+    less than UNIFORM_GRID_MIN   brute force
+    more                         uniform grid
+
+    static                       pairs with what does not move
+    no more than move, or        brute force; or the static bodies look into the uniform grid of what moves
+      than BRUTE_FORCE_MAX
+    more                         what moves looks into the static grid; the few long ones that are not in it, as above
 
 Where boxes differ too much in size for a grid, or crowd in one place, trees are used: Python builds these
 (FIND_IN_PYTHON).
@@ -16,9 +19,10 @@ Where boxes differ too much in size for a grid, or crowd in one place, trees are
 from __future__ import annotations
 
 from ...framework.compilation import packed, part
-from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, OK
-from .boxes import FRAME_SIZE, fixed_count, fixed_row
+from ..codes import FIND_IN_PYTHON, NEED_CANDIDATES, NEED_CELLS, NEED_STATIC_CELLS, OK
+from .boxes import fixed_count, fixed_row
 from .brute_force import BRUTE_FORCE_MAX, boxes_overlap
+from .records import FRAME_SIZE
 from .static_grid import build_static_grid, follow_rows
 from .uniform_grid import FULL, build_grid, look_around, look_inside, look_near, test_notes
 
@@ -32,28 +36,26 @@ UNIFORM_GRID_MIN = BRUTE_FORCE_MAX + 1
 BLOCK = 64  # boxes that are ruled out together
 
 # Values of ``state.pair_search``: what finds the candidates of this step.
-NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, STATIC_GRID, TREE, PLUGIN = range(6)
+NO_SEARCH, BRUTE_FORCE, UNIFORM_GRID, TREE, PLUGIN = range(5)
 
 
 @part
-def choose_by_count(moving, static):
-    """The search for so many bodies."""
-    if static > max(moving, BRUTE_FORCE_MAX):
-        return STATIC_GRID
-    return UNIFORM_GRID if moving >= UNIFORM_GRID_MIN else BRUTE_FORCE
+def has_many_static(moving, static):
+    """Whether so many static bodies are in a grid of their own, if that suits them."""
+    return static > max(moving, BRUTE_FORCE_MAX)
 
 
-def choose_search(state, dt):
-    """No candidates yet; and how they are to be found."""
-    state.candidates.count = 0
-    state.pair_search = NO_SEARCH
-    if not state.collides or state.all_still:
-        return OK
-    if state.uses_plugin_broad_phase:
-        state.pair_search = PLUGIN
-        return FIND_IN_PYTHON
-    state.pair_search = choose_by_count(state.moving - state.first, fixed_count(state))
-    return OK
+@part
+def has_static_grid(state):
+    """The same of the bodies that there are."""
+    return has_many_static(state.moving - state.first, fixed_count(state))
+
+
+@part
+def looks_into_statics(state):
+    """Whether what moves looks into the grid of what does not, however pairs of what moves are found."""
+    by_grids = state.pair_search == BRUTE_FORCE or state.pair_search == UNIFORM_GRID
+    return by_grids and has_static_grid(state)
 
 
 @part
@@ -74,25 +76,82 @@ def need_more_room(state):
     return NEED_CANDIDATES
 
 
-def place_statics(state, dt):
-    """Where more bodies are static than move: their grid, when they have changed."""
-    grid = state.static_grid
-    if state.pair_search != STATIC_GRID:
-        return OK
+@part
+def forget_queries(state, grid):
+    """Queries that look into this grid make it again."""
+    state.motion_version += grid.serves
+    grid.serves = False
+
+
+@part
+def build_statics(state):
+    """The grid of what does not move, when that has changed; returns a code."""
+    grid, fixed = state.static_grid, fixed_count(state)
     if grid.version != state.statics_version:
-        if len(grid.keys) < fixed_count(state):
-            state.needed = fixed_count(state)
-            return NEED_CELLS
+        if len(grid.keys) < fixed:
+            state.needed = fixed
+            return NEED_STATIC_CELLS
         build_static_grid(state)
+        forget_queries(state, grid)
     elif grid.first != state.moving:
         follow_rows(state)
-    return OK if grid.suits else leave_to_trees(state)
+    return OK
+
+
+def place_statics(state, dt):
+    """Where more bodies are static than move: their grid."""
+    if state.all_still or state.uses_plugin_broad_phase:
+        return OK
+    return build_statics(state) if has_static_grid(state) else OK
+
+
+@part
+def build_moving_grid(state):
+    """A uniform grid of what moves, if that is even enough for it; returns a code."""
+    grid, bodies, moving = state.grid, state.bodies, state.moving - state.first
+    if len(grid.keys) < moving:
+        state.needed = moving
+        return NEED_CELLS
+    for k in range(FRAME_SIZE):
+        grid.frame[k] = state.frame[k]
+    build_grid(grid, bodies.lower, bodies.upper, state.first, moving)
+    grid.version, grid.first, grid.outside_count = state.version, state.first, 0
+    forget_queries(state, grid)
+    return OK
+
+
+@packed
+def place_moving(state, dt):
+    """Where many bodies move: their grid."""
+    if state.all_still or state.uses_plugin_broad_phase:
+        return OK
+    return build_moving_grid(state) if state.moving - state.first >= UNIFORM_GRID_MIN else OK
+
+
+def choose_search(state, dt):
+    """No candidates yet; and how they are to be found."""
+    state.candidates.count = 0
+    state.pair_search = NO_SEARCH
+    if not state.collides or state.all_still:
+        return OK
+    if state.uses_plugin_broad_phase:
+        state.pair_search = PLUGIN
+        return FIND_IN_PYTHON
+    if has_static_grid(state) and not state.static_grid.suits:
+        return leave_to_trees(state)
+    if state.moving - state.first < UNIFORM_GRID_MIN:
+        state.pair_search = BRUTE_FORCE
+    elif state.grid.suits:
+        state.pair_search = UNIFORM_GRID
+    else:
+        return leave_to_trees(state)
+    return OK
 
 
 @part
 def look_from_outside(state, found):
     """Static bodies that are in no grid look into that of what moves; returns the number of pairs, or FULL."""
-    static_grid, all_static = state.static_grid, state.pair_search == UNIFORM_GRID
+    static_grid, all_static = state.static_grid, not looks_into_statics(state)
     for k in range(fixed_count(state) if all_static else static_grid.outside_count):
         i = fixed_row(state, k) if all_static else static_grid.outside[k]
         found = look_inside(state, state.grid, i, state.bodies.lower[i], state.bodies.upper[i], found)
@@ -102,28 +161,9 @@ def look_from_outside(state, found):
 
 
 @part
-def do_without_grid(state):
-    """The boxes of what moves are too uneven: trees of many, and every pair of few."""
-    if state.moving - state.first > BRUTE_FORCE_MAX:
-        return leave_to_trees(state)
-    if state.pair_search == UNIFORM_GRID:
-        state.pair_search = BRUTE_FORCE
-    return OK
-
-
-@part
-def use_uniform_grid(state):
-    """A uniform grid of what moves, for its pairs and those with static bodies that are in no grid; returns a code."""
-    moving, grid, bodies = state.moving - state.first, state.grid, state.bodies
-    if len(grid.keys) < moving:
-        state.needed = moving
-        return NEED_CELLS
-    for k in range(FRAME_SIZE):
-        grid.frame[k] = state.frame[k]
-    build_grid(grid, bodies.lower, bodies.upper, state.first, moving)
-    if not grid.suits:
-        return do_without_grid(state)
-    at, found, count = 0, 0, grid.directory[grid.total]  # without invalid boxes
+def search_moving_grid(state):
+    """Pairs of what is in the grid, and those with static bodies that are in none; returns a code."""
+    grid, at, found, count = state.grid, 0, 0, state.grid.directory[state.grid.total]  # without invalid boxes
     while at < count and found != FULL:
         held, at = look_around(grid, at, count)
         found = test_notes(state, held, found)
@@ -138,11 +178,7 @@ def use_uniform_grid(state):
 @packed
 def search_uniform_grid(state, dt):
     """Many bodies move."""
-    if state.moving - state.first < UNIFORM_GRID_MIN:
-        return OK
-    if state.pair_search != UNIFORM_GRID and state.pair_search != STATIC_GRID:
-        return OK
-    return use_uniform_grid(state)
+    return search_moving_grid(state) if state.pair_search == UNIFORM_GRID else OK
 
 
 @part
@@ -161,12 +197,9 @@ def test_row(state, i, start, stop, found):
 
 def test_few(state, dt):
     """Few bodies move: every pair of them, and they with all static bodies that are in no grid."""
-    first, moving, candidates, grid, all_static = state.first, state.moving, state.candidates, state.static_grid, True
-    if state.pair_search == STATIC_GRID:
-        if moving - first >= UNIFORM_GRID_MIN and state.grid.suits:
-            return OK
-        all_static = False
-    elif state.pair_search != BRUTE_FORCE:
+    first, moving, candidates, grid = state.first, state.moving, state.candidates, state.static_grid
+    all_static = not looks_into_statics(state)
+    if state.pair_search != BRUTE_FORCE:
         return OK
     found, stop = 0, state.count if all_static else moving
     for i in range(first, moving):
@@ -197,12 +230,16 @@ def test_blocks(state, i, start, stop, found):
     return found
 
 
-def search_static_grid(state, dt):
-    """What moves looks into the grid of what does not."""
-    if state.pair_search != STATIC_GRID:
-        return OK
+@part
+def look_into_statics(state):
+    """Pairs of what moves with what is in the static grid; returns a code."""
     found = look_near(state, state.static_grid, state.first, state.moving, state.candidates.count)
     if found == FULL:
         return need_more_room(state)
     state.candidates.count = found
     return OK
+
+
+def search_static_grid(state, dt):
+    """What moves looks into the grid of what does not."""
+    return look_into_statics(state) if looks_into_statics(state) else OK

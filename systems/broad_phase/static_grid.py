@@ -1,6 +1,7 @@
 """A uniform grid of what does not move: built once, and whatever moves looks into it (see :mod:`.uniform_grid`).
 
-Static boxes are seldom of one size: a level has walls around it. So the few longest boxes stay outside the grid.
+Static boxes are seldom of one size: a level has walls around it. So the few longest boxes stay outside the grid, whose
+cells need not be as large as they are.
 """
 
 from __future__ import annotations
@@ -10,11 +11,9 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item
-from .boxes import HIGHEST, LARGEST, LOWEST, fixed_count, fixed_row
-from .uniform_grid import build_grid, reserve_grid
-
-OUTSIDE_MAX = 64  # boxes that may stay outside the grid, so that its cells need not be as large as they are
-
+from .boxes import fixed_count, fixed_row
+from .records import HIGHEST, LARGEST, LOWEST
+from .uniform_grid import OUTSIDE_MAX, build_grid, reserve_grid
 
 NEVER_BUILT = -1  # in place of a version
 

@@ -17,6 +17,7 @@ from .stages import (
     TREE,
     UNIFORM_GRID_MIN,
     choose_search,
+    place_moving,
     place_statics,
     search_static_grid,
     search_uniform_grid,
@@ -45,14 +46,18 @@ class BroadPhase(StagedSystem):
             box_motions, "boxes around the motion of what moves, with room for what impacts make of it",
             ("previous_position", "position", "rotation"), BOXES, "colliders",
         ),
-        Stage(choose_search, "how to find which boxes overlap", (), ("candidates",), "colliders"),
         Stage(
             place_statics, "uniform grid of what does not move", BOXES, ("static_grid",), MANY,
             "more bodies are static than move, and these change",
         ),
         Stage(
-            search_uniform_grid, "uniform grid of what moves", BOXES, ("candidates", "grid"), MANY,
+            place_moving, "uniform grid of what moves", BOXES, ("grid",), MANY,
             f"at least {UNIFORM_GRID_MIN} bodies move",
+        ),
+        Stage(choose_search, "how to find which boxes overlap", (), ("candidates",), "colliders"),
+        Stage(
+            search_uniform_grid, "what is in that grid with each other, and with what is in none", (*BOXES, "grid"),
+            ("candidates",), MANY, f"at least {UNIFORM_GRID_MIN} bodies move",
         ),
         Stage(
             test_few, f"every pair of at most {BRUTE_FORCE_MAX} that move, and with what is in no grid", BOXES,

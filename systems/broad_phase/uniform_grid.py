@@ -25,9 +25,9 @@ from ...framework.compilation import inlined, part
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import item, replace
 from ..bits import lowest_bit
-from .boxes import HIGHEST, LARGEST, LOWEST
 from .brute_force import boxes_overlap
 from .lanes import eight_at, four_at
+from .records import HIGHEST, LARGEST, LOWEST
 
 CELLS_PER_BOX = 2.0  # at most; cells grow where there is more room than that
 SPARE_CELLS = 64
@@ -39,6 +39,7 @@ FARTHEST = 2.0**28  # distance from the origin, in boxes, up to which LOOSE and 
 FULLEST = 64  # most boxes in one cell
 CODE_BITS = 60
 CHUNK = 1024  # notes tested at a time; they stay in the first-level cache
+OUTSIDE_MAX = 64  # boxes that may stay outside a grid
 LONGEST = 128  # notes of one box: 2 and 4 * 3 cells, all of them full, by eights, with some to spare
 LANES = 8  # codes that may be read past the last one
 NOTE = 12  # pairs that one note may stand for: 4 and 8 lanes
@@ -112,6 +113,16 @@ def code_bits(d):
     return field, (1 << (field - 1)) - 1
 
 
+@inlined
+def guard_bits(d):
+    """The free bit above each coordinate of a code."""
+    field, largest = code_bits(d)
+    guards = np.int64(0)
+    for _ in range(2 * d):
+        guards = (guards << field) | (largest + 1)
+    return guards
+
+
 @part
 def choose_codes(grid):
     """What coordinates are multiplied by to become the integers of codes."""
@@ -122,28 +133,29 @@ def choose_codes(grid):
     grid.scale[0] = scale
 
 
+@inlined
+def code_of(grid, low, high):
+    """The code of a box that is in the frame."""
+    scale, code, (field, largest) = grid.scale[0], np.int64(0), code_bits(len(low))
+    for q in range(len(low)):
+        origin, shift = grid.frame[LOWEST + q], q * field
+        code |= np.int64((item(low, q) - origin) * item(scale, q)) << shift
+        code |= (largest - np.int64((item(high, q) - origin) * item(scale, q))) << (shift + len(low) * field)
+    return code
+
+
 @part
 def place_boxes(grid, lower, upper, start, count):
     """The counting sort's last pass; afterwards directory[key] is where cell ``key`` begins."""
-    frame, total, scale, origin = grid.frame, grid.total, grid.scale[0], zero_of(grid)
-    keys, directory, order, cells, codes = grid.keys, grid.directory, grid.order, grid.cells, grid.codes
-    d = len(origin)
-    field, largest = code_bits(d)
-    for q in range(d):
-        origin = replace(origin, q, frame[LOWEST + q])
+    total, keys, directory, order, cells = grid.total, grid.keys, grid.directory, grid.order, grid.cells
     for i in range(count):
         key = keys[i]
         if key == total:  # invalid
             continue
         place = directory[key + 1]
         directory[key + 1] += 1
-        order[place] = start + i
-        cells[place] = key
-        code, low, high = np.int64(0), lower[start + i], upper[start + i]
-        for q in range(d):
-            code |= np.int64((item(low, q) - item(origin, q)) * item(scale, q)) << (q * field)
-            code |= (largest - np.int64((item(high, q) - item(origin, q)) * item(scale, q))) << ((d + q) * field)
-        codes[place] = code
+        order[place], cells[place] = start + i, key
+        grid.codes[place] = code_of(grid, lower[start + i], upper[start + i])
 
 
 @part
@@ -154,6 +166,41 @@ def build_grid(grid, lower, upper, start, count):
     if grid.suits:
         choose_codes(grid)
         place_boxes(grid, lower, upper, start, count)
+
+
+@inlined
+def is_near_cell(grid, key, low, high):
+    """Whether a box is in the frame, and reaches over the edges of that cell by no more than half a cell: it may be
+    there wherever its middle is."""
+    inverse, left, near = grid.inverse_cell, key, True
+    for q in range(len(low) - 1, -1, -1):
+        origin, stride = grid.frame[LOWEST + q], 1 if q == 0 else grid.row if q == 1 else grid.layer
+        at = left // stride
+        left -= at * stride
+        near &= (item(low, q) >= origin) & (item(high, q) <= grid.frame[HIGHEST + q])
+        near &= (item(low, q) - origin) * inverse >= at - 1.5
+        near &= (item(high, q) - origin) * inverse <= at + 0.5
+    return near
+
+
+@part
+def move_in_grid(grid, i, low, high):
+    """Row i has left the box that the grid has of it, and now has this one. It stays in its cell if it is near that, or
+    is outside of the grid now. No more than OUTSIDE_MAX can be."""
+    count, key = grid.outside_count, np.int64(grid.keys[i - grid.first])
+    for k in range(count):
+        if grid.outside[k] == i:
+            return
+    for place in range(grid.directory[key], grid.directory[key + 1] if key < grid.total else 0):
+        if grid.order[place] == i:
+            if is_near_cell(grid, key, low, high):
+                grid.codes[place] = code_of(grid, low, high)
+                return
+            grid.codes[place] = guard_bits(len(low))  # overlaps nothing
+    grid.suits &= count < OUTSIDE_MAX
+    if grid.suits:
+        grid.outside[count] = i
+        grid.outside_count = count + 1
 
 
 @part
@@ -168,9 +215,8 @@ def look_around(grid, start, count):
     field = CODE_BITS // (2 * d)
     half = np.int64(field * d)
     lower_half = (np.int64(1) << half) - 1
-    guards, full = np.int64(0), np.int64(0)
+    guards, full = guard_bits(d), np.int64(0)
     for _ in range(2 * d):
-        guards = (guards << field) | (1 << (field - 1))
         full = (full << field) | ((1 << (field - 1)) - 1)
     one, held, room, i = np.int64(1), np.int64(0), len(notes) - LONGEST, start
     while i < count and held < room:
@@ -231,17 +277,14 @@ def test_notes(state, held, found):
 def outline(grid, low, high):
     """What codes of boxes are subtracted from to see whether they may overlap this one, which may reach out of the
     grid; and a guard bit above each coordinate."""
-    frame, scale, code, guards = grid.frame, grid.scale[0], np.int64(0), np.int64(0)
-    d = len(low)
+    frame, scale, code, d = grid.frame, grid.scale[0], np.int64(0), len(low)
     field, largest = code_bits(d)
     for q in range(d):
         origin, unit = frame[LOWEST + q], item(scale, q)
         before = np.int64(min(max((item(low, q) - origin) * unit, 0.0), float(largest)))
         behind = np.int64(min(max((item(high, q) - origin) * unit, 0.0), float(largest)))
         code |= (behind << (q * field)) | ((largest - before) << ((d + q) * field))
-    for _ in range(2 * d):
-        guards = (guards << field) | (largest + 1)
-    return code | guards, guards
+    return code | guard_bits(d), guard_bits(d)
 
 
 @inlined
@@ -261,12 +304,10 @@ def look_near(state, grid, start, stop, found):
     order, directory, codes = grid.order, grid.directory, grid.codes
     lower, upper, first = state.bodies.lower, state.bodies.upper, state.candidates.first
     second, row, layer, inverse, scale = state.candidates.second, grid.row, grid.layer, grid.inverse_cell, grid.scale[0]
-    origin, end, d, guards, one = zero_of(grid), zero_of(grid), len(zero_of(grid)), np.int64(0), np.int64(1)
-    field, largest = code_bits(d)
+    origin, end, d, one = zero_of(grid), zero_of(grid), len(zero_of(grid)), np.int64(1)
+    (field, largest), guards = code_bits(d), guard_bits(d)
     for q in range(d):
         origin, end = replace(origin, q, grid.frame[LOWEST + q]), replace(end, q, grid.frame[HIGHEST + q])
-    for _ in range(2 * d):
-        guards = (guards << field) | (largest + 1)
     width = 8 if d == 2 else 7  # boxes of a line that bits stand for
     for i in range(start, stop):
         low, high, fits = lower[i], upper[i], found + 64 <= len(first)
@@ -303,39 +344,56 @@ def look_near(state, grid, start, stop, found):
     return found
 
 
+@inlined
+def cells_around(grid, low, high):
+    """Cells whose boxes may overlap low..high, which is valid: (first cell, lines, lines a layer, cells a line)."""
+    frame, inverse, first, lines, across = grid.frame, grid.inverse_cell, np.int64(0), np.int64(1), np.int64(1)
+    width = np.int64(0)
+    for q in range(len(low)):
+        origin = frame[LOWEST + q]
+        end = np.int64((frame[HIGHEST + q] - origin) * inverse) + 1.0
+        start = np.int64(min(max((item(low, q) - origin) * inverse - 0.5 - SLACK, 0.0), end))
+        stop = np.int64(min(max((item(high, q) - origin) * inverse + 0.5 + SLACK, -1.0), end - 1.0))
+        length = max(stop - start + 1, 0)
+        first += (start + 1) * (1 if q == 0 else grid.row if q == 1 else grid.layer)
+        width = length if q == 0 else width
+        across = length if q == 1 else across
+        lines *= length if q > 0 else 1
+    return first, lines, across, width
+
+
+@inlined
+def line_of(grid, cells, n):
+    """(begin, end): the places of the boxes in line n of :func:`cells_around`."""
+    first, _, across, width = cells
+    layer = 0 if n < across else n // across  # a division takes longer than all the rest
+    at = first + (n - layer * across) * grid.row + layer * grid.layer
+    return np.int64(grid.directory[at]), np.int64(grid.directory[at + width])
+
+
 @part
 def look_inside(state, grid, i, low, high, found):
     """Pairs of body i, which is not in the grid, with what of it overlaps this box of any size; returns as
     ``test_notes``."""
-    bodies, candidates, frame, inverse = state.bodies, state.candidates, grid.frame, grid.inverse_cell
-    lower, upper, order, directory, codes = bodies.lower, bodies.upper, grid.order, grid.directory, grid.codes
-    first, second, room = candidates.first, candidates.second, len(candidates.first)
-    begin, last = low, high
+    lower, upper, order, codes, one = state.bodies.lower, state.bodies.upper, grid.order, grid.codes, np.int64(1)
+    first, second, room = state.candidates.first, state.candidates.second, len(state.candidates.first)
     for q in range(len(low)):
         if not item(low, q) <= item(high, q):
             return found
-        origin = frame[LOWEST + q]
-        end = np.int64((frame[HIGHEST + q] - origin) * inverse) + 1.0
-        start = min(max((item(low, q) - origin) * inverse - 0.5 - SLACK, 0.0), end)
-        stop = min(max((item(high, q) - origin) * inverse + 0.5 + SLACK, -1.0), end - 1.0)
-        begin, last = replace(begin, q, start + 1.0), replace(last, q, stop + 1.0)
     code, guards = outline(grid, low, high)
-    x, after, one = int(begin[0]), max(int(last[0]) + 1, int(begin[0])), np.int64(1)
-    deep = len(low) - 1
-    for z in range(int(item(begin, deep)) if deep == 2 else 0, int(item(last, deep)) + 1 if deep == 2 else 1):
-        for y in range(int(begin[1]), int(last[1]) + 1):
-            at = y * grid.row + z * grid.layer
-            place, behind = directory[at + x], directory[at + after]
-            if found + (behind - place) > room:
-                return FULL
-            for start in range(place, max(behind, place + 1), 8):  # at least once: a branch less to foresee
-                bits = eight_at(codes, start, code, guards) & ((one << min(behind - start, 8)) - 1)
-                while bits != 0:
-                    there = order[start + lowest_bit(bits)]
-                    bits &= bits - 1
-                    first[found] = there
-                    second[found] = i
-                    found += boxes_overlap(low, high, lower[there], upper[there])
+    cells = cells_around(grid, low, high)
+    for n in range(cells[1]):
+        place, behind = line_of(grid, cells, n)
+        if found + (behind - place) > room:
+            return FULL
+        for start in range(place, max(behind, place + 1), 8):  # at least once: a branch less to foresee
+            bits = eight_at(codes, start, code, guards) & ((one << min(behind - start, 8)) - 1)
+            while bits != 0:
+                there = order[start + lowest_bit(bits)]
+                bits &= bits - 1
+                first[found] = there
+                second[found] = i
+                found += boxes_overlap(low, high, lower[there], upper[there])
     return found
 
 

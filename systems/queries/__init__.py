@@ -2,8 +2,8 @@
 
 A batch of queries is a record (:mod:`.records`); the verbs write its rows, one call of a compiled function writes what
 is found, and Python copies that. The functions know no shapes: :mod:`carom.systems.shapes.query` evaluates the query
-shape against those of bodies through tables of addresses. Each goes through the two trees of the broad phase, of what
-moves and of what does not, which are built when the first query after a change needs them.
+shape against those of bodies through tables of addresses. Each goes through two indexes of the broad phase, of what
+moves and of what does not: grids, brought up to date by the first query after a change, or trees where there is none.
 
 - :mod:`.overlap`: what touches a shape; :mod:`.nearest`: the nearest surface; :mod:`.neighbours`: bodies near bodies
 - :mod:`.casts`: along the path, with :mod:`.first_touch` for each body that comes near

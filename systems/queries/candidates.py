@@ -9,8 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...framework.compilation import inlined, part, pasted
-from ...framework.vectors import add, add_scaled, item, sub
-from ..broad_phase.tree.cells import cells_of, cover, parts_of
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import add, add_scaled, item, replace, sub
+from ..bits import lowest_bit
+from ..broad_phase.lanes import eight_at
+from ..broad_phase.records import HIGHEST, LOWEST
+from ..broad_phase.tree.cells import REACH, cells_of, cover, parts_of
+from ..broad_phase.uniform_grid import LANES, cells_around, line_of, outline
 
 NO_ROOM = -1  # in place of a number of hits
 
@@ -22,6 +27,65 @@ def boxes_overlap(tree, place, low, high):
     for k in range(d):
         hit &= (item(low, k) <= tree.boxes[place, d + k]) & (tree.boxes[place, k] <= item(high, k))
     return hit
+
+
+@inlined
+def is_box_near(state, i, low, high):
+    """The same for the box of row i."""
+    lower, upper, hit = state.bodies.lower[i], state.bodies.upper[i], True
+    for k in range(len(low)):
+        hit &= (item(low, k) <= item(upper, k)) & (item(lower, k) <= item(high, k))
+    return hit
+
+
+@inlined
+def places_of(grid, cells, n):
+    """(begin, end) of the boxes in line n of :func:`cells_around`; line -1 is what is outside of the grid."""
+    if n < 0:
+        return np.int64(0), np.int64(grid.outside_count)
+    return line_of(grid, cells, n)
+
+
+@inlined
+def near_at(grid, n, start, end, outlined):
+    """Bits of the boxes from ``start`` on in that line, up to LANES of them, that may overlap what is outlined."""
+    code, guards = outlined
+    some = (np.int64(1) << min(end - start, LANES)) - 1
+    return some if n < 0 else eight_at(grid.codes, start, code, guards) & some
+
+
+@inlined
+def row_at(grid, n, place):
+    """The row of a box in that line."""
+    return np.int64(grid.outside[place] if n < 0 else grid.order[place])
+
+
+@inlined
+def frame_of(grid):
+    """(lower, upper) corner of what holds all boxes in the grid."""
+    low = high = zero_of(grid)
+    for k in range(len(low)):
+        low, high = replace(low, k, grid.frame[LOWEST + k]), replace(high, k, grid.frame[HIGHEST + k])
+    return low, high
+
+
+@inlined
+def rounding_of(point, low, high):
+    """Per axis more than all rounding errors of distances between the point and boxes inside of low..high."""
+    result = point
+    for k in range(len(point)):
+        farthest = max(abs(item(low, k)), abs(item(high, k)))
+        result = replace(result, k, REACH * (abs(item(point, k)) + farthest))
+    return result
+
+
+@inlined
+def box_at(tree, place):
+    """The box at that place of the tree's order."""
+    low = high = zero_of(tree)
+    for k in range(len(low)):
+        low, high = replace(low, k, tree.boxes[place, k]), replace(high, k, tree.boxes[place, len(low) + k])
+    return low, high
 
 
 @inlined
@@ -68,8 +132,11 @@ def order_by_entity(state, batch, begin, end):
         batch.entity[k] = ids[row[k]]
 
 
-def make_find_all(box_of: Callable[..., Any], may_hit: Callable[..., bool], is_hit: Callable[..., bool]) -> Any:
-    """find_all(state, batch, trees, first, stop) for queries that look for all bodies of some kind.
+def make_find_all(
+    box_of: Callable[..., Any], may_hit: Callable[..., bool], is_hit: Callable[..., bool], in_grids: bool
+) -> Any:
+    """find_all(state, batch, moving, static, first, stop) for queries that look for all bodies of some kind: in_grids,
+    in those of the state that serve and else in two trees; or in the first tree alone.
 
     It finds the hits of queries first..stop-1, by id, and returns the query to go on with once the hits are taken away.
     There must be room for as many hits as there are bodies: that is enough for one query.
@@ -81,9 +148,8 @@ def make_find_all(box_of: Callable[..., Any], may_hit: Callable[..., bool], is_h
     """
 
     @pasted
-    def find_in_tree(state, batch, tree, q, found):
-        """Append the hits of one tree; returns how many there are then, or NO_ROOM."""
-        centre, low, high = box_of(state, batch, q)
+    def gather_of_tree(batch, tree, low, high, found):
+        """Append the rows whose boxes in the tree overlap low..high; returns how many there are then, or NO_ROOM."""
         for level in range(tree.levels + 1):
             if tree.level_end[level] == tree.level_begin[level]:
                 continue
@@ -94,24 +160,58 @@ def make_find_all(box_of: Callable[..., Any], may_hit: Callable[..., bool], is_h
                 if found + (end - begin) > len(batch.row):
                     return NO_ROOM
                 for place in range(begin, end):
-                    i = tree.order[place]
-                    if boxes_overlap(tree, place, low, high) and may_hit(state, batch, q, centre, i):
-                        batch.row[found] = i
-                        found += is_hit(state, batch, q, centre, i)
+                    batch.row[found] = tree.order[place]
+                    found += boxes_overlap(tree, place, low, high)
         return found
 
     @pasted
-    def find_all(state, batch, trees, first, stop):
-        found = np.int64(0)
+    def gather_of_grid(state, batch, grid, low, high, found):
+        """The same of a grid."""
+        begin, outlined, cells = found, outline(grid, low, high), cells_around(grid, low, high)
+        for n in range(-1, cells[1]):
+            first, end = places_of(grid, cells, n)
+            if found + (end - first) > len(batch.row):
+                return NO_ROOM
+            for start in range(first, end, LANES):
+                bits = near_at(grid, n, start, end, outlined)
+                while bits != 0:
+                    batch.row[found] = row_at(grid, n, start + lowest_bit(bits))
+                    bits &= bits - 1
+                    found += 1
+        near = begin
+        for k in range(begin, found):
+            i = batch.row[k]
+            batch.row[near] = i
+            near += is_box_near(state, i, low, high)
+        return near
+
+    @pasted
+    def keep_hits(state, batch, q, centre, begin, end):
+        """Of these rows keep those that are hits; returns where they end."""
+        found = begin
+        for k in range(begin, end):
+            i = batch.row[k]
+            if may_hit(state, batch, q, centre, i):
+                batch.row[found] = i
+                found += is_hit(state, batch, q, centre, i)
+        return found
+
+    @pasted
+    def find_all(state, batch, moving, static, first, stop):
+        end = np.int64(0)
         for q in range(first, stop):
-            begin = found
-            for tree in trees:
-                if tree.count > 0 and found != NO_ROOM:
-                    found = find_in_tree(state, batch, tree, q, found)
-            if found == NO_ROOM:
+            begin, (centre, low, high) = end, box_of(state, batch, q)
+            for turn in range(2 if in_grids else 1):
+                tree, grid = (moving, state.grid) if turn == 0 else (static, state.static_grid)
+                if end != NO_ROOM and in_grids and grid.serves:
+                    end = gather_of_grid(state, batch, grid, low, high, end)
+                if end != NO_ROOM and tree.count > 0:
+                    end = gather_of_tree(batch, tree, low, high, end)
+            if end == NO_ROOM:
                 return q
-            order_by_entity(state, batch, begin, found)
-            batch.end[q] = found
+            end = keep_hits(state, batch, q, centre, begin, end)
+            order_by_entity(state, batch, begin, end)
+            batch.end[q] = end
         return stop
 
     return find_all

@@ -1,7 +1,7 @@
 """Casts: what a ray or a moving shape meets on a straight path, and where.
 
-The path through a tree is cut into slices, for each level of the tree by itself, a few cells long. The level whose next
-slice begins first is searched first, and once that is beyond the nearest hit, nothing nearer can come.
+The path is cut into slices, a few cells long; through a tree, for each level by itself. The level whose next slice
+begins first is searched first, and once that is beyond the nearest hit, nothing nearer can come.
 """
 
 from __future__ import annotations
@@ -11,13 +11,16 @@ import math
 from ...framework.compilation import inlined, pasted
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, divided, item, length, replace, sub
+from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
+from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import query_half_extents
-from .candidates import is_wanted, nan_vector
+from .candidates import box_at, frame_of, is_wanted, nan_vector, near_at, places_of, rounding_of, row_at
 from .first_touch import LAST_STEP, Path, first_touch
 from .records import ENDLESS
 
 SLACK = 1.0 + 4.0 * LAST_STEP  # so that bodies at the nearest distance are all tested, in whatever order
+
 SLICE = 3.0  # cells; measured: 2 is as good, 6 is worse
 SHORTEST = 2.2250738585072014e-308  # m, the smallest normal number: at a length of 0 the distance is 0 too
 
@@ -36,35 +39,21 @@ def inverse_of(direction):
 
 
 @inlined
-def path_of(state, batch, tree, q):
-    """The path of query q through a tree."""
+def path_of(state, batch, q, rounding):
+    """The path of query q; rounding: what half extents exceed those of the query's shape by."""
     start, direction = batch.centre[q], batch.direction[q]
-    half = add(query_half_extents(state, batch.query, q), uncertainty(tree, start))
+    half = add(query_half_extents(state, batch.query, q), rounding)
     return Path(start, direction, inverse_of(direction), half)
 
 
 @inlined
-def frame_interval(tree, path):
-    """(enter, leave) of the path and the tree's extent, in which nearly all cells in use lie; enter > leave if they do
-    not meet."""
+def box_interval(lower, upper, path, reach):
+    """(enter, leave) of the path as far as ``reach`` and the box lower..upper; enter > leave if they never meet."""
     back, front = sub(path.start, path.half), add(path.start, path.half)
-    origin, extent = tree.origin[0], tree.extent[0]
-    enter, leave = 0.0, math.inf
-    for k in range(len(back)):
-        one = (item(origin, k) - item(front, k)) * item(path.inverse, k)
-        two = (item(origin, k) + item(extent, k) - item(back, k)) * item(path.inverse, k)
-        enter, leave = max(enter, min(one, two)), min(leave, max(one, two))
-    return enter, leave
-
-
-@inlined
-def box_interval(tree, place, path, reach):
-    """(enter, leave) of the path as far as ``reach`` and a box of the tree; enter > leave if they never meet."""
-    back, front, d = sub(path.start, path.half), add(path.start, path.half), len(path.start)
     enter, leave = 0.0, reach
-    for k in range(d):
-        one = (tree.boxes[place, k] - item(front, k)) * item(path.inverse, k)
-        two = (tree.boxes[place, d + k] - item(back, k)) * item(path.inverse, k)
+    for k in range(len(back)):
+        one = (item(lower, k) - item(front, k)) * item(path.inverse, k)
+        two = (item(upper, k) - item(back, k)) * item(path.inverse, k)
         low, high = (one, two) if one < two else (two, one)
         enter = low if low > enter else enter
         leave = high if high < leave else leave
@@ -143,25 +132,50 @@ def keep_hit(state, batch, q, i, path, touch):
 
 
 @pasted
-def cast_at(state, batch, tree, q, path, cells, begin, end):
-    """Test the bodies of some cells (their first and last place) whose boxes are entered in the slice begin..end."""
-    for place in range(cells[0], cells[1]):
-        reach = batch.search_limit[q] * SLACK
-        enter, leave = box_interval(tree, place, path, reach)
-        if not (enter <= leave and begin <= enter < end):  # every body has its turn in one slice
-            continue
-        i = tree.order[place]
-        if is_wanted(state, batch, q, i):
-            touches, distance, normal, point = first_touch(state, batch, q, i, path, leave, reach)
-            if touches:
-                keep_hit(state, batch, q, i, path, (distance, normal, point))
+def cast_at(state, batch, q, path, i, box, between):
+    """Test row i if the path enters its box in the slice from between[0] to between[1]: each has its turn in one."""
+    reach = batch.search_limit[q] * SLACK
+    enter, leave = box_interval(box[0], box[1], path, reach)
+    if enter <= leave and between[0] <= enter < between[1] and is_wanted(state, batch, q, i):
+        touches, distance, normal, point = first_touch(state, batch, q, i, path, leave, reach)
+        if touches:
+            keep_hit(state, batch, q, i, path, (distance, normal, point))
 
 
 @pasted
-def cast_through(state, batch, tree, q):
-    """What query q meets of the bodies in a tree."""
-    path = path_of(state, batch, tree, q)
-    enter, leave = frame_interval(tree, path)
+def cast_in_grid(state, batch, grid, q):
+    """What query q meets of the bodies in a grid: first of those outside of it, then slice by slice."""
+    lowest, highest = frame_of(grid)
+    path = path_of(state, batch, q, rounding_of(batch.centre[q], lowest, highest))
+    enter, leave = box_interval(lowest, highest, path, math.inf)
+    meets, first, batch.span = enter <= leave and enter <= batch.search_limit[q] * SLACK, -1, 0.0
+    enter, leave = (enter, leave) if meets else (0.0, 0.0)
+    begin = enter
+    while True:
+        reach = batch.search_limit[q] * SLACK
+        end = min(begin + SLICE / grid.inverse_cell, leave)
+        low, high = slice_box(path, begin, min(end, reach))
+        outlined, cells = outline(grid, low, high), cells_around(grid, low, high)
+        last = end == leave or not end > begin
+        for n in range(first, cells[1] if meets else 0):
+            first_place, behind = places_of(grid, cells, n)
+            between = (-math.inf if n < 0 or begin == enter else begin, math.inf if n < 0 or last else end)
+            for start in range(first_place, behind, LANES):
+                bits = near_at(grid, n, start, behind, outlined)
+                while bits != 0:
+                    i = row_at(grid, n, start + lowest_bit(bits))
+                    bits &= bits - 1
+                    cast_at(state, batch, q, path, i, (state.bodies.lower[i], state.bodies.upper[i]), between)
+        if last or not end <= batch.search_limit[q] * SLACK:
+            return
+        begin, first = end, 0
+
+
+@pasted
+def cast_in_tree(state, batch, tree, q):
+    """The same of the bodies in a tree; nearly all cells in use lie in its extent."""
+    path = path_of(state, batch, q, uncertainty(tree, batch.centre[q]))
+    enter, leave = box_interval(tree.origin[0], add(tree.origin[0], tree.extent[0]), path, math.inf)
     used = begin_slices(batch, tree)
     batch.span = 0.0
     while used > 0:
@@ -176,7 +190,9 @@ def cast_through(state, batch, tree, q):
         runs = cover(tree, low, high, level)
         parts, wraps = parts_of(tree, level, runs)
         for part in range(parts):
-            cast_at(state, batch, tree, q, path, cells_of(tree, level, runs, part, wraps), begin, end)
+            first, behind = cells_of(tree, level, runs, part, wraps)
+            for place in range(first, behind):
+                cast_at(state, batch, q, path, tree.order[place], box_at(tree, place), (begin, end))
 
 
 # -- batches -------------------------------------------------------------------------------------
@@ -214,9 +230,12 @@ def find_hits(state, batch, moving, static, first, stop):
     batch.hit_count = 0
     for q in range(first, stop):
         begin_cast(state, batch, q)
-        for tree in (moving, static):
+        for turn in range(2):
+            tree, grid = (moving, state.grid) if turn == 0 else (static, state.static_grid)
+            if grid.serves:
+                cast_in_grid(state, batch, grid, q)
             if tree.count > 0:
-                cast_through(state, batch, tree, q)
+                cast_in_tree(state, batch, tree, q)
     count = stop if batch.only_nearest else batch.hit_count
     for place in range(count):
         end_cast(state, batch, place if batch.only_nearest else 0, place)

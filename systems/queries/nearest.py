@@ -7,47 +7,60 @@ import math
 from ...framework.compilation import inlined, pasted
 from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add_scaled, item, replace, sub
+from ..bits import lowest_bit
 from ..broad_phase.tree.cells import cells_of, cover, parts_of, uncertainty
+from ..broad_phase.uniform_grid import LANES, cells_around, outline
 from ..shapes.query import evaluate_against
-from .candidates import is_wanted, nan_vector, to_collider
+from .candidates import (
+    box_at,
+    frame_of,
+    is_wanted,
+    nan_vector,
+    near_at,
+    places_of,
+    rounding_of,
+    row_at,
+    to_collider,
+)
 from .records import ENDLESS
 
 FIRST_BOX = 0.5  # half the size of the first box, in cells of the finest level; measured: 1 takes longer, as does 0.2
 
 
 @inlined
-def squared_gap(tree, place, point, slack):
-    """Square of the distance from a point to a box of the tree, at most: less the uncertainty of both."""
-    d, square = len(point), 0.0
-    for k in range(d):
-        gap = max(tree.boxes[place, k] - item(point, k), item(point, k) - tree.boxes[place, d + k])
+def squared_gap(low, high, point, slack):
+    """Square of the distance from a point to the box low..high, at most: less the uncertainty of both."""
+    square = 0.0
+    for k in range(len(point)):
+        gap = max(item(low, k) - item(point, k), item(point, k) - item(high, k))
         gap = max(gap - item(slack, k), 0.0)
         square += gap * gap
     return square
 
 
 @pasted
-def improve(state, batch, tree, q, begin, end, slack):
-    """Compare what query q has as its nearest with the boxes begin..end-1 of the tree's order."""
-    point, ids = batch.centre[q], state.bodies.entity
-    for place in range(begin, end):
-        best = batch.distance[q]
-        outside = max(best, 0.0)
-        if not squared_gap(tree, place, point, slack) <= outside * outside:
-            continue
-        i = tree.order[place]
-        if not is_wanted(state, batch, q, i):
-            continue
+def improve(state, batch, q, i, gap):
+    """Compare what query q has as its nearest with row i, the square of the distance to whose box is ``gap``."""
+    point, ids, best = batch.centre[q], state.bodies.entity, batch.distance[q]
+    outside = max(best, 0.0)
+    if gap <= outside * outside and is_wanted(state, batch, q, i):
         d = to_collider(state, point, i)
         _, depth, normal, _ = evaluate_against(state, batch.query, q, state.bodies.shape[i], i, d)
         distance = -depth
-        if not distance <= best:
-            continue
-        if distance == best and batch.row[q] >= 0 and ids[batch.row[q]] <= ids[i]:
-            continue
-        batch.row[q], batch.distance[q] = i, distance
-        batch.normal[q] = sub(zero_of(state), normal)
-        batch.point[q] = add_scaled(point, normal, distance)
+        if distance < best or (distance == best and not (batch.row[q] >= 0 and ids[batch.row[q]] <= ids[i])):
+            batch.row[q], batch.distance[q] = i, distance
+            batch.normal[q] = sub(zero_of(state), normal)
+            batch.point[q] = add_scaled(point, normal, distance)
+
+
+@inlined
+def around(point, reach, slack):
+    """The box that reaches so far from the point, and its uncertainty farther."""
+    low, high = point, point
+    for k in range(len(point)):
+        low = replace(low, k, item(point, k) - reach - item(slack, k))
+        high = replace(high, k, item(point, k) + reach + item(slack, k))
+    return low, high
 
 
 @inlined
@@ -74,23 +87,22 @@ def covers_all(tree, low, high):
 
 
 @pasted
-def improve_from(state, batch, tree, q):
+def improve_from_tree(state, batch, tree, q):
     """Compare what query q has as its nearest with a tree: first what is too large or too far out for cells, then
     boxes around the point, all levels of each, that grow."""
     point, top = batch.centre[q], tree.levels
     slack = uncertainty(tree, point)
     reach, level = 0.0, top
     while True:
-        low, high = point, point
-        for k in range(len(point)):
-            low = replace(low, k, item(point, k) - reach - item(slack, k))
-            high = replace(high, k, item(point, k) + reach + item(slack, k))
+        low, high = around(point, reach, slack)
         if tree.level_end[level] > tree.level_begin[level]:
             runs = cover(tree, low, high, level)
             parts, wraps = parts_of(tree, level, runs)
             for part in range(parts):
                 begin, end = cells_of(tree, level, runs, part, wraps)
-                improve(state, batch, tree, q, begin, end, slack)
+                for place in range(begin, end):
+                    lower, upper = box_at(tree, place)
+                    improve(state, batch, q, tree.order[place], squared_gap(lower, upper, point, slack))
         if level < top - 1:
             level += 1
             continue
@@ -107,15 +119,47 @@ def improve_from(state, batch, tree, q):
         level = 0
 
 
+@pasted
+def improve_from_grid(state, batch, grid, q):
+    """The same with a grid: first what is outside of it, then boxes around the point that grow."""
+    point, bodies = batch.centre[q], state.bodies
+    lowest, highest = frame_of(grid)
+    slack, first = rounding_of(point, lowest, highest), FIRST_BOX / grid.inverse_cell
+    reach, begin = first, -1
+    for k in range(len(point)):
+        reach = max(reach, max(item(lowest, k) - item(point, k), item(point, k) - item(highest, k)) + first)
+    while True:
+        reach = min(reach, max(batch.distance[q], 0.0))
+        low, high = around(point, reach, slack)
+        outlined, cells = outline(grid, low, high), cells_around(grid, low, high)
+        for n in range(begin, cells[1]):
+            first_place, end = places_of(grid, cells, n)
+            for start in range(first_place, end, LANES):
+                bits = near_at(grid, n, start, end, outlined)
+                while bits != 0:
+                    i = row_at(grid, n, start + lowest_bit(bits))
+                    bits &= bits - 1
+                    improve(state, batch, q, i, squared_gap(bodies.lower[i], bodies.upper[i], point, slack))
+        best, covers = batch.distance[q], True
+        for k in range(len(point)):
+            covers &= (item(low, k) <= item(lowest, k)) & (item(high, k) >= item(highest, k))
+        if best <= reach or covers:
+            return
+        reach, begin = (best if batch.row[q] >= 0 else 2.0 * reach), 0
+
+
 def find_nearest(state, batch, moving, static, first, stop):
     """The nearest surface to the centre of each query: row, id, distance, normal and point; -1, inf and nan if none."""
     nothing = nan_vector(zero_of(state))
     for q in range(first, stop):
         batch.row[q], batch.distance[q] = -1, min(batch.limit[q], ENDLESS)
         batch.normal[q], batch.point[q] = nothing, nothing
-        for tree in (moving, static):
+        for turn in range(2):
+            tree, grid = (moving, state.grid) if turn == 0 else (static, state.static_grid)
+            if grid.serves:
+                improve_from_grid(state, batch, grid, q)
             if tree.count > 0:
-                improve_from(state, batch, tree, q)
+                improve_from_tree(state, batch, tree, q)
         i = batch.row[q]
         if i < 0:
             batch.entity[q], batch.distance[q] = -1, math.inf

@@ -33,9 +33,9 @@ def is_near(state, batch, q, centre, i):
     return length(sub(state.bodies.position[i], centre)) <= batch.radius
 
 
-find_near = make_find_all(box_of_body, may_be_near, is_near)
+find_near = make_find_all(box_of_body, may_be_near, is_near, in_grids=False)
 
 
 def find_neighbours(state, batch, points, unused, first, stop):
     """The neighbours of queries first..stop-1; ``points``: a tree of the bodies' positions, boxes without size."""
-    return find_near(state, batch, (points,), first, stop)
+    return find_near(state, batch, points, unused, first, stop)

@@ -27,9 +27,9 @@ def touches(state, batch, q, centre, i):
     return evaluate_against(state, batch.query, q, state.bodies.shape[i], i, to_collider(state, centre, i))[0]
 
 
-find_touching = make_find_all(box_of_query, may_touch, touches)
+find_touching = make_find_all(box_of_query, may_touch, touches, in_grids=True)
 
 
 def find_overlaps(state, batch, moving, static, first, stop):
     """What touches the shapes of queries first..stop-1."""
-    return find_touching(state, batch, (moving, static), first, stop)
+    return find_touching(state, batch, moving, static, first, stop)

@@ -29,7 +29,7 @@ NEVER: Any = object()  # in place of a version
 
 
 class Queries:
-    """Answers to queries, from trees that are built when the first query after a change needs them.
+    """Answers to queries, from the grids of the step, or trees that the first query after a change builds.
 
     state
         the record; queries read count, bodies (entity, position, offset, shape, collider_slot), colliders.layer and
@@ -39,7 +39,7 @@ class Queries:
     registry
         the pairs of query shapes and bodies
     candidate_search
-        has the trees of the broad phase
+        has the grids and trees of the broad phase
     refresh
         between two steps: brings shapes, rows and columns up to date; called by every query
     """
@@ -67,8 +67,9 @@ class Queries:
         return SpatialTree(self._dimensions)
 
     def forget(self) -> None:
-        """Let the next query build the trees again."""
+        """Let the next query make the indexes again; code of the game may have written to what sleeps, too."""
         self._version = self._points_version = NEVER
+        self._state.statics_version += int(self._state.first > 0)
 
     # -- what touches a shape ---------------------------------------------------------------------
 
@@ -259,14 +260,14 @@ class Queries:
         return shape
 
     def _renew(self) -> None:
-        """Build the trees again, and forget the query shapes if the shapes of the scene are others."""
+        """Make the indexes again, and forget the query shapes if the shapes of the scene are others."""
         scene = self._scene
         if scene.linked is not None:
             version = scene.linked, scene.parameters, self._registry.version
             if version != self._linked_version:
                 self._shapes, self._linked_version = {}, version
             scene.refresh_rotation()
-            moving, static = self._search.partitions()
+            moving, static = self._search.index_now()
             self._trees = moving.record.address, static.record.address
         self._version = scene.seen_version
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from worlds import both_dimensions
 
 from carom.systems.broad_phase.brute_force import BRUTE_FORCE_MAX
-from carom.systems.broad_phase.stages import BRUTE_FORCE, STATIC_GRID, TREE, UNIFORM_GRID
+from carom.systems.broad_phase.stages import BRUTE_FORCE, TREE, UNIFORM_GRID
 from carom.systems.codes import FIND_IN_PYTHON
 
 
@@ -32,8 +32,8 @@ def mixed(rng, count, d):
     [
         (0, 0, BRUTE_FORCE), (1, 0, BRUTE_FORCE), (20, 1, BRUTE_FORCE), (0, 40, BRUTE_FORCE),
         (BRUTE_FORCE_MAX, BRUTE_FORCE_MAX, BRUTE_FORCE), (BRUTE_FORCE_MAX + 1, 0, UNIFORM_GRID),
-        (700, 700, UNIFORM_GRID), (0, 300, STATIC_GRID), (5, BRUTE_FORCE_MAX + 1, STATIC_GRID),
-        (700, 701, STATIC_GRID), (100, 2000, STATIC_GRID),
+        (700, 700, UNIFORM_GRID), (0, 300, BRUTE_FORCE), (5, BRUTE_FORCE_MAX + 1, BRUTE_FORCE),
+        (700, 701, UNIFORM_GRID), (100, 2000, BRUTE_FORCE),
     ],
 )  # fmt: skip
 def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
@@ -42,6 +42,7 @@ def test_the_search_by_the_numbers_of_bodies(d, moving, static, search):
     boxes.set(lower, upper, moving)
     assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
     assert boxes.state.pair_search == boxes.search.last == search
+    assert boxes.state.static_grid.suits == (static > max(moving, BRUTE_FORCE_MAX))
     assert FIND_IN_PYTHON not in boxes.asked
 
 
@@ -96,7 +97,7 @@ def test_uneven_boxes_are_left_to_trees(d, moving, static):
     lower, upper = spread(rng, moving + static, d)  # and grids take over again
     boxes.set(lower, upper, moving)
     assert pair_set(*boxes.find()) == overlapping(lower, upper, moving)
-    assert boxes.state.pair_search in (UNIFORM_GRID, STATIC_GRID)
+    assert boxes.state.pair_search in (UNIFORM_GRID, BRUTE_FORCE)
 
 
 def test_room_for_one_grid_leaves_the_other_as_it_is():
@@ -107,7 +108,8 @@ def test_room_for_one_grid_leaves_the_other_as_it_is():
     boxes.find()
     boxes.set(lower[:700], upper[:700], BRUTE_FORCE_MAX + 1)
     assert pair_set(*boxes.find()) == overlapping(lower[:700], upper[:700], BRUTE_FORCE_MAX + 1)
-    assert boxes.state.pair_search == STATIC_GRID
+    assert boxes.state.pair_search == UNIFORM_GRID
+    assert boxes.state.static_grid.suits
 
 
 def test_one_pair_more_than_there_is_room_for():

@@ -13,8 +13,8 @@ from worlds import both_dimensions
 
 from carom.components import RigidBody, Transform
 from carom.systems.broad_phase.stages import CANDIDATE_LIMIT
-from carom.systems.broad_phase.static_grid import OUTSIDE_MAX
 from carom.systems.broad_phase.tree.tree import CandidateLimitError
+from carom.systems.broad_phase.uniform_grid import OUTSIDE_MAX
 
 # -- what moves ------------------------------------------------------------------------------------
 
