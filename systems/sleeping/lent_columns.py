@@ -51,7 +51,9 @@ class LentColumns:
 
     def changed(self) -> np.ndarray:
         """Rows that hold other bits in some column."""
-        found = [self._ids[0][:0]]
+        found = [self._ids[MOVABLE][:0]]
+        if not self._copies:
+            return found[0]
         for (key, group), copy in self._copies.items():
             rows, bits = self._rows_now()[group], f"i{copy.itemsize}"
             now = self._table.column(key)[self._places[group]].view(bits)

@@ -222,7 +222,7 @@ class Sleepers:
     def _mark(self, rows: np.ndarray) -> None:
         """What is still in these rows is disturbed."""
         still = self._table.arrays.get("_still")
-        if still is None or not len(rows := rows[still[rows] > AWAKE]):
+        if still is None or not len(rows) or not len(rows := rows[still[rows] > AWAKE]):
             return
         still[rows] = DISTURBED
         self._disturbed = True
