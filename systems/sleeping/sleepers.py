@@ -84,8 +84,7 @@ class Sleepers:
         if self._all_wake:
             self._wake_all()
             self._all_wake = False
-        seen = table.version + table.members_version + table.static_version + table.columns_version  # these only grow
-        fresh = False
+        fresh, seen = False, self._versions()
         if seen != self._seen:
             self._scene.reserve(*SLEEPING)
             structure = self._structure()
@@ -157,6 +156,11 @@ class Sleepers:
         self._mark(self._lent.changed())
         if self._state.first and (self._still() == DISTURBED).any():
             self._join()
+
+    def _versions(self) -> int:
+        """Another number whenever rows, their components, static bodies or arrays may be others."""
+        table = self._table
+        return table.version + table.members_version + table.static_version + table.columns_version  # these only grow
 
     def _structure(self) -> tuple[int, ...]:
         table = self._table
@@ -442,14 +446,15 @@ class Sleepers:
         self._mark(self._lent.changed())
         followed = self._structure() == self._followed
         more = {"changes": list(self._changes)} if self._changes else {}
-        return {**self._saved_parts(), "followed": followed, "all_wake": self._all_wake, **more}
+        seen = self._versions() == self._seen
+        return {**self._saved_parts(), "followed": followed, "seen": seen, "all_wake": self._all_wake, **more}
 
     def take_back(self, saved: Any) -> None:
         """The table is what it was then; if this world does not sleep, all of them wake."""
         state = self._state
         self.kept, self._followed, self._seen = None, None, -1
         self._leave_out(0)
-        self._placed, self._disturbed = None, True  # what was written after that time is not known
+        self._placed, self._disturbed, self._pushed = None, bool((self._still() == DISTURBED).any()), True
         self._lent.take(np.flatnonzero(self._still() > AWAKE))
         self._changes = [] if saved is None else list(saved.get("changes", ()))
         if saved is None:
@@ -463,3 +468,6 @@ class Sleepers:
         self.on = state.sleeping or self._all_wake
         if saved["followed"]:
             self._followed = self._structure()
+        if saved["seen"]:
+            self._scene.reserve(*SLEEPING)
+            self._seen = self._versions()

@@ -381,6 +381,22 @@ def test_springs_and_other_force_systems_wake(integrator):
     assert is_asleep(world, *boxes) == [False]
 
 
+def test_a_spring_from_a_sleeper_to_what_is_awake_goes_on_from_a_snapshot_to_the_bit():
+    springs, settings = Springs(), Settings(sleeping=True, integrator="rk4")
+    world = World(Physics(2, gravity=(0.0, -GRAVITY)), springs, settings=settings)
+    floor(world)
+    boxes = tower(world, 0.0, 1)
+    sleep(world, *boxes)
+    springs.connect(boxes[0], ball(world, (0.0, 3.0)), stiffness=20.0, damping=0.5)
+    snapshot, ends = world.snapshot(), []
+    for _ in range(2):
+        for _ in range(10):
+            world.step()
+        ends.append(world.state_hash())
+        world.restore(snapshot)
+    assert ends[0] == ends[1]
+
+
 @pytest.mark.parametrize("column", [False, True])
 def test_a_system_that_moves_a_sleeper_within_the_step_wakes_it(column):
     class Kick(System):
