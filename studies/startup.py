@@ -27,7 +27,7 @@ COMMANDS = {
 COMMANDS_AXIS = "commands"
 EMPTY, KEPT, SHIPPED = "none", "kept on disk", "shipped"  # kernels that are compiled already
 PROGRAM = f"""
-import json, sys, time
+import json, resource, sys, time
 import carom.framework.jit.dispatchers  # numba, as the first kernel imports it
 from carom import scenes
 from carom.framework import use_kernels
@@ -45,6 +45,7 @@ for _ in range({STEPS}):
     world.step()
     worst = max(worst, time.perf_counter() - started)
 found = {{"at": at, "imports": imported, "first": first - imported, "worst": worst, "compiled": len(log.compiled)}}
+found["peak"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # on Linux
 print(json.dumps(found))
 """
 
@@ -98,7 +99,7 @@ def _ship(scene: str, folder: str) -> None:
 
 def _start(scene: str, cache: str, shipped: str) -> dict[str, float]:
     """Of one process, by name: seconds by the wall clock to the end of its first step; processor seconds of imports and
-    of building the world with the first step; seconds of the longest step after it; kernels that were compiled."""
+    of building the world with the first step; seconds of the longest step after it; kernels that were compiled; most memory held."""
     started = time.time()
     found = json.loads(_run([sys.executable, "-c", PROGRAM, scene, shipped], {CACHE_FOLDER_VARIABLE: cache}))
     return {"seconds": found.pop("at") - started, **found}
@@ -124,12 +125,13 @@ def report(result: Result) -> tuple[list[TextTable], list[str]]:
             (
                 line.axis, kernels, f"{of['compiled'].median:.0f}", compact(of["seconds"].median), span(of["seconds"]),
                 compact(of["imports"].median), compact(of["first"].median), compact(of["worst"].median * 1e3),
+                f"{of['peak'].median:.0f}",
             )
             for kernels, of in found
         ]  # fmt: skip
     columns = (
         "scene", "kernels", "compiled", "first step after s", "from .. to", "imports CPU s", "first step CPU s",
-        f"worst of {STEPS} ms",
+        f"worst of {STEPS} ms", "peak MB",
     )  # fmt: skip
     title = (
         "from starting a process to the end of its first step, and the longest step after it, medians of "

@@ -12,6 +12,7 @@ import numpy as np
 
 LARGEST = float(np.finfo(float).max)
 SMALLEST_WITH_INVERSE = 1 / LARGEST  # 5.6e-309, a denormal
+LONGEST = 200  # characters of a value in a message
 REQUIRED: Any = type("Required", (), {"__repr__": lambda self: "<required>"})()
 
 
@@ -226,6 +227,7 @@ class Column:
         prefix = "" if entity is None else f"entity {entity}: "
         shown = value.tolist() if isinstance(value, np.ndarray) else value
         text = shown if isinstance(shown, str) and shown.startswith("an array") else repr(shown)
+        text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
         return ValueError(f"{prefix}{self.owner}.{self.name} {rule}, got {text}")
 
     # -- descriptor -------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ anew. Files are written whole or not at all, so any number of processes share a 
 from __future__ import annotations
 
 import contextlib
+import functools
 import getpass
 import hashlib
 import logging
@@ -22,6 +23,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 from numba.core import compiler
 from numba.core.caching import _Cache
 from numba.core.serialize import dumps
@@ -123,6 +125,18 @@ def _read(path: Path) -> Any:
         return None
 
 
+def _loaded(context: Any, library: Any, description: Any, *rest: Any) -> Any:
+    """A kernel from its file, without what only the compiler needs: numba's own functions, which the first kernel that
+    has to compile loads, and its code in LLVM's language, which is read when another kernel has it compiled in."""
+    name, kind, (code, inlinable) = library
+    nothing = llvmlite.binding.parse_assembly("").as_bitcode()
+    symbols = "llvm_func_name", "llvm_cpython_wrapper_name", "llvm_cfunc_wrapper_name"
+    context.codegen()._engine._defined_symbols.update(getattr(description, symbol) for symbol in symbols)
+    result = compiler.CompileResult._rebuild(context, (name, kind, (code, nothing)), description, *rest)
+    machine_code(result)._get_module_for_linking = functools.cache(lambda: llvmlite.binding.parse_bitcode(inlinable))
+    return result
+
+
 def announcement() -> str:
     """What is said once of a process that compiles: where the kernels are kept."""
     log.announced = True
@@ -170,13 +184,12 @@ class KernelCache(_Cache):
             path.unlink(missing_ok=True)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        target_context.refresh()
         if self._enabled:
             for path in self._places(sig, target_context.codegen()):
                 found = _read(path)
                 if found is not None:
                     used.add(path)
-                    return compiler.CompileResult._rebuild(target_context, *found)
+                    return _loaded(target_context, *found)
         announce(self._dispatcher)
         return None
 

@@ -103,6 +103,24 @@ def test_a_second_process_loads_what_the_first_has_compiled(program):
     assert second[4] == first[4]
 
 
+CALLER = """
+@kernel
+def twice(values):
+    return 2.0 * total(values)
+
+print(total(np.arange(3.0)), twice(np.arange(3.0)), len(log.compiled), log.loaded, "numba.np.linalg" in sys.modules)
+"""
+
+
+def test_loading_reads_nothing_of_numbas_own_functions_and_a_loaded_kernel_compiles_into_another(compiled):
+    """They take .7 s and 50 MB, and what loads has no need of them; the first kernel that compiles has."""
+    before = compiled.main
+    compiled.main = before.replace("deep_hash(total)", "'numba.np.linalg' in sys.modules")
+    assert compiled.run(anew=True) == (9.0, 109.0, 0, 2, "False")
+    compiled.main = before[: before.index("print(")] + CALLER
+    assert compiled.run(anew=True) == (9.0, 18.0, 1, 1, "True")
+
+
 EDITS = [
     ("FACTOR * x", "FACTOR * x * x", 13.0),  # two calls deep, in another file
     ("FACTOR = 2.0", "FACTOR = 3.0", 12.0),  # a constant there

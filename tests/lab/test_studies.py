@@ -134,7 +134,8 @@ def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
 
     def start(scene, cache, portable):
         started.append((cache, portable != ""))
-        return {"seconds": float(len(started)), "imports": 0.25, "first": 0.125, "worst": 0.002, "compiled": 3}
+        found = {"imports": 0.25, "first": 0.125, "worst": 0.002, "compiled": 3, "peak": 130.0}
+        return {"seconds": float(len(started)), **found}
 
     monkeypatch.setattr(startup, "_ship", lambda scene, folder: shipped.append(scene))
     monkeypatch.setattr(startup, "_start", start)
@@ -143,7 +144,7 @@ def test_startup_times_processes_with_caches_of_their_own(studies, monkeypatch):
     assert shipped == ["jump"]
     assert [portable for _, portable in started] == [False, False, True] * 2
     assert [caches[0] == caches[1], len(set(caches))] == [True, 4]
-    assert "jump shipped 3 4.50 3.00 .. 6.00 0.250 0.125 2.00" in re.sub(" +", " ", done.stdout)
+    assert "jump shipped 3 4.50 3.00 .. 6.00 0.250 0.125 2.00 130" in re.sub(" +", " ", done.stdout)
 
 
 def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
@@ -151,6 +152,7 @@ def test_a_process_is_timed_and_one_that_fails_is_no_measurement(tmp_path):
     assert 0 < found["imports"] < found["seconds"]
     assert 0 < found["worst"] < found["seconds"]
     assert found["compiled"] >= 0
+    assert 50 < found["peak"] < 5000
     with pytest.raises(Problem, match="nothing"):
         startup._start("nothing", str(tmp_path), "")
 

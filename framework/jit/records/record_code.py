@@ -22,10 +22,9 @@ from numba.core.extending import lower_builtin, lower_cast, register_model
 from numba.core.imputils import lower_getattr_generic, lower_setattr_generic
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
-from numba.np.arrayobj import populate_array
 from numba.np.numpy_support import from_dtype
 
-from ..lazy import intrinsic, operation
+from ..lazy import arrayobj, intrinsic, operation
 from ..log import CHECKED
 from .schema import WORD, Column, Schema
 
@@ -343,7 +342,7 @@ def compiled_rows(typing_context: Any, column: Any, start: Any, stop: Any) -> An
         if dimensions == 2:
             shape, strides = [count, _WORD(column.width)], [_WORD(size * column.width), _WORD(size)]
         array = context.make_array(kind)(context, builder)
-        populate_array(
+        arrayobj.populate_array(
             array, data=builder.gep(made.data, [first]), shape=cgutils.pack_array(builder, shape, _WORD),
             strides=cgutils.pack_array(builder, strides, _WORD), itemsize=_WORD(size), meminfo=None,
         )  # fmt: skip
