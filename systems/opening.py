@@ -6,7 +6,7 @@ from ..framework.compilation import part
 from .codes import NEED_SWEEPS, OK, ROTATE
 
 DISCRETE = 0
-OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE = 1, 2, 4, 8  # bits of state.kept
+OPENED, KEEPS_VELOCITY, KEEPS_START, KEEPS_FORCE, KEEPS_WRITTEN = 1, 2, 4, 8, 16  # bits of state.kept
 NOTHING_TESTED = -1  # in place of a row: no pair has been tested yet
 LARGEST = 1.7976931348623157e308  # of all finite numbers
 

@@ -362,6 +362,7 @@ STATE = Schema(
     "State",
     **PROGRAM_FIELDS,
     links=ints(),  # addresses of parts of stages, see linking.parts
+    extensions=ints(),  # by stage: the address of what it has of its own, see systems/extensions
     needed=integer(),  # rows that a stage asks for
     checked=ints(),  # addresses of records of CHECKED
     sleeping=flag(),  # the settings say so

@@ -16,7 +16,7 @@ from ..framework.data.table import Table
 from ..framework.jit.records.record import make_record
 from ..framework.schedule.phases import System
 from ..framework.schedule.plan import PlannedColumn, PlannedKernel
-from ..framework.schedule.stages import Program, Segment
+from ..framework.schedule.stages import Program
 from ..framework.world.contacts import Contacts
 from ..framework.world.world import World
 from .broad_phase.search import CandidateSearch
@@ -24,6 +24,7 @@ from .broad_phase.system import BroadPhase
 from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, WAKE, WAKE_TOUCHED
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
+from .extensions.extensions import Extensions
 from .forces.accumulation import ForceAccumulation
 from .inspection.counters import counters_of, reset, set_counters
 from .inspection.energies import kinetic_energy, momentum, potential_energy
@@ -33,6 +34,7 @@ from .integration.system import Integration
 from .linking.preparation import evaluate_forces, keep_ready, link_needed
 from .linking.steps import StepLinks
 from .narrow_phase.system import NarrowPhase
+from .opening import KEEPS_WRITTEN
 from .quarantine.quarantine import Quarantine
 from .queries.system import Queries
 from .record_buffers import Room
@@ -106,7 +108,8 @@ class Simulation:
             self.program, source, self.contacts, self._membership, lambda: world.settings
         )
         self.parts_version = 0
-        self.links = StepLinks(self.scene, self.program, self.integration, self.search)
+        self.extensions = Extensions(self.state, self.table, self.scene, world.registry)
+        self.links = StepLinks(self.scene, self.program, self.integration, self.search, self.extensions)
         self.must_check = False  # in every step: sensors among levels, pairs that no plugin has
         self.copies = ColumnCopies(self.table)
         self._words = self.state.words
@@ -201,6 +204,9 @@ class Simulation:
             linked = scene.linked
             self.must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
             self.quarantine.bind()
+            if self.extensions.follow(self.program):
+                self.links.forget()
+                self.parts_version += 1
         scene.refresh_statics()
         if table.generation != self._generation:
             self._generation, state.ids_changed = table.generation, True
@@ -259,12 +265,11 @@ class Simulation:
 
     def opening(self) -> list[Any]:
         """The parts of a step before all systems."""
-        return [Segment(self.program, 0, len(OPENING))]
+        return [self.program.segment(OPENING[0].name, OPENING[-1].name)]
 
     def closing(self) -> list[Any]:
         """The parts of a step after all systems."""
-        start = self.program.index[CLOSING[0].function.__name__]
-        return [Segment(self.program, start, start + len(CLOSING)), *self.contact_events.closing()]
+        return [self.program.segment(CLOSING[0].name, CLOSING[-1].name), *self.contact_events.closing()]
 
     def abandon_step(self) -> None:
         """The step failed: put everything back to its start."""
@@ -275,6 +280,8 @@ class Simulation:
             if state.kept & bit:
                 kept = slice(state.kept_first, getattr(state, rows))
                 getattr(bodies, column)[kept] = getattr(bodies, copy)[kept]
+        if state.kept & KEEPS_WRITTEN:
+            self.extensions.written.put_back()
         self.copies.kept = False
         if state.kept:
             state.warm_start.now, state.contacts.now = state.warm_start.before, state.contacts.before
@@ -368,7 +375,8 @@ class Simulation:
 
     def system_of_stage(self, stage: int) -> str:
         """The name of the system that a stage belongs to; "" for those that open and close a step."""
-        return SYSTEM_OF_STAGE[stage]
+        found = self.program.stages[stage]
+        return SYSTEM_OF_STAGE[found.anchor or found.name]
 
     def look_ahead(self, others_write: bool) -> None:
         """Before a plan is made, between two steps."""
@@ -379,7 +387,7 @@ class Simulation:
         state.sweeping = self.links.needs_sweeps()
 
     def planned_kernels(self) -> Iterable[PlannedKernel]:
-        return planned_kernels(self.state)
+        return planned_kernels(self.program)
 
     def planned_columns(self) -> Iterable[PlannedColumn]:
         return planned_columns(self.state, self.table, self.scene, self.copies)
@@ -406,7 +414,7 @@ class Simulation:
         keep_ready(self.scene, self.adoption, components)
         with self.attribute_errors():
             self.refresh_for_queries()
-            link_needed(self.scene, self.integration)
+            link_needed(self.scene, self.integration, self.program)
         evaluate_forces(self.table, self.bodies, self._world)
 
     def _running_step(self) -> int | None:

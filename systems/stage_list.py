@@ -10,6 +10,7 @@ from .ccd.refresh_pairs import merge_pairs
 from .ccd.time_of_impact import first_touch
 from .contacts.events import ContactEvents
 from .contacts.response import Response
+from .extensions.kept import keep_written
 from .forces.accumulation import ForceAccumulation
 from .impacts.together import resolve_simultaneous
 from .integration.system import Integration
@@ -23,6 +24,7 @@ from .sleeping.stages import update_sleep
 
 OPENING = (
     Stage(keep_state, "keeps what a failed step puts back", ("linear_velocity",), ("kept", "kept_velocity")),
+    Stage(keep_written, "the same of columns that stages of plugins write", (), ("kept",), "stages of plugins"),
     Stage(
         check_columns, "takes out bodies with values that cannot be",
         ("mass", "gravity_scale", "constant_force", "rotation", "restitution", "friction"), ("quarantined",),
@@ -65,7 +67,9 @@ ON_DEMAND = (
 )  # fmt: skip
 # What may be true of a scene, for ``Stage.needed``; besides, stages of integrators are needed by their own names.
 WITH_COLLIDERS = frozenset(("colliders", "contacts", "one level", "several levels", "many bodies", "swept bodies"))
-CONDITIONS = ("", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "sleeping", "on demand")
+CONDITIONS = (
+    "", "dynamic bodies", *sorted(WITH_COLLIDERS), "standard", "sleeping", "stages of plugins", "on demand",
+)  # fmt: skip
 # What a failed step puts back, in this order: the bit of state.kept that says that the copy is made; the column, its
 # copy, and their rows.
 KEPT = (
@@ -100,10 +104,10 @@ STAGES = check_stages((*OPENING, *(stage for system in SYSTEMS for stage in syst
 LINKED_PARTS = {BOUND_SEARCHES: bound_searches, FIRST_TOUCH: first_touch, TAKE_TOGETHER: resolve_simultaneous}
 
 # The system of each stage; "" for those that open and close a step.
-SYSTEM_OF_STAGE = (
-    *("" for _ in OPENING),
-    *(system.__name__ for system in SYSTEMS for _ in system.STAGES),
-    *("" for _ in CLOSING),
-    *(BroadPhase.__name__, BroadPhase.__name__, NarrowPhase.__name__, NarrowPhase.__name__),
-    *(Integration.__name__ for _ in Integration.ON_DEMAND),
-)
+SYSTEM_OF_STAGE = {
+    **{stage.name: "" for stage in (*OPENING, *CLOSING)},
+    **{stage.name: system.__name__ for system in SYSTEMS for stage in system.STAGES},
+    **dict.fromkeys(("box_standing", "box_rest_of_step"), BroadPhase.__name__),
+    **dict.fromkeys(("merge_pairs", "finish_found"), NarrowPhase.__name__),
+    **{stage.name: Integration.__name__ for stage in Integration.ON_DEMAND},
+}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, ClassVar
 
 from ..framework.schedule.phases import System
-from ..framework.schedule.plan import PlannedKernel
+from ..framework.schedule.plan import PlannedKernel, kernels_of
 from ..framework.schedule.stages import Program, Segment, Stage
 
 
@@ -23,10 +23,9 @@ class StagedSystem(System):
         self._program = program
 
     def segment(self, first: str = "", last: str = "") -> Segment:
-        """Its stages from the first to the last of these names; all of them, if none are given."""
-        index = self._program.index
-        start, stop = index[first or self.STAGES[0].name], index[last or self.STAGES[-1].name]
-        return Segment(self._program, start, stop + 1)
+        """Its stages from the first to the last of these names, with those of plugins next to them; all of them, if
+        none are given."""
+        return self._program.segment(first or self.STAGES[0].name, last or self.STAGES[-1].name)
 
     def parts(self) -> list[Any] | None:
         if type(self).process is not StagedSystem.process or "process" in vars(self):
@@ -43,9 +42,7 @@ class StagedSystem(System):
 
     def kernels(self) -> Iterator[PlannedKernel]:
         """Its stages that are needed in this scene, for ``world.plan()``."""
-        for stage in self.STAGES:
-            if self._program.is_linked(stage.name):
-                yield PlannedKernel(stage.name, stage.why, stage.when)
+        yield from kernels_of(self.segment())
 
     def reason(self) -> str:
         """What it does in this scene, for ``world.plan()``."""

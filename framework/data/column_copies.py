@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compilation import kernel
-from ..jit.lazy import JIT
+from ..compilation import kernel, part
 from ..jit.linking import Called
 from ..jit.records.record import make_record
 from ..jit.records.record_type import record_at
@@ -20,22 +19,29 @@ BLOCKS = Schema("Blocks", sources=ints(), targets=ints(), sizes=ints())  # addre
 _blocks_at = record_at(BLOCKS, 2)
 
 
-@kernel
-def copy_blocks(address):
+@part
+def copy_all(address):
     """Copy every block of the record at that address from its source to its target."""
     blocks = _blocks_at(address)
     for k in range(len(blocks.sizes)):
         move_bytes(blocks.targets[k], blocks.sources[k], blocks.sizes[k])
 
 
+@kernel
+def copy_blocks(address):
+    """The same, called from Python."""
+    copy_all(address)
+
+
 COPY_BLOCKS = Called(copy_blocks, int)
 
 
 class ColumnCopies:
-    """The copies of one table; all but what no step changes: which bodies there are, and their components."""
+    """The copies of one table: of some columns, or of all but what no step changes: which bodies there are, and their
+    components."""
 
-    def __init__(self, table: Table) -> None:
-        self._table = table
+    def __init__(self, table: Table, keys: tuple[str, ...] | None = None) -> None:
+        self._table, self._keys = table, keys
         self._blocks = make_record(BLOCKS, 2)
         self._pairs: list[tuple[np.ndarray, np.ndarray]] = []  # copy and column
         self._buffers: dict[str, np.ndarray] = {}
@@ -43,23 +49,31 @@ class ColumnCopies:
         self._unmade: list[str] = []  # columns on demand that had no memory
         self.kept = False
 
-    def keep(self) -> None:
-        """Copy all columns."""
+    @property
+    def address(self) -> int:
+        """For :func:`copy_all`, after :meth:`bind`."""
+        return self._blocks.address
+
+    def bind(self) -> None:
+        """Follow which rows and columns there are."""
         table = self._table
         made_of = (table.version, table.members_version, len(table.arrays))
         if made_of != self._made_of:
             self._made_of = made_of
-            keys = [key for key in table.arrays if key != "entity" and not key.startswith("has:")]
+            if self._keys is None:
+                keys = [key for key in table.arrays if key != "entity" and not key.startswith("has:")]
+                self._unmade = table.unmade()
+            else:
+                keys = list(self._keys)
             self._pairs = [(self._buffer(key), table.column(key)) for key in keys]
-            self._unmade = table.unmade()
             self._blocks.sources = np.array([column.ctypes.data for _, column in self._pairs], np.int64)
             self._blocks.targets = np.array([copy.ctypes.data for copy, _ in self._pairs], np.int64)
             self._blocks.sizes = np.array([column.nbytes for _, column in self._pairs], np.int64)
-        if JIT:
-            copy_blocks(self._blocks.address)
-        else:
-            for copy, column in self._pairs:
-                copy[...] = column
+
+    def keep(self) -> None:
+        """Copy the columns."""
+        self.bind()
+        copy_blocks(self._blocks.address)
         self.kept = True
 
     def put_back(self) -> None:

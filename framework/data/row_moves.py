@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -49,9 +50,7 @@ _plan_at = record_at(ROW_PLAN, 2)
 _columns_at = record_at(MOVED_COLUMNS, 2)
 
 
-@intrinsic
-def move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
-    """Copy so many bytes from one address to another; the two may overlap."""
+def _move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
 
     def emit(context: Any, builder: Any, sig: Any, values: Any) -> Any:
         byte = ir.IntType(8).as_pointer()
@@ -60,6 +59,14 @@ def move_bytes(typing_context: Any, target: Any, source: Any, size: Any) -> Any:
         return context.get_dummy_value()
 
     return types.none(types.int64, types.int64, types.int64), emit
+
+
+def _plain_move_bytes(target: int, source: int, size: int) -> None:
+    ctypes.memmove(int(target), int(source), int(size))
+
+
+# move_bytes(target, source, size): copy so many bytes from one address to another; the two may overlap.
+move_bytes: Any = intrinsic(_move_bytes, _plain_move_bytes)
 
 
 @part

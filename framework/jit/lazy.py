@@ -96,9 +96,9 @@ class LazyIntrinsic:
         return self
 
 
-def intrinsic(function: Callable[..., Any]) -> Any:
+def intrinsic(function: Callable[..., Any], plain: Callable[..., Any] | None = None) -> Any:
     """numba's decorator of that name: ``function(typing_context, *types)`` gives (signature, code generator)."""
-    return LazyIntrinsic(lambda: _made_intrinsic(function, function))
+    return LazyIntrinsic(lambda: _made_intrinsic(function, function), plain)
 
 
 def operation(name: str, count: int, typing: Callable[..., Any], depends_on: Any) -> Any:

@@ -7,6 +7,7 @@ shape, function, the input and the cure. ``carom plugins check`` checks the laws
 from __future__ import annotations
 
 import collections
+import dis
 import inspect
 import math
 import numbers
@@ -240,6 +241,37 @@ def check_filter(plugin: Any, function: Any) -> None:
     if not inspect.isfunction(function):
         raise PluginError(f"{where}: register a function of (bodies, a, b), got {function!r}")
     _check_arity(where, function, ("bodies", "a", "b"))
+
+
+def check_stage(
+    plugin: Any, function: Any, places: tuple[str, str], columns: dict[str, Iterable[str]]
+) -> tuple[str, list[tuple[str, ...]]]:
+    """The one name of a stage that is given, and the columns as tuples; PluginError unless it can be a stage."""
+    where = f"plugin {plugin.name}: stage {getattr(function, '__name__', function)!s}"
+    if not inspect.isfunction(function) or not function.__name__.isidentifier():
+        raise PluginError(f"{where}: register a plain function with a name; carom compiles it itself")
+    given = [name for name in places if name]
+    if len(given) != 1 or not isinstance(given[0], str):
+        after, before = places
+        raise PluginError(f"{where}: say after= or before= which one stage, got after={after!r}, before={before!r}")
+    for what, names in columns.items():
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            raise PluginError(f"{where}: {what} takes a tuple of names, got {names!r}")
+    _check_arity(where, function, ("state", "dt"))
+    if not returns_nothing(function):
+        raise PluginError(f"{where} must return nothing")
+    return given[0], [tuple(names) for names in columns.values()]
+
+
+def returns_nothing(function: Any) -> bool:
+    """Whether the function has no ``return`` with a value on any path."""
+    before: Any = None
+    for instruction in dis.get_instructions(function):
+        value = {"RETURN_CONST": instruction, "RETURN_VALUE": before}.get(instruction.opname)
+        if value is not None and not (value.opname in ("RETURN_CONST", "LOAD_CONST") and value.argval is None):
+            return False
+        before = instruction
+    return True
 
 
 def check_system(plugin: Any, make: Any) -> None:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import functools
 import inspect
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, ParamSpec, TypeVar
 
-from ..compilation import inlined, pasted
+from ..compilation import inlined, part, pasted
 from ..data.component import Component
 from ..errors import PluginError
 from ..vectors import dot, scale
 from . import checks
-from .registry import Convex, Pair, Registry, Shape
+from .registry import Convex, Pair, PluginStage, Registry, Shape
 
 Thing = TypeVar("Thing")
 P = ParamSpec("P")
@@ -63,6 +63,7 @@ class Plugin:
         self.broad_phases: dict[str, Any] = {}
         self.mixing_rules: dict[str, Any] = {}
         self.pair_filters: list[Callable[..., Any]] = []
+        self.stages: dict[str, PluginStage] = {}
         self.systems: list[Callable[[], Any]] = []
         self.registries: weakref.WeakSet[Registry] = weakref.WeakSet()  # of the worlds it is in
 
@@ -198,6 +199,35 @@ class Plugin:
             self._refresh(lambda: self.pair_filters.remove(function))  # type: ignore[arg-type]
         return function
 
+    @_called_first("after='sum_forces', writes=('force',)")
+    def stage(
+        self, *, after: str = "", before: str = "", reads: Iterable[str] = (), writes: Iterable[str] = (),
+        needed: str = "",
+    ) -> Callable[[Thing], Thing]:  # fmt: skip
+        """Register ``function(state, dt)``, a compiled stage of a step, next to a built-in one.
+
+        after, before
+            one of the two: the name of a built-in stage, as ``world.plan()`` and docs/architecture.md show it. Several
+            at one place run in the order of the world's plugins, those of one plugin in that of registration
+        reads, writes
+            all columns of the bodies and all records of the state that it uses. A step that fails puts back the columns
+            that are written
+        needed
+            what has to be true of the world for it to run, as of a built-in stage: "colliders" and the like
+
+        ``state`` is what the built-in stages get. Bodies that take part in the step have the rows from ``state.first``
+        on; the first ``state.dynamic`` rows are dynamic, ``state.moving`` move.
+        """
+
+        def register(function: Any) -> Any:
+            place, columns = checks.check_stage(self, function, (after, before), {"reads": reads, "writes": writes})
+            why = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip(".")
+            stage = PluginStage(part(function), place, bool(after), *columns, needed, why, self.name)
+            self._register(self.stages, stage.name, stage)
+            return function
+
+        return register
+
     def system(self, make: Thing) -> Thing:
         """Register a class of System, ForceSystem or esper processor: each world that takes the plugin gets one."""
         checks.check_system(self, make)
@@ -247,6 +277,7 @@ class Plugin:
             "broad phases": list(self.broad_phases),
             "mixing rules": list(self.mixing_rules),
             "pair filters": [function.__name__ for function in self.pair_filters],
+            "stages": list(self.stages),
             "systems": [getattr(make, "__name__", repr(make)) for make in self.systems],
         }
         return {kind: names for kind, names in found.items() if names}

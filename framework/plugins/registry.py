@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -91,6 +92,35 @@ class Pair:
         return f"{self.first.__name__} and {self.second.__name__}"
 
 
+@dataclass(frozen=True)
+class PluginStage:
+    """A stage of a step; (state, dt), compiled, at the place that ``anchor`` and ``after`` name.
+
+    anchor, after
+        a built-in stage; whether this one runs after it, or before
+    reads, writes, needed, why
+        as of a built-in one
+    """
+
+    function: Any
+    anchor: str
+    after: bool
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    needed: str
+    why: str
+    plugin: str
+
+    @property
+    def name(self) -> str:
+        return self.function.__name__
+
+    @property
+    def place(self) -> str:
+        """As its author has written it."""
+        return f"{'after' if self.after else 'before'}={self.anchor!r}"
+
+
 @dataclass(eq=False)
 class Registry:
     """Everything the plugins of one world have registered; ``version`` changes whenever they register more."""
@@ -104,6 +134,8 @@ class Registry:
     broad_phases: dict[str, Any] = field(default_factory=dict)
     mixing_rules: dict[str, Any] = field(default_factory=dict)
     pair_filters: list[tuple[str, Any]] = field(default_factory=list)  # (plugin, function)
+    stages: dict[str, PluginStage] = field(default_factory=dict)
+    check_stages: Callable[[Iterable[PluginStage]], Any] = tuple  # PluginError for what no step can have
 
     def add(self, plugin: Any) -> None:
         """PluginError if something of it is registered already; what it registers later is seen too."""
@@ -128,11 +160,13 @@ class Registry:
         integrators: dict[str, Any] = {}
         broad_phases: dict[str, Any] = {}
         mixing_rules: dict[str, Any] = {}
+        stages: dict[str, PluginStage] = {}
         owners: dict[Any, str] = {}
         for plugin in self.plugins:
             kinds = (
                 ("shape", shapes, plugin.shapes), ("integrator", integrators, plugin.integrators),
                 ("broad phase", broad_phases, plugin.broad_phases), ("mixing rule", mixing_rules, plugin.mixing_rules),
+                ("stage", stages, plugin.stages),
             )  # fmt: skip
             for kind, known, fresh in kinds:
                 for key in fresh:
@@ -159,7 +193,8 @@ class Registry:
                         f"{other.plugin}"
                     )
                 pairs[first, second] = pair
-        self.shapes, self.pairs, self.integrators = shapes, pairs, integrators
+        self.check_stages(stages.values())
+        self.shapes, self.pairs, self.integrators, self.stages = shapes, pairs, integrators, stages
         self.broad_phases, self.mixing_rules = broad_phases, mixing_rules
         self.pair_filters = [(plugin.name, each) for plugin in self.plugins for each in plugin.pair_filters]
         self.version += 1

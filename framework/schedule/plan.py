@@ -26,6 +26,13 @@ class PlannedKernel:
     when: str = ""
 
 
+def kernels_of(segment: Any) -> Iterator[PlannedKernel]:
+    """The stages of a segment that are needed in this scene."""
+    for stage in segment.program.stages[segment.start : segment.stop]:
+        if segment.program.is_linked(stage.name):
+            yield PlannedKernel(stage.name, stage.why, stage.when)
+
+
 @dataclass(frozen=True)
 class PlannedColumn:
     """An array with a value for each body (or pair, contact, impact) there is room for.

@@ -20,7 +20,7 @@ class Profiler:
         self._pipeline = pipeline
         self.steps = 0
         self._sums = Totals()  # of what is Python
-        self._before: Any = 0  # what the stages had taken when measuring began
+        self._before: dict[str, np.ndarray] = {}  # what the stages had taken when measuring began, by name
         self._profiled = Totals()  # inside profiles that have ended
         self._profile_start: Totals | None = None
 
@@ -53,15 +53,17 @@ class Profiler:
         sums.calls[key] = sums.calls.get(key, 0) + 1
         sums.kernel_seconds[key] = sums.kernel_seconds.get(key, 0.0) + 1e-9 * nanoseconds
 
-    def _counts(self) -> np.ndarray:
+    def _counts(self) -> dict[str, np.ndarray]:
         """Calls and ticks of all stages since the world began."""
-        return self._pipeline.physics.program.counts()
+        program = self._pipeline.physics.program
+        return dict(zip((stage.name for stage in program.stages), program.counts().T, strict=True))
 
     def _stages(self) -> Totals:
         """What all stages have taken since measuring began."""
         physics, totals = self._pipeline.physics, Totals()
         program = physics.program
-        counts = program.counts() - self._before
+        taken = [count - self._before.get(name, 0) for name, count in self._counts().items()]
+        counts = np.array(taken).reshape(-1, 3).T
         seconds = program.seconds_of(counts).tolist()
         for k, (stage, count) in enumerate(zip(program.stages, counts[0].astype(int).tolist(), strict=True)):
             if count:

@@ -69,6 +69,8 @@ class Stage:
         name of the property of the scene that has to be true; empty: always
     when
         what has to happen for it to do something; empty: in every step
+    anchor, plugin
+        of a plugin's stage: the built-in one next to which it runs, and the name of the plugin
     """
 
     function: Callable[..., int]
@@ -77,6 +79,8 @@ class Stage:
     writes: tuple[str, ...] = ()
     needed: str = ""
     when: str = ""
+    anchor: str = ""
+    plugin: str = ""
 
     def __post_init__(self) -> None:
         if _may_return_nothing(self.function):
@@ -111,19 +115,32 @@ class Program:
     def __init__(
         self, state: Record, stages: Sequence[Stage], handlers: dict[int, Callable[[float], None]], afterwards: int
     ) -> None:
-        self.state, self.stages = state, tuple(stages)
+        self.state = state
         self.handlers, self._afterwards = handlers, afterwards
-        self.index = {stage.name: k for k, stage in enumerate(self.stages)}
         self._words, self._stage = state.words, state.word_of("stage")
-        self._addresses = np.zeros(len(stages), np.int64)
-        state.program = self._addresses
-        state.ticks, state.calls = np.zeros(len(stages), np.int64), np.zeros(len(stages), np.int64)
         self._clock: TickClock | None = None  # from the first link on
-        self._python_seconds = np.zeros(len(stages))  # of what Python has done for each stage
+        self.stages: tuple[Stage, ...] = ()
+        self._python_seconds = np.zeros(0)  # of what Python has done for each stage
+        self.take(stages)
         self.inside = 0.0  # s of stages that Python has run within a step: not to be counted twice
         self.describe_error: Callable[[BaseException], None] = lambda error: None  # adds notes to it
         self.alarm = 0  # the word of the state that is not 0 when a stage has noted something wrong
         self.on_alarm: Callable[[], None] = lambda: None
+
+    def take(self, stages: Sequence[Stage]) -> None:
+        """Run these from now on, once they are linked; those that it has had go on counting."""
+        state, before = self.state, dict(zip((stage.name for stage in self.stages), self.counts().T, strict=True))
+        self.stages = tuple(stages)
+        self.index = {stage.name: k for k, stage in enumerate(self.stages)}
+        self.spans: dict[str, tuple[int, int]] = {}  # of each built-in stage with those of plugins next to it
+        for k, stage in enumerate(self.stages):
+            home = stage.anchor or stage.name
+            self.spans[home] = self.spans.get(home, (k, k))[0], k + 1
+        counts = np.array([before.get(stage.name, np.zeros(3)) for stage in self.stages]).reshape(-1, 3)
+        self._addresses = np.zeros(len(stages), np.int64)
+        state.program = self._addresses
+        state.calls, state.ticks = (np.ascontiguousarray(counts[:, k]).astype(np.int64) for k in (0, 1))
+        self._python_seconds = counts[:, 2].copy()
 
     @functools.cached_property
     def _run_stages(self) -> Any:
@@ -156,7 +173,11 @@ class Program:
         try:
             return self._run_stages(self.state.address, start, stop, dt)
         except Exception as error:
-            self.describe_error(error)
+            stage = self.stages[self._words[self._stage]]
+            if stage.plugin:
+                error.add_note(f"plugin {stage.plugin}: stage {stage.name}")
+            else:
+                self.describe_error(error)
             raise
 
     def resume(self, code: int, stop: int, dt: float) -> None:
@@ -189,12 +210,21 @@ class Program:
         self.run(start, stop, dt)
         self.inside = inside + time.perf_counter() - began - (log.waited - waited)
 
-    def run_one(self, name: str, dt: float) -> None:
-        """Run one stage, linked or not."""
+    def require(self, name: str) -> int:
+        """The place of a stage, which is linked from now on."""
         k = self.index[name]
         if not self._addresses[k]:
             self._addresses[k] = self._linked(self.stages[k]).address
+        return k
+
+    def run_one(self, name: str, dt: float) -> None:
+        """Run one stage, linked or not."""
+        k = self.require(name)
         self.run_inside(k, k + 1, dt)
+
+    def segment(self, first: str, last: str) -> Segment:
+        """The stages from one built-in stage to another, with those of plugins next to these."""
+        return Segment(self, self.spans[first][0], self.spans[last][1])
 
     def counts(self) -> np.ndarray:
         """(3, n): how often each stage has run so far, its ticks, and the seconds that Python has worked for it."""

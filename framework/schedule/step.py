@@ -189,7 +189,7 @@ class Pipeline(esper.Processor):
     def fail_at_work(self, error: BaseException) -> None:
         """The system at work has raised that."""
         at, self._at = self._at or self._system_at(), ""
-        self.fail(f"system {at}", error)
+        self.fail(f"system {at}" if at else "a stage of no system", error)
 
     def run_python(self, part: PythonPart, dt: float) -> None:
         """A system in Python: its time is taken, less that of stages inside and what it has waited for the compiler."""
@@ -244,7 +244,7 @@ class Pipeline(esper.Processor):
             self.physics.begin_step(others_write)
         except BaseException as error:
             if hasattr(error, "__notes__"):  # it comes from a plugin's function
-                self.fail("compiling what the bodies' shapes need", error)
+                self.fail("compiling what the step needs", error)
             self.roll_back()
             raise
 

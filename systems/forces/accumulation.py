@@ -55,7 +55,8 @@ class ForceAccumulation(StagedSystem):
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""
-        self._program.run_one(sum_forces.__name__, 0.0)
+        self._program.require(sum_forces.__name__)
+        self.segment(sum_forces.__name__, sum_forces.__name__)(self.world.settings.dt)  # with stages of plugins
         self.add_systems(time)
 
     def add_systems(self, time: float) -> None:

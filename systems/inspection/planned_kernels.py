@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...framework.data.column_copies import copy_blocks
-from ...framework.jit.records.record import Record
-from ...framework.schedule.plan import PlannedKernel
+from ...framework.schedule.plan import PlannedKernel, kernels_of
+from ...framework.schedule.stages import Program
 from ..stage_list import CLOSING, OPENING
 
 
-def planned_kernels(state: Record) -> Iterator[PlannedKernel]:
+def planned_kernels(program: Program) -> Iterator[PlannedKernel]:
     """The kernels that belong to no system."""
-    for stage in (*OPENING, *CLOSING):
-        if stage.needed and not (state.sleeping and state.collides):
-            continue
-        yield PlannedKernel(stage.name, stage.why, stage.when)
-    if state.others_write:
+    for stages in (OPENING, CLOSING):
+        yield from kernels_of(program.segment(stages[0].name, stages[-1].name))
+    if program.state.others_write:
         yield PlannedKernel(copy_blocks.__name__, "copies of all columns: code of the game may write any of them")

@@ -12,7 +12,7 @@ import numpy as np
 from ...framework.jit.records.record import Record
 from ...framework.plugins.registry import Registry
 from ...framework.schedule.phases import Phase
-from ...framework.schedule.plan import PlannedKernel
+from ...framework.schedule.plan import PlannedKernel, kernels_of
 from ...framework.schedule.stages import Program, PythonPart, Stage
 from ...framework.settings import Settings
 from ..forces.accumulation import ForceAccumulation
@@ -146,7 +146,8 @@ class Integration(StagedSystem):
         state.moves_with_old_velocity = bool(getattr(integrator, "moves_with_old_velocity", False))
         state.flies = isinstance(integrator, Flight)
         state.force_changes = bool(self.world.force_systems)
-        state.has_force_systems = state.force_changes
+        by_stages = any("force" in stage.writes for stage in self._program.stages if stage.plugin)
+        state.has_force_systems = state.force_changes or by_stages
         state.heavy_damping, state.heavy_step = math.inf, 0.0
         state.path_degree = state.usual_path_degree = integrator.path
         self._forces.several_evaluations = integrator.evaluations > 1
@@ -163,7 +164,7 @@ class Integration(StagedSystem):
         return [
             self.segment(last="drift"),
             PythonPart(self.name, self._advance),
-            self.segment("end_flight", "rest_sleepers"),
+            self.segment("end_flight"),
         ]
 
     def _advance(self, dt: float) -> None:
@@ -213,19 +214,14 @@ class Integration(StagedSystem):
         if not self.in_python or not self._state.dynamic:
             yield from super().kernels()
             return
-        linked = {kernel.kernel: kernel for kernel in super().kernels()}
-        for name in ("look_at_sleepers", "keep_start", "drift"):
-            if name in linked:
-                yield linked[name]
+        yield from kernels_of(self.segment(last="drift"))
         called: Any = getattr(self.integrator, "kernels", None)  # a plugin's need not say
         for name in called(bool(self.world.force_systems)) if called is not None else ():
             yield PlannedKernel(name, FLIES)
         if self.world.force_systems and self.integrator.evaluations > 1:
             for kernel in self._forces.kernels_of_systems():
                 yield dataclasses.replace(kernel, reason=f"{kernel.reason}, at each stage")
-        for name in ("end_flight", "check_flight", "note_path", "rest_sleepers"):
-            if name in linked:
-                yield linked[name]
+        yield from kernels_of(self.segment("end_flight"))
 
     def reason(self) -> str:
         integrator, name = self.integrator, self.integrator_name

@@ -25,9 +25,10 @@ from ...framework.jit.background import link_in_background
 from ...framework.jit.link_all import link_all
 from ...framework.jit.linking import Called, Linked
 from ...framework.jit.tick_counter import TICKS_NOW
-from ...framework.schedule.stages import RUN_STAGES, linked_stage
+from ...framework.schedule.stages import RUN_STAGES, Program, Stage, linked_stage
 from ...framework.world.world import World
 from ..broad_phase.tree.passes import tree_passes
+from ..extensions.extensions import NEEDED
 from ..forces.accumulation import required_bodies
 from ..integration.system import Integration
 from ..queries.kernels import query_kernels
@@ -37,36 +38,42 @@ from ..shapes.geometry_levels import in_order
 from ..shapes.linking.linked_shape import half_extents_call
 from ..shapes.linking.linked_shapes import LinkedShapes
 from ..shapes.query import LinkedQuery, linked_query
-from ..stage_list import LINKED_PARTS, STAGES, WITH_COLLIDERS
+from ..stage_list import LINKED_PARTS, WITH_COLLIDERS
 from .parts import linked_part
 
 QUERY_SHAPES = (SphereCollider, AABBCollider)  # that queries ask with, beside casts of the shapes of the scene
 
-# What the list depends on: dimension, conditions of stages, the shapes of the scene, those that queries ask with.
-Kind = tuple[int, frozenset[str], LinkedShapes | None, tuple[LinkedQuery, ...]]
+# What the list depends on: dimension, the stages that there may be, and their conditions, the shapes of the scene,
+# those that queries ask with.
+Kind = tuple[int, tuple[Stage, ...], frozenset[str], LinkedShapes | None, tuple[LinkedQuery, ...]]
 
 
-def kind_of(scene: Scene, integration: Integration) -> Kind:
+def kind_of(scene: Scene, integration: Integration, program: Program) -> Kind:
     """What can be needed depends on this alone; the same for all worlds alike."""
     linked, registry, dimensions = scene.linked, scene.registry, scene.state.dimensions
-    conditions = frozenset(("", "dynamic bodies", *integration.stages_possible))
+    stages = program.stages
+    extensions = [stage.name for stage in stages if stage.plugin]
+    conditions = frozenset(("", "dynamic bodies", *integration.stages_possible, *extensions))
+    if extensions:
+        conditions |= {NEEDED}
     if linked is None:
-        return dimensions, conditions, None, ()
+        return dimensions, stages, conditions, None, ()
     asking = dict.fromkeys((*QUERY_SHAPES, *(shape.component for shape in linked.shapes)))
     queries = tuple(linked_query(registry, linked, component) for component in asking if component in registry.shapes)
     sleeping = frozenset(("sleeping",)) if scene.state.sleeping else frozenset()
-    return dimensions, conditions | WITH_COLLIDERS | sleeping, linked, queries
+    return dimensions, stages, conditions | WITH_COLLIDERS | sleeping, linked, queries
 
 
 def needed_functions(
-    dimensions: int, conditions: frozenset[str], linked: LinkedShapes | None, queries: tuple[LinkedQuery, ...]
-) -> Iterator[Linked | Called]:
+    dimensions: int, stages: tuple[Stage, ...], conditions: frozenset[str], linked: LinkedShapes | None,
+    queries: tuple[LinkedQuery, ...],
+) -> Iterator[Linked | Called]:  # fmt: skip
     """All that steps and queries of such a world may call, some more than once."""
     has_shapes = linked is not None
     yield from (RUN_STAGES, TICKS_NOW, COPY_BLOCKS, MOVE_ROWS)
     for place, function in LINKED_PARTS.items() if has_shapes else ():
         yield linked_part(place, function, dimensions)
-    for stage in STAGES:
+    for stage in stages:
         if stage.needed in conditions or stage.name in conditions:
             yield linked_stage(stage, STATE, dimensions)
     yield from tree_passes(dimensions).of_world(has_shapes)
@@ -104,9 +111,9 @@ def keep_ready(scene: Scene, adoption: Adoption, components: tuple[type[Any], ..
     scene.forget()
 
 
-def link_needed(scene: Scene, integration: Integration) -> None:
+def link_needed(scene: Scene, integration: Integration, program: Program) -> None:
     """Compile or load now all that such a world may call."""
-    link_all(needed_functions(*kind_of(scene, integration)))
+    link_all(needed_functions(*kind_of(scene, integration, program)))
 
 
 def evaluate_forces(table: Table, bodies: Bodies, world: World) -> None:

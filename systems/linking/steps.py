@@ -12,6 +12,7 @@ from ...framework.jit.linking import Called, Linked
 from ...framework.schedule.stages import Program, Stage
 from ..broad_phase.search import CandidateSearch
 from ..ccd.search_bounds import DISCRETE
+from ..extensions.extensions import Extensions
 from ..integration.system import Integration
 from ..records import SWEEPS
 from ..scene import Scene
@@ -25,9 +26,11 @@ NEVER = -1
 class StepLinks:
     """Follows the scene: which stages, parts of stages and functions of shapes its steps need."""
 
-    def __init__(self, scene: Scene, program: Program, integration: Integration, search: CandidateSearch) -> None:
+    def __init__(
+        self, scene: Scene, program: Program, integration: Integration, search: CandidateSearch, extensions: Extensions
+    ) -> None:
         self._scene, self._state, self._program = scene, scene.state, program
-        self._integration, self._search = integration, search
+        self._integration, self._search, self._extensions = integration, search, extensions
         self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = self._forces = NEVER  # of the scene, and how many force systems there were
         self._key: Any = None  # what the linked stages depend on
@@ -99,7 +102,7 @@ class StepLinks:
         """What is true of the scene now, as in ``stage_list.CONDITIONS``."""
         state = self._state
         moves, collides = state.dynamic > 0, state.collides
-        return {
+        met = {
             "": True,
             "dynamic bodies": moves,
             "colliders": collides,
@@ -111,6 +114,7 @@ class StepLinks:
             "sleeping": collides and state.sleeping,
             **dict.fromkeys(self._integration.stages_needed, moves),
         }
+        return {**met, **self._extensions.conditions(met)}
 
     def _functions_of_shapes(self) -> Iterator[Linked | Called]:
         linked = self._scene.linked
@@ -144,5 +148,5 @@ class StepLinks:
         """All that this world can need, when that may be more than before."""
         key = (self._scene.linked, self._scene.registry.version, self._integration.stages_possible)
         if key != self._kept_key:
-            link_possible(*kind_of(self._scene, self._integration))
+            link_possible(*kind_of(self._scene, self._integration, self._program))
             self._kept_key = key

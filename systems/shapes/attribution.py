@@ -72,9 +72,9 @@ class ErrorAttribution:
         return bool(np.isfinite(self._state.bodies.rotation[i * width : (i + 1) * width]).all())
 
     def _uncompiled(self, error: BaseException) -> str:
-        """The pairs and shapes whose functions numba's message mentions."""
+        """The pairs, shapes and stages whose functions numba's message mentions."""
         text, registry = str(error), self._registry
-        functions = {}
+        functions = {f"plugin {each.plugin}: stage {each.name}": each.function for each in registry.stages.values()}
         for pair in registry.pairs.values():
             for kind in ("function", "sweep", "corner"):
                 function = getattr(pair, kind)
