@@ -55,6 +55,7 @@ class Scene:
         self.state, self.table, self.registry = state, table, registry
         self._settings = settings
         self.prepared: set[type[Any]] = set()  # colliders whose functions are kept ready
+        self.read_by_plugins: set[str] = set()  # columns that stages of plugins read
         self.version = 0
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None

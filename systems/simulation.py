@@ -108,7 +108,7 @@ class Simulation:
             self.program, source, self.contacts, self._membership, lambda: world.settings
         )
         self.parts_version = 0
-        self.extensions = Extensions(self.state, self.table, self.scene, world.registry)
+        self.extensions = Extensions(self.state, self.scene, self.adoption, world.registry)
         self.links = StepLinks(self.scene, self.program, self.integration, self.search, self.extensions)
         self.must_check = False  # in every step: sensors among levels, pairs that no plugin has
         self.copies = ColumnCopies(self.table)
@@ -197,6 +197,9 @@ class Simulation:
     def _refresh(self) -> None:
         """Follow which bodies and colliders there are."""
         scene, state, table = self.scene, self.state, self.table
+        if self._structure() != scene.structure and self.extensions.follow(self.program):
+            self.links.forget()
+            self.parts_version += 1
         if scene.refresh():
             table.frames_applied = True
             if not state.collides:
@@ -204,9 +207,6 @@ class Simulation:
             linked = scene.linked
             self.must_check = linked is not None and (state.several_levels or bool(linked.unhandled))
             self.quarantine.bind()
-            if self.extensions.follow(self.program):
-                self.links.forget()
-                self.parts_version += 1
         scene.refresh_statics()
         if table.generation != self._generation:
             self._generation, state.ids_changed = table.generation, True
@@ -390,7 +390,8 @@ class Simulation:
         return planned_kernels(self.program)
 
     def planned_columns(self) -> Iterable[PlannedColumn]:
-        return planned_columns(self.state, self.table, self.scene, self.copies)
+        copies = dict((*self.extensions.written.sizes(), *self.copies.sizes()))
+        return planned_columns(self.state, self.table, self.scene, copies)
 
     def counters(self) -> dict[str, int]:
         return counters_of(self.state)

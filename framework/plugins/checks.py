@@ -244,9 +244,9 @@ def check_filter(plugin: Any, function: Any) -> None:
 
 
 def check_stage(
-    plugin: Any, function: Any, places: tuple[str, str], columns: dict[str, Iterable[str]]
-) -> tuple[str, list[tuple[str, ...]]]:
-    """The one name of a stage that is given, and the columns as tuples; PluginError unless it can be a stage."""
+    plugin: Any, function: Any, places: tuple[str, str], records: Any, columns: dict[str, Iterable[str]]
+) -> tuple[str, list[tuple[Any, ...]]]:
+    """The one name of a stage that is given, then records and columns as tuples; PluginError unless it can be one."""
     where = f"plugin {plugin.name}: stage {getattr(function, '__name__', function)!s}"
     if not inspect.isfunction(function) or not function.__name__.isidentifier():
         raise PluginError(f"{where}: register a plain function with a name; carom compiles it itself")
@@ -257,10 +257,14 @@ def check_stage(
     for what, names in columns.items():
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             raise PluginError(f"{where}: {what} takes a tuple of names, got {names!r}")
-    _check_arity(where, function, ("state", "dt"))
+    types = [] if isinstance(records, type) else [each for each in records if isinstance(each, type)]
+    own = [each for each in types if issubclass(each, Component) and not each._abstract and each.prefix]
+    if isinstance(records, type) or len(own) < len(records):
+        raise PluginError(f"{where}: records takes a tuple of component types of your own, got {records!r}")
+    _check_arity(where, function, ("state", "dt", *(component.prefix.rstrip(".") for component in own)))
     if not returns_nothing(function):
         raise PluginError(f"{where} must return nothing")
-    return given[0], [tuple(names) for names in columns.values()]
+    return given[0], [tuple(own), *(tuple(names) for names in columns.values())]
 
 
 def returns_nothing(function: Any) -> bool:

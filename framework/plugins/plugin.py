@@ -201,17 +201,20 @@ class Plugin:
 
     @_called_first("after='sum_forces', writes=('force',)")
     def stage(
-        self, *, after: str = "", before: str = "", reads: Iterable[str] = (), writes: Iterable[str] = (),
-        needed: str = "",
+        self, *, after: str = "", before: str = "", records: Iterable[type[Component]] = (),
+        reads: Iterable[str] = (), writes: Iterable[str] = (), needed: str = "",
     ) -> Callable[[Thing], Thing]:  # fmt: skip
-        """Register ``function(state, dt)``, a compiled stage of a step, next to a built-in one.
+        """Register ``function(state, dt, *records)``, a compiled stage of a step, next to a built-in one.
 
         after, before
             one of the two: the name of a built-in stage, as ``world.plan()`` and docs/architecture.md show it. Several
             at one place run in the order of the world's plugins, those of one plugin in that of registration
+        records
+            component types: the function gets a record of the columns of each, ``charge.value[i]`` of row i, and runs
+            only where some body has them all; ``charge.present[i]``: whether this one has it
         reads, writes
-            all columns of the bodies and all records of the state that it uses. A step that fails puts back the columns
-            that are written
+            all columns of the bodies and all records of the state that it uses, "mass" and "charge.value". A step that
+            fails puts back the columns that are written
         needed
             what has to be true of the world for it to run, as of a built-in stage: "colliders" and the like
 
@@ -220,9 +223,10 @@ class Plugin:
         """
 
         def register(function: Any) -> Any:
-            place, columns = checks.check_stage(self, function, (after, before), {"reads": reads, "writes": writes})
+            columns = {"reads": reads, "writes": writes}
+            place, used = checks.check_stage(self, function, (after, before), records, columns)
             why = " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip(".")
-            stage = PluginStage(part(function), place, bool(after), *columns, needed, why, self.name)
+            stage = PluginStage(part(function), place, bool(after), *used, needed, why, self.name)
             self._register(self.stages, stage.name, stage)
             return function
 

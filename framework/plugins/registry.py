@@ -94,10 +94,12 @@ class Pair:
 
 @dataclass(frozen=True)
 class PluginStage:
-    """A stage of a step; (state, dt), compiled, at the place that ``anchor`` and ``after`` name.
+    """A stage of a step; (state, dt, *records), compiled, at the place that ``anchor`` and ``after`` name.
 
     anchor, after
         a built-in stage; whether this one runs after it, or before
+    records
+        component types, whose columns the function gets
     reads, writes, needed, why
         as of a built-in one
     """
@@ -105,6 +107,7 @@ class PluginStage:
     function: Any
     anchor: str
     after: bool
+    records: tuple[type[Component], ...]
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     needed: str

@@ -65,7 +65,7 @@ class StateVerbs:
         plugins
             all that the saved world had, of the same versions or newer
         components
-            your own component classes that it had
+            your own component classes that it had, but for those that stages of the plugins are about
         name
             as for a new world
 
@@ -77,7 +77,8 @@ class StateVerbs:
         world: Any = cls(*plugins, settings=file.settings(), name=name)  # type: ignore[call-arg]
         try:
             physics = world._services
-            known = (*physics.table.component_types, *world.registry.shapes, *components)
+            of_stages = [component for stage in world.registry.stages.values() for component in stage.records]
+            known = (*physics.table.component_types, *world.registry.shapes, *of_stages, *components)
             snapshot = file.snapshot(dict.fromkeys(known))
             file.whole(lambda: snapshots.restore_world(snapshot, world, physics))
             snapshots.restore_plugins(snapshot, world)

@@ -1,19 +1,61 @@
-"""Stages of plugins as the program calls them."""
+"""Stages of plugins as the program calls them, and the records that they get."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
+from ...framework.data.arrays.column import ArrayColumn
+from ...framework.data.columns import Column
+from ...framework.data.component import Component
 from ...framework.jit.linking import CACHE_SIZE
+from ...framework.jit.records import schema
+from ...framework.jit.records.record_type import record_at
+from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage
 from ..codes import OK
 from ..shapes.linking.source import source_module
 from ..shapes.linking.user_functions import user_function
 
+PRESENT = "present"  # the column that says which rows have the component
+
+
+def visible_columns(component: type[Component]) -> list[Column]:
+    """Those that a record of the component has: arrays are for shapes alone."""
+    return [column for column in component.columns.values() if not isinstance(column, ArrayColumn)]
+
 
 @lru_cache(maxsize=CACHE_SIZE)
-def compiled_stage(stage: PluginStage) -> Any:
+def component_schema(component: type[Component], dimensions: int) -> Schema:
+    """The record of a component's columns; a quaternion is four numbers, read and written one by one."""
+    fields: dict[str, Any] = {PRESENT: schema.flags()}
+    for column in visible_columns(component):
+        if column.item == "vector":
+            fields[column.name] = schema.vectors()
+        elif column.item_shape(dimensions):
+            fields[column.name] = schema.table("float64", 4)
+        else:
+            fields[column.name] = schema.Column(np.dtype(column.dtype).name)
+    return Schema(component.__name__, **fields)
+
+
+@lru_cache(maxsize=CACHE_SIZE)
+def own_schema(stage: PluginStage, dimensions: int) -> Schema:
+    """The record of all that a stage gets beside the state, by number."""
+    records = {f"record_{k}": component_schema(each, dimensions) for k, each in enumerate(stage.records)}
+    return Schema("Own", **records)
+
+
+@lru_cache(maxsize=CACHE_SIZE)
+def compiled_stage(stage: PluginStage, dimensions: int) -> Any:
     """A function (state, dt) -> code of the plugin's function; it has its name."""
-    source = f"def {stage.name}(state, dt):\n    function(state, dt)\n    return OK\n"
-    return getattr(source_module(source, {"function": user_function(stage.function), "OK": OK}), stage.name)
+    scope = {"function": user_function(stage.function), "OK": OK}
+    lines = [f"def {stage.name}(state, dt):"]
+    names = [f"own.{name}" for name in own_schema(stage, dimensions).fields]
+    if names:
+        scope["own_at"] = record_at(own_schema(stage, dimensions), dimensions)
+        lines.append("    own = own_at(state.extensions[state.stage])")
+    lines += [f"    function({', '.join(('state', 'dt', *names))})", "    return OK", ""]
+    return getattr(source_module("\n".join(lines), scope), stage.name)

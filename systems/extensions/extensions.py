@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...framework.data.adoption import Adoption
 from ...framework.data.column_copies import ColumnCopies
-from ...framework.data.table import Table
-from ...framework.jit.records.record import Record
+from ...framework.jit.records.record import Record, make_record
 from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program
 from .. import records
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
+from .compiled import PRESENT, own_schema, visible_columns
 from .placement import OF_TABLE, check_stages, placed
 
 NEEDED = "stages of plugins"  # the condition of what all of them need
@@ -33,10 +34,12 @@ class Extensions:
         copies of what the stages write, see :mod:`.kept`
     """
 
-    def __init__(self, state: Record, table: Table, scene: Scene, registry: Registry) -> None:
-        self._state, self._table, self._scene, self._registry = state, table, scene, registry
+    def __init__(self, state: Record, scene: Scene, adoption: Adoption, registry: Registry) -> None:
+        self._state, self._scene, self._table = state, scene, scene.table
+        self._adoption, self._registry = adoption, registry
         self.stages: tuple[PluginStage, ...] = ()
-        self.written = ColumnCopies(table, ())
+        self.written = ColumnCopies(self._table, ())
+        self._own: dict[PluginStage, Record] = {}  # what each of them gets
         check_stages(registry.stages.values())
         registry.check_stages = check_stages
 
@@ -45,27 +48,54 @@ class Extensions:
         stages = tuple(self._registry.stages.values())
         changed = stages != self.stages
         if changed:
-            program.take(tuple(placed(stages)))
-            self.stages = stages
-            written = dict.fromkeys(name for stage in stages for name in stage.writes)
-            self.written = ColumnCopies(self._table, tuple(OF_TABLE.intersection(written).difference(MADE_AGAIN)))
+            self._take(stages, program)
         if stages:
             self._bind(program)
         return changed
 
+    def _take(self, stages: tuple[PluginStage, ...], program: Program) -> None:
+        dimensions = self._state.dimensions
+        self._adoption.register(dict.fromkeys(record for stage in stages for record in stage.records))
+        program.take(tuple(placed(stages, dimensions)))
+        self.stages = stages
+        self._own = {stage: make_record(own_schema(stage, dimensions), dimensions) for stage in stages}
+        reads, writes = ({name for stage in stages for name in getattr(stage, what)} for what in ("reads", "writes"))
+        kept = {name for name in writes if name in OF_TABLE or self._table.has_column(name)}.difference(MADE_AGAIN)
+        self.written = ColumnCopies(self._table, tuple(sorted(kept)))
+        self._scene.read_by_plugins = reads - writes
+
     def _bind(self, program: Program) -> None:
         """Rows for all columns that the stages name, and the addresses of what they have of their own."""
+        table, addresses = self._table, np.zeros(len(program.stages), np.int64)
         for name in sorted({name for stage in self.stages for name in (*stage.reads, *stage.writes)}):
             if name in OF_TABLE:
-                self._table.make(name)
+                table.make(name)
             elif name in RESERVED:
                 self._scene.reserve(name)
+        for stage, own in self._own.items():
+            addresses[program.index[stage.name]] = own.address
+            for component, name in zip(stage.records, own.schema.fields, strict=True):
+                record = getattr(own, name)
+                record.show(PRESENT, table.has_mask(component))
+                for column in visible_columns(component):
+                    record.show(column.name, table.make(column.key))
         self.written.bind()
-        addresses = np.zeros(len(program.stages), np.int64)
         addresses[program.index["keep_written"]] = self.written.address
         self._state.extensions = addresses
 
+    def present(self) -> tuple[bool, ...]:
+        """Of each stage, whether some body has all components that it is about."""
+        table = self._table
+        return tuple(
+            bool(np.logical_and.reduce([table.has_mask(each)[: table.count] for each in stage.records]).any())
+            if stage.records else True
+            for stage in self.stages
+        )  # fmt: skip
+
     def conditions(self, met: dict[str, bool]) -> dict[str, bool]:
         """Which of the stages are needed, by name, where these conditions are met."""
-        needed = {stage.name: met[stage.needed] for stage in self.stages}
+        needed = {
+            stage.name: met[stage.needed] and present
+            for stage, present in zip(self.stages, self.present(), strict=True)
+        }
         return {NEEDED: any(needed.values()), **needed}

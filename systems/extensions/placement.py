@@ -16,7 +16,7 @@ from ..integration.system import Integration
 from ..narrow_phase.system import NarrowPhase
 from ..records import BODIES, COLLIDERS, QUARANTINE, SLEEP_COLUMNS, STATE, TABLE_COLUMNS, UNDO, UNDO_FORCE
 from ..stage_list import CONDITIONS, ON_DEMAND, STAGES, SYSTEM_OF_STAGE
-from .compiled import compiled_stage
+from .compiled import compiled_stage, visible_columns
 
 INTEGRATORS = {stage.name for stage in Integration.STAGES if stage.needed in ("standard", stage.name)}
 REPEATED = (BroadPhase.__name__, NarrowPhase.__name__)  # their stages may run several times in a step
@@ -28,9 +28,9 @@ FIRST_AND_LAST = "the first place is before='check_columns', the last before='cl
 CHOICES = tuple(name for name in CONDITIONS if name not in ("standard", "stages of plugins", "on demand"))
 
 
-def placed(stages: Iterable[PluginStage]) -> Iterator[Stage]:
+def placed(stages: Iterable[PluginStage], dimensions: int) -> Iterator[Stage]:
     """All stages of a step in their order: at each place those of plugins in the order in which they are given."""
-    own = [(stage, made(stage)) for stage in stages]
+    own = [(stage, made(stage, dimensions)) for stage in stages]
     for built_in in STAGES:
         here = [(stage.after, one) for stage, one in own if stage.anchor == built_in.name]
         yield from (one for after, one in here if not after)
@@ -38,12 +38,11 @@ def placed(stages: Iterable[PluginStage]) -> Iterator[Stage]:
         yield from (one for after, one in here if after)
 
 
-def made(stage: PluginStage) -> Stage:
+def made(stage: PluginStage, dimensions: int) -> Stage:
     """The stage as programs have it; the one condition that it is needed for goes by its own name."""
     why = f"plugin {stage.plugin}" + (f": {stage.why}" if stage.why else "")
-    return Stage(
-        compiled_stage(stage), why, stage.reads, stage.writes, stage.name, anchor=stage.anchor, plugin=stage.plugin
-    )
+    function = compiled_stage(stage, dimensions)
+    return Stage(function, why, stage.reads, stage.writes, stage.name, anchor=stage.anchor, plugin=stage.plugin)
 
 
 def check_stages(stages: Iterable[PluginStage]) -> None:
@@ -72,19 +71,22 @@ def _fault_of_place(stage: PluginStage) -> str:
 
 
 def _fault_of_columns(stage: PluginStage) -> str:
-    known = {*BODIES.fields, *COLLIDERS.fields, *RECORDS}
+    own = {column.key: component for component in stage.records for column in visible_columns(component)}
+    known = {*BODIES.fields, *COLLIDERS.fields, *RECORDS, *own}
     for name in (*stage.reads, *stage.writes):
         if name not in known:
             return f"no record has {name!r}{did_you_mean(name, known)}"
     for name in stage.writes:
-        if name in FIXED:
+        if name in FIXED or hasattr(own.get(name), "stack"):  # of a shape
             return f"it writes {name}, which is for reading only"
-        if name in BODIES.fields and SYSTEM_OF_STAGE[stage.anchor] in REPEATED:
+        if (name in BODIES.fields or name in own) and SYSTEM_OF_STAGE[stage.anchor] in REPEATED:
             return (
                 f"it writes {name}, and stages of {' and '.join(REPEATED)} may run several times in a step: they must "
                 f"not change the bodies"
             )
-    unnamed = sorted((_names_in(stage.function, set()) & known) - {*stage.reads, *stage.writes})
+    named = {name.rpartition(".")[2] for name in (*stage.reads, *stage.writes)}
+    used = _names_in(stage.function, set()) & {name.rpartition(".")[2] for name in known}
+    unnamed = sorted(used - named)
     if unnamed:
         what = "them" if len(unnamed) > 1 else "it"
         return f"it uses {', '.join(unnamed)}, and names {what} neither in reads nor in writes"

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...framework.data.column_copies import ColumnCopies
 from ...framework.data.columns import REQUIRED
 from ...framework.data.table import HAS_OBJECTS, Table
 from ...framework.jit.records.record import Record
@@ -24,8 +23,10 @@ NOT_ENCLOSING = "some body has several colliders: whether the cheaper one still 
 UNDO = "copies for going back to the start of a step that fails"
 
 
-def planned_columns(state: Record, table: Table, scene: Scene, copies: ColumnCopies) -> Iterator[PlannedColumn]:
-    """All arrays of bodies, then of pairs, contacts and impacts; ``copies``: the room for those of all columns."""
+def planned_columns(
+    state: Record, table: Table, scene: Scene, copies: dict[str, np.ndarray]
+) -> Iterator[PlannedColumn]:
+    """All arrays of bodies, then of pairs, contacts and impacts; ``copies``: the room for those of columns."""
     bodies, capacity = state.bodies, table.capacity
     of_table = [section for section in BODIES.sections if section.group == "the table"]
     yield from _fields(table)
@@ -38,7 +39,7 @@ def planned_columns(state: Record, table: Table, scene: Scene, copies: ColumnCop
     yield from _column("level_not_enclosing", "body", "shapes", bodies.level_not_enclosing, capacity, NOT_ENCLOSING)
     for key, array in sorted(scene.rotated_columns.items()):
         yield from _column(f"{key}, rotated", "body", "rotation", array, capacity, ROTATED)
-    for key, copy in copies.sizes():
+    for key, copy in copies.items():
         yield from _column(f"copy of {key}", "body", "going back", copy, len(copy), UNDO)
     for name, schema in state.schema.fields.items():
         if isinstance(schema, Schema) and schema is not BODIES:

@@ -64,6 +64,7 @@ class StepLinks:
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
             state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
+            self._extensions.present(),
         )  # fmt: skip
         if self._key is not None and usual == self._usual and collides:  # bodies have come or gone, no more
             self.link_shapes()  # there may have been a query meanwhile, with other shapes

@@ -71,7 +71,8 @@ class LentColumns:
     def _watched(self) -> set[str]:
         linked = self._scene.linked
         shapes = linked.shapes if linked is not None else ()
-        return {*OF_BODIES, *(column.key for shape in shapes for column in shape.component.columns.values())}
+        read = self._scene.read_by_plugins
+        return {*OF_BODIES, *read, *(column.key for shape in shapes for column in shape.component.columns.values())}
 
 
 def _slice_of(rows: np.ndarray) -> Any:

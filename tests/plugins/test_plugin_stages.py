@@ -320,7 +320,7 @@ def test_a_stage_returns_nothing_and_needs_a_place():
     with pytest.raises(PluginError, match="stage answers must return nothing"):
         Plugin("wrong").stage(after="put_back")(answers)
     with pytest.raises(PluginError, match="stage on bare takes arguments"):
-        Plugin("wrong").stage(bare)  # pyright: ignore[reportCallIssue]
+        Plugin("wrong").stage(bare)
 
 
 def test_names_are_taken_once():
@@ -351,24 +351,29 @@ def test_what_cannot_be_compiled_is_named_before_a_step_begins():
 
 
 PROGRAM = """
-from carom import Physics, Plugin, RigidBody, Transform, World
+from carom import Component, Physics, Plugin, RigidBody, Transform, World, column
 from carom.framework.jit.log import log
 from carom.framework.vectors import add, scale
 
 plugin = Plugin("swirl")
 
-@plugin.stage(before="end_flight", writes=("linear_velocity",))
-def swirl(state, dt):
+class Swirl(Component):
+    rate = column(1.0)
+
+@plugin.stage(before="end_flight", records=(Swirl,), writes=("linear_velocity", "swirl.rate"))
+def swirling(state, dt, swirl):
     velocity = state.bodies.linear_velocity
     for i in range(state.first, state.dynamic):
         x, y = velocity[i]
-        velocity[i] = add(velocity[i], scale((-y, x), dt))
+        velocity[i] = add(velocity[i], scale((-y, x), dt * swirl.rate[i]))
+        swirl.rate[i] *= 1.01
 
 world = World(Physics(dimensions=2, gravity=(0.0, -9.81)), plugin)
-world.create_entities(20, Transform.many([(i, 0.1 * i) for i in range(20)]), RigidBody.many())
+places, rates = [(i, 0.1 * i) for i in range(20)], [0.1 * i for i in range(20)]
+world.create_entities(20, Transform.many(places), RigidBody.many(), Swirl.many(rates))
 for _ in range(30):
     world.step()
-print(world.state_hash(), any("swirl" in name for name, _ in log.compiled), len(log.compiled))
+print(world.state_hash(), any("swirling" in name for name, _ in log.compiled), len(log.compiled))
 """
 
 
