@@ -146,8 +146,8 @@ def test_a_stage_gives_the_bits_of_a_system():
 
 def test_a_stage_runs_where_some_body_has_its_components():
     with world_of(aging()) as world:
-        bare = world.create_entity(Transform((0, 0)), RigidBody())
-        other = world.create_entity(Transform((5, 0)), RigidBody())
+        bare = world.create_entity(Transform((0, 0)), RigidBody(), SphereCollider(1.0))
+        other = world.create_entity(Transform((5, 0)), RigidBody(), SphereCollider(1.0))
         world.step()
         assert "grow_old" not in str(world.plan())
         world.add_component(bare, Aging())
