@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Self, TypedDict, Unpack
 
 import numpy as np
@@ -101,6 +102,14 @@ class SphereCollider(Collider):
     @staticmethod
     def rounding(shape):
         return shape.radius
+
+    @staticmethod
+    def second_moments(shape, dimensions):
+        square = shape.radius * shape.radius
+        if dimensions == 2:
+            return math.pi * square, 0.0, 0.0, 0.25 * square, 0.0, 0.25 * square
+        fifth = 0.2 * square
+        return 4.0 / 3.0 * math.pi * square * shape.radius, 0.0, 0.0, 0.0, fifth, fifth, fifth, 0.0, 0.0, 0.0
 
 
 class AABBCollider(Collider):

@@ -19,8 +19,20 @@ FORCE = Column(item="vector", owner="RigidBody", name="apply_force")
 IMPULSE = Column(item="vector", owner="RigidBody", name="apply_impulse")
 
 
-def _force_applied(table: Any, row: int) -> None:
+def force_applied(table: Any, row: int) -> None:
+    """A push was applied from outside a step."""
     table.frames_applied = True
+
+
+def add_push(handle: Any, push: Any, names: tuple[str, str]) -> None:
+    """Add a push to the first of these columns, till the frame ends, or inside a system to the second, for one step."""
+    store, (applied, step) = handle._store, names
+    if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
+        setattr(handle, step, getattr(handle, step) + push)
+        return
+    frame = getattr(store, "frame", 0)
+    setattr(handle, applied, getattr(handle, applied) + push if handle.applied_frame == frame else 0.0 + push)
+    handle.applied_frame = frame
 
 
 def _kind_written(table: Any, row: int) -> None:
@@ -53,6 +65,7 @@ class RigidBody(Component, flat=True):
     __slots__ = ()
 
     makes_body: ClassVar[bool] = True
+    until_frame_ends: ClassVar[tuple[str, ...]] = ("applied_force", "applied_frame")
 
     mass: float = special_column(default=1.0, positive=True)
     linear_velocity: VectorField = special_column(
@@ -74,7 +87,7 @@ class RigidBody(Component, flat=True):
     ccd: bool = special_column(default=False, dtype=bool, kw_only=True, on_demand=True, also=("bullet", "continuous"))
     # Not for the constructor: pushes until the frame ends, the frame they are of, and pushes for one step.
     applied_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
-    applied_frame: int = special_column(default=-1, dtype=int, on_demand=True, init=False, on_write=_force_applied)
+    applied_frame: int = special_column(default=-1, dtype=int, on_demand=True, init=False, on_write=force_applied)
     step_force: VectorField = special_column(default=0.0, item="vector", on_demand=True, init=False)
 
     @property
@@ -103,15 +116,10 @@ class RigidBody(Component, flat=True):
         store: Any = self._store
         if self.kind != "dynamic":
             return
-        if store.in_step if hasattr(store, "in_step") else esper_bridge.step_is_running():
-            if hasattr(store, "in_step") and store.forces_are_summed():
-                store.make("force")[store.find(self._entity)] += push
-            else:
-                self.step_force = self.step_force + push
-            return
-        frame = getattr(store, "frame", 0)
-        self.applied_force = self.applied_force + push if self.applied_frame == frame else 0.0 + push
-        self.applied_frame = frame
+        if hasattr(store, "in_step") and store.in_step and store.forces_are_summed():
+            store.make("force")[store.find(self._entity)] += push
+        else:
+            add_push(self, push, ("applied_force", "step_force"))
 
     def _vector(self, argument: Column, value: Any) -> Any:
         vector, velocity = argument.checked(value, self._entity), self.linear_velocity

@@ -21,7 +21,7 @@ def _teleport(table: Any, row: int) -> None:
 class Transform(Component, flat=True):
     """Position in metres, (d,), and rotation: an angle in radians in 2D, a unit quaternion (w, x, y, z) in 3D.
 
-    Rotation is set by the game, never simulated; it enlarges boxes and turns offsets. Assigning ``position`` is a
+    Rotation is set by the game, or by a Spin; it enlarges boxes and turns offsets. Assigning ``position`` is a
     teleport. For a dynamic or kinematic body ``position`` is a writable view.
     """
 

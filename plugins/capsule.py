@@ -54,6 +54,27 @@ class CapsuleCollider(Collider):
     def rounding(shape):
         return shape.radius
 
+    @staticmethod
+    def second_moments(shape, dimensions):
+        """Of the part between the two centres, and of two half discs or balls beyond them."""
+        r, half = shape.radius, shape.half_height
+        square = r * r
+        if dimensions == 2:
+            middle, ends = 4.0 * r * half, math.pi * square
+            area = middle + ends
+            if area == 0.0:
+                return 0.0, 0.0, 0.0, 0.0, 0.0, half * half / 3.0
+            xx = middle * square / 3.0 + ends * square / 4.0
+            yy = middle * half * half / 3.0 + ends * (half * half + square / 4.0) + 8.0 / 3.0 * half * square * r
+            return area, 0.0, 0.0, xx / area, 0.0, yy / area
+        middle, ends = 2.0 * math.pi * square * half, 4.0 / 3.0 * math.pi * square * r
+        volume = middle + ends
+        if volume == 0.0:
+            return 0.0, 0.0, 0.0, 0.0, 0.0, half * half / 3.0, 0.0, 0.0, 0.0, 0.0
+        xx = (middle * square / 4.0 + ends * square / 5.0) / volume
+        yy = middle * half * half / 3.0 + ends * (half * half + square / 5.0) + math.pi * half * square * square
+        return volume, 0.0, 0.0, 0.0, xx, yy / volume, xx, 0.0, 0.0, 0.0
+
 
 @plugin.kernel
 def nearest_along(axis, half, d):

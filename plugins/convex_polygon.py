@@ -134,3 +134,39 @@ class ConvexPolygonCollider(Collider):
     @staticmethod
     def rounding(shape):
         return shape.corner_radius
+
+    @staticmethod
+    def second_moments(shape, dimensions):
+        """Triangles from the centre to each edge, strips along the edges, and sectors around the corners."""
+        r, count = shape.corner_radius, len(shape.vertices)
+        area = mx = my = xx = xy = yy = 0.0
+        for k in range(count):
+            j, i = (k + 1) % count, (k - 1) % count
+            px, py, qx, qy = shape.vertices[k, 0], shape.vertices[k, 1], shape.vertices[j, 0], shape.vertices[j, 1]
+            triangle = 0.5 * (px * qy - py * qx)
+            area, mx, my = area + triangle, mx + triangle * (px + qx) / 3.0, my + triangle * (py + qy) / 3.0
+            xx += triangle * (px * px + px * qx + qx * qx) / 6.0
+            xy += triangle * (2.0 * px * py + px * qy + qx * py + 2.0 * qx * qy) / 12.0
+            yy += triangle * (py * py + py * qy + qy * qy) / 6.0
+            if r > 0.0:
+                tx, ty = qx - px, qy - py
+                size = math.sqrt(tx * tx + ty * ty)
+                nx, ny = ty / size, -tx / size
+                cx, cy, strip = 0.5 * (px + qx + r * nx), 0.5 * (py + qy + r * ny), size * r
+                along, across = size * size / 12.0, r * r / 12.0
+                area, mx, my = area + strip, mx + strip * cx, my + strip * cy
+                xx += strip * (cx * cx + along * ny * ny + across * nx * nx)
+                xy += strip * (cx * cy + (across - along) * nx * ny)
+                yy += strip * (cy * cy + along * nx * nx + across * ny * ny)
+                before = math.atan2(py - shape.vertices[i, 1], px - shape.vertices[i, 0])
+                turn = (math.atan2(ty, tx) - before) % FULL_TURN
+                middle = before - 0.5 * math.pi + 0.5 * turn  # direction of the corner's sector
+                ux, uy, sector = math.cos(middle), math.sin(middle), 0.5 * turn * r * r
+                first, wide = 2.0 / 3.0 * r * r * r * math.sin(0.5 * turn), r * r * r * r / 8.0
+                area, mx, my = area + sector, mx + sector * px + first * ux, my + sector * py + first * uy
+                xx += sector * px * px + 2.0 * first * px * ux + wide * (turn + math.sin(turn) * (ux * ux - uy * uy))
+                xy += sector * px * py + first * (px * uy + py * ux) + wide * 2.0 * math.sin(turn) * ux * uy
+                yy += sector * py * py + 2.0 * first * py * uy + wide * (turn - math.sin(turn) * (ux * ux - uy * uy))
+        if not area > 0.0:
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return area, mx / area, my / area, xx / area, xy / area, yy / area

@@ -99,7 +99,7 @@ def _ship(scene: str, folder: str) -> None:
 
 def _start(scene: str, cache: str, shipped: str) -> dict[str, float]:
     """Of one process, by name: seconds by the wall clock to the end of its first step; processor seconds of imports and
-    of building the world with the first step; seconds of the longest step after it; kernels that were compiled; most memory held."""
+    of building the world with the first step; seconds of the longest step after it; kernels that were compiled; MB."""
     started = time.time()
     found = json.loads(_run([sys.executable, "-c", PROGRAM, scene, shipped], {CACHE_FOLDER_VARIABLE: cache}))
     return {"seconds": found.pop("at") - started, **found}

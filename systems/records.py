@@ -187,6 +187,7 @@ SHAPES = Schema(
     own_parameters=ints(),  # the same as the components have them, before rotation
     bounds=ints(),
     rotated=ints(),  # 0 for shapes that rotation does not change
+    moments=ints(),  # 0 for shapes that do not tell; empty unless a stage of a plugin asks
     concave=flags(),
     sharp=flags(),  # of faces that meet in corners
     flipped=flags(),  # pairs that are registered as (second, first); the functions below take them so
@@ -442,6 +443,7 @@ STATE = Schema(
     too_fast_row=integer(),
     event_count=integer(),  # events of contacts that Python has to hear of
     # what an error names
+    blamed=integer(),  # 1 + the row of a body for which a plugin's stage raises an error; 0: none
     row_a=integer(),
     row_b=integer(),
     unsound=integer(),

@@ -56,6 +56,7 @@ class Scene:
         self._settings = settings
         self.prepared: set[type[Any]] = set()  # colliders whose functions are kept ready
         self.read_by_plugins: set[str] = set()  # columns that stages of plugins read
+        self.moments_asked = False  # whether one of them reads the shapes' second moments
         self.version = 0
         self.linked: LinkedShapes | None = None
         self.parameters: ParameterRecords | None = None
@@ -327,7 +328,7 @@ class Scene:
     def link_shapes(self, sweeps: bool) -> None:
         """Compile or load the functions of the shapes; sweeps: also those of swept bodies and casts."""
         if self.linked is not None:
-            self.linked.fill(self.state.shapes, sweeps)
+            self.linked.fill(self.state.shapes, sweeps, self.moments_asked)
 
     # -- what changes from step to step -----------------------------------------------------------
 

@@ -323,12 +323,16 @@ class Simulation:
     def end_window(self) -> None:
         """The last step of a ``step()`` or ``advance()`` is over: forces applied from outside have done their work."""
         table, words = self.table, self._words
-        if "applied_force" in table.arrays and (words[self._pushed] or words[self._others_write]):
-            table.arrays["applied_force"][: table.stops[0]] = 0.0
-        if table.frames_applied:
-            if "applied_frame" in table.arrays:
-                table.arrays["applied_frame"][: table.stops[0]] = -1  # else state_hash would tell frame rates apart
-            table.frames_applied = False
+        if not (table.frames_applied or words[self._pushed] or words[self._others_write]):
+            return
+        for component in table.component_types:
+            if component.until_frame_ends:
+                push, frame = (table.arrays.get(component.prefix + name) for name in component.until_frame_ends)
+                if push is not None:
+                    push[: table.stops[0]] = 0.0
+                if frame is not None and table.frames_applied:
+                    frame[: table.stops[0]] = -1  # else state_hash would tell frame rates apart
+        table.frames_applied = False
 
     # -- snapshots --------------------------------------------------------------------------------
 

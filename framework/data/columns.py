@@ -13,6 +13,11 @@ import numpy as np
 LARGEST = float(np.finfo(float).max)
 SMALLEST_WITH_INVERSE = 1 / LARGEST  # 5.6e-309, a denormal
 LONGEST = 200  # characters of a value in a message
+# Of an array as one value, by item: how many numbers it may have, and what a message says.
+LENGTHS: dict[str, tuple[tuple[int, ...], str]] = {
+    "scalar": ((), "one number"), "vector": ((2, 3), "2 or 3 numbers"), "angular": ((3,), "a number or 3 numbers"),
+    "rotation": ((4,), "an angle or 4 numbers (w, x, y, z)"),
+}  # fmt: skip
 REQUIRED: Any = type("Required", (), {"__repr__": lambda self: "<required>"})()
 
 
@@ -20,8 +25,8 @@ REQUIRED: Any = type("Required", (), {"__repr__": lambda self: "<required>"})()
 class Column:
     """One field of a component type; as a class attribute, the access to that field of a handle.
 
-    ``item`` is ``"scalar"``, ``"vector"`` (d floats in a d-dimensional world) or ``"rotation"`` (an angle in 2D, a unit
-    quaternion w, x, y, z in 3D).
+    ``item`` is ``"scalar"``, ``"vector"`` (d floats in a d-dimensional world), ``"rotation"`` (an angle in 2D, a unit
+    quaternion w, x, y, z in 3D) or ``"angular"`` (a number in 2D, a vector of 3 in 3D).
     """
 
     default: Any = REQUIRED
@@ -52,7 +57,7 @@ class Column:
             return (dimensions,)
         if self.item == "rotation":
             return () if dimensions == 2 else (4,)
-        return ()
+        return (3,) if self.item == "angular" and dimensions == 3 else ()
 
     def empty_value(self, dimensions: int) -> Any:
         """What rows hold whose entity lacks the component, and what an omitted scalar expands to."""
@@ -104,9 +109,10 @@ class Column:
             return usual
         array = self._as_numbers(value, entity)
         if array.ndim > (0 if self.item == "scalar" else 1):
-            raise self._error(value, f"must be one {self.item}", entity)
-        if array.ndim == 1 and len(array) not in ((2, 3) if self.item == "vector" else (4,)):
-            wanted = "2 or 3 numbers" if self.item == "vector" else "an angle or 4 numbers (w, x, y, z)"
+            kind = "number or vector" if self.item == "angular" else self.item
+            raise self._error(value, f"must be one {kind}", entity)
+        lengths, wanted = LENGTHS[self.item]
+        if array.ndim == 1 and len(array) not in lengths:
             raise self._error(value, f"must be {wanted}", entity)
         self.check_numbers(array, value, entity)
         if self.item == "rotation" and array.ndim == 1:
@@ -179,6 +185,11 @@ class Column:
         whole = isinstance(value, np.ndarray)
         if self.item == "vector" and whole and len(value) != dimensions:
             raise self._error(value, f"must have {dimensions} components in this {dimensions}D world", entity)
+        if self.item == "angular":
+            if dimensions == 2 and whole:
+                raise self._error(value, "must be one number in this 2D world", entity)
+            if dimensions == 3 and not whole and value != 0 and value == value:
+                raise self._error(value, "must be 3 numbers in this 3D world", entity)
         if self.item == "rotation":
             if dimensions == 2 and whole:
                 raise self._error(value, "must be an angle in this 2D world", entity)
@@ -252,6 +263,8 @@ class Column:
         if array.ndim == 1:
             return self.shown(array.item(row))
         view = array[row]
+        if self.optional and math.isnan(view[0]):
+            return None
         if store.is_frozen(self.key, row):
             view.flags.writeable = False
         return view
@@ -289,7 +302,7 @@ class Column:
         """The stored value as users see it."""
         if self.choices:
             return self.choices[int(value)]
-        if self.optional and math.isnan(value):
+        if self.optional and np.isscalar(value) and math.isnan(value):
             return None
         return value
 
@@ -321,7 +334,8 @@ def column(
     default
         value of entities that do not give one; without it the constructor demands one
     item
-        ``"scalar"``, ``"vector"`` (d numbers; one number stands for all) or ``"rotation"``
+        ``"scalar"``, ``"vector"`` (d numbers; one number stands for all), ``"rotation"`` or ``"angular"`` (a number in
+        2D, 3 in 3D)
     dtype
         ``float``, ``int`` or ``bool``
     positive, minimum, optional, choices
@@ -329,8 +343,8 @@ def column(
     kw_only
         whether the constructor takes it by name only
     """
-    if item not in ("scalar", "vector", "rotation"):
-        raise ValueError(f"column item must be scalar, vector or rotation, got {item!r}")
+    if item not in LENGTHS:
+        raise ValueError(f"column item must be {', '.join(list(LENGTHS)[:-1])} or rotation, got {item!r}")
     if choices:
         dtype = np.int8
     elif dtype is int:

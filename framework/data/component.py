@@ -31,6 +31,9 @@ class Component:
     columns: ClassVar[dict[str, Column]] = {}
     prefix: ClassVar[str] = ""  # of the columns' names in a table
     makes_body: ClassVar[bool] = False  # an entity that has it together with a Transform is a body
+    excludes: ClassVar[Mapping[type[Component], str]] = {}  # what no entity has together with it, and the cure
+    plugin: ClassVar[str] = ""  # the plugin without which it does nothing
+    until_frame_ends: ClassVar[tuple[str, ...]] = ()  # columns of a push from outside, and of the frame that it is of
     _abstract: ClassVar[bool] = True
     _shaped: ClassVar[tuple[Column, ...]] = ()  # columns whose shape depends on the world's dimensions
     _held: ClassVar[tuple[str, ...]] = ()  # those whose default does not fit worlds of 2 and of 3 dimensions

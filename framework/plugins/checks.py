@@ -25,6 +25,7 @@ SHAPE_FUNCTIONS = {
     "support": ("shape", "direction"),
     "rounding": ("shape",),
     "turned": ("shape", "axes"),
+    "second_moments": ("shape", "dimensions"),
 }
 POSES = ((1.0, 0.0, 0.0), (0.3, -0.2, 0.1), (0.0, 0.0, 0.0), (-2.0, 3.0, 1.0))  # of b as seen from a
 VALUES = ((0.0, 0.0), (0.25, 1.0), (1.0, 0.5), (3.0, 0.0))  # of both bodies, for a mixing rule
@@ -73,6 +74,8 @@ def _check_extents(where: str, component: Any, sample: Any, dimensions: int) -> 
         raise PluginError(f"{said}: return half extents of the box around it, a tuple of {dimensions} numbers")
     if any(math.isnan(x) or x < 0 for x in half):
         raise PluginError(f"{said}: half extents are not negative")
+    if hasattr(component, "second_moments"):
+        _check_moments(f"{where}: second_moments(shape, {dimensions})", component, sample, dimensions)
     if not hasattr(component, "support"):
         return
     rounding = getattr(component, "rounding", lambda shape: 0.0)
@@ -86,6 +89,18 @@ def _check_extents(where: str, component: Any, sample: Any, dimensions: int) -> 
             raise PluginError(f"{said}: return a point, a tuple of {dimensions} numbers")
         if not all(map(math.isfinite, point)):
             raise PluginError(f"{said}: the shape's farthest point in a direction must be finite")
+
+
+def _check_moments(where: str, component: Any, sample: Any, dimensions: int) -> None:
+    """Measure, centre and second moments of a sample: squares have no mean below zero."""
+    found = _call(where, component.second_moments, (sample, dimensions), sample)
+    count = 1 + dimensions + dimensions * (dimensions + 1) // 2
+    if not _is_vector(found, count) or not all(map(math.isfinite, found)):
+        names = f"measure, centre, means of {'xx, xy, yy' if dimensions == 2 else 'xx, yy, zz, xy, xz, yz'}"
+        raise PluginError(f"{where} for {shown(sample)} returned {plain(found)!r}: return {count} numbers, {names}")
+    squares = (found[3], found[5]) if dimensions == 2 else found[4:7]
+    if found[0] < 0 or min(squares) < 0:
+        raise PluginError(f"{where} for {shown(sample)} returned {plain(found)!r}: squares are not negative")
 
 
 # -- pairs ----------------------------------------------------------------------------------------

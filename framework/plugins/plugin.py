@@ -85,17 +85,20 @@ class Plugin:
         The class defines ``bounds(shape, dimensions)``, the half extents of the box around it as a tuple; it may define
         ``support(shape, direction)``, its farthest point from its centre in a direction (of any length but 0), and with
         it meets every other convex shape; and ``rounding(shape)``, how far it reaches beyond the core that support is
-        about. ``rotates = True`` in the class gives the functions ``shape.axes``, the body's axes in the world;
+        about; and ``second_moments(shape, dimensions)``, from which bodies that spin get their inertia: its area or
+        volume, its centre, then the means over it of xx, xy, yy, in 3D of xx, yy, zz, xy, xz, yz, of a body that is not
+        rotated. ``rotates = True`` in the class gives the functions ``shape.axes``, the body's axes in the world;
         ``dimensions = (2,)`` makes it a shape of 2D worlds only.
         """
 
         def register(component: ShapeClass) -> ShapeClass:
             checks.check_shape(self, component, cost)
-            bounds, support, rounding, turned = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
+            bounds, support, rounding, turned, moments = (_function(component, name) for name in checks.SHAPE_FUNCTIONS)
             shape = Shape(
                 component, float(cost), pasted(bounds), None if turned is None else inlined(turned), self.name,
                 None if support is None else checked_support(inlined(support)),
                 inlined(rounding or _no_rounding) if support is not None else None,
+                None if moments is None else pasted(moments),
             )  # fmt: skip
             self._register(self.shapes, component, shape)
             return component

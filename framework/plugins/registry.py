@@ -28,6 +28,8 @@ class Shape:
     support, rounding
         compiled, or None; (shape, direction) -> the core's farthest point that way; (shape) -> how far the shape
         reaches beyond its core
+    second_moments
+        compiled, or None; (shape, dimensions) -> measure, centre, means of products of coordinates
     """
 
     component: type[Component]
@@ -37,6 +39,7 @@ class Shape:
     plugin: str
     support: Any | None = None
     rounding: Any | None = None
+    second_moments: Any | None = None
 
     @property
     def rotates(self) -> bool:

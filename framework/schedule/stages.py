@@ -175,7 +175,9 @@ class Program:
         except Exception as error:
             stage = self.stages[self._words[self._stage]]
             if stage.plugin:
-                error.add_note(f"plugin {stage.plugin}: stage {stage.name}")
+                blamed, self.state.blamed = int(self.state.blamed), 0
+                entity = f", entity {self.state.bodies.entity[blamed - 1]}" if blamed else ""
+                error.add_note(f"plugin {stage.plugin}: stage {stage.name}{entity}")
             else:
                 self.describe_error(error)
             raise

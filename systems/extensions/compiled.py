@@ -29,11 +29,14 @@ def visible_columns(component: type[Component]) -> list[Column]:
 
 @lru_cache(maxsize=CACHE_SIZE)
 def component_schema(component: type[Component], dimensions: int) -> Schema:
-    """The record of a component's columns; a quaternion is four numbers, read and written one by one."""
+    """The record of a component's columns; a quaternion is four numbers, read and written one by one, what turns is one
+    or three."""
     fields: dict[str, Any] = {PRESENT: schema.flags()}
     for column in visible_columns(component):
         if column.item == "vector":
             fields[column.name] = schema.vectors()
+        elif column.item == "angular":
+            fields[column.name] = schema.table("float64", 1 if dimensions == 2 else 3)
         elif column.item_shape(dimensions):
             fields[column.name] = schema.table("float64", 4)
         else:

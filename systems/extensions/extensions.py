@@ -62,7 +62,7 @@ class Extensions:
         reads, writes = ({name for stage in stages for name in getattr(stage, what)} for what in ("reads", "writes"))
         kept = {name for name in writes if name in OF_TABLE or self._table.has_column(name)}.difference(MADE_AGAIN)
         self.written = ColumnCopies(self._table, tuple(sorted(kept)))
-        self._scene.read_by_plugins = reads - writes
+        self._scene.read_by_plugins, self._scene.moments_asked = reads - writes, "shapes" in reads
 
     def _bind(self, program: Program) -> None:
         """Rows for all columns that the stages name, and the addresses of what they have of their own."""
@@ -78,7 +78,8 @@ class Extensions:
                 record = getattr(own, name)
                 record.show(PRESENT, table.has_mask(component))
                 for column in visible_columns(component):
-                    record.show(column.name, table.make(column.key))
+                    array = table.make(column.key)
+                    record.show(column.name, array.reshape(len(array), -1) if column.item == "angular" else array)
         self.written.bind()
         addresses[program.index["keep_written"]] = self.written.address
         self._state.extensions = addresses

@@ -23,6 +23,7 @@ REPEATED = (BroadPhase.__name__, NarrowPhase.__name__)  # their stages may run s
 RECORDS = {name for name, field in STATE.fields.items() if isinstance(field, Schema)} - {"bodies", "colliders"}
 # What others rely on in ways that no stage of a plugin can keep to, or what no failed step would put back.
 FIXED = {"entity", "shape", "rank", "collider_slot", *SLEEP_COLUMNS, *QUARANTINE, *UNDO, *UNDO_FORCE, *COLLIDERS.fields}
+FIXED -= {"rest_steps"}  # of what is not at rest, whatever its velocity says
 OF_TABLE = {*TABLE_COLUMNS, "rotation"} - {"entity"}
 FIRST_AND_LAST = "the first place is before='check_columns', the last before='close_step'"
 CHOICES = tuple(name for name in CONDITIONS if name not in ("standard", "stages of plugins", "on demand"))

@@ -80,7 +80,7 @@ def needed_functions(
     yield from query_kernels(dimensions).of_world(has_shapes)
     if linked is None:
         return
-    yield from linked.all_functions(sweeps=True)
+    yield from linked.all_functions(True, any("shapes" in stage.reads for stage in stages if stage.plugin))
     yield half_extents_call(dimensions)
     for query in queries:
         yield from query.all_functions()

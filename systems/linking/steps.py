@@ -120,7 +120,7 @@ class StepLinks:
     def _functions_of_shapes(self) -> Iterator[Linked | Called]:
         linked = self._scene.linked
         if linked is not None:
-            yield from linked.all_functions(self._state.sweeps_ready)
+            yield from linked.all_functions(self._state.sweeps_ready, self._scene.moments_asked)
 
     def _parts(self) -> dict[int, Linked]:
         """The parts of stages that are called by address: those of swept bodies and of impacts at the same time only
@@ -134,7 +134,7 @@ class StepLinks:
 
     def link_shapes(self) -> None:
         """The functions of the shapes alone, where they are not linked yet."""
-        key = _, sweeps = self._scene.linked, self._state.sweeps_ready
+        key = _, sweeps, _ = self._scene.linked, self._state.sweeps_ready, self._scene.moments_asked
         if key != self._shapes_key:
             link_all(self._functions_of_shapes())
             self._scene.link_shapes(sweeps)

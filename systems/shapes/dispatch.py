@@ -12,7 +12,15 @@ from ...framework.vectors import add_scaled, negative
 from .linking.batches import SOUND, repeat_batch, turned_back
 from .linking.mixing import mix as mix
 from .linking.mixing import mix_friction as mix_friction
-from .linking.signatures import call_batch, call_bounds, call_corner, call_evaluate, call_rotated, call_sweep
+from .linking.signatures import (
+    call_batch,
+    call_bounds,
+    call_corner,
+    call_evaluate,
+    call_moments,
+    call_rotated,
+    call_sweep,
+)  # fmt: skip
 
 DEEPER = 2.0  # slops: how deep two shapes are looked at that may touch at a corner
 OTHER_FACE = 0.9  # of that: a way out that is shorter is not that of the face that they touch with
@@ -121,6 +129,12 @@ def both_convex(state, shape_a, shape_b):
 def half_extents(state, shape, i):
     """Half extents of the box around row i's shape, as it is in the world."""
     return call_bounds(state.shapes.bounds[shape], state, state.shapes.parameters[shape], i)
+
+
+@inlined
+def second_moments(state, shape, i):
+    """Measure, centre and second moments of row i's shape, not rotated; the shape must tell them."""
+    return call_moments(state.shapes.moments[shape], state, state.shapes.own_parameters[shape], i)
 
 
 @inlined

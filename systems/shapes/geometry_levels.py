@@ -69,8 +69,19 @@ class LevelCheck:
         self._registry = registry
 
     def check_types(self, types: Iterable[type[Component]], entity: int) -> None:
-        """Whether these colliders are shapes of this world; the entity is for messages."""
+        """Whether these may be together, and colliders are shapes of this world; the entity is for messages."""
         for component in types:
+            for other, cure in component.excludes.items():
+                if other in types:
+                    raise ValueError(
+                        f"entity {entity} has {component.__name__}, which no {other.__name__} can have: {cure}"
+                    )
+            if component.plugin and component.plugin not in (plugin.name for plugin in self._registry.plugins):
+                name = component.plugin.capitalize()
+                raise ValueError(
+                    f"entity {entity}: {component.__name__} does nothing without its plugin: "
+                    f"World(Physics(...), {name}()), from carom.plugins.{component.plugin}"
+                )
             if issubclass(component, Collider):
                 self._check_dimensions(component, entity)
 

@@ -272,5 +272,6 @@ def test_a_hundred_thousand_entities_at_once():
 
 def test_of_a_value_too_long_for_a_message_its_beginning_is_shown():
     """The array of a whole scene, given where one vector is wanted, is four million characters long."""
-    with pytest.raises(ValueError, match=r"Transform.position must be one vector, got \[\[1.0, 1.0\], .{150,200} \.\.\.$"):
+    said = r"Transform.position must be one vector, got \[\[1.0, 1.0\], .{150,200} \.\.\.$"
+    with pytest.raises(ValueError, match=said):
         Transform(np.ones((100_000, 2)))

@@ -29,6 +29,7 @@ from .signatures import (
     NOT_FINITE,
     bounds_signature,
     call_bounds,
+    moments_signature,
     rotated_signature,
     rounding_signature,
     support_signature,
@@ -93,6 +94,15 @@ class LinkedShape:
         source = f"return function({self._parameters('p')})"
         made = self._function("def rounding(p, i):", source, function=self.shape.rounding)
         return Linked(made.rounding, rounding_signature())
+
+    @cached_property
+    def moments(self) -> Linked | None:
+        """Measure, centre and second moments; None if the shape does not tell them."""
+        if self.shape.second_moments is None:
+            return None
+        source = f"return function({self._parameters('p')}, {self.dimensions})"
+        made = self._function("def moments(state, p, i):", source, function=self.shape.second_moments)
+        return Linked(made.moments, moments_signature(self.dimensions))
 
     def all_functions(self, by_address: bool) -> Iterator[Linked]:
         """by_address: whether some pair takes the shape by the addresses of support and rounding."""

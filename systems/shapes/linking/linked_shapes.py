@@ -77,11 +77,12 @@ class LinkedShapes:
         columns = (shape.component.columns[name] for shape in self.shapes for name in shape.columns)
         return any(isinstance(column, ArrayColumn) for column in columns)
 
-    def fill(self, shapes: Record, sweeps: bool = False) -> None:
+    def fill(self, shapes: Record, sweeps: bool = False, moments: bool = False) -> None:
         """Write the tables of functions into a record of ``SHAPES``; compiles or loads what is new.
 
-        sweeps
-            also those of sweeps, which only swept bodies and casts need; without it kernels see none
+        sweeps, moments
+            also those of sweeps, which only swept bodies and casts need, and of second moments, which only what spins
+            needs; without it kernels see none
         """
         shapes.count = len(self.shapes)
         shapes.concave = np.array([not shape.convex for shape in self.shapes], bool)
@@ -89,12 +90,16 @@ class LinkedShapes:
         for name in ("bounds", "rotated", "evaluate", "batch", "corner"):
             setattr(shapes, name, self._table(name))
         shapes.mixing, shapes.flipped = addresses(self._rules), self._flipped
+        shapes.moments = self._table("moments") if moments else np.zeros(0, np.int64)
         shapes.sweep = self._table("sweep") if sweeps else np.zeros(len(self.shapes) ** 2, np.int64)
 
-    def all_functions(self, sweeps: bool) -> Iterator[Linked]:
-        """Everything that a step may call for these shapes; sweeps: where there are swept bodies."""
+    def all_functions(self, sweeps: bool, moments: bool) -> Iterator[Linked]:
+        """Everything that a step may call for these shapes; sweeps: where there are swept bodies; moments: where some
+        stage asks for them."""
         for number, function in enumerate(self.functions):
             yield from function.all_functions(by_address=number in self.warm_started)
+            if moments and function.moments is not None:
+                yield function.moments
         yield from self._rules
         for pair in self.pairs.values():
             if pair is not None:
@@ -103,7 +108,7 @@ class LinkedShapes:
     def _table(self, name: str) -> np.ndarray:
         """Addresses of a function, by shape, or for pairs at first * count + second; 0 where there is none."""
         if name not in self._tables:
-            if name in ("bounds", "rotated"):
+            if name in ("bounds", "rotated", "moments"):
                 functions = [getattr(function, name) for function in self.functions]
             else:
                 functions = [getattr(self.pairs.get(pair), name, None) for pair in np.ndindex(2 * (len(self.shapes),))]

@@ -61,6 +61,13 @@ def bounds_signature(dimensions: int) -> Any:
 
 
 @cache
+def moments_signature(dimensions: int) -> Any:
+    """(state, own parameters, row) -> measure, centre, means of products of coordinates."""
+    count = 1 + dimensions + dimensions * (dimensions + 1) // 2
+    return types.UniTuple(types.float64, count)(record_type(STATE, dimensions), types.int64, types.int64)
+
+
+@cache
 def rotated_signature(dimensions: int) -> Any:
     """(state, own parameters, parameters as rotated, row, whether bodies are rotated) -> 0."""
     return types.int64(record_type(STATE, dimensions), types.int64, types.int64, types.int64, types.boolean)
@@ -108,6 +115,7 @@ call_batch = call_in_dimension(batch_signature)
 call_sweep = call_in_dimension(sweep_signature)
 call_corner = call_in_dimension(corner_signature)
 call_bounds = call_in_dimension(bounds_signature)
+call_moments = call_in_dimension(moments_signature)
 call_rotated = call_in_dimension(rotated_signature)
 call_support = call_in_dimension(support_signature)
 call_rounding = linked_call(rounding_signature)

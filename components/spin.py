@@ -1,0 +1,159 @@
+"""Spin: how a body turns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..framework.data.columns import Column, special_column
+from ..framework.data.component import Component
+from ..framework.errors import CaromError
+from ..framework.typing import Vector
+from .colliders import AABBCollider, Collider
+from .rigid_body import RigidBody, add_push, force_applied
+
+UNKNOWN = "Spin.inertia is None, and it has no collider that tells it, or several: give a number"
+FASTEST_TURN = 1e150  # rad/s: squares of it are finite
+Angular = float | np.ndarray
+# Arguments, checked like fields.
+TORQUE = Column(item="angular", owner="Spin", name="apply_torque")
+FORCE = Column(item="vector", owner="Spin", name="apply_force")
+IMPULSE = Column(item="vector", owner="Spin", name="apply_impulse")
+POINT = Column(item="vector", owner="Spin", name="at")
+
+
+class Spin(Component):
+    """How a body turns, in a world with the plugin ``Rotation``.
+
+    angular_velocity
+        rad/s; in 3D (3,), along the world's axes
+    inertia
+        kg m^2 about the body's position; in 3D the (3,) principal moments about its own axes. None: of its mass, spread
+        evenly over its last collider
+    angular_damping
+        rate c in 1/s: the angular velocity decays as exp(-c t)
+    max_angular_speed
+        rad/s, or None
+    constant_torque
+        N m, acts always; in 3D (3,), along the world's axes
+
+    Kinematic bodies turn with their angular velocity; dynamic ones under torques, in 3D also as their inertia makes
+    them (Euler's equations). Contacts do not turn bodies.
+    """
+
+    __slots__ = ()
+
+    excludes: ClassVar[Mapping[type[Component], str]] = {
+        AABBCollider: "its sides never turn; give it a BoxCollider, from carom.plugins.rotation"
+    }
+    plugin: ClassVar[str] = "rotation"
+    until_frame_ends: ClassVar[tuple[str, str]] = ("applied_torque", "applied_frame")
+
+    angular_velocity: Angular = special_column(
+        default=0.0, item="angular", largest=FASTEST_TURN, also=("velocity", "speed", "omega")
+    )
+    inertia: Angular | None = special_column(default=None, item="angular", optional=True, positive=True)
+    angular_damping: float = special_column(default=0.0, minimum=0.0, kw_only=True, also=("damping",))
+    max_angular_speed: float | None = special_column(
+        default=None, optional=True, minimum=0.0, kw_only=True, also=("max_speed",)
+    )
+    constant_torque: Angular = special_column(default=0.0, item="angular", kw_only=True, also=("torque",))
+    # Not for the constructor, as in RigidBody.
+    applied_torque: Angular = special_column(default=0.0, item="angular", init=False)
+    applied_frame: int = special_column(default=-1, dtype=int, init=False, on_write=force_applied)
+    step_torque: Angular = special_column(default=0.0, item="angular", init=False)
+
+    def apply_torque(self, torque: Angular) -> None:
+        """Turn with ``torque``, N m; in 3D (3,), along the world's axes. How long it acts: as a force does, see
+        :meth:`RigidBody.apply_force`; kinematic and static bodies do not react."""
+        self._turn(self._checked(TORQUE, torque))
+
+    def apply_force(self, force: Vector, at: Vector) -> None:
+        """Push with ``force``, (d,) N, at a point of the world, (d,) m."""
+        push, arm = self._checked(FORCE, force), self._arm(at)
+        self._handle(RigidBody).apply_force(push)
+        self._turn(_cross(arm, push))
+
+    def apply_impulse(self, impulse: Vector, at: Vector) -> None:
+        """Change both velocities at once by an impulse, (d,) N s, at a point of the world, (d,) m."""
+        push, arm, body = self._checked(IMPULSE, impulse), self._arm(at), self._handle(RigidBody)
+        if body.kind == "dynamic":
+            change = self._turned_by(_cross(arm, push))
+            body.apply_impulse(push)
+            self.angular_velocity = self.angular_velocity + change
+
+    def velocity_at(self, point: Vector) -> np.ndarray:
+        """(d,) m/s: the velocity of the body's point that is there."""
+        arm, w = self._arm(point), self.angular_velocity
+        turned = np.cross(w, arm) if np.ndim(w) else w * np.array((-arm[1], arm[0]))
+        return self._handle(RigidBody).linear_velocity + turned
+
+    @property
+    def moments(self) -> Angular:
+        """kg m^2: the inertia about the body's position; in 3D (3, 3), along its own axes."""
+        given, store = self.inertia, self._in_world()
+        if given is not None:
+            return np.diag(given) if np.ndim(given) else float(given)
+        row, d = store.find(self._entity), store.dimensions
+        colliders = [component for component in store.types_in(row) if issubclass(component, Collider)]
+        if len(colliders) != 1 or not hasattr(colliders[0], "second_moments"):
+            raise CaromError(f"entity {self._entity}: {UNKNOWN}")
+        shape = self._handle(colliders[0])
+        _, *found = colliders[0].second_moments(shape, d)  # type: ignore[attr-defined]
+        centre, offset, mass = np.array(found[:d]), np.asarray(shape.offset), store.column("mass")[row]
+        xx, yy, zz, xy, xz, yz = (found[d], found[d + 2], 0, found[d + 1], 0, 0) if d == 2 else found[d:]
+        means = np.array(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))[:d, :d]
+        means = means + np.outer(offset, centre) + np.outer(centre, offset) + np.outer(offset, offset)
+        return mass * np.trace(means) if d == 2 else mass * (np.trace(means) * np.eye(3) - means)
+
+    def _turned_by(self, twist: Any) -> Angular:
+        """The change of the angular velocity by an angular impulse, N m s, along the world's axes."""
+        moments = self.moments
+        if not np.ndim(moments):
+            return float(twist) / moments if moments > 0.0 else 0.0
+        axes = _matrix(self._in_world().column("rotation")[self._in_world().find(self._entity)])
+        return axes @ np.linalg.solve(moments, axes.T @ twist)
+
+    def _turn(self, torque: Any) -> None:
+        if self._store is None or self._handle(RigidBody).kind == "dynamic":
+            add_push(self, torque, ("applied_torque", "step_torque"))
+
+    def _in_world(self) -> Any:
+        if self._store is None:
+            raise CaromError(
+                "this Spin belongs to no body yet: a look at world.bodies, or a step, takes it into the world"
+            )
+        return self._store
+
+    def _handle(self, component: type[Any]) -> Any:
+        """A handle of another component of the entity."""
+        handle = object.__new__(component)
+        handle._bind(self._in_world(), self._entity)
+        return handle
+
+    def _arm(self, point: Any) -> np.ndarray:
+        at = self._checked(POINT, point)
+        store = self._in_world()
+        return at - store.column("position")[store.find(self._entity)]
+
+    def _checked(self, argument: Column, value: Any) -> Any:
+        found = argument.checked(value, self._entity)
+        if self._store is not None:
+            d = self._store.dimensions
+            argument.check_dimensions(found, d, self._entity)
+            found = argument.whole(found, d) if argument.item_shape(d) else found
+        return found
+
+
+def _cross(arm: np.ndarray, push: np.ndarray) -> Angular:
+    """arm x push; in a plane its only component."""
+    return np.cross(arm, push) if len(arm) == 3 else float(arm[0] * push[1] - arm[1] * push[0])
+
+
+def _matrix(rotation: np.ndarray) -> np.ndarray:
+    """The matrix of a unit quaternion w, x, y, z."""
+    w, (x, y, z) = rotation[0], rotation[1:]
+    across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
+    return np.eye(3) + 2.0 * w * across + 2.0 * across @ across

@@ -1,0 +1,50 @@
+"""A box that turns with its body."""
+
+from __future__ import annotations
+
+from ...components import Collider
+from ...framework import Plugin, column
+from ...framework.typing import VectorField
+from ...framework.vectors import add_scaled, dot, item, replace, scale
+
+boxes = Plugin("boxes that turn")
+
+
+@boxes.shape(cost=3)
+class BoxCollider(Collider):
+    """A box that turns with the Transform; an AABBCollider never does.
+
+    half_extents
+        (d,) m, half the size along each of the body's own axes, 0 or more
+    """
+
+    __slots__ = ()
+
+    rotates = True
+    half_extents: VectorField = column(item="vector", minimum=0.0)
+
+    @staticmethod
+    def bounds(shape, dimensions):
+        half = shape.half_extents
+        for k in range(len(half)):
+            reach = 0.0
+            for j in range(len(half)):
+                reach += abs(item(shape.axes[j], k)) * item(shape.half_extents, j)
+            half = replace(half, k, reach)
+        return half
+
+    @staticmethod
+    def support(shape, direction):
+        corner = scale(direction, 0.0)
+        for j in range(len(direction)):
+            half = item(shape.half_extents, j)
+            corner = add_scaled(corner, shape.axes[j], half if dot(shape.axes[j], direction) >= 0.0 else -half)
+        return corner
+
+    @staticmethod
+    def second_moments(shape, dimensions):
+        x, y = shape.half_extents[0], shape.half_extents[1]
+        if dimensions == 2:
+            return 4.0 * x * y, 0.0, 0.0, x * x / 3.0, 0.0, y * y / 3.0
+        z = shape.half_extents[2]
+        return 8.0 * x * y * z, 0.0, 0.0, 0.0, x * x / 3.0, y * y / 3.0, z * z / 3.0, 0.0, 0.0, 0.0

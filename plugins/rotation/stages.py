@@ -1,0 +1,245 @@
+"""The stages of a step in which bodies turn.
+
+In a plane the angle is one more coordinate, and is advanced as positions are. In space a body turns under no torque as
+Euler's equations say (see free_rotation), between two halves of what torques and damping do: of order 1, 2 or 4, as the
+integrator of the positions is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...components.spin import FASTEST_TURN, UNKNOWN, Spin
+from ...framework import Plugin
+from ...framework.compilation import part
+from ...framework.jit.records.record_type import zero_of
+from ...framework.vectors import item
+from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
+from ...systems.shapes.dispatch import second_moments
+from .free_rotation import diagonalised, product, rotate, turn_freely
+
+TRIPLE = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))  # of the step: the outer two of Yoshida's three
+SLOW = 1e-4  # rad in a step: what turns slower may fall asleep
+NOT_FINITE = f"Spin.angular_velocity must be finite, at most {FASTEST_TURN:g} rad/s"
+
+spinning = Plugin("stages of rotation")
+
+
+@part
+def number(values, k):
+    """One of several; k need not be known when this compiles."""
+    return values[k]
+
+
+@part
+def inertia_of(state, spin, i):
+    """(xx, yy, zz, xy, xz, yz) of the inertia of body i about its position, along its own axes; in a plane zz alone."""
+    d, bodies = len(zero_of(state)), state.bodies
+    if spin.inertia[i, 0] == spin.inertia[i, 0]:
+        if d == 2:
+            return 0.0, 0.0, spin.inertia[i, 0], 0.0, 0.0, 0.0
+        return spin.inertia[i, 0], spin.inertia[i, 1], spin.inertia[i, 2], 0.0, 0.0, 0.0
+    shape = bodies.levels[0, i] if state.collides else -1
+    several = state.collides and state.several_levels and bodies.levels[state.level_count - 1, i] != shape
+    if shape < 0 or several or state.shapes.moments[shape] == 0:
+        state.blamed = i + 1
+        raise ValueError(UNKNOWN)
+    found, offset = second_moments(state, shape, i), state.colliders.offset[state.shapes.slots[shape], i]
+    mass, xx, yy, zz, xy, xz, yz = bodies.mass[i], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x, y, at_x, at_y = item(offset, 0), item(offset, 1), number(found, 1), number(found, 2)
+    xx = number(found, 1 + d) + x * (2.0 * at_x + x)
+    yy = number(found, 5) + y * (2.0 * at_y + y)
+    if d == 2:
+        return 0.0, 0.0, mass * (xx + yy), 0.0, 0.0, 0.0
+    z, at_z = item(offset, d - 1), number(found, d)
+    zz = number(found, d + 3) + z * (2.0 * at_z + z)
+    xy = number(found, d + 4) + x * at_y + y * at_x + x * y
+    xz = number(found, d + 5) + x * at_z + z * at_x + x * z
+    yz = number(found, d + 6) + y * at_z + z * at_y + y * z
+    return mass * (yy + zz), mass * (xx + zz), mass * (xx + yy), -mass * xy, -mass * xz, -mass * yz
+
+
+@part
+def limited(w, most):
+    """An angular velocity, shortened if it exceeds the limit; nan: none."""
+    size = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    by = most / size if size > most else 1.0
+    return w[0] * by, w[1] * by, w[2] * by
+
+
+@part
+def torque_on(spin, i, k):
+    """Along one axis."""
+    return spin.constant_torque[i, k] + spin.applied_torque[i, k] + spin.step_torque[i, k]
+
+
+@part
+def turn_in_plane(state, spin, i, h):
+    """The angle and the angular velocity of a dynamic body after a step."""
+    moment, damping, w = inertia_of(state, spin, i)[2], spin.angular_damping[i], spin.angular_velocity[i, 0]
+    acceleration = torque_on(spin, i, 0) / moment if moment > 0.0 else 0.0
+    w, z, most = limited((w, 0.0, 0.0), spin.max_angular_speed[i])[0], -damping * h, spin.max_angular_speed[i]
+    new = w * math.exp(z) + acceleration * h * phi1(z)
+    turn = h * new
+    if state.usual_path_degree > LINE:
+        turn = h * (w * phi1(z) + acceleration * h * phi2(z))
+    elif state.moves_with_old_velocity:
+        turn = h * w
+    new = limited((new, 0.0, 0.0), most)[0]
+    if abs(turn) > most * h:
+        turn = math.copysign(most * h, turn)
+    spin.angular_velocity[i, 0] = new
+    state.bodies.rotation[i] += turn
+
+
+@part
+def pushed(q, m, inverse, act, h):
+    """The angular momentum along the principal axes after h seconds of torque and damping. act: (torque along the axes
+    of the world, damping)."""
+    along, decay, gain = rotate(q, act[0], True), math.exp(-act[1] * h), h * phi1(-act[1] * h)
+    return (
+        m[0] * decay + along[0] * gain if inverse[0] > 0.0 else 0.0,
+        m[1] * decay + along[1] * gain if inverse[1] > 0.0 else 0.0,
+        m[2] * decay + along[2] * gain if inverse[2] > 0.0 else 0.0,
+    )
+
+
+@part
+def turn_between_pushes(q, m, inverse, act, h):
+    """(q, m) after half of what pushes, the free turn, and the other half: of order 2."""
+    m = pushed(q, m, inverse, act, 0.5 * h)
+    q, m = turn_freely(q, m, inverse, h)
+    return q, pushed(q, m, inverse, act, 0.5 * h)
+
+
+@part
+def rotation_in_space(state, i):
+    """The quaternion of a body, of length 1."""
+    rotation, k = state.bodies.rotation, 4 * i
+    w, x, y, z = rotation[k], rotation[k + 1], rotation[k + 2], rotation[k + 3]
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    return w / size, x / size, y / size, z / size
+
+
+@part
+def set_rotation(state, i, q):
+    """The quaternion of a body."""
+    rotation, k = state.bodies.rotation, 4 * i
+    size = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    rotation[k], rotation[k + 1] = q[0] / size, q[1] / size
+    rotation[k + 2], rotation[k + 3] = q[2] / size, q[3] / size
+
+
+@part
+def turn_in_space(state, spin, i, h):
+    """The rotation and the angular velocity of a dynamic body after a step."""
+    xx, yy, zz, xy, xz, yz = inertia_of(state, spin, i)
+    principal, own = (xx, yy, zz), (1.0, 0.0, 0.0, 0.0)
+    if xy != 0.0 or xz != 0.0 or yz != 0.0:
+        principal, own = diagonalised(xx, yy, zz, xy, xz, yz)
+    inverse = (
+        1.0 / principal[0] if principal[0] > 0.0 else 0.0,
+        1.0 / principal[1] if principal[1] > 0.0 else 0.0,
+        1.0 / principal[2] if principal[2] > 0.0 else 0.0,
+    )
+    w, speed = (
+        (spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]),
+        spin.angular_velocity,
+    )
+    torque, most = (torque_on(spin, i, 0), torque_on(spin, i, 1), torque_on(spin, i, 2)), spin.max_angular_speed[i]
+    act, q = (torque, spin.angular_damping[i]), product(rotation_in_space(state, i), own)
+    along = rotate(q, limited(w, most), True)
+    m = along[0] * principal[0], along[1] * principal[1], along[2] * principal[2]
+    if state.usual_path_degree == CUBIC:
+        for place in range(3):
+            q, m = turn_between_pushes(q, m, inverse, act, h * (TRIPLE if place != 1 else 1.0 - 2.0 * TRIPLE))
+    elif state.usual_path_degree > LINE:
+        q, m = turn_between_pushes(q, m, inverse, act, h)
+    elif state.moves_with_old_velocity:
+        q, m = turn_freely(q, m, inverse, h)
+        m = pushed(q, m, inverse, act, h)
+    else:
+        m = pushed(q, m, inverse, act, h)
+        q, m = turn_freely(q, m, inverse, h)
+    w = limited(rotate(q, (m[0] * inverse[0], m[1] * inverse[1], m[2] * inverse[2]), False), most)
+    speed[i, 0], speed[i, 1], speed[i, 2] = w[0], w[1], w[2]
+    set_rotation(state, i, product(q, (own[0], -own[1], -own[2], -own[3])))
+
+
+@part
+def turn_by_itself(state, spin, i, h):
+    """What is kinematic turns with its angular velocity."""
+    if len(zero_of(state)) == 2:
+        state.bodies.rotation[i] += h * spin.angular_velocity[i, 0]
+        return
+    x, y, z = spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
+    size = math.sqrt(x * x + y * y + z * z)
+    if size > 0.0:
+        s = math.sin(0.5 * size * h) / size
+        turn = math.cos(0.5 * size * h), s * x, s * y, s * z
+        set_rotation(state, i, product(turn, rotation_in_space(state, i)))
+
+
+@part
+def write_axes(state, i):
+    """The rotation matrix of a body, where shapes read it."""
+    axes, d = state.bodies.axes, len(zero_of(state))
+    if len(axes) == 0:
+        return
+    if d == 2:
+        angle = state.bodies.rotation[i]
+        cosine, sine, k = math.cos(angle), math.sin(angle), 4 * i
+        axes[k], axes[k + 1], axes[k + 2], axes[k + 3] = cosine, -sine, sine, cosine
+        return
+    w, x, y, z = rotation_in_space(state, i)
+    k = 9 * i
+    axes[k], axes[k + 1], axes[k + 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    axes[k + 3], axes[k + 4], axes[k + 5] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    axes[k + 6], axes[k + 7], axes[k + 8] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+
+
+@part
+def turn_per_second(state, spin, i):
+    """The angular speed of a body."""
+    x, y, z = spin.angular_velocity[i, 0], 0.0, 0.0
+    if len(zero_of(state)) == 3:
+        y, z = spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@spinning.stage(
+    after="check_flight", records=(Spin,),
+    reads=(
+        "mass", "inverse_mass", "still", "levels", "shapes", "spin.inertia", "spin.angular_damping",
+        "spin.max_angular_speed", "spin.constant_torque", "spin.applied_torque",
+    ),
+    writes=("rotation", "axes", "spin.angular_velocity", "spin.step_torque"),
+)  # fmt: skip
+def turn_bodies(state, dt, spin):
+    """bodies turn"""
+    bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
+    for i in range(state.first, state.moving):
+        if not spin.present[i] or bodies.still[i] != 0:
+            continue
+        if i >= state.dynamic:
+            turn_by_itself(state, spin, i, dt)
+        elif bodies.inverse_mass[i] > 0.0 and parts == 1:  # 0: it is taken out
+            turn_in_plane(state, spin, i, dt)
+        elif bodies.inverse_mass[i] > 0.0:
+            turn_in_space(state, spin, i, dt)
+        if not turn_per_second(state, spin, i) <= FASTEST_TURN:
+            state.blamed = i + 1
+            raise ValueError(NOT_FINITE)
+        write_axes(state, i)
+        for k in range(parts):
+            spin.step_torque[i, k] = 0.0
+
+
+@spinning.stage(
+    before="update_sleep", records=(Spin,), reads=("spin.angular_velocity",), writes=("rest_steps",), needed="sleeping"
+)
+def keep_spinning_awake(state, dt, spin):
+    """what turns does not fall asleep"""
+    for i in range(state.first, state.moving):
+        if spin.present[i] and turn_per_second(state, spin, i) * dt > SLOW:
+            state.bodies.rest_steps[i] = 0

@@ -1,0 +1,309 @@
+"""Spin as a component: inertia from shapes, torques and impulses, what a world keeps of it, and what is refused."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import esper
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import CaromError, Phase, Settings, StepError, System, World
+from carom.plugins import Physics, capsule, convex_polygon
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
+
+SIDE = 400  # of the lattice that sums inertia
+
+
+def space(d=2, gravity=0, **settings):
+    return World(
+        Physics(d, gravity=gravity), Rotation(), capsule.plugin, *([convex_polygon.plugin] if d == 2 else []),
+        settings=Settings(**settings),
+    )  # fmt: skip
+
+
+def shapes(random, d):
+    """Shapes of random sizes, and which points of space each holds."""
+    r, h = random.uniform(0.2, 0.8, 2)
+    half = random.uniform(0.2, 0.9, d)
+    axis = np.arange(d) == 1
+    along = lambda x: np.clip(x[..., 1], -h, h)[..., None] * axis  # noqa: E731 - of the capsule's segment
+    yield SphereCollider(r), lambda x: np.linalg.norm(x, axis=-1) <= r
+    yield BoxCollider(half), lambda x: (np.abs(x) <= half).all(axis=-1)
+    yield capsule.CapsuleCollider(r, h), lambda x: np.linalg.norm(x - along(x), axis=-1) <= r
+    if d == 3:
+        return
+    angles = np.sort(random.uniform(0, 2 * math.pi, 5))
+    corners = np.stack((np.cos(angles), np.sin(angles)), axis=-1) * random.uniform(0.4, 0.7) + random.uniform(
+        -0.2, 0.2, 2
+    )
+    for rounding in (0.0, 0.15):
+        yield (
+            convex_polygon.ConvexPolygonCollider(corners, corner_radius=rounding),
+            lambda x, r=rounding: distance_to(corners, x) <= r,
+        )
+
+
+def distance_to(corners, x):
+    """From points to a convex polygon, counter-clockwise; 0 inside."""
+    best, inside = np.full(x.shape[:-1], np.inf), np.ones(x.shape[:-1], bool)
+    for p, q in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        t, d = q - p, x - p
+        nearest = np.clip((d @ t) / (t @ t), 0, 1)[..., None] * t
+        best = np.minimum(best, np.linalg.norm(d - nearest, axis=-1))
+        inside &= t[0] * d[..., 1] - t[1] * d[..., 0] >= 0
+    return np.where(inside, 0.0, best)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_inertia_of_uniform_shapes_is_the_sum_over_a_lattice(seed, d):
+    """sum m r^2 over points of a lattice, to its spacing; in the step what a torque does, in Python what it says."""
+    random = np.random.default_rng(seed)
+    count = SIDE if d == 2 else 90
+    line = (np.arange(count) + 0.5) / count * 4 - 2
+    points = np.stack(np.meshgrid(*(line,) * d, indexing="ij"), axis=-1)
+    for shape, holds in shapes(random, d):
+        mass, offset, torque = 1.7, random.uniform(-0.5, 0.5, d), 0.3
+        held = points[holds(points)] + offset
+        square = (held**2).sum(axis=-1).mean()
+        expected = mass * (square if d == 2 else square * np.eye(3) - np.einsum("ni,nj->ij", held, held) / len(held))
+        with space(d) as world:
+            twist = torque if d == 2 else (0, 0, torque)
+            entity = world.create_entity(Transform((0,) * d), RigidBody(mass), Spin(constant_torque=twist))
+            given = shape.copy()
+            given.offset = offset
+            world.add_component(entity, given)
+            world.step()
+            spin = world.component_for_entity(entity, Spin)
+            assert np.allclose(spin.moments, expected, rtol=0.03, atol=0.01 * mass)
+            moments = np.linalg.inv(spin.moments)[2, 2] if d == 3 else 1 / spin.moments
+            w = spin.angular_velocity if d == 2 else spin.angular_velocity[2]
+            assert w == pytest.approx(torque * moments / 60, rel=1e-6)
+
+
+# -- torques, forces and impulses -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_an_impulse_at_a_point_gives_momentum_and_angular_momentum(seed, d):
+    """dv = j / m and dL = r x j; the velocity of the point is then v + w x r."""
+    random = np.random.default_rng(seed)
+    place, at, impulse, w0 = (random.uniform(-2, 2, d) for _ in range(4))
+    turn = 0.4 if d == 2 else random.normal(size=4)
+    with space(d) as world:
+        entity = world.create_entity(
+            Transform(place, turn),
+            RigidBody(2.0),
+            Spin(w0[0] if d == 2 else w0),
+            BoxCollider(random.uniform(0.3, 1, d)),
+        )
+        world.bodies  # noqa: B018
+        spin, body = world.component_for_entity(entity, Spin), world.component_for_entity(entity, RigidBody)
+        before = np.array(spin.angular_velocity)
+        spin.apply_impulse(impulse, at)
+        change, arm = np.array(spin.angular_velocity) - before, at - place
+        if d == 2:
+            gained, seen = (
+                spin.moments * change,
+                body.linear_velocity + spin.angular_velocity * np.array((-arm[1], arm[0])),
+            )
+        else:
+            w, x = (
+                np.array(world.component_for_entity(entity, Transform).rotation[0]),
+                np.array(world.component_for_entity(entity, Transform).rotation[1:]),
+            )
+            cross = np.array(((0, -x[2], x[1]), (x[2], 0, -x[0]), (-x[1], x[0], 0)))
+            axes = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+            gained = axes @ spin.moments @ axes.T @ change
+            seen = body.linear_velocity + np.cross(spin.angular_velocity, arm)
+        assert np.allclose(
+            gained,
+            np.cross(np.append(arm, 0)[:3], np.append(impulse, 0)[:3])[-1 if d == 2 else slice(3)],
+            rtol=1e-12,
+            atol=1e-14,
+        )
+        assert np.allclose(body.linear_velocity, impulse / 2.0)
+        assert np.allclose(spin.velocity_at(at), seen)
+
+
+def test_a_torque_acts_for_the_frame_in_which_it_is_applied_and_in_a_system_for_one_step():
+    class Push(System):
+        phase = Phase.FORCES
+
+        def process(self, dt):
+            for _, spin in self.world.get_component(Spin):
+                spin.apply_torque(2.0)
+
+    with space() as world:
+        entity = world.create_entity(Transform((0, 0)), RigidBody(), Spin(inertia=0.5))
+        world.bodies  # noqa: B018
+        spin = world.component_for_entity(entity, Spin)
+        spin.apply_torque(1.0)
+        spin.apply_force((0, 3), at=(0.5, 0))
+        world.advance(3 / 60)
+        assert spin.angular_velocity == pytest.approx((1.0 + 1.5) / 0.5 * 3 / 60)
+        assert world.component_for_entity(entity, RigidBody).linear_velocity[1] == pytest.approx(3 * 3 / 60)
+        world.step()
+        assert spin.angular_velocity == pytest.approx(2.5 / 0.5 * 3 / 60)
+        world.add_system(Push())
+        world.step()
+        world.step()
+        assert spin.angular_velocity == pytest.approx((2.5 * 3 + 2.0 * 2) / 0.5 / 60)
+
+
+# -- what a world keeps ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_snapshots_files_and_failed_steps_bring_back_every_bit(d, tmp_path):
+    class Fails(System):
+        phase = Phase.RESPONSE
+        armed = False
+
+        def process(self, dt):
+            if self.armed and self.world.time > 0.5:
+                raise RuntimeError("as ordered")
+
+    random = np.random.default_rng(d)
+    with space(d) as world:
+        fails = Fails()
+        world.add_system(fails)
+        for k in range(8):
+            w = random.uniform(-3, 3, 3)
+            world.create_entity(
+                Transform((3.0 * k,) + (0,) * (d - 1)),
+                RigidBody(),
+                Spin(w[0] if d == 2 else w),
+                BoxCollider(0.1 + random.random(d)),
+            )
+        for _ in range(20):
+            world.step()
+        kept, at = world.snapshot(), world.state_hash()
+        world.save(tmp_path / "world.carom")
+        for _ in range(20):
+            world.step()
+        later = world.state_hash()
+        world.restore(kept)
+        assert world.state_hash() == at
+        while world.time <= 0.5:
+            world.step()
+        fails.armed, before = True, world.state_hash()
+        with pytest.raises(StepError, match="as ordered"):
+            world.step()
+        assert world.state_hash() == before
+        fails.armed = False
+        while world.clock.step_count < 40:
+            world.step()
+        assert world.state_hash() == later
+    plugins = (Physics(d, gravity=0), Rotation(), capsule.plugin, *([convex_polygon.plugin] if d == 2 else []))
+    with World.load(tmp_path / "world.carom", *plugins) as other:
+        other.add_system(Fails())
+        for _ in range(20):
+            other.step()
+        assert other.state_hash() == later
+
+
+def test_what_spins_stays_awake_and_what_has_stopped_sleeps():
+    with space(gravity=(0, -10), sleeping=True) as world:
+        world.create_entity(Transform((0, -1)), RigidBody(kind="static"), AABBCollider((10, 1)))
+        still, turns = (
+            world.create_entity(Transform((x, 0.5)), RigidBody(), Spin(w), SphereCollider(0.5))
+            for x, w in ((-3, 0), (3, 2))
+        )
+        for _ in range(120):
+            world.step()
+        asleep = {e: world.component_for_entity(e, RigidBody).asleep for e in (still, turns)}
+        assert asleep == {still: True, turns: False}
+        angle = world.component_for_entity(turns, Transform).rotation
+        assert angle == pytest.approx(4.0)
+
+
+def test_plain_esper_calls_and_bulk_creation_do_the_same():
+    hashes = []
+    for way in range(3):
+        with space() as world:
+            places, spins = np.arange(6.0).reshape(3, 2) * 4, np.array((0.5, -1.0, 2.0))
+            if way == 0:
+                world.create_entities(
+                    3, Transform.many(places), RigidBody.many(), Spin.many(spins), BoxCollider.many((0.5, 0.2))
+                )
+            for place, w in zip(places, spins, strict=True) if way else ():
+                make = esper.create_entity if way == 1 else world.create_entity
+                make(Transform(place), RigidBody(), Spin(w), BoxCollider((0.5, 0.2)))
+            for _ in range(10):
+                world.step()
+            assert np.allclose(world.bodies.spin.angular_velocity, spins)
+            assert np.allclose(world.bodies.rotation, spins / 6)
+            hashes.append(world.state_hash())
+    assert hashes[0] == hashes[1] == hashes[2]
+
+
+def test_a_world_with_the_plugin_but_without_a_spin_runs_the_same_stages_and_bits():
+    found = []
+    for plugins in ((), (Rotation(),)):
+        with World(Physics(2, gravity=(0, -10)), *plugins) as world:
+            world.create_entity(Transform((0, 0)), RigidBody(kind="static"), AABBCollider((5, 0.5)))
+            world.create_entities(
+                20,
+                Transform.many(np.random.default_rng(0).uniform(1, 5, (20, 2))),
+                RigidBody.many(),
+                SphereCollider.many(0.3),
+            )
+            for _ in range(60):
+                world.step()
+            found.append((world.state_hash(), str(world.plan()).partition("columns, bytes per body")[0]))
+    assert found[0] == found[1]
+
+
+# -- bad input ------------------------------------------------------------------------------------
+
+
+REFUSED = [  # dimensions, plugins, components, what the error says
+    (2, [Rotation], (Spin(1), AABBCollider((1, 1))), "entity {} has Spin, which no AABBCollider can have"),
+    (2, [], (Spin(1), SphereCollider(1)), "entity {}: Spin does nothing without its plugin"),
+    (2, [Rotation], (Spin(1),), "entity {}: ValueError: Spin.inertia is None, and it has no collider that tells it"),
+    (3, [Rotation], (Spin(1.0), SphereCollider(1)), "Spin.angular_velocity must be 3 numbers in this 3D"),
+    (2, [Rotation], (Spin((0, 0, 1)), SphereCollider(1)), "Spin.angular_velocity must be one number in this 2D"),
+]
+
+
+@pytest.mark.parametrize(("d", "plugins", "components", "message"), REFUSED, ids=range(len(REFUSED)))
+def test_what_cannot_spin_is_refused_by_entity_with_the_cure(d, plugins, components, message):
+    with World(Physics(d, gravity=0), *(plugin() for plugin in plugins)) as world:
+        other = world.create_entity(Transform((9,) * d), RigidBody(), SphereCollider(1))
+
+        def create_and_step():
+            world.create_entity(Transform((0,) * d), RigidBody(), *(one.copy() for one in components))
+            world.step()
+
+        with pytest.raises((ValueError, StepError), match=re.escape(message.format(other + 1))):
+            create_and_step()
+        if world.entity_exists(other + 1):
+            world.delete_entity(other + 1, immediate=True)
+        world.step()
+        assert world.entity_exists(other)
+
+
+def test_wrong_values_of_spin_are_refused_where_they_are_given():
+    wrong = {
+        "inertia": [0, -1], "angular_damping": [-1], "angular_velocity": [math.nan, 1e200], "max_angular_speed": [-1],
+    }  # fmt: skip
+    for name, values in wrong.items():
+        for value in values:
+            with pytest.raises(ValueError, match=rf"Spin\.{name}"):
+                Spin(**{name: value})
+    with pytest.raises(CaromError, match="belongs to no body yet"):
+        Spin(1.0).velocity_at((0, 0))
+    with space() as world:
+        entity = world.create_entity(Transform((0, 0)), RigidBody(), Spin(1), SphereCollider(1))
+        world.step()
+        at = world.state_hash()
+        world.bodies.spin.angular_velocity[0] = math.nan
+        with pytest.raises(StepError, match=rf"entity {entity}: ValueError: Spin.angular_velocity must be finite"):
+            world.step()
+        world.bodies.spin.angular_velocity[0] = 1.0
+        assert world.state_hash() == at
