@@ -13,7 +13,6 @@ from . import codes, records
 from .broad_phase.search import CandidateSearch
 from .broad_phase.static_grid import reserve_static_grid
 from .broad_phase.uniform_grid import reserve_grid
-from .impacts.selection import FRESH
 from .scene import Scene
 
 COLOURS = 64
@@ -91,8 +90,6 @@ class Room:
     def _grow_events(self) -> None:
         """Whichever is too small: room for the search among all pairs, the queue, the log."""
         impacts, state = self._state.impacts, self._state
-        if len(impacts.looks) <= 2 * state.pairs.count:
-            impacts.reserve(_with_spare(2 * state.pairs.count) + 1, "links", "looks")
         if len(impacts.heads) < state.count:
             impacts.reserve(self._scene.table.capacity, "heads")
         old = len(impacts.heap)
@@ -141,7 +138,6 @@ class Room:
     def _refresh_pairs(self, simulation: Any, dt: float) -> None:
         """An impact has sent a body out of its search bounds: pairs for what is left of the step."""
         state, program = self._state, simulation.program
-        now = state.impacts.until
         program.run_one("box_rest_of_step", dt)
         found = simulation.broad_phase.segment("place_statics")
         found(dt)
@@ -151,10 +147,7 @@ class Room:
         simulation.narrow_phase.filter_candidates()
         program.run_one("merge_pairs", dt)
         state.pairs, state.merged = state.merged, state.pairs
-        impacts = state.impacts
-        impacts.last_pair, impacts.linked = FRESH, False
-        impacts.touchdown_pair, impacts.touchdown_time = -1, 0.0
-        impacts.now, impacts.until = now, state.neighbours_known_until
+        state.impacts.until = state.neighbours_known_until
 
 
 def _with_spare(rows: int) -> int:

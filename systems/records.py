@@ -259,13 +259,11 @@ EVENTS = Section(
     event_point=vectors(),
     event_pull=vectors(),  # change of velocity along the surface
     heap=ints("int32"),
+    worklist=ints("int32"),  # pairs to search for their next impact,
+    listed_since=floats(),  # each from this time on
+    links=ints("int32"),  # to a body's next pair
 )  # fmt: skip
-QUEUE = Section(
-    "impact", "impacts", BOUNCED,
-    heads=ints("int32"),
-    links=ints("int32"),
-    looks=ints("int32"),
-)  # fmt: skip
+HEADS = Section("impact", "impacts", BOUNCED, heads=ints("int32"))  # the first pair of each body
 # Impacts at the same time: the events, by member; lists of the members of each body.
 MEMBER_LISTS = Section("impact", "impacts", BOUNCED, member=ints("int32"), next_member=ints("int32"))
 MEMBERS = Section(
@@ -282,7 +280,6 @@ MEMBERS = Section(
 BODIES_OF_MEMBERS = Section(
     "impact", "impacts", BOUNCED,
     first_member=ints("int32"),
-    searched_with=ints("int32"),  # where the log has the body's first one
     gained=vectors(),  # change of velocity
 )  # fmt: skip
 LOG = Section(
@@ -294,14 +291,13 @@ LOG = Section(
     log_point=vectors(),
 )  # fmt: skip
 IMPACTS = Schema(
-    "Impacts", EVENTS, QUEUE, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
+    "Impacts", EVENTS, HEADS, MEMBER_LISTS, MEMBERS, BODIES_OF_MEMBERS, LOG,
     active=flag(),  # something may bounce in this step
     sweeps=flag(),  # bodies are swept
     waiting=integer(),
     # the loop
-    linked=flag(),
-    last_pair=integer(),
-    cluster=integer(),
+    listed=integer(),  # pairs in the worklist
+    linked=flag(),  # ``heads`` and ``links`` are those of the pairs
     clusters_version=integer(),  # of the rows, when those of static bodies became clusters
     may_sink=flag(),  # through something thin, at the speed of contacts at rest
     touchdown_pair=integer(),  # the last one of whose bodies landings were searched
@@ -311,8 +307,6 @@ IMPACTS = Schema(
     # impacts at the same time
     together=integer(),  # for how many there must be room
     group_visits=integer(),  # impacts in all passes over groups of this step
-    searching=integer(),  # the one in the log after which pairs are searched, until search_end
-    search_end=integer(),
     # what has happened in this step
     logged=integer(),
     capped=integer(),

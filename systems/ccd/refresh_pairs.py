@@ -4,19 +4,20 @@ The boxes of the broad phase hold each body's foreseen motion and a margin for w
 stops when a body leaves its bounds. Then candidates are made for the rest of the step from the paths as they are now,
 and the loop goes on. In most scenes that never happens; where everything is fast, a step takes several searches.
 
-What the queue holds of pairs that are candidates again stays: their paths are the same. Only the others are looked at.
+What the queue holds of pairs that are candidates again stays: their paths are the same. Only the others are searched.
 """
 
 from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ..codes import NEED_MERGED, OK
+from ..codes import NEED_EVENTS, NEED_MERGED, OK
 from ..impacts.heap import heap_push
+from ..impacts.worklist import lacks_room, list_pair
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import is_solid_pair, layers_meet, rank_rows
 
-SURVIVED, GONE, NEW = -1, -2, -3  # in ``pairs.place``; from 0 on it is the place in the other list
+SURVIVED, GONE = -1, -2  # in ``pairs.place``; from 0 on it is the place in the other list
 
 
 @part
@@ -33,7 +34,7 @@ def mark_kept(state):
 def keep_pair(state, j, found):
     """Pair j of the list until now becomes pair ``found`` of the new one."""
     old, new = state.pairs, state.merged
-    old.place[j], new.place[found] = found, SURVIVED
+    old.place[j] = found
     new.a[found], new.b[found] = old.a[j], old.b[j]
     new.is_solid[found], new.near_contact[found] = old.is_solid[j], old.near_contact[j]
     new.crossed[found] = old.crossed[j]
@@ -46,7 +47,6 @@ def keep_pair(state, j, found):
 def add_pair(state, a, b, found):
     """A candidate becomes pair ``found``; how it stands at the end is not known yet."""
     new = state.merged
-    new.place[found] = NEW
     new.a[found], new.b[found] = a, b
     new.is_solid[found] = is_solid_pair(state, a, b)
     new.near_contact[found], new.crossed[found] = True, False
@@ -86,11 +86,14 @@ def keep_events(state):
 
 
 def merge_pairs(state, dt):
-    """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of."""
+    """Join two lists in canonical order: candidates whose layers meet, and the pairs that something has come of. New
+    candidates are searched for impacts."""
     candidates, old, new, rank = state.candidates, state.pairs, state.merged, state.bodies.rank
     if old.count + candidates.count > len(new.a):
         state.needed = old.count + candidates.count
         return NEED_MERGED
+    if lacks_room(state, old.count + candidates.count):
+        return NEED_EVENTS
     mark_kept(state)
     if state.ranks_version != state.version:
         rank_rows(state)
@@ -106,7 +109,7 @@ def merge_pairs(state, dt):
                 keep_pair(state, j, found)
             elif old_key == new_key:
                 add_pair(state, old.a[j], old.b[j], found)
-                old.place[j], new.place[found] = found, SURVIVED
+                old.place[j] = found
             found += 1 if old.place[j] >= 0 else 0
             i += 1 if old_key == new_key else 0
             j += 1
@@ -115,9 +118,11 @@ def merge_pairs(state, dt):
         i += 1
         if layers_meet(state, a, b):
             add_pair(state, a, b, found)
+            list_pair(state.impacts, found, state.impacts.until)
             found += 1
     new.count = found
     renumber(state)
     keep_events(state)
+    state.impacts.linked, state.impacts.touchdown_pair, state.impacts.touchdown_time = False, -1, 0.0
     state.refreshes_counted += 1
     return OK

@@ -95,11 +95,11 @@ def leaves_touch_at(state, c, path, since, t):
 
 
 @part
-def find_touch(state, c, a, b, path, restitution, dt):
+def find_touch(state, c, a, b, path, since, restitution, dt):
     """(NO_TOUCH, OVERLAPS_AT_END or SWEPT; (time, normal, point, from a's centre to b's); the normal at the end) of the
-    pair's next touch from now on."""
+    pair's next touch from a time on."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
-    since, swept, nothing = impacts.now, False, (dt, zero, zero, zero)
+    swept, nothing = False, (dt, zero, zero, zero)
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt)
@@ -269,22 +269,22 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
 
 
 @part
-def queue_next_impact(state, c, dt):
-    """Put the pair's next impact into the queue, if it has one: a touch, and a fast approach.
+def queue_next_impact(state, c, since, dt):
+    """Put the pair's next impact from a time on into the queue, if it has one: a touch, and a fast approach.
 
     A pair that is not solid only has its crossing noted, if it is swept.
     """
     pairs, bodies, impacts = state.pairs, state.bodies, state.impacts
     a, b, passive = pairs.a[c], pairs.b[c], not pairs.is_solid[c]
     path = relative_path(state, a, b)
-    if impacts.sweeps and bounds_stay_disjoint(state, a, b, path, impacts.now, dt):
+    if impacts.sweeps and bounds_stay_disjoint(state, a, b, path, since, dt):
         return
     slot, restitutions = bodies.collider_slot, state.colliders.restitution
     e = mix(state, state.restitution_rule, restitutions[slot[a], a], restitutions[slot[b], b])
     rested = pairs.early[c] and not passive and e < 1.0
     if rested and is_at_manifold(pairs, c, along(path, dt), smaller_extent(bodies, a, b)):  # it stays there
         return
-    kind, touch, end_normal = find_touch(state, c, a, b, path, e, dt)
+    kind, touch, end_normal = find_touch(state, c, a, b, path, since, e, dt)
     if kind == NO_TOUCH:
         return
     t, normal, point, apart = touch

@@ -15,8 +15,8 @@ from .bounds_exit import update_bounds_exit_time
 from .find import queue_next_impact
 from .heap import heap_pop
 from .impulses import CROSS, SLIDE, STICK, STOPPED, TOUCHDOWN, bounce, can_stick, slide, stick, stop
-from .selection import HITS, LANDINGS, MEMBERS, NONE, link_pairs, look_at_landings, select_pairs
 from .together import EQUAL, holds, put_back
+from .worklist import lacks_room, list_contacts, list_landings, list_neighbours, list_pair, list_pairs_of
 
 BLOCK = 256  # bodies that are looked at before one that bounces is enough
 FAR = 1 << 15  # bodies from which their columns do not fit into the second-level cache
@@ -65,7 +65,13 @@ def begin_impacts(state, dt):
     impacts.may_sink = impacts.sweeps and may_sink(state, dt)
     if impacts.sweeps:
         begin_clusters(state)
-    begin_search(state, HITS, 0.0)
+    impacts.waiting = impacts.listed = 0
+    impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
+    impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
+    if impacts.active:
+        if lacks_room(state, state.pairs.count):
+            return NEED_EVENTS
+        list_contacts(state)
     return OK
 
 
@@ -80,16 +86,6 @@ def begin_clusters(state):
         bodies.cluster_root[i], bodies.cluster_next[i], bodies.cluster_tail[i] = i, -1, i
         bodies.cluster_holder[i] = -1
     impacts.clusters_version = state.version
-
-
-@part
-def begin_search(state, last_pair, now):
-    """The queue is empty, and the pairs may be others than before."""
-    impacts = state.impacts
-    impacts.waiting, impacts.last_pair, impacts.linked = 0, last_pair, False
-    impacts.touchdown_pair, impacts.touchdown_time = -1, 0.0
-    impacts.searching = impacts.search_end = 0
-    impacts.now, impacts.until = now, state.neighbours_known_until if impacts.sweeps else math.inf
 
 
 @part
@@ -117,15 +113,15 @@ def take_swept_event(state, event, dt):
     if kind == CROSS:
         pairs.crossed[c] = True
         impacts.crossings += 1
-        impacts.last_pair = NONE
-    elif kind == STICK and can_stick(state, event):
-        impacts.cluster = stick(state, event, dt)
-        impacts.last_pair = MEMBERS
-        i = impacts.cluster
+        return
+    if kind == STICK and can_stick(state, event):
+        i = stick(state, event, dt)
         while i >= 0:
             update_bounds_exit_time(state, i, dt)
+            list_pairs_of(state, i, -1)
             i = bodies.cluster_next[i]
-    elif kind in (SLIDE, TOUCHDOWN):
+        return
+    if kind in (SLIDE, TOUCHDOWN):
         impacts.capped += 1 if kind == SLIDE else 0
         a, b = pairs.a[c], pairs.b[c]
         if bodies.inverse_mass[a] * bodies.inverse_mass[b] == 0.0:
@@ -138,6 +134,7 @@ def take_swept_event(state, event, dt):
             i = pairs.a[c] if side == 0 else pairs.b[c]
             if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
                 stop(state, i, impacts.now)
+    list_neighbours(state, c)
 
 
 @part
@@ -149,11 +146,11 @@ def touches_down_first(state, event):
     looked, impacts.touchdown_time = impacts.touchdown_pair == c, 0.0
     if looked or not impacts.may_sink or kind in (TOUCHDOWN, CROSS):
         return False
-    if not impacts.linked:
-        link_pairs(state)
-    if look_at_landings(state, c, now) == 1:
+    list_landings(state, c, now)
+    if impacts.listed == 0:
         return False
-    impacts.touchdown_pair, impacts.touchdown_time, impacts.last_pair, impacts.now = c, now, LANDINGS, 0.0
+    list_pair(impacts, c, 0.0)
+    impacts.touchdown_pair, impacts.touchdown_time = c, now
     return True
 
 
@@ -164,7 +161,7 @@ def take_event(state, event, dt):
     if touches_down_first(state, event):
         return OK
     c, kind = impacts.event_pair[event], impacts.event_kind[event]
-    impacts.last_pair, impacts.now = c, impacts.event_time[event]
+    impacts.now = impacts.event_time[event]
     if kind > TOUCHDOWN:
         take_swept_event(state, event, dt)
         return OK
@@ -178,23 +175,13 @@ def take_event(state, event, dt):
     bounce(state, event, dt)
     if kind == TOUCHDOWN:
         take_swept_event(state, event, dt)
+    else:
+        list_neighbours(state, c)
     for side in range(2 if impacts.sweeps else 0):
         i = pairs.a[c] if side == 0 else pairs.b[c]
         if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] < STOPPED:
             update_bounds_exit_time(state, i, dt)
     return OK
-
-
-@part
-def is_searched(state):
-    """Whether all pairs are searched that the impacts so far have sent elsewhere; else which are next."""
-    impacts = state.impacts
-    if impacts.searching + 1 < impacts.search_end:
-        impacts.searching += 1
-        impacts.last_pair, impacts.now = impacts.log_pair[impacts.searching], impacts.log_time[impacts.searching]
-        return False
-    impacts.searching = impacts.search_end = 0
-    return True
 
 
 @part
@@ -219,41 +206,45 @@ def request_bodies(state, c):
 
 @part
 def halt(state):
-    """Too many rounds: what impacts have sent elsewhere stays where it is until the step ends."""
+    """Too many rounds: what impacts have sent elsewhere stays where it is until the step ends; others may meet it."""
     impacts, bodies = state.impacts, state.bodies
+    impacts.now = impacts.until
     for i in range(state.first, state.dynamic):
         if bodies.inverse_mass[i] > 0.0 and 0 < bodies.impact_count[i] < STOPPED:
             if impacts.halted == 0:
                 impacts.halted_row = i
             impacts.halted += 1
-            stop(state, i, impacts.until)
+            stop(state, i, impacts.now)
+            list_pairs_of(state, i, -1)
     impacts.until = math.inf
+
+
+@part
+def search_worklist(state, dt, far):
+    """Queue the next impact of each of its pairs; then it is empty."""
+    impacts, pairs = state.impacts, state.pairs
+    impacts.looked += impacts.listed
+    for q in range(min(AHEAD, impacts.listed) if far else 0):
+        request_bodies(state, impacts.worklist[q])
+    for q in range(impacts.listed):
+        c = impacts.worklist[q]
+        if far and q + AHEAD < impacts.listed:
+            request_bodies(state, impacts.worklist[q + AHEAD])
+        if pairs.is_solid[c] or impacts.sweeps:
+            queue_next_impact(state, c, impacts.listed_since[q], dt)
+    impacts.listed = 0
 
 
 def resolve_impacts(state, dt):
     """Bounce every pair that touches in its motion and approaches faster than the threshold."""
-    impacts, pairs, far = state.impacts, state.pairs, state.count >= FAR
+    impacts, far = state.impacts, state.count >= FAR
     if not impacts.active:
         return OK
     while True:
-        if len(impacts.looks) <= 2 * pairs.count or len(impacts.heads) < state.count:
-            state.needed = 2 * pairs.count
+        if impacts.waiting + impacts.listed > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
+            state.needed = impacts.waiting + impacts.listed
             return NEED_EVENTS
-        wanted = select_pairs(state)
-        if impacts.waiting + wanted > len(impacts.heap) or impacts.logged == len(impacts.log_pair):
-            state.needed = impacts.waiting + wanted
-            return NEED_EVENTS
-        impacts.looked += wanted
-        for q in range(min(AHEAD, wanted) if far else 0):
-            request_bodies(state, impacts.looks[q])
-        for q in range(wanted):
-            c = impacts.looks[q]
-            if far and q + AHEAD < wanted:
-                request_bodies(state, impacts.looks[q + AHEAD])
-            if pairs.is_solid[c] or impacts.sweeps:
-                queue_next_impact(state, c, dt)
-        if not is_searched(state):
-            continue
+        search_worklist(state, dt, far)
         event = next_event(state)
         if event >= 0:
             code = take_event(state, event, dt)

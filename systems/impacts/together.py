@@ -18,7 +18,7 @@ from .bounds_exit import update_bounds_exit_time
 from .group import WORK, is_affordable, push_group, shoots, solve_group
 from .heap import heap_pop, heap_push
 from .impulses import BOUNCE, CROSS, FREE, bounce
-from .selection import NONE, link_pairs, look_at_landings
+from .worklist import list_landings, list_pairs_of
 
 EQUAL = 1e-6  # of the step: times that differ by more are never the same, however slow the approach
 
@@ -58,12 +58,11 @@ def next_at(state, now, dt):
         if holds(state, event) and kind != CROSS:
             if kind not in (BOUNCE, FREE) or not is_at(state, event, now, dt):
                 return -1
-            if impacts.may_sink:
-                if not impacts.linked:
-                    link_pairs(state)
-                if look_at_landings(state, c, time) > 1:
-                    return -1
-            return event
+            if not impacts.may_sink:
+                return event
+            list_landings(state, c, time)
+            sinks, impacts.listed = impacts.listed > 0, 0
+            return -1 if sinks else event
         if kind == CROSS and holds(state, event) and is_at(state, event, now, dt):
             pairs.crossed[c] = True
             impacts.crossings += 1
@@ -75,8 +74,8 @@ def next_at(state, now, dt):
 
 @part
 def put_back(impacts, event):
-    """Add an event to the queue again that has been taken off it; all pairs are searched."""
-    heap, place, impacts.last_pair = impacts.heap, impacts.waiting, NONE
+    """Add an event to the queue again that has been taken off it."""
+    heap, place = impacts.heap, impacts.waiting
     while heap[place] != event:
         place += 1
     heap[place], heap[impacts.waiting] = heap[impacts.waiting], event
@@ -108,12 +107,9 @@ def resolve_simultaneous(state, event, dt):
         if following >= 0:
             heap_pop(impacts)
     link_members(state, members)
-    impacts.searching = impacts.logged
     for m in range(members):
         if impacts.is_left[m]:
             take_group(state, m, dt)
-    impacts.search_end = impacts.logged
-    impacts.last_pair, impacts.now = impacts.log_pair[impacts.searching], impacts.log_time[impacts.searching]
     return OK
 
 
@@ -127,7 +123,7 @@ def link_members(state, members):
         c = impacts.event_pair[impacts.member[m]]
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            impacts.first_member[i], impacts.searched_with[i], impacts.gained[i] = -1, -1, zero_of(state)
+            impacts.first_member[i], impacts.gained[i] = -1, zero_of(state)
     for m in range(members):
         c = impacts.event_pair[impacts.member[m]]
         a, b = pairs.a[c], pairs.b[c]
@@ -202,10 +198,14 @@ def take_group(state, m, dt):
                 put_back(impacts, impacts.member[impacts.group[g]])
         bounce(state, first, dt)
     for k in range(logged, impacts.logged):
-        c = impacts.log_pair[k]
+        c, listed = impacts.log_pair[k], -1
         for side in range(2):
             i = pairs.a[c] if side == 0 else pairs.b[c]
-            if bodies.inverse_mass[i] > 0.0 and impacts.searched_with[i] < 0:
-                impacts.searched_with[i] = k
+            if bodies.inverse_mass[i] == 0.0:
+                continue
+            if impacts.first_member[i] >= 0:
+                impacts.first_member[i] = -1  # once each
+                list_pairs_of(state, i, listed)
                 if impacts.sweeps:
                     update_bounds_exit_time(state, i, dt)
+            listed = c

@@ -1,0 +1,104 @@
+"""The worklist: pairs to search for their next impact, each with the time from which on.
+
+It begins with what may have met; each event adds the pairs of the bodies that it has sent elsewhere.
+"""
+
+from __future__ import annotations
+
+from ...framework.compilation import inlined, part
+from ..ccd.search_bounds import FAST
+from ..shapes.tolerances import smaller_extent
+from .find import bounce_threshold
+
+
+@part
+def lacks_room(state, pairs):
+    """Whether so many pairs may be too many: each is listed at most twice, and one once more, before it is searched."""
+    impacts, state.needed = state.impacts, 2 * pairs + 1
+    return len(impacts.worklist) < state.needed or len(impacts.heads) < state.count
+
+
+@inlined
+def list_pair(impacts, c, since):
+    """Search pair c for an impact from that time on."""
+    impacts.worklist[impacts.listed], impacts.listed_since[impacts.listed] = c, since
+    impacts.listed += 1
+
+
+@part
+def list_contacts(state):
+    """The pairs of supported bodies, and the contacts of all others."""
+    impacts, pairs, warm_started = state.impacts, state.pairs, state.bodies.warm_started
+    for c in range(pairs.count if state.any_warm_started else 0):
+        if warm_started[pairs.a[c]] or warm_started[pairs.b[c]]:
+            list_pair(impacts, c, 0.0)
+    for h in range(pairs.found):
+        c = pairs.hits[h]
+        if not (warm_started[pairs.a[c]] or warm_started[pairs.b[c]]):
+            list_pair(impacts, c, 0.0)
+
+
+@part
+def link_pairs(state):
+    """Chain the pairs of each body that moves, ascending: heads[i] is the first of row i, then follows links[it], till
+    -1. An entry is twice the pair for its first body, one more for its second.
+    """
+    impacts, pairs = state.impacts, state.pairs
+    heads, links = impacts.heads, impacts.links
+    for i in range(state.first, state.moving):
+        heads[i] = -1
+    for c in range(pairs.count - 1, -1, -1):
+        for side in range(2):
+            i = pairs.a[c] if side == 0 else pairs.b[c]
+            if i < state.moving:
+                links[2 * c + side] = heads[i]
+                heads[i] = 2 * c + side
+    impacts.linked = True
+
+
+@part
+def list_pairs_of(state, i, but):
+    """The pairs of body i, but for one, from now on."""
+    impacts = state.impacts
+    if not impacts.linked:
+        link_pairs(state)
+    entry = impacts.heads[i]
+    while entry >= 0:
+        if entry // 2 != but:
+            list_pair(impacts, entry // 2, impacts.now)
+        entry = impacts.links[entry]
+
+
+@part
+def list_neighbours(state, c):
+    """The pairs of the two bodies of pair c that can be moved."""
+    listed = -1
+    for side in range(2):
+        i = state.pairs.a[c] if side == 0 else state.pairs.b[c]
+        if state.bodies.inverse_mass[i] > 0.0:
+            list_pairs_of(state, i, listed)
+            listed = c
+
+
+@part
+def may_have_sunk(state, i, k, now):
+    """Whether body i may by now have sunk through k, which cannot be moved, as slowly as a contact at rest lets it."""
+    if state.bodies.inverse_mass[k] > 0.0:
+        return False
+    return bounce_threshold(state, i, k) * now > FAST * smaller_extent(state.bodies, i, k)
+
+
+@part
+def list_landings(state, c, now):
+    """The pairs in which a body of pair c may have sunk before its impact, from the start of the step on."""
+    impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
+    if not impacts.linked:
+        link_pairs(state)
+    for side in range(2):
+        i = pairs.a[c] if side == 0 else pairs.b[c]
+        entry = impacts.heads[i] if bodies.inverse_mass[i] > 0.0 and bodies.impact_count[i] == 0 else -1
+        while entry >= 0:
+            p = entry // 2
+            if p != c and pairs.is_solid[p] and may_have_sunk(state, i, pairs.a[p] + pairs.b[p] - i, now):
+                list_pair(impacts, p, 0.0)
+            entry = impacts.links[entry]
