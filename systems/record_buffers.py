@@ -58,7 +58,7 @@ class Room:
             **{code: self._named(grow) for code, grow in growing.items()},
             codes.NEED_COLUMNS: lambda dt: self._scene.make(*COLUMNS_OF[simulation.program.stages[state.stage].name]),
             codes.NEED_SWEEPS: lambda dt: simulation.link(),
-            codes.NEED_TOGETHER: lambda dt: simulation.links.link_together(),
+            codes.NEED_IMPACTS: lambda dt: simulation.links.link_impacts(),
             codes.FIND_IN_PYTHON: lambda dt: self._find_candidates(simulation, dt),
             codes.ROTATE: lambda dt: self._scene.refresh_rotation(),
             codes.RUN_BROAD: lambda dt: simulation.broad_phase.process(dt),

@@ -1,9 +1,11 @@
 """The next impact of a pair: when and where the two meet on their paths, and whether they meet fast enough.
 
-Pairs that are swept are taken where they first touch on their path, others where they overlap at the end of it.
+They are taken where they first touch on their path; pairs that are not swept only if they overlap at the end of it.
 """
 
 from __future__ import annotations
+
+import math
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
@@ -28,7 +30,6 @@ from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
 
-TIME_ITERATIONS = 80
 QUICK = 1e-3  # of the step: inelastic impacts closer than this in time are treated as inelastic collapse
 MOST_LOOKS = 16_000_000  # at pairs in a step, of elastic impacts too: some seconds, then what meets is stopped
 
@@ -37,43 +38,11 @@ NONE, LANDING, IMPACT = range(3)  # a landing is too slow to bounce
 
 
 @part
-def overlap_at_end(state, a, b, path, since, dt, slop):
-    """(whether they overlap at the end of their motion; time, normal, point, from a's centre to b's of their first
-    touch; the normal at the end).
-
-    The time is ``since`` if they touch then already. It is found between a time apart and one in touch by Newton's
-    method on the separation, whose rate is the speed along the normal; where that leads out of the bracket, and
-    every eighth time, the bracket is halved instead.
-    """
-    shape_a, shape_b, zero = state.bodies.shape[a], state.bodies.shape[b], zero_of(state)
-    low, high, guess = since, dt, dt
-    met, t, normal, point, apart, end_normal = False, dt, zero, zero, zero, zero
-    for look in range(TIME_ITERATIONS):
-        middle = dt if look == 0 else since
-        if look > 1:
-            middle = guess if low < guess < high and look % 8 != 7 else 0.5 * (low + high)
-            if not low < middle < high:
-                break
-        d = along(path, middle)
-        hit, depth, n, p = evaluate(state, shape_a, a, shape_b, b, d)
-        near = look > 1 and abs(depth) <= ROUNDING * length(d)
-        guess = middle + depth / dot(rate_along(path, middle), n)
-        if look == 0 and hit:
-            end_normal = n
-            if is_corner_touch(state, shape_a, a, shape_b, b, d, slop):
-                break
-        if hit or near:
-            met, t, normal, point, apart = True, middle, n, p, d
-            if near:
-                break
-            high = middle
-            if look == 1:
-                break
-        elif look == 0:
-            break
-        else:
-            low = middle
-    return met, (t, normal, point, apart), end_normal
+def overlap_at_end(state, a, b, path, dt):
+    """(whether they overlap at the end of their motion, and not at a corner only; the normal there)."""
+    shape_a, shape_b, d = state.bodies.shape[a], state.bodies.shape[b], along(path, dt)
+    hit, _, normal, _ = evaluate(state, shape_a, a, shape_b, b, d)
+    return hit and not is_corner_touch(state, shape_a, a, shape_b, b, d, slop_of(state, a, b)), normal
 
 
 @part
@@ -96,39 +65,46 @@ def leaves_touch_at(state, c, path, since, t):
 
 @part
 def find_touch(state, c, a, b, path, since, restitution, dt):
-    """(NO_TOUCH, OVERLAPS_AT_END or SWEPT; (time, normal, point, from a's centre to b's); the normal at the end) of the
-    pair's next touch from a time on."""
+    """(NO_TOUCH, OVERLAPS_AT_END or SWEPT; (time, normal, point, from a's centre to b's)) of the pair's next touch from
+    a time on. What is not swept, or touches at a corner, has none unless it overlaps where the step ends."""
     impacts, bodies, zero = state.impacts, state.bodies, zero_of(state)
-    swept, nothing = False, (dt, zero, zero, zero)
+    swept, overlaps, end_normal, nothing = False, False, zero, (dt, zero, zero, zero)
+    limits = slop_of(state, a, b), dt, -math.inf
     if impacts.sweeps:
         since = max(since, bodies.last_impact[a], bodies.last_impact[b])
         passive, travel = not state.pairs.is_solid[c], travel_of(path, dt)
         swept = is_swept(state, a, b, travel)
         if passive and (not swept or state.pairs.crossed[c]):
-            return NO_TOUCH, nothing, zero
+            return NO_TOUCH, nothing
         if swept:
-            straight = is_straight(state, a, b, path, dt)
             stride = FAST * smaller_extent(bodies, a, b) / travel * dt
             limits = rest_edge(state, a, b, dt), stride, bounce_threshold(state, a, b)
-            found, t, normal, point, apart = call_first_touch(
-                state.links[FIRST_TOUCH], state, a, b, path, straight, since, dt, limits
-            )
-            if found == TOUCHES and state.pairs.impulse[c] > 0.0 and dot(normal, state.pairs.normal[c]) < 0.0:
-                clear = leaves_touch_at(state, c, path, since, t)
-                if clear >= dt:
-                    return NO_TOUCH, nothing, zero
-                if clear > since:
-                    found, t, normal, point, apart = call_first_touch(
-                        state.links[FIRST_TOUCH], state, a, b, path, straight, clear, dt, limits
-                    )
-            if found == APART:
-                return NO_TOUCH, nothing, zero
-            if found != AT_CORNER:
-                return SWEPT, (t, normal, point, apart), zero
-    if restitution <= 0.0 and not swept:
-        return NO_TOUCH, nothing, zero
-    met, touch, end_normal = overlap_at_end(state, a, b, path, since, dt, slop_of(state, a, b))
-    return OVERLAPS_AT_END if met else NO_TOUCH, touch, end_normal
+    if not swept:
+        if restitution > 0.0:
+            overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
+        if not overlaps:
+            return NO_TOUCH, nothing
+    straight, clear = is_straight(state, a, b, path, dt), since
+    while True:
+        found, t, normal, point, apart = call_first_touch(
+            state.links[FIRST_TOUCH], state, a, b, path, straight, clear, dt, limits
+        )
+        since = clear
+        if swept and found == TOUCHES and state.pairs.impulse[c] > 0.0 and dot(normal, state.pairs.normal[c]) < 0.0:
+            clear = leaves_touch_at(state, c, path, since, t)
+        if not clear > since:
+            break
+        if clear >= dt:
+            return NO_TOUCH, nothing
+    if found == APART:
+        return NO_TOUCH, nothing
+    if found != AT_CORNER:
+        return SWEPT if swept else OVERLAPS_AT_END, (t, normal, point, apart)
+    if swept:
+        overlaps, end_normal = overlap_at_end(state, a, b, path, dt)
+        if not overlaps:
+            return NO_TOUCH, nothing
+    return OVERLAPS_AT_END, (t, end_normal, point, apart)  # it slides onto the next thing: edges do not stop it
 
 
 @part
@@ -284,7 +260,7 @@ def queue_next_impact(state, c, since, dt):
     rested = pairs.early[c] and not passive and e < 1.0
     if rested and is_at_manifold(pairs, c, along(path, dt), smaller_extent(bodies, a, b)):  # it stays there
         return
-    kind, touch, end_normal = find_touch(state, c, a, b, path, since, e, dt)
+    kind, touch = find_touch(state, c, a, b, path, since, e, dt)
     if kind == NO_TOUCH:
         return
     t, normal, point, apart = touch
@@ -293,10 +269,6 @@ def queue_next_impact(state, c, since, dt):
         if pairs.impulse[c] > 0.0:  # it has parted already
             return
         normal = divided(negative(w), length(w))  # no direction between the centres: they part the way they came
-    elif kind == OVERLAPS_AT_END and is_corner_touch(
-        state, bodies.shape[a], a, bodies.shape[b], b, apart, slop_of(state, a, b)
-    ):
-        normal = end_normal  # it slides from one thing onto the next: the edges do not stop it
     touch = (t, normal, point, apart)
     speed, approach = dot(w, normal), IMPACT
     if not passive:

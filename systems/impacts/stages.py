@@ -7,8 +7,8 @@ import math
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import request
 from ..ccd.search_bounds import FAST
-from ..codes import NEED_EVENTS, NEED_TOGETHER, OK, REFRESH_PAIRS
-from ..linking.parts import TAKE_TOGETHER, call_take_together
+from ..codes import NEED_EVENTS, NEED_IMPACTS, OK, REFRESH_PAIRS
+from ..linking.parts import FIRST_TOUCH, TAKE_TOGETHER, call_take_together
 from ..narrow_phase.manifolds import forget_manifold
 from ..narrow_phase.stages import find_hasty
 from .bounds_exit import update_bounds_exit_time
@@ -69,6 +69,8 @@ def begin_impacts(state, dt):
     impacts.linked, impacts.touchdown_pair, impacts.touchdown_time = False, -1, 0.0
     impacts.until = state.neighbours_known_until if impacts.sweeps else math.inf
     if impacts.active:
+        if state.links[FIRST_TOUCH] == 0:
+            return NEED_IMPACTS
         if lacks_room(state, state.pairs.count):
             return NEED_EVENTS
         list_contacts(state)
@@ -168,7 +170,7 @@ def take_event(state, event, dt):
     if kind != TOUCHDOWN and impacts.waiting > 0 and impacts.event_time[impacts.heap[0]] - impacts.now <= EQUAL * dt:
         if state.links[TAKE_TOGETHER] == 0:
             put_back(impacts, event)
-            return NEED_TOGETHER
+            return NEED_IMPACTS
         taken = call_take_together(state.links[TAKE_TOGETHER], state, event, dt)
         if taken >= 0:
             return taken

@@ -1,5 +1,5 @@
-"""Parts of stages that are compiled on their own and called through their address: those of swept bodies, and impacts
-at the same time, which take seconds to compile and which many worlds never need."""
+"""Parts of stages that are compiled on their own and called through their address: those of swept bodies and impacts,
+which take seconds to compile and which many worlds never need."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..shapes.linking.signatures import call_in_dimension, vector_type
 
 # Places in ``state.links``.
 BOUND_SEARCHES, FIRST_TOUCH, TAKE_TOGETHER = PLACES = range(3)
-SWEPT = BOUND_SEARCHES, FIRST_TOUCH
+SWEPT, IMPACTS = (BOUND_SEARCHES, FIRST_TOUCH), (FIRST_TOUCH, TAKE_TOGETHER)
 
 
 @cache

@@ -17,7 +17,7 @@ from ..integration.system import Integration
 from ..records import SWEEPS
 from ..scene import Scene
 from ..stage_list import LINKED_PARTS
-from .parts import PLACES, SWEPT, TAKE_TOGETHER, linked_part
+from .parts import IMPACTS, PLACES, SWEPT, linked_part
 from .preparation import kind_of, link_possible
 
 NEVER = -1
@@ -33,6 +33,7 @@ class StepLinks:
         self._integration, self._search, self._extensions = integration, search, extensions
         self._state.links = np.zeros(len(PLACES), np.int64)
         self.version = self._forces = NEVER  # of the scene, and how many force systems there were
+        self._bounces = False  # some collider does, or has
         self._key: Any = None  # what the linked stages depend on
         self._usual: Any = None  # what of that bodies may change
         self._shapes_key: Any = None
@@ -61,6 +62,8 @@ class StepLinks:
         scene, state = self._scene, self._state
         collides = state.collides
         state.sweeps_ready = sweeps = collides and self.needs_sweeps()
+        if collides and not self._bounces:
+            self._bounces = bool(np.any(state.colliders.restitution[:, : state.count]))
         usual = (
             scene.linked, scene.registry.version, scene.table.capacity, force_systems, sweeps, collides,
             state.several_levels, state.dynamic > 0, self._search.needs_grids(), state.sleeping,
@@ -120,30 +123,32 @@ class StepLinks:
     def _functions_of_shapes(self) -> Iterator[Linked | Called]:
         linked = self._scene.linked
         if linked is not None:
-            yield from linked.all_functions(self._state.sweeps_ready, self._scene.moments_asked)
+            sweeps = self._state.sweeps_ready or self._bounces
+            yield from linked.all_functions(sweeps, self._scene.moments_asked)
 
     def _parts(self) -> dict[int, Linked]:
-        """The parts of stages that are called by address: those of swept bodies and of impacts at the same time only
-        where there may be any."""
+        """The parts of stages that are called by address: those of swept bodies and of impacts only where there may be
+        any."""
         if not self._state.collides:
             return {}
-        places = [*SWEPT] if self._state.sweeps_ready else []
-        if np.any(self._state.colliders.restitution[:, : self._state.count]):
-            places.append(TAKE_TOGETHER)
+        places = {*(SWEPT if self._state.sweeps_ready else ()), *(IMPACTS if self._bounces else ())}
         return {place: linked_part(place, LINKED_PARTS[place], self._state.dimensions) for place in places}
 
     def link_shapes(self) -> None:
         """The functions of the shapes alone, where they are not linked yet."""
-        key = _, sweeps, _ = self._scene.linked, self._state.sweeps_ready, self._scene.moments_asked
+        sweeps = self._state.sweeps_ready or self._bounces
+        key = self._scene.linked, sweeps, self._scene.moments_asked
         if key != self._shapes_key:
             link_all(self._functions_of_shapes())
             self._scene.link_shapes(sweeps)
             self._shapes_key = key
 
-    def link_together(self) -> None:
-        """What impacts at the same time need, where nothing could bounce when the stages were linked."""
-        part = linked_part(TAKE_TOGETHER, LINKED_PARTS[TAKE_TOGETHER], self._state.dimensions)
-        self._state.links[TAKE_TOGETHER] = part.address
+    def link_impacts(self) -> None:
+        """What impacts need, where nothing could bounce when the stages were linked."""
+        self._bounces = True
+        for place, part in self._parts().items():
+            self._state.links[place] = part.address
+        self.link_shapes()
 
     def _link_possible(self) -> None:
         """All that this world can need, when that may be more than before."""
