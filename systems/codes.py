@@ -13,6 +13,7 @@ NEED_MERGED, NEED_SWEEPS, NEED_ORDER = 9, 10, 13
 NEED_COLUMNS = 14  # columns of the bodies that few scenes need: which ones follows from the stage, see room.COLUMNS_OF
 NEED_IMPACTS = 15  # parts of it are not linked yet
 NEED_STATIC_CELLS = 18  # rows of the grid of what does not move
+NEED_OWN_ROWS = 19  # of records that a plugin's stage has
 WAKE, WAKE_TOUCHED = 16, 17  # bodies that are marked as disturbed, before the broad phase and after the narrow one
 RUN_BROAD, RUN_NARROW = 11, 12  # the phase before has not run: a phase is run alone, or its system was removed
 AFTERWARDS = 32

@@ -79,13 +79,13 @@ class Room:
     def _grow_order(self) -> None:
         candidates, state = self._state.candidates, self._state
         if state.needed > len(candidates.sorted_a):
-            candidates.reserve(_with_spare(state.needed), *records.HALVES, *records.SORTED)
+            candidates.reserve(with_spare(state.needed), *records.HALVES, *records.SORTED)
         candidates.reserve(self._scene.table.capacity + 1, "starts")
         kinds = state.shapes.count**2 + 2
         candidates.reserve(kinds, "bucket_starts")
 
     def _reserve_pairs(self, pairs: Record) -> None:
-        pairs.reserve(_with_spare(self._state.needed), *records.PAIR_COLUMNS, keep=len(pairs.a))
+        pairs.reserve(with_spare(self._state.needed), *records.PAIR_COLUMNS, keep=len(pairs.a))
 
     def _grow_events(self) -> None:
         """Whichever is too small: room for the search among all pairs, the queue, the log."""
@@ -94,13 +94,13 @@ class Room:
             impacts.reserve(self._scene.table.capacity, "heads")
         old = len(impacts.heap)
         if state.needed > old:
-            size = _with_spare(state.needed)
+            size = with_spare(state.needed)
             impacts.reserve(size, *records.EVENTS, keep=old)
             impacts.heap[old:size] = np.arange(old, size)
         if impacts.logged + impacts.together >= len(impacts.log_pair):
-            impacts.reserve(_with_spare(impacts.logged + impacts.together), *records.LOG, keep=impacts.logged)
+            impacts.reserve(with_spare(impacts.logged + impacts.together), *records.LOG, keep=impacts.logged)
         if impacts.together > len(impacts.member):
-            rows = _with_spare(impacts.together)
+            rows = with_spare(impacts.together)
             impacts.reserve(rows, "member", *records.MEMBERS)
             impacts.reserve(2 * rows, "next_member")
         if impacts.together > 0 and len(impacts.first_member) < state.count:
@@ -111,23 +111,23 @@ class Room:
     def _grow_solver(self) -> None:
         solver, state = self._state.solver, self._state
         if state.needed > len(solver.first):
-            solver.reserve(_with_spare(state.needed), *records.SOLVER_CONTACTS)
+            solver.reserve(with_spare(state.needed), *records.SOLVER_CONTACTS)
         bodies = min(2 * state.needed, state.count)
         if bodies > len(solver.body_row):
-            solver.reserve(min(_with_spare(bodies), self._scene.table.capacity), *records.SOLVER_BODIES)
+            solver.reserve(min(with_spare(bodies), self._scene.table.capacity), *records.SOLVER_BODIES)
 
     def reserve_warm_start(self, rows: int) -> None:
         """Room for the impulses of so many contacts, if there is less."""
         memory = self._state.warm_start
         if rows > len(memory.off):
-            _grow_stacked(memory, max(_with_spare(rows), memory.entity_a.shape[1]))
+            _grow_stacked(memory, max(with_spare(rows), memory.entity_a.shape[1]))
             memory.reserve(memory.entity_a.shape[1], "off")
 
     def reserve_contacts(self, rows: int) -> None:
         """Room for so many contacts, if there is less."""
         contacts = self._state.contacts
         if rows > len(contacts.began):
-            _grow_stacked(contacts, max(_with_spare(rows), contacts.entity_a.shape[1]))
+            _grow_stacked(contacts, max(with_spare(rows), contacts.entity_a.shape[1]))
             contacts.reserve(contacts.entity_a.shape[1], "began", "ended")
 
     def _find_candidates(self, simulation: Any, dt: float) -> None:
@@ -150,7 +150,7 @@ class Room:
         state.impacts.until = state.neighbours_known_until
 
 
-def _with_spare(rows: int) -> int:
+def with_spare(rows: int) -> int:
     """So many rows and half as many again, up to a limit: numbers of pairs change from step to step."""
     return rows + min(rows // 2, SPARE) + 16
 

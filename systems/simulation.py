@@ -13,7 +13,8 @@ from ..framework.data.bodies import Bodies
 from ..framework.data.column_copies import ColumnCopies
 from ..framework.data.esper_bridge import Membership
 from ..framework.data.table import Table
-from ..framework.jit.records.record import make_record
+from ..framework.jit.records.record import Record, make_record
+from ..framework.jit.records.schema import Schema
 from ..framework.schedule.phases import System
 from ..framework.schedule.plan import PlannedColumn, PlannedKernel
 from ..framework.schedule.stages import Program
@@ -21,7 +22,7 @@ from ..framework.world.contacts import Contacts
 from ..framework.world.world import World
 from .broad_phase.search import CandidateSearch
 from .broad_phase.system import BroadPhase
-from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, WAKE, WAKE_TOUCHED
+from .codes import AFTERWARDS, CHECK_COLUMNS, CHECK_FLIGHT, LOOK, NEED_OWN_ROWS, WAKE, WAKE_TOUCHED
 from .contacts.events import ContactEvents, RecordedContacts
 from .contacts.response import Response
 from .extensions.extensions import Extensions
@@ -82,6 +83,7 @@ class Simulation:
             **self._room.handlers(self),
             CHECK_COLUMNS: self.quarantine.check_columns, CHECK_FLIGHT: self.quarantine.check_flight,
             LOOK: lambda dt: self.sleepers.look(),
+            NEED_OWN_ROWS: lambda dt: self.extensions.grow(self.program),
             WAKE: lambda dt: self.sleepers.wake_disturbed(),
             WAKE_TOUCHED: lambda dt: self.sleepers.wake_touched(self, dt),
         }  # fmt: skip
@@ -421,6 +423,9 @@ class Simulation:
             self.refresh_for_queries()
             link_needed(self.scene, self.integration, self.program)
         evaluate_forces(self.table, self.bodies, self._world)
+
+    def record(self, schema: Schema) -> Record:
+        return self.extensions.record(schema)
 
     def _running_step(self) -> int | None:
         return self._world.step_count if self.table.in_step else None

@@ -7,7 +7,6 @@ shape, function, the input and the cure. ``carom plugins check`` checks the laws
 from __future__ import annotations
 
 import collections
-import dis
 import inspect
 import math
 import numbers
@@ -18,6 +17,8 @@ import numpy as np
 
 from ..data.component import Component
 from ..errors import PluginError
+from ..jit.records.schema import Column, Schema
+from ..schedule.stages import answers
 from .registry import Convex, Shape
 
 SHAPE_FUNCTIONS = {
@@ -272,25 +273,32 @@ def check_stage(
     for what, names in columns.items():
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             raise PluginError(f"{where}: {what} takes a tuple of names, got {names!r}")
-    types = [] if isinstance(records, type) else [each for each in records if isinstance(each, type)]
-    own = [each for each in types if issubclass(each, Component) and not each._abstract and each.prefix]
-    if isinstance(records, type) or len(own) < len(records):
-        raise PluginError(f"{where}: records takes a tuple of component types of your own, got {records!r}")
-    _check_arity(where, function, ("state", "dt", *(component.prefix.rstrip(".") for component in own)))
-    if not returns_nothing(function):
-        raise PluginError(f"{where} must return nothing")
-    return given[0], [tuple(own), *(tuple(names) for names in columns.values())]
+    if not isinstance(records, tuple) or not all(map(_is_record, records)):
+        raise PluginError(f"{where}: records takes a tuple of component types of your own and schemas, got {records!r}")
+    names = (each.name if isinstance(each, Schema) else each.prefix.rstrip(".") for each in records)
+    _check_arity(where, function, ("state", "dt", *names))
+    if answers(function) != {False} and not (answers(function) == {True} and _has_rows(records)):
+        raise PluginError(
+            f"{where} must return nothing; one with a record of its own that has columns may return, on every path, "
+            f"how many rows these need"
+        )
+    return given[0], [records, *(tuple(names) for names in columns.values())]
 
 
-def returns_nothing(function: Any) -> bool:
-    """Whether the function has no ``return`` with a value on any path."""
-    before: Any = None
-    for instruction in dis.get_instructions(function):
-        value = {"RETURN_CONST": instruction, "RETURN_VALUE": before}.get(instruction.opname)
-        if value is not None and not (value.opname in ("RETURN_CONST", "LOAD_CONST") and value.argval is None):
-            return False
-        before = instruction
-    return True
+def _is_record(thing: Any) -> bool:
+    """Whether stages can have a record of it: a schema, or a component type whose columns have a name of their own."""
+    component = isinstance(thing, type) and issubclass(thing, Component) and not thing._abstract
+    return isinstance(thing, Schema) or bool(component and thing.prefix)
+
+
+def _has_rows(records: tuple[Any, ...]) -> bool:
+    schemas = (each for each in records if isinstance(each, Schema))
+    return any(is_column(field) for each in schemas for field in each.fields.values())
+
+
+def is_column(field: Any) -> bool:
+    """Whether a field of a schema has rows that can become more."""
+    return isinstance(field, Column) and not field.stacked
 
 
 def check_system(plugin: Any, make: Any) -> None:

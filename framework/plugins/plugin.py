@@ -11,6 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 from ..compilation import inlined, part, pasted
 from ..data.component import Component
 from ..errors import PluginError
+from ..jit.records.schema import Schema
 from ..vectors import dot, scale
 from . import checks
 from .registry import Convex, Pair, PluginStage, Registry, Shape
@@ -204,7 +205,7 @@ class Plugin:
 
     @_called_first("after='sum_forces', writes=('force',)")
     def stage(
-        self, *, after: str = "", before: str = "", records: Iterable[type[Component]] = (),
+        self, *, after: str = "", before: str = "", records: tuple[type[Component] | Schema, ...] = (),
         reads: Iterable[str] = (), writes: Iterable[str] = (), needed: str = "",
     ) -> Callable[[Thing], Thing]:  # fmt: skip
         """Register ``function(state, dt, *records)``, a compiled stage of a step, next to a built-in one.
@@ -214,7 +215,9 @@ class Plugin:
             at one place run in the order of the world's plugins, those of one plugin in that of registration
         records
             component types: the function gets a record of the columns of each, ``charge.value[i]`` of row i, and runs
-            only where some body has them all; ``charge.present[i]``: whether this one has it
+            only where some body has them all; ``charge.present[i]``: whether this one has it. Schemas: it gets
+            ``world.record(schema)``, and may return how many rows all columns of these need: if there are fewer, they
+            get them, and it runs again
         reads, writes
             all columns of the bodies and all records of the state that it uses, "mass" and "charge.value". A step that
             fails puts back the columns that are written

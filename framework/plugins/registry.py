@@ -8,6 +8,7 @@ from typing import Any
 
 from ..data.component import Component
 from ..errors import PluginError
+from ..jit.records.schema import Schema
 from ..settings import AUTOMATIC, MIXING_RULES
 
 
@@ -102,7 +103,7 @@ class PluginStage:
     anchor, after
         a built-in stage; whether this one runs after it, or before
     records
-        component types, whose columns the function gets
+        what the function gets beside the state: the columns of component types, and records of the plugin's own
     reads, writes, needed, why
         as of a built-in one
     """
@@ -110,7 +111,7 @@ class PluginStage:
     function: Any
     anchor: str
     after: bool
-    records: tuple[type[Component], ...]
+    records: tuple[type[Component] | Schema, ...]
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     needed: str
@@ -120,6 +121,14 @@ class PluginStage:
     @property
     def name(self) -> str:
         return self.function.__name__
+
+    @property
+    def components(self) -> tuple[type[Component], ...]:
+        return tuple(each for each in self.records if not isinstance(each, Schema))
+
+    @property
+    def schemas(self) -> tuple[Schema, ...]:
+        return tuple(each for each in self.records if isinstance(each, Schema))
 
     @property
     def place(self) -> str:

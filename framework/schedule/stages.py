@@ -83,7 +83,7 @@ class Stage:
     plugin: str = ""
 
     def __post_init__(self) -> None:
-        if _may_return_nothing(self.function):
+        if False in answers(self.function):
             raise ValueError(f"stage {self.name} must return a code on every path: 0, or what it asks of Python")
 
     @property
@@ -91,17 +91,15 @@ class Stage:
         return self.function.__name__
 
 
-def _may_return_nothing(function: Callable[..., Any]) -> bool:
-    """Whether the function ends without a return statement on some path, or says ``return None``."""
-    if None not in function.__code__.co_consts:
-        return False
-    before: Any = None
+def answers(function: Callable[..., Any]) -> set[bool]:
+    """Of the paths through a function: True if one returns something, False if one ends without, or returns None."""
+    found, before = set(), None
     for instruction in dis.get_instructions(function):
-        value = {"RETURN_CONST": instruction, "RETURN_VALUE": before}.get(instruction.opname)
-        if value is not None and value.opname in ("RETURN_CONST", "LOAD_CONST") and value.argval is None:
-            return True
+        value: Any = {"RETURN_CONST": instruction, "RETURN_VALUE": before}.get(instruction.opname)
+        if value is not None:
+            found.add(value.opname not in ("RETURN_CONST", "LOAD_CONST") or value.argval is not None)
         before = instruction
-    return False
+    return found
 
 
 class Program:

@@ -77,7 +77,7 @@ class StateVerbs:
         world: Any = cls(*plugins, settings=file.settings(), name=name)  # type: ignore[call-arg]
         try:
             physics = world._services
-            of_stages = [component for stage in world.registry.stages.values() for component in stage.records]
+            of_stages = [component for stage in world.registry.stages.values() for component in stage.components]
             known = (*physics.table.component_types, *world.registry.shapes, *of_stages, *components)
             snapshot = file.snapshot(dict.fromkeys(known))
             file.whole(lambda: snapshots.restore_world(snapshot, world, physics))

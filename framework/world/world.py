@@ -15,6 +15,8 @@ from ..data import esper_bridge
 from ..data.bodies import Bodies, counts_by_kind
 from ..data.component import Component
 from ..errors import CaromError, NoPhysicsError, PluginError
+from ..jit.records.record import Record
+from ..jit.records.schema import Schema
 from ..plugins.plugin import Plugin
 from ..plugins.registry import Registry
 from ..schedule.clock import Clock
@@ -360,6 +362,10 @@ class World(KnownAttributes, EntityVerbs, QueryVerbs, StateVerbs):
             if not (isinstance(component, type) and issubclass(component, Component)):
                 raise TypeError(f"register takes component types, got {component!r}")
         self._synchronized().adoption.register(component_types)
+
+    def record(self, schema: Schema) -> Record:
+        """The record of this world that stages of plugins get for that schema: numbers, and columns as numpy arrays."""
+        return self._services.record(schema)
 
     def prepare(self, *component_types: type[Any]) -> None:
         """Compile ahead what bodies of these component types, and those there are, will need; between two steps.

@@ -14,8 +14,10 @@ from ...framework.jit.linking import CACHE_SIZE
 from ...framework.jit.records import schema
 from ...framework.jit.records.record_type import record_at
 from ...framework.jit.records.schema import Schema
+from ...framework.plugins.checks import is_column, plain_function
 from ...framework.plugins.registry import PluginStage
-from ..codes import OK
+from ...framework.schedule.stages import answers
+from ..codes import NEED_OWN_ROWS, OK
 from ..shapes.linking.source import source_module
 from ..shapes.linking.user_functions import user_function
 
@@ -47,8 +49,14 @@ def component_schema(component: type[Component], dimensions: int) -> Schema:
 @lru_cache(maxsize=CACHE_SIZE)
 def own_schema(stage: PluginStage, dimensions: int) -> Schema:
     """The record of all that a stage gets beside the state, by number."""
-    records = {f"record_{k}": component_schema(each, dimensions) for k, each in enumerate(stage.records)}
-    return Schema("Own", **records)
+    schemas = (each if isinstance(each, Schema) else component_schema(each, dimensions) for each in stage.records)
+    return Schema("Own", **{f"record_{k}": each for k, each in enumerate(schemas)})
+
+
+def own_columns(stage: PluginStage) -> list[tuple[str, str]]:
+    """The columns of records of the plugin's own, as fields of the record of all."""
+    own = [(f"record_{k}", each) for k, each in enumerate(stage.records) if isinstance(each, Schema)]
+    return [(record, name) for record, each in own for name, field in each.fields.items() if is_column(field)]
 
 
 @lru_cache(maxsize=CACHE_SIZE)
@@ -60,5 +68,12 @@ def compiled_stage(stage: PluginStage, dimensions: int) -> Any:
     if names:
         scope["own_at"] = record_at(own_schema(stage, dimensions), dimensions)
         lines.append("    own = own_at(state.extensions[state.stage])")
-    lines += [f"    function({', '.join(('state', 'dt', *names))})", "    return OK", ""]
+    call = f"function({', '.join(('state', 'dt', *names))})"
+    if True in answers(plain_function(stage.function)):
+        short = " or ".join(f"state.needed > len(own.{record}.{name})" for record, name in own_columns(stage))
+        scope["NEED_OWN_ROWS"] = NEED_OWN_ROWS
+        lines += [f"    state.needed = {call}", f"    if {short}:", "        return NEED_OWN_ROWS"]
+    else:
+        lines.append(f"    {call}")
+    lines += ["    return OK", ""]
     return getattr(source_module("\n".join(lines), scope), stage.name)

@@ -6,13 +6,16 @@ import numpy as np
 
 from ...framework.data.adoption import Adoption
 from ...framework.data.column_copies import ColumnCopies
+from ...framework.data.component import Component
 from ...framework.jit.records.record import Record, make_record
+from ...framework.jit.records.schema import Schema
 from ...framework.plugins.registry import PluginStage, Registry
 from ...framework.schedule.stages import Program
 from .. import records
+from ..record_buffers import with_spare
 from ..scene import Scene
 from ..stage_list import MADE_AGAIN
-from .compiled import PRESENT, own_schema, visible_columns
+from .compiled import PRESENT, own_columns, own_schema, visible_columns
 from .placement import OF_TABLE, check_stages, placed
 
 NEEDED = "stages of plugins"  # the condition of what all of them need
@@ -40,6 +43,7 @@ class Extensions:
         self.stages: tuple[PluginStage, ...] = ()
         self.written = ColumnCopies(self._table, ())
         self._own: dict[PluginStage, Record] = {}  # what each of them gets
+        self._records: dict[Schema, Record] = {}  # of plugins' own
         check_stages(registry.stages.values())
         registry.check_stages = check_stages
 
@@ -55,7 +59,7 @@ class Extensions:
 
     def _take(self, stages: tuple[PluginStage, ...], program: Program) -> None:
         dimensions = self._state.dimensions
-        self._adoption.register(dict.fromkeys(record for stage in stages for record in stage.records))
+        self._adoption.register(dict.fromkeys(component for stage in stages for component in stage.components))
         program.take(tuple(placed(stages, dimensions)))
         self.stages = stages
         self._own = {stage: make_record(own_schema(stage, dimensions), dimensions) for stage in stages}
@@ -74,22 +78,42 @@ class Extensions:
                 self._scene.reserve(name)
         for stage, own in self._own.items():
             addresses[program.index[stage.name]] = own.address
-            for component, name in zip(stage.records, own.schema.fields, strict=True):
-                record = getattr(own, name)
-                record.show(PRESENT, table.has_mask(component))
-                for column in visible_columns(component):
-                    array = table.make(column.key)
-                    record.show(column.name, array.reshape(len(array), -1) if column.item == "angular" else array)
+            for source, name in zip(stage.records, own.schema.fields, strict=True):
+                if isinstance(source, Schema):
+                    setattr(own, name, self.record(source))
+                else:
+                    self._show(source, getattr(own, name))
         self.written.bind()
         addresses[program.index["keep_written"]] = self.written.address
         self._state.extensions = addresses
+
+    def _show(self, component: type[Component], record: Record) -> None:
+        """Let the record of a component show the table's columns."""
+        record.show(PRESENT, self._table.has_mask(component))
+        for column in visible_columns(component):
+            array = self._table.make(column.key)
+            record.show(column.name, array.reshape(len(array), -1) if column.item == "angular" else array)
+
+    def record(self, schema: Schema) -> Record:
+        """The one of this world of a plugin's schema."""
+        if schema not in self._records:
+            self._records[schema] = make_record(schema, self._state.dimensions)
+        return self._records[schema]
+
+    def grow(self, program: Program) -> None:
+        """A stage asks for rows of the plugin's own records."""
+        name, needed = program.stages[self._state.stage].name, self._state.needed
+        stage = next(stage for stage in self.stages if stage.name == name)
+        for record, column in own_columns(stage):
+            found = getattr(self._own[stage], record)
+            found.reserve(with_spare(needed), column, keep=len(getattr(found, column)))
 
     def present(self) -> tuple[bool, ...]:
         """Of each stage, whether some body has all components that it is about."""
         table = self._table
         return tuple(
-            bool(np.logical_and.reduce([table.has_mask(each)[: table.count] for each in stage.records]).any())
-            if stage.records else True
+            bool(np.logical_and.reduce([table.has_mask(each)[: table.count] for each in stage.components]).any())
+            if stage.components else True
             for stage in self.stages
         )  # fmt: skip
 

@@ -72,7 +72,7 @@ def _fault_of_place(stage: PluginStage) -> str:
 
 
 def _fault_of_columns(stage: PluginStage) -> str:
-    own = {column.key: component for component in stage.records for column in visible_columns(component)}
+    own = {column.key: component for component in stage.components for column in visible_columns(component)}
     known = {*BODIES.fields, *COLLIDERS.fields, *RECORDS, *own}
     for name in (*stage.reads, *stage.writes):
         if name not in known:
@@ -87,7 +87,7 @@ def _fault_of_columns(stage: PluginStage) -> str:
             )
     named = {name.rpartition(".")[2] for name in (*stage.reads, *stage.writes)}
     used = _names_in(stage.function, set()) & {name.rpartition(".")[2] for name in known}
-    unnamed = sorted(used - named)
+    unnamed = sorted(used - named - {name for schema in stage.schemas for name in schema.fields})
     if unnamed:
         what = "them" if len(unnamed) > 1 else "it"
         return f"it uses {', '.join(unnamed)}, and names {what} neither in reads nor in writes"
