@@ -40,7 +40,7 @@ class Spin(Component):
         N m, acts always; in 3D (3,), along the world's axes
 
     Kinematic bodies turn with their angular velocity; dynamic ones under torques, in 3D also as their inertia makes
-    them (Euler's equations). Contacts do not turn bodies.
+    them (Euler's equations). Contacts turn only those with a SphereCollider without offset, by friction.
     """
 
     __slots__ = ()

@@ -75,7 +75,7 @@ def read_bodies(state, dt):
     every = state.read_version != state.statics_version or state.inverse_masses_exposed
     for i in range(state.dynamic, state.count if every else state.moving):
         inverse_mass[i] = 0.0
-    state.limits_speed = limited
+    state.limits_speed, state.spinning = limited, False
     state.sweeping = state.collides and (state.mode != DISCRETE or any_ccd(state))
     if state.sweeping and not state.sweeps_ready:
         return NEED_SWEEPS

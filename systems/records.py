@@ -119,6 +119,13 @@ EVALUATIONS = Section(
     rk_speeds=vectors(),
     rk_kicks=vectors(),
 )  # fmt: skip
+SPINS = Section(
+    "body", "rotation", "bodies spin: a plugin's stages say how fast, and contacts change that",
+    spin=vectors(),  # rad/s; in 2D the first component
+    inverse_inertia=floats(default=0.0),  # 1 / (kg m^2), in every direction; 0: contacts do not turn it
+    rolling_radius=floats(default=0.0),  # m: of a round body; 0: its surface moves as its centre
+    turn=vectors(),  # rad, in the step
+)  # fmt: skip
 FAILS = "the start of the step, for one that fails"
 UNDO = Section("body", "going back", FAILS, kept_previous=vectors(), kept_velocity=vectors())
 UNDO_FORCE = Section("body", "going back", FAILS, kept_step_force=vectors())
@@ -130,7 +137,7 @@ SLEEPING = Section(
 
 BODIES = Schema(
     "Bodies", *TABLE_SECTIONS, SLEEP_COLUMNS, START, QUARANTINE, COLLISIONS, PREDICTED, HELD, CURVES, SWEEPS,
-    EVALUATIONS, UNDO, UNDO_FORCE, SLEEPING,
+    EVALUATIONS, SPINS, UNDO, UNDO_FORCE, SLEEPING,
     Section(
         "body", "rotation", "some body is rotated, or a shape reads its axes",
         axes=floats(),  # rotation matrices (n, d, d), flat
@@ -386,6 +393,7 @@ STATE = Schema(
     slot_count=integer(),  # types of colliders in the stacks
     has_force_systems=flag(),
     rotated=flag(),  # some body is
+    spinning=flag(),  # some body spins: ``bodies.spin`` and what goes with it have rows
     limits_speed=flag(),
     others_write=flag(),  # code that is not carom's runs in the step
     # settings

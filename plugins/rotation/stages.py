@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 
+from ...components import SphereCollider
 from ...components.spin import FASTEST_TURN, UNKNOWN, Spin
 from ...framework import Plugin
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import item
+from ...framework.vectors import item, length, replace, scale
+from ...systems.forces.stages import is_zero
 from ...systems.integration.stages import CUBIC, LINE, phi1, phi2
 from ...systems.shapes.dispatch import second_moments
 from .free_rotation import diagonalised, product, rotate, turn_freely
@@ -167,17 +169,25 @@ def turn_in_space(state, spin, i, h):
 
 
 @part
-def turn_by_itself(state, spin, i, h):
-    """What is kinematic turns with its angular velocity."""
-    if len(zero_of(state)) == 2:
-        state.bodies.rotation[i] += h * spin.angular_velocity[i, 0]
+def turn_about(state, i, angle):
+    """A body turns by an angle; in space by a vector, about its direction."""
+    if len(angle) == 2:
+        state.bodies.rotation[i] += item(angle, 0)
         return
-    x, y, z = spin.angular_velocity[i, 0], spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
-    size = math.sqrt(x * x + y * y + z * z)
+    size = length(angle)
     if size > 0.0:
-        s = math.sin(0.5 * size * h) / size
-        turn = math.cos(0.5 * size * h), s * x, s * y, s * z
+        s = math.sin(0.5 * size) / size
+        turn = math.cos(0.5 * size), s * item(angle, 0), s * item(angle, 1), s * item(angle, 2)
         set_rotation(state, i, product(turn, rotation_in_space(state, i)))
+
+
+@part
+def spin_of(state, spin, i):
+    """The angular velocity of a body; in a plane the first component."""
+    w = zero_of(state)
+    for k in range(1 if len(w) == 2 else 3):
+        w = replace(w, k, spin.angular_velocity[i, k])
+    return w
 
 
 @part
@@ -198,15 +208,6 @@ def write_axes(state, i):
     axes[k + 6], axes[k + 7], axes[k + 8] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
 
 
-@part
-def turn_per_second(state, spin, i):
-    """The angular speed of a body."""
-    x, y, z = spin.angular_velocity[i, 0], 0.0, 0.0
-    if len(zero_of(state)) == 3:
-        y, z = spin.angular_velocity[i, 1], spin.angular_velocity[i, 2]
-    return math.sqrt(x * x + y * y + z * z)
-
-
 @spinning.stage(
     after="check_flight", records=(Spin,),
     reads=(
@@ -222,12 +223,12 @@ def turn_bodies(state, dt, spin):
         if not spin.present[i] or bodies.still[i] != 0:
             continue
         if i >= state.dynamic:
-            turn_by_itself(state, spin, i, dt)
+            turn_about(state, i, scale(spin_of(state, spin, i), dt))
         elif bodies.inverse_mass[i] > 0.0 and parts == 1:  # 0: it is taken out
             turn_in_plane(state, spin, i, dt)
         elif bodies.inverse_mass[i] > 0.0:
             turn_in_space(state, spin, i, dt)
-        if not turn_per_second(state, spin, i) <= FASTEST_TURN:
+        if not length(spin_of(state, spin, i)) <= FASTEST_TURN:
             state.blamed = i + 1
             raise ValueError(NOT_FINITE)
         write_axes(state, i)
@@ -236,10 +237,61 @@ def turn_bodies(state, dt, spin):
 
 
 @spinning.stage(
+    after="check_flight",
+    records=(Spin, SphereCollider),
+    reads=(
+        "mass", "inverse_mass", "shapes", "levels", "offset", "spin.inertia", "spin.angular_velocity",
+        "sphere_collider.radius",
+    ),
+    writes=("spin", "inverse_inertia", "rolling_radius", "turn"),
+    needed="colliders",
+)  # fmt: skip
+def share_spins(state, dt, spin, sphere):
+    """how fast round bodies spin, for the contacts"""
+    bodies, zero, parts = state.bodies, zero_of(state), 1 if len(zero_of(state)) == 2 else 3
+    state.spinning = True
+    for i in range(state.count):
+        bodies.spin[i], bodies.inverse_inertia[i], bodies.rolling_radius[i] = zero, 0.0, 0.0
+        at = state.colliders.offset[bodies.collider_slot[i], i] if i < state.moving else zero
+        if i < state.first or i >= state.moving or not (spin.present[i] and sphere.present[i] and is_zero(at)):
+            continue
+        w = spin_of(state, spin, i)
+        bodies.spin[i], bodies.rolling_radius[i], bodies.turn[i] = w, sphere.radius[i], scale(w, dt)
+        if bodies.inverse_mass[i] > 0.0:
+            xx, yy, moment, _, _, _ = inertia_of(state, spin, i)
+            if moment > 0.0 and (parts == 1 or (xx == yy == moment)):
+                bodies.inverse_inertia[i] = 1.0 / moment
+
+
+@spinning.stage(
+    after="resolve_static_penetration",
+    records=(Spin, SphereCollider),
+    reads=("spin", "turn", "inverse_inertia"),
+    writes=("spin.angular_velocity", "rotation", "axes"),
+    needed="colliders",
+)
+def take_spins(state, dt, spin, sphere):
+    """what contacts have made of the spins; the step has turned the bodies with these"""
+    bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
+    for i in range(state.first, state.dynamic):
+        if not (spin.present[i] and sphere.present[i] and bodies.inverse_inertia[i] > 0.0):
+            continue
+        changed, further = False, bodies.turn[i]
+        for k in range(parts):
+            old, new = spin.angular_velocity[i, k], item(bodies.spin[i], k)
+            changed |= new != old or item(bodies.turn[i], k) != old * dt
+            further = replace(further, k, item(bodies.turn[i], k) - old * dt)
+            spin.angular_velocity[i, k] = new
+        if changed:
+            turn_about(state, i, further)
+            write_axes(state, i)
+
+
+@spinning.stage(
     before="update_sleep", records=(Spin,), reads=("spin.angular_velocity",), writes=("rest_steps",), needed="sleeping"
 )
 def keep_spinning_awake(state, dt, spin):
     """what turns does not fall asleep"""
     for i in range(state.first, state.moving):
-        if spin.present[i] and turn_per_second(state, spin, i) * dt > SLOW:
+        if spin.present[i] and length(spin_of(state, spin, i)) * dt > SLOW:
             state.bodies.rest_steps[i] = 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...framework.compilation import part
 from ...framework.jit.records.record_type import zero_of
-from ...framework.vectors import add, add_scaled, dot, scale, sub
+from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..codes import NEED_COLUMNS, NEED_SOLVER, OK
 from ..integration.trajectory import along, path_of
 from .solving.islands import order_rows
@@ -57,7 +57,8 @@ def gather(state, dt):
         v, x, a = nothing, nothing, nothing
         if i < state.moving:
             v = bodies.start_velocity[i]
-            if inverse_mass[i] == 0.0 and dot(v, v) > 0.0:
+            spins = state.spinning and length(bodies.spin[i]) > 0.0
+            if inverse_mass[i] == 0.0 and (dot(v, v) > 0.0 or spins):
                 solver.mover[solver.movers] = q
                 solver.movers += 1
             if inverse_mass[i] > 0.0:
@@ -69,6 +70,12 @@ def gather(state, dt):
                 if state.impacts.sweeps and bodies.impact_count[i] > 0:
                     x = start_of_flight(state, i, v, a, dt)
         solver.velocity[q], solver.shift[q], solver.acceleration[q] = v, x, a
+    solver.spinning = state.spinning
+    for q in range(solver.bodies if state.spinning else 0):
+        i = solver.body_row[q]
+        solver.spin[q], solver.rolling_radius[q] = bodies.spin[i], bodies.rolling_radius[i]
+        solver.turn[q] = nothing
+        solver.inverse_inertia[q] = bodies.inverse_inertia[i] if solver.inverse_mass[q] > 0.0 else 0.0
     return OK
 
 
@@ -87,6 +94,8 @@ def put_back(state, dt):
         if bodies.held[i] and solver.inverse_mass[q] > 0.0:
             bodies.position[i] = add(bodies.previous_position[i], solver.shift[q])
             bodies.linear_velocity[i] = solver.velocity[q]
+            if state.spinning:
+                bodies.spin[i], bodies.turn[i] = solver.spin[q], solver.turn[q]
     if state.any_warm_started:
         drop_support(state, dt)
     return OK

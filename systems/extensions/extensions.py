@@ -24,7 +24,7 @@ RESERVED = {
     name
     for section in (
         records.START, records.QUARANTINE, records.COLLISIONS, records.PREDICTED, records.HELD, records.CURVES,
-        records.SWEEPS, records.EVALUATIONS, records.SLEEPING,
+        records.SWEEPS, records.EVALUATIONS, records.SPINS, records.SLEEPING,
     )
     for name in section
 }  # fmt: skip

@@ -27,6 +27,7 @@ from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
+from ..turning import surface_velocity, turning_mass
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
 
@@ -227,11 +228,14 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     friction = state.colliders.friction
     mu = mix_friction(state, state.friction_rule, friction[slot[a], a], friction[slot[b], b])
     if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
-        w = rate_along(path, t)
+        w, share = rate_along(path, t), 1.0
+        if state.spinning:
+            w, light = add(w, surface_velocity(bodies, a, b, normal)), bodies.inverse_mass[a] + bodies.inverse_mass[b]
+            share = light / (light + turning_mass(bodies, a, b))
         sliding = add_scaled(w, normal, -dot(w, normal))
         fast = length(sliding)
         if fast > 0.0:
-            pull = scale(sliding, -min(1.0, -mu * (1.0 + restitution) * speed / fast))
+            pull = scale(sliding, -min(share, -mu * (1.0 + restitution) * speed / fast))
     if state.ranks_version != state.version:
         rank_rows(state)
     event = impacts.heap[impacts.waiting]

@@ -18,6 +18,7 @@ from ...framework.jit.records.record_type import zero_of
 from ...framework.vectors import add, add_scaled, dot, item, length, replace, scale, sub
 from ..integration.trajectory import rate_along, relative_path
 from ..shapes.dispatch import mix_friction
+from ..turning import surface_velocity, turn_at, turning_mass
 from .exact_sum import exact_sum
 from .impulses import FREE, deflect, log_impact, stands_still
 
@@ -201,13 +202,16 @@ def solve_friction(state, count):
         if mu > 0.0 and impacts.ahead[m] > 0.0:
             w = rate_along(relative_path(state, a, b), impacts.now)
             w = add(w, sub(impacts.gained[b], impacts.gained[a]))
+            if state.spinning:
+                w = add(w, surface_velocity(state.bodies, a, b, normal))
             sliding = add_scaled(w, normal, -dot(w, normal))
             fast, light = length(sliding), 0.0
             for side in range(2):
                 i = a if side == 0 else b
                 entry = impacts.first_member[i] if inverse_mass[i] > 0.0 else -1
+                turns = turning_mass(state.bodies, i, i) * 0.5 if state.spinning else 0.0
                 while entry >= 0:
-                    light, entry = light + inverse_mass[i], impacts.next_member[entry]
+                    light, entry = light + inverse_mass[i] + turns, impacts.next_member[entry]
             if fast > 0.0:
                 impacts.friction_impulse[m] = scale(sliding, -min(1.0 / light, mu * impacts.ahead[m] / fast))
                 rubs = True
@@ -219,7 +223,8 @@ def push_group(state, count, dt):
     """Give the bodies of a group their impulses, all at once, and note these."""
     impacts, pairs, bodies = state.impacts, state.pairs, state.bodies
     inverse_mass, caught = bodies.inverse_mass, bodies.caught
-    if solve_friction(state, count):
+    rubs = solve_friction(state, count)
+    if rubs:
         push_bodies(state, count, True)
     for g in range(count):
         m = impacts.group[g]
@@ -232,6 +237,9 @@ def push_group(state, count, dt):
             if inverse_mass[i] > 0.0 and impacts.ahead[m] > 0.0:
                 bodies.impact_count[i] += 1
                 bodies.counted_impacts[i] += 0 if impacts.event_kind[event] == FREE else 1
+        if rubs and state.spinning:
+            sides, left = (pairs.a[c], pairs.b[c]), dt - impacts.now
+            turn_at(bodies, sides, impacts.event_normal[event], impacts.friction_impulse[m], left)
         if impacts.ahead[m] > 0.0:
             impacts.event_time[event] = impacts.now
             log_impact(state, event, impacts.ahead[m])

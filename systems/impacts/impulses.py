@@ -15,6 +15,7 @@ from ...framework.vectors import add, add_scaled, dot, length, scale, sub
 from ..ccd.search_bounds import EVENT_DRIVEN, FAST
 from ..integration.trajectory import along, path_of, rate_along
 from ..narrow_phase.manifolds import forget_manifold
+from ..turning import turn_at
 
 STOPPED = 1 << 30  # added to a body's impacts: it moves no more in this step, and the solver leaves it alone
 STUCK = 1 << 29  # in the impacts that the cap counts: no cap is that high, so a body that stuck once goes on to stick
@@ -87,6 +88,8 @@ def bounce(state, event, dt):
             if impacts.sweeps:
                 bodies.caught[i] = bodies.caught[i] + 1 if stands_still(bodies, a + b - i) else 0
             deflect(state, i, scale(change, (-mass if side == 0 else mass) * inverse_mass[i]), now, dt)
+    if state.spinning:
+        turn_at(bodies, (a, b), impacts.event_normal[event], scale(impacts.event_pull[event], mass), dt - now)
     log_impact(state, event, impacts.event_change[event] * mass)
 
 

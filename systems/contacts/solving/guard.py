@@ -11,6 +11,7 @@ import math
 
 from ....framework.compilation import inlined, part
 from ....framework.vectors import add, add_scaled, dot, scale, sub
+from ...turning import cross_spin
 from ..constants import (
     DEEP,
     EXCESS,
@@ -55,6 +56,14 @@ def weigh(solver, span, islands):
             slope[t] += m * dot(v, change)
             curvature[t] += m * dot(change, change)
             energy[t] += m * dot(v, v)
+    for q in range(begin, end if solver.spinning else begin):
+        t, w = island[q], solver.inverse_inertia[q]
+        if t >= 0 and w > 0.0:
+            before = solver.spin_before[q]
+            change = sub(solver.spin[q], before)
+            slope[t] += dot(before, change) / w
+            curvature[t] += dot(change, change) / w
+            energy[t] += dot(before, before) / w
     for k in range(start, stop if solver.movers > 0 else start):
         a, b = solver.first[k], solver.second[k]
         if island[a] < 0 or island[b] < 0:
@@ -62,6 +71,10 @@ def weigh(solver, span, islands):
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
             work = -dot(push, solver.velocity[a]) if island[a] < 0 else dot(push, solver.velocity[b])
+            if solver.spinning:
+                fixed = a if island[a] < 0 else b
+                rate = cross_spin(scale(solver.spin[fixed], solver.rolling_radius[fixed]), solver.normal[k])
+                work -= dot(solver.tangent[k], rate)
             slope[island_of(solver, k)] += work
 
 
@@ -153,6 +166,9 @@ def restrain(solver, span, islands):
             before = solver.velocity_before[q]
             change = sub(solver.velocity[q], before)
             solver.velocity[q] = add_scaled(before, change, share[t]) if share[t] > 0.0 else before
+            if solver.spinning:
+                turned = sub(solver.spin[q], solver.spin_before[q])
+                solver.spin[q] = add_scaled(solver.spin_before[q], turned, share[t])
     for k in range(start, stop if any_gain else start):
         kept = share[island_of(solver, k)]
         if kept < 1.0:

@@ -1,6 +1,6 @@
 """Rows of the solver: points where two bodies touch. How a row moves its bodies stands here, and nowhere else.
 
-A body that turns adds its arm to :func:`effective_mass`, :func:`relative_velocity` and :func:`apply_impulse`.
+What a round body that spins adds along the surface is in :mod:`turning`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 from ....framework.compilation import inlined, part
-from ....framework.vectors import add_scaled, dot, scale, sub
+from ....framework.vectors import add, add_scaled, dot, scale, sub
+from ...turning import surface_velocity, turn_by, turning_mass
 
 
 @inlined
@@ -63,13 +64,19 @@ def solve_normals(solver, bias, softness, pushes, start, stop):
 @inlined
 def solve_friction_of(solver, k):
     """Stop what slides at row k, with at most ``friction`` times the normal impulse (Coulomb)."""
-    n, old, w = solver.normal[k], solver.tangent[k], relative_velocity(solver, k)
-    pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -solver.mass[k])
+    n, old, w, mass = solver.normal[k], solver.tangent[k], relative_velocity(solver, k), solver.mass[k]
+    a, b = solver.first[k], solver.second[k]
+    if solver.spinning:
+        w = add(w, surface_velocity(solver, a, b, n))
+        mass = 1.0 / (1.0 / mass + turning_mass(solver, a, b))
+    pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass)
     strength, limit = math.sqrt(dot(pull, pull)), solver.friction[k] * solver.impulse[k]
     if strength > limit:
         pull = scale(pull, limit / strength)
     solver.tangent[k] = pull
     apply_impulse(solver, k, sub(pull, old))
+    if solver.spinning:
+        turn_by(solver, a, b, n, sub(pull, old))
 
 
 @part

@@ -15,6 +15,7 @@ from ....framework.compilation import packed, part
 from ....framework.jit.records.record_type import zero_of
 from ....framework.vectors import add, add_scaled, dot, length, scale, sub
 from ...codes import OK
+from ...turning import turn_by
 from ..constants import (
     AGREED,
     AGREED_SHARE,
@@ -75,6 +76,8 @@ def apply_forces(solver, h, span):
     for q in range(span[2], span[3]):
         v = add_scaled(solver.velocity[q], solver.acceleration[q], h)
         solver.velocity[q], solver.velocity_before[q] = v, v
+    for q in range(span[2], span[3] if solver.spinning else span[2]):
+        solver.spin_before[q] = solver.spin[q]
 
 
 @part
@@ -88,6 +91,8 @@ def apply_warm_start(solver, most, span):
             push = scale(solver.normal[k], solver.impulse[k])
             if solver.has_friction:
                 push = add(push, solver.tangent[k])
+                if solver.spinning:
+                    turn_by(solver, solver.first[k], solver.second[k], solver.normal[k], solver.tangent[k])
             apply_impulse(solver, k, push)
 
 
@@ -99,6 +104,8 @@ def move(solver, h, span):
     for m in range(solver.movers if span[2] > 0 else 0):
         q = solver.mover[m]
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
+    for q in range(span[2], span[3] if solver.spinning else span[2]):
+        solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], h)
 
 
 @part
@@ -238,6 +245,8 @@ def repeat_substep(solver, left, h, span):
         solver.total[k] += left * solver.impulse[k]
     for q in range(span[2], span[3]):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], left * h)
+        if solver.spinning:
+            solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], left * h)
 
 
 @part

@@ -1,0 +1,241 @@
+"""Round bodies that spin, in contact: rolling, slipping and impacts with friction, against closed forms and laws."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
+from carom.framework import Settings, World
+from carom.plugins import Physics
+from carom.plugins.rotation import Rotation, Spin
+
+MODES = ("discrete", "continuous", "event_driven")
+SHARE = {2: 1 / 2, 3: 2 / 5}  # inertia of a disc and a ball, over m r^2
+G = 9.81
+
+
+def plane(d, slope=0.0, friction=1.0, gravity=G, **settings):
+    """A world in which the ground is level and gravity leans by ``slope``."""
+    down = (gravity * math.sin(slope), -gravity * math.cos(slope)) + (0.0,) * (d - 2)
+    world = World(Physics(d, gravity=down), Rotation(), settings=Settings(**settings))
+    world.create_entity(
+        Transform((0, -1) + (0,) * (d - 2)), RigidBody(kind="static"), AABBCollider((500, 1, 50)[:d], friction=friction)
+    )
+    return world
+
+
+def ball(world, place, velocity=0.0, spin=0.0, r=0.5, m=2.0, **collider):
+    d = len(place)
+    w = spin if d == 2 or np.ndim(spin) else (0, 0, spin)
+    return world.create_entity(
+        Transform(place), RigidBody(m, np.broadcast_to(velocity, (d,))), Spin(w), SphereCollider(r, **collider)
+    )
+
+
+def motion(world, entity):
+    """(velocity, angular velocity as a vector of 3)."""
+    w = world.component_for_entity(entity, Spin).angular_velocity
+    v = np.array(world.component_for_entity(entity, RigidBody).linear_velocity)
+    return v, np.array((0, 0, w) if np.ndim(w) == 0 else w)
+
+
+# -- on a slope -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("d", [2, 3])
+def test_on_a_slope_it_rolls_or_slips_as_newton_says(d, mode):
+    """g sin a / (1 + I / m r^2) while tan a < mu (1 + m r^2 / I), else g (sin a - mu cos a): 1 % to either side. The
+    forces are constant, so the solver is exact but for the first step."""
+    mu, seconds = 0.2, 1.0
+    for times in (0.5, 0.99, 1.01, 1.5):
+        slope = math.atan(times * mu * (1 + 1 / SHARE[d]))
+        with plane(d, slope, mu, collision=mode) as world:
+            entity = ball(world, (0, 0.5) + (0,) * (d - 2), friction=mu)
+            for _ in range(60):
+                world.step()
+            v, w = motion(world, entity)
+        rolls = G * math.sin(slope) / (1 + SHARE[d])
+        slips = G * (math.sin(slope) - mu * math.cos(slope))
+        assert v[0] == pytest.approx(seconds * (rolls if times < 1 else slips), rel=1e-3)
+        slip = v[0] + 0.5 * w[2]
+        assert (abs(slip) < 1e-9) == (times < 1), slip
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_angle_follows_the_way(d):
+    """x = r angle while it rolls, to the first step's share."""
+    with plane(d, 0.1) as world:
+        entity = ball(world, (0, 0.5) + (0,) * (d - 2))
+        for _ in range(60):
+            world.step()
+        x = world.component_for_entity(entity, Transform).x
+        rotation = world.component_for_entity(entity, Transform).rotation
+        angle = rotation if d == 2 else 2 * math.atan2(rotation[3], rotation[0])
+    assert -0.5 * angle == pytest.approx(x, rel=1e-3)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("spin", [0.0, 30.0, -30.0])
+def test_a_ball_that_slides_comes_to_roll_with_the_momentum_about_the_ground(d, spin):
+    """m r v + I w about a point of the ground stays: v = (v0 - k r w0) / (1 + k), k = I / m r^2."""
+    with plane(d, friction=0.3) as world:
+        entity = ball(world, (0, 0.5) + (0,) * (d - 2), (4.0,) + (0.0,) * (d - 1), spin, friction=0.3)
+        for _ in range(240):
+            world.step()
+        v, w = motion(world, entity)
+    k = SHARE[d]
+    assert v[0] == pytest.approx((4.0 - k * 0.5 * spin) / (1 + k), rel=1e-9)
+    assert v[0] + 0.5 * w[2] == pytest.approx(0, abs=1e-9)
+
+
+# -- impacts --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bounce_with_spin_is_that_of_coulomb(seed, d, mode):
+    """Normal: -e v. Along the wall: what slips is stopped, by at most mu (1 + e) v; the spin takes its share."""
+    random = np.random.default_rng(seed)
+    e, mu = random.uniform(0.3, 1.0), random.uniform(0.02, 0.6)
+    v0, w0 = (
+        np.append(random.uniform(-3, 3, d - 1), 0)[:2],
+        random.uniform(-15, 15, 3) if d == 3 else np.array((0, 0, random.uniform(-15, 15))),
+    )
+    start = np.array((v0[0], -6.0) if d == 2 else (v0[0], -6.0, v0[1]))
+    with plane(d, friction=mu, gravity=0.0, collision=mode) as world:
+        entity = ball(world, (0, 1.0) + (0,) * (d - 2), start, w0[2] if d == 2 else w0, friction=mu, restitution=e)
+        for _ in range(30):
+            world.step()
+        v, w = motion(world, entity)
+    n, r = np.array((0.0, 1.0, 0.0)), 0.5
+    before = np.append(start, 0)[:3]
+    slip = before + np.cross(w0, -r * n)
+    slip[1] = 0.0
+    push = slip / np.linalg.norm(slip) * min(np.linalg.norm(slip) / (1 + 1 / SHARE[d]), mu * (1 + e) * 6.0)
+    after = before - push
+    after[1] = 6.0 * e
+    turned = w0 + np.cross(-r * n, -push) / (SHARE[d] * r * r)
+    assert np.allclose(np.append(v, 0)[:3], after, rtol=1e-9, atol=1e-9)
+    assert np.allclose(w, turned, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_gas_of_spinning_balls_keeps_momentum_and_loses_energy_by_friction_only(d, mode):
+    """Elastic: with mu = 0 spins and energy stay to rounding; else it falls, never rises in a step, and
+    angular momentum stays where impacts are at their time (they meet in one point then)."""
+    random = np.random.default_rng(5)
+    n = 40
+    for mu in (0.0, 0.4):
+        with World(
+            Physics(d, gravity=0), Rotation(), settings=Settings(collision=mode, max_impacts_per_step=64)
+        ) as world:
+            places = np.stack(np.meshgrid(*(np.arange(7.0),) * d, indexing="ij"), -1).reshape(-1, d)
+            chosen = places[random.permutation(len(places))[:n]] * 1.2
+            spins = random.uniform(-8, 8, n) if d == 2 else random.uniform(-8, 8, (n, 3))
+            inwards = 3 * (chosen.mean(0) - chosen) + random.uniform(-1, 1, (n, d))
+            world.create_entities(
+                n, Transform.many(chosen), RigidBody.many(linear_velocity=inwards),
+                Spin.many(spins), SphereCollider.many(0.5, restitution=1.0, friction=mu),
+            )  # fmt: skip
+            bodies = world.bodies
+
+            def totals(bodies=bodies):
+                x, v, w = bodies.position, bodies.linear_velocity, bodies.spin.angular_velocity
+                inertia = SHARE[d] * 0.25
+                energy = 0.5 * (v**2).sum() + 0.5 * inertia * (w**2).sum()
+                about = (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) if d == 2 else np.cross(x, v)
+                return energy, v.sum(0), about.sum(0) + inertia * w.sum(0)
+
+            first = last = totals()
+            for _ in range(120):
+                world.step()
+                now = totals()
+                assert now[0] <= last[0] * (1 + 1e-12)
+                last = now
+            assert world.stats().counters["impacts"] > 50
+            assert np.allclose(last[1], first[1], atol=1e-10)
+            if mu == 0.0:
+                assert last[0] == pytest.approx(first[0], rel=1e-10 if mode != "discrete" else 1e-2)
+                assert np.allclose(bodies.spin.angular_velocity, spins, rtol=1e-12)
+            else:
+                assert last[0] < 0.95 * first[0]
+            if mode == "event_driven":
+                assert np.allclose(last[2], first[2], rtol=1e-9, atol=1e-9)
+
+
+# -- billiards ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "spin"), [("follow", None), ("stun", 0.0), ("draw", 20.0)])
+def test_follow_stun_and_draw(kind, spin):
+    """A ball strikes an equal one head on, elastic and smooth, on a table with friction. The struck one leaves with the
+    speed and comes to roll with 5/7 of it; what the cue ball keeps is its spin: it goes on with -2/7 r w."""
+    r, speed = 0.5, 4.0
+    with plane(3, friction=0.2, collision="event_driven") as world:
+        w = (0, 0, -speed / r if spin is None else spin)
+        cue = ball(world, (0, r, 0), (speed, 0, 0), w, r, restitution=1.0)
+        other = ball(world, (2 * r + 0.02, r, 0), 0.0, (0, 0, 0), r, restitution=1.0)
+        table = world.get_component(AABBCollider)[0][1]
+        table.restitution = 0.0
+        for _ in range(300):
+            world.step()
+        (v, _), (u, _) = motion(world, cue), motion(world, other)
+    assert v[0] == pytest.approx(-2 / 7 * r * w[2], abs=0.02 * speed), kind
+    assert u[0] == pytest.approx(5 / 7 * speed, abs=0.02 * speed)
+
+
+# -- what turns by itself, and heaps --------------------------------------------------------------
+
+
+def test_a_wheel_that_turns_drives_what_lies_on_it():
+    """A ball between two kinematic wheels that turn alike comes to turn the other way, as fast at its surface."""
+    with World(Physics(2, gravity=(0, -G)), Rotation()) as world:
+        for x in (-0.8, 0.8):
+            world.create_entity(
+                Transform((x, 0)), RigidBody(kind="kinematic"), Spin(-3.0), SphereCollider(0.7, friction=1.0)
+            )
+        entity = ball(world, (0, 0.95), r=0.5, friction=1.0)
+        for _ in range(120):
+            world.step()
+        v, w = motion(world, entity)
+        assert abs(world.component_for_entity(entity, Transform).x) < 1e-9
+    assert w[2] == pytest.approx(3.0 * 0.7 / 0.5, rel=1e-9)
+    assert np.abs(v).max() < 1e-9
+
+
+@pytest.mark.parametrize("e", [0.0, 0.4])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_bin_of_spinning_discs_comes_to_rest_and_never_gains(seed, e):
+    random = np.random.default_rng(seed)
+    with plane(2, friction=0.5) as world:
+        for x in (-4.5, 4.5):
+            world.create_entity(Transform((x, 5)), RigidBody(kind="static"), AABBCollider((0.5, 5), friction=0.5))
+        places = np.stack(np.meshgrid(np.arange(-3, 4), np.arange(1, 9)), -1).reshape(-1, 2) + random.uniform(
+            -0.04, 0.04, (56, 2)
+        )
+        world.create_entities(
+            56, Transform.many(places), RigidBody.many(), Spin.many(random.uniform(-10, 10, 56)),
+            SphereCollider.many(0.45, friction=0.5, restitution=e),
+        )  # fmt: skip
+
+        def energy():
+            bodies = world.bodies
+            moving = bodies.dynamic
+            v, w, y = moving.linear_velocity, moving.spin.angular_velocity, moving.position[:, 1]
+            return 0.5 * (v**2).sum() + 0.25 * 0.45**2 * (w**2).sum() + G * y.sum()
+
+        highest = energy()
+        for step in range(900):
+            world.step()
+            now = energy()
+            assert now <= highest + (G * G * 56 / 3600 if step < 300 else 0.05)  # m g^2 dt^2: of falling, by the step
+            highest = min(highest, now)
+        bodies = world.bodies.dynamic
+        assert np.abs(bodies.linear_velocity).max() < 0.05
+        assert np.abs(bodies.spin.angular_velocity).max() < 0.2
