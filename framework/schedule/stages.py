@@ -210,17 +210,21 @@ class Program:
         self.run(start, stop, dt)
         self.inside = inside + time.perf_counter() - began - (log.waited - waited)
 
-    def require(self, name: str) -> int:
-        """The place of a stage, which is linked from now on."""
+    def run_one(self, name: str, dt: float) -> None:
+        """Run one stage, linked or not."""
+        k = self._required(name)
+        self.run_inside(k, k + 1, dt)
+
+    def run_span(self, name: str, dt: float) -> None:
+        """The same, with the stages of plugins next to it that are linked."""
+        self._required(name)
+        self.run_inside(*self.spans[name], dt)
+
+    def _required(self, name: str) -> int:
         k = self.index[name]
         if not self._addresses[k]:
             self._addresses[k] = self._linked(self.stages[k]).address
         return k
-
-    def run_one(self, name: str, dt: float) -> None:
-        """Run one stage, linked or not."""
-        k = self.require(name)
-        self.run_inside(k, k + 1, dt)
 
     def segment(self, first: str, last: str) -> Segment:
         """The stages from one built-in stage to another, with those of plugins next to these."""

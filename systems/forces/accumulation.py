@@ -55,8 +55,7 @@ class ForceAccumulation(StagedSystem):
 
     def evaluate(self, time: float) -> None:
         """Sum all forces at the state in the columns; ``time`` in seconds."""
-        self._program.require(sum_forces.__name__)
-        self.segment(sum_forces.__name__, sum_forces.__name__)(self.world.settings.dt)  # with stages of plugins
+        self._program.run_span(sum_forces.__name__, self.world.settings.dt)
         self.add_systems(time)
 
     def add_systems(self, time: float) -> None:

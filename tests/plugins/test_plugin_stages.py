@@ -392,3 +392,26 @@ def test_a_cold_and_a_warm_cache_give_the_same_bits(tmp_path):
     assert cold == warm
     assert compiled == "True"
     assert again == "0"
+
+
+def test_columns_that_a_stage_names_have_rows_where_nothing_else_needs_them():
+    """Also after there have come more bodies than there was room for."""
+    plugin, names = Plugin("curious"), ("path_velocity", "path_second", "flight_velocity", "linear_damping", "rotation")
+
+    @plugin.stage(before="close_step", reads=names, writes=("constant_force",))
+    def count_rows(state, dt):
+        bodies = state.bodies
+        shortest = min(len(bodies.path_velocity), len(bodies.path_second), len(bodies.flight_velocity))
+        shortest = min(shortest, len(bodies.linear_damping), len(bodies.rotation), len(bodies.constant_force))
+        if shortest < state.count:
+            raise ValueError("too short", shortest)
+        for i in range(state.first, state.moving):
+            bodies.constant_force[i] = add(bodies.path_second[i], (bodies.rotation[i], bodies.linear_damping[i]))
+
+    with World(Physics(dimensions=2), plugin) as world:
+        for count in (3, 300):
+            world.create_entities(
+                count, Transform.many(np.zeros((count, 2)), rotation=0.5), RigidBody.many(linear_damping=0.25)
+            )
+            world.step()
+            assert (world.bodies.constant_force == (0.5, 0.25)).all()
