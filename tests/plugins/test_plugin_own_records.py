@@ -13,7 +13,7 @@ from carom.framework.vectors import add
 from carom.plugins import Physics
 
 WIND = Schema("Wind", strength=number(), blows=flag(), calls=integer())
-TRACE = Schema("Trace", count=integer(), calls=integer(), row=ints(), place=vectors())
+TRACE = Schema("Trace", count=integer(), calls=integer(), row=ints(), place=vectors(), mark=ints())
 
 
 def steady():
@@ -75,7 +75,7 @@ def tracing(place):
 
 @pytest.mark.parametrize("place", ["keep_start", "put_back"])
 def test_columns_get_the_rows_that_a_stage_asks_for_within_the_step(place):
-    """The other stage uses all of them in the same step; what has room runs once."""
+    """The other stage uses all of them in the same step; what has room runs once; what was in the rows stays."""
     with world_of(tracing(place), count=3) as world:
         trace, expected = world.record(TRACE), world.bodies.position.copy()
         for count, calls in ((3, 2), (3, 3), (1000, 5), (1000, 6)):
@@ -88,6 +88,8 @@ def test_columns_get_the_rows_that_a_stage_asks_for_within_the_step(place):
             np.testing.assert_array_equal(world.bodies.position, expected)
             assert (trace.count, trace.calls) == (count, calls)
             np.testing.assert_array_equal(trace.row[:count], np.arange(count))
+            trace.mark[:3] = trace.mark[:3] + 1 if calls > 2 else 0
+        assert trace.mark[:3].tolist() == [3, 3, 3]
 
 
 def no_rows(state, dt, wind):
