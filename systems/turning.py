@@ -1,13 +1,14 @@
-"""Round bodies that spin: how fast their surface moves where another body touches it, and how impulses there turn them.
+"""Bodies that spin, where another body touches them: how fast their surface moves, and how impulses there turn them.
 
-A contact of a round body lies on the line of its normal through the centre: what pushes along that does not turn it.
+Only round dynamic bodies are turned: their contacts lie on the line of the normal through the centre, and what pushes
+along that does not turn them. What is kinematic turns whatever its shape, and each point of it has its own velocity.
 The spin is a vector; in 2D its first component is the angular velocity, about the axis that leads out of the plane.
 """
 
 from __future__ import annotations
 
 from ..framework.compilation import inlined
-from ..framework.vectors import add_scaled, item, replace, scale, sub
+from ..framework.vectors import add, add_scaled, item, length, replace, scale, sub
 
 
 @inlined
@@ -65,3 +66,23 @@ def turn_at(bodies, sides, normal, impulse, left):
     turn_by(bodies, a, b, normal, impulse)
     bodies.turn[a] = add_scaled(bodies.turn[a], sub(bodies.spin[a], spin_a), left)
     bodies.turn[b] = add_scaled(bodies.turn[b], sub(bodies.spin[b], spin_b), left)
+
+
+@inlined
+def is_mill(bodies, i):
+    """Whether body i turns by itself and is not round, so that its surface moves along its normal too."""
+    return bodies.inverse_mass[i] == 0.0 and bodies.rolling_radius[i] == 0.0 and length(bodies.spin[i]) > 0.0
+
+
+@inlined
+def carried(bodies, a, b, point, d):
+    """The velocity of b's point, as that of a sees it, beside that of their centres, where one of the two is a mill.
+
+    point: of the contact, from the centre of a's shape; d: from there to that of b's.
+    """
+    result = scale(d, 0.0)
+    if is_mill(bodies, a):
+        result = sub(result, cross_spin(bodies.spin[a], add(bodies.offset[a], point)))
+    if is_mill(bodies, b):
+        result = add(result, cross_spin(bodies.spin[b], add(bodies.offset[b], sub(point, d))))
+    return result

@@ -237,30 +237,37 @@ def turn_bodies(state, dt, spin):
 
 
 @spinning.stage(
-    after="check_flight",
-    records=(Spin, SphereCollider),
-    reads=(
-        "mass", "inverse_mass", "shapes", "levels", "offset", "spin.inertia", "spin.angular_velocity",
-        "sphere_collider.radius",
-    ),
-    writes=("spin", "inverse_inertia", "rolling_radius", "turn"),
-    needed="colliders",
+    after="check_flight", records=(Spin,), reads=("spin.angular_velocity", "still"),
+    writes=("spin", "inverse_inertia", "rolling_radius", "turn"), needed="colliders",
 )  # fmt: skip
-def share_spins(state, dt, spin, sphere):
-    """how fast round bodies spin, for the contacts"""
-    bodies, zero, parts = state.bodies, zero_of(state), 1 if len(zero_of(state)) == 2 else 3
+def share_spins(state, dt, spin):
+    """how fast bodies spin, for the contacts"""
+    bodies, zero = state.bodies, zero_of(state)
     state.spinning = True
     for i in range(state.count):
-        bodies.spin[i], bodies.inverse_inertia[i], bodies.rolling_radius[i] = zero, 0.0, 0.0
-        at = state.colliders.offset[bodies.collider_slot[i], i] if i < state.moving else zero
-        if i < state.first or i >= state.moving or not (spin.present[i] and sphere.present[i] and is_zero(at)):
-            continue
-        w = spin_of(state, spin, i)
-        bodies.spin[i], bodies.rolling_radius[i], bodies.turn[i] = w, sphere.radius[i], scale(w, dt)
-        if bodies.inverse_mass[i] > 0.0:
-            xx, yy, moment, _, _, _ = inertia_of(state, spin, i)
-            if moment > 0.0 and (parts == 1 or (xx == yy == moment)):
-                bodies.inverse_inertia[i] = 1.0 / moment
+        w = zero
+        if state.first <= i < state.moving and spin.present[i] and bodies.still[i] == 0:
+            w = spin_of(state, spin, i)
+        bodies.spin[i], bodies.turn[i] = w, scale(w, dt)
+        bodies.inverse_inertia[i], bodies.rolling_radius[i] = 0.0, 0.0
+
+
+@spinning.stage(
+    after="check_flight", records=(Spin, SphereCollider),
+    reads=("mass", "inverse_mass", "shapes", "levels", "offset", "spin.inertia", "sphere_collider.radius"),
+    writes=("inverse_inertia", "rolling_radius"), needed="colliders",
+)  # fmt: skip
+def find_round(state, dt, spin, sphere):
+    """which bodies roll, and their inertia"""
+    bodies, parts = state.bodies, 1 if len(zero_of(state)) == 2 else 3
+    for i in range(state.first, state.moving):
+        rolls = spin.present[i] and sphere.present[i] and (bodies.inverse_mass[i] > 0.0 or i >= state.dynamic)
+        if rolls and is_zero(state.colliders.offset[bodies.collider_slot[i], i]):
+            bodies.rolling_radius[i] = sphere.radius[i]
+            if i < state.dynamic:
+                xx, yy, moment, _, _, _ = inertia_of(state, spin, i)
+                if moment > 0.0 and (parts == 1 or (xx == yy == moment)):
+                    bodies.inverse_inertia[i] = 1.0 / moment
 
 
 @spinning.stage(

@@ -242,6 +242,13 @@ class ContactEvents(StagedSystem):
                 f"Settings.collision = 'continuous', or use smaller steps",
                 kind="too fast", entity=fast,
             )  # fmt: skip
+        if state.turns_too_far:
+            turned = int(entity[state.turns_too_far - 1])
+            self.world.report_fault(
+                f"entity {turned}: turns so far in a step that it may pass others unseen: turn it slower, or use "
+                f"smaller steps",
+                kind="turns too far", entity=turned,
+            )  # fmt: skip
         if solver.squeezed:
             self.world.report_fault(
                 f"no room for {solver.squeezed} squeezed bodies, the first is entity "

@@ -22,6 +22,7 @@ from ..narrow_phase.manifolds import (
 )  # fmt: skip
 from ..shapes.dispatch import both_convex, mix, mix_friction
 from ..shapes.tolerances import SAME_PLACE, contact_margin, slop_for, slop_of, smaller_extent
+from ..turning import carried
 from .approach import first_touch_on_segment, meets_at_corner, segment_start
 
 ENTRY_ITERATIONS = 24
@@ -196,6 +197,9 @@ def linearise(state, dt):
         # After an impact at time t the body seems to come from dv t behind: no overlap to be pushed out.
         solver.parting[k] = parting == PARTS or (pairs.impulse[c] > 0.0 and gap > 0.0)
         solver.extent[k] = extent
+        if state.spinning:
+            solver.carried[k] = carried(bodies, a, b, pairs.point[c], d)
+            solver.gap[k] -= dt * dot(solver.carried[k], normal)  # shapes stand as they are turned when the step ends
         mu = mix_friction(state, state.friction_rule, friction[slot_of_body[a], a], friction[slot_of_body[b], b])
         solver.friction[k] = mu
         has_friction |= mu != 0.0

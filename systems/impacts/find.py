@@ -27,7 +27,7 @@ from ..narrow_phase.manifolds import is_at_manifold
 from ..narrow_phase.stages import rank_rows
 from ..shapes.dispatch import both_convex, evaluate, is_corner_touch, mix, mix_friction
 from ..shapes.tolerances import contact_margin, slop_of, smaller_extent
-from ..turning import surface_velocity, turning_mass
+from ..turning import carried, surface_velocity, turning_mass
 from .heap import heap_push
 from .impulses import BOUNCE, CROSS, FREE, SLIDE, STICK, STOP, STOPPED, TOUCHDOWN, is_deflected, is_rattling
 
@@ -147,8 +147,10 @@ def passes_unseen(state, a, b, path, touch, dt):
 @part
 def closing_speed(state, a, b, path, touch, kind, dt):
     """Of a solid pair: (NONE, LANDING or IMPACT, speed along the normal)."""
-    bodies, impacts, (t, normal, _, _) = state.bodies, state.impacts, touch
+    bodies, impacts, (t, normal, point, apart) = state.bodies, state.impacts, touch
     speed = dot(rate_along(path, t), normal)
+    if state.spinning:
+        speed += dot(carried(bodies, a, b, point, apart), normal)
     threshold, rounding = bounce_threshold(state, a, b), 0.0
     if impacts.sweeps:  # else a plastic impact would be one again, by a rounding error
         rounding = ROUNDING * (length(bodies.path_velocity[a]) + length(bodies.path_velocity[b]))
@@ -222,7 +224,7 @@ def is_beyond_cap(state, a, b):
 @part
 def queue_event(state, c, kind, path, touch, speed, restitution):
     """Put an event into the queue."""
-    impacts, pairs, bodies, (t, normal, point, _) = state.impacts, state.pairs, state.bodies, touch
+    impacts, pairs, bodies, (t, normal, point, apart) = state.impacts, state.pairs, state.bodies, touch
     a, b = pairs.a[c], pairs.b[c]
     slot, pull = bodies.collider_slot, zero_of(state)
     friction = state.colliders.friction
@@ -230,7 +232,8 @@ def queue_event(state, c, kind, path, touch, speed, restitution):
     if mu > 0.0:  # Coulomb: stops what slides, with at most mu times the normal impulse
         w, share = rate_along(path, t), 1.0
         if state.spinning:
-            w, light = add(w, surface_velocity(bodies, a, b, normal)), bodies.inverse_mass[a] + bodies.inverse_mass[b]
+            w = add(add(w, carried(bodies, a, b, point, apart)), surface_velocity(bodies, a, b, normal))
+            light = bodies.inverse_mass[a] + bodies.inverse_mass[b]
             share = light / (light + turning_mass(bodies, a, b))
         sliding = add_scaled(w, normal, -dot(w, normal))
         fast = length(sliding)

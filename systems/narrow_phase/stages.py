@@ -6,6 +6,7 @@ from ...framework.compilation import inlined, part
 from ...framework.vectors import dot, length, sub
 from ..codes import NEED_ORDER, NEED_PAIRS, OK, RUN_BROAD
 from ..shapes.dispatch import evaluate_batch
+from ..turning import is_mill
 from .manifolds import is_near, mark_early
 
 # Candidates are sorted by comparison if there are so many times more bodies, else by counting.
@@ -159,6 +160,17 @@ def find_hasty(state, dt):
                 farthest, state.too_fast_for_discrete, state.too_fast_row = beyond, True, i
 
 
+@part
+def find_fast_turns(state, dt):
+    """Note a mill whose far end moves by more than the thinnest of all that moves is thick: shapes are looked at as
+    they are turned where the step ends."""
+    bodies = state.bodies
+    for i in range(state.dynamic, state.moving):
+        reach = length(bodies.half_extents[i]) + length(bodies.offset[i])
+        if is_mill(bodies, i) and length(bodies.spin[i]) * dt * reach > state.thinnest_moving:
+            state.turns_too_far = i + 1
+
+
 def select_pairs(state, dt):
     """The candidates whose layers meet become pairs; they are counted by the shapes of the two bodies."""
     candidates, pairs, bodies, shapes = state.candidates, state.pairs, state.bodies, state.shapes
@@ -169,8 +181,10 @@ def select_pairs(state, dt):
     changed = state.moved and (state.limits_speed or not state.drifted)
     for i in range(state.first, state.moving):  # that of static bodies is always 0
         bodies.force_speed_change[i] = length(sub(velocity[i], start[i])) if changed else 0.0
-    state.too_fast_for_discrete = False
+    state.too_fast_for_discrete, state.turns_too_far = False, 0
     find_hasty(state, dt)
+    if state.spinning:
+        find_fast_turns(state, dt)
     shape, kind, starts = bodies.shape, candidates.kind, candidates.bucket_starts
     for k in range(shapes.count * shapes.count + 2):
         starts[k] = 0

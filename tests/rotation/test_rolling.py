@@ -10,7 +10,7 @@ import pytest
 from carom.components import AABBCollider, RigidBody, SphereCollider, Transform
 from carom.framework import Settings, World
 from carom.plugins import Physics
-from carom.plugins.rotation import Rotation, Spin
+from carom.plugins.rotation import BoxCollider, Rotation, Spin
 
 MODES = ("discrete", "continuous", "event_driven")
 SHARE = {2: 1 / 2, 3: 2 / 5}  # inertia of a disc and a ball, over m r^2
@@ -207,6 +207,54 @@ def test_a_wheel_that_turns_drives_what_lies_on_it():
         assert abs(world.component_for_entity(entity, Transform).x) < 1e-9
     assert w[2] == pytest.approx(3.0 * 0.7 / 0.5, rel=1e-9)
     assert np.abs(v).max() < 1e-9
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_bar_that_turns_throws_with_the_speed_of_its_points(d, mode):
+    """v' = u + e (u - v) with u = w r where it strikes, within the turn of the bar in two steps."""
+    for e, w, r in ((0.5, 1.0, 2.0), (1.0, 0.5, 1.0), (0.8, -0.6, -1.5)):
+        rest = (0.0,) * (d - 2)
+        with World(Physics(d, gravity=0), Rotation(), settings=Settings(collision=mode)) as world:
+            world.create_entity(
+                Transform((0, 0, *rest)), RigidBody(kind="kinematic"), Spin(w if d == 2 else (0, 0, w)),
+                BoxCollider((3, 0.1, 1)[:d], restitution=e),
+            )  # fmt: skip
+            body = RigidBody(linear_velocity=(0, -2.0, *rest))
+            entity = world.create_entity(Transform((r, 0.34, *rest)), body, SphereCollider(0.2, restitution=e))
+            for _ in range(12):
+                world.step()
+            v = world.component_for_entity(entity, RigidBody).linear_velocity
+        u = abs(w * r)
+        assert v[1] == pytest.approx(u + e * (u + 2.0), rel=0.02)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_bar_that_turns_slowly_lifts_and_carries(mode):
+    """A ball that cannot slip has the velocity of the point that it touches, below its centre; it stays on the bar."""
+    w, mu = 0.2, 2.0
+    with World(Physics(2, gravity=(0, -G)), Rotation(), settings=Settings(collision=mode)) as world:
+        world.create_entity(
+            Transform((0, 0)), RigidBody(kind="kinematic"), Spin(w), BoxCollider((3, 0.1), friction=mu)
+        )
+        entity = world.create_entity(Transform((2, 0.3)), RigidBody(), SphereCollider(0.2, friction=mu))
+        for step in range(90):
+            world.step()
+            x, y = world.component_for_entity(entity, Transform).position
+            angle = w * (step + 1) / 60
+            assert -math.sin(angle) * x + math.cos(angle) * y == pytest.approx(0.3, abs=1e-3)
+        assert math.cos(angle) * x + math.sin(angle) * y == pytest.approx(2.0 + 0.2 * w * 1.5, abs=1e-3)
+        assert not world.faults
+
+
+def test_a_flipper_that_may_pass_the_ball_is_told():
+    with World(Physics(2, gravity=0), Rotation(), settings=Settings(on_fault="ignore")) as world:
+        entity = world.create_entity(
+            Transform((0, 0)), RigidBody(kind="kinematic"), Spin(15.0), BoxCollider((1, 0.1), offset=(1, 0))
+        )
+        world.create_entity(Transform((1.8, 0.4)), RigidBody(), SphereCollider(0.1))
+        world.step()
+        assert any(f"entity {entity}: turns so far in a step" in text for text in world.faults)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.4])

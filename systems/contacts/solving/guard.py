@@ -74,7 +74,7 @@ def weigh(solver, span, islands):
             if solver.spinning:
                 fixed = a if island[a] < 0 else b
                 rate = cross_spin(scale(solver.spin[fixed], solver.rolling_radius[fixed]), solver.normal[k])
-                work -= dot(solver.tangent[k], rate)
+                work += dot(push, solver.carried[k]) - dot(solver.tangent[k], rate)
             slope[island_of(solver, k)] += work
 
 

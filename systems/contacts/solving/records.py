@@ -35,6 +35,7 @@ SOLVER = Schema(
     any_hard=flag(),
     has_friction=flag(),
     spinning=flag(),
+    carried=vectors(),  # m/s, where bodies spin: see turning
     visits=integer(),  # rows solved in this step
     starts=ints(),  # where each colour begins
     # bodies, in the order of their ranges

@@ -67,7 +67,7 @@ def solve_friction_of(solver, k):
     n, old, w, mass = solver.normal[k], solver.tangent[k], relative_velocity(solver, k), solver.mass[k]
     a, b = solver.first[k], solver.second[k]
     if solver.spinning:
-        w = add(w, surface_velocity(solver, a, b, n))
+        w = add(add(w, solver.carried[k]), surface_velocity(solver, a, b, n))
         mass = 1.0 / (1.0 / mass + turning_mass(solver, a, b))
     pull = add_scaled(old, add_scaled(w, n, -dot(w, n)), -mass)
     strength, limit = math.sqrt(dot(pull, pull)), solver.friction[k] * solver.impulse[k]

@@ -67,6 +67,9 @@ def measure(solver, h, bias_rate, dt, stiff, ends, span):
             pushing = bias_rate * room
             soft = not (stiff or hard)
         solver.had_impulse[k] |= solver.impulse[k] > 0.0
+        if solver.spinning:  # what turns by itself comes nearer, or goes, by itself
+            leaves = dot(solver.carried[k], solver.normal[k])
+            opening, pushing = opening + leaves, pushing + leaves
         solver.opening[k], solver.pushing[k], solver.soft[k] = opening, pushing, soft
 
 
@@ -106,6 +109,8 @@ def move(solver, h, span):
         solver.shift[q] = add_scaled(solver.shift[q], solver.velocity[q], h)
     for q in range(span[2], span[3] if solver.spinning else span[2]):
         solver.turn[q] = add_scaled(solver.turn[q], solver.spin[q], h)
+    for k in range(span[0], span[1] if solver.spinning else span[0]):
+        solver.gap[k] += h * dot(solver.carried[k], solver.normal[k])
 
 
 @part
